@@ -33,6 +33,7 @@ def python(times: int, written: bool, scheme: bool) -> float:
 def rust(times: int, written: bool, scheme: bool) -> float:
     """Seconds of the request that this was."""
     answer = obsdeg.analyze(SCHEME, solutions=False) if scheme else obsdeg.analyze(angles=ANGLES, carry="inertial", solutions=False)
+    assert answer._asked is not None
     command, request, _ = answer._asked
     begun = time.process_time()
     _obsdeg.seconds(command, request, times, written)

@@ -13,6 +13,8 @@ from typing import Any
 import obsdeg
 
 from ._files import Text
+from ._request import READ
+from ._request import plain as plain_option
 
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
 _NUMBER = re.compile(_DECIMAL.pattern + r"([eE][+-]?\d{1,4})?", re.ASCII)
@@ -67,7 +69,7 @@ def _canonical(name: str, value: Any) -> Any:
     if name == "scheme":
         return value
     try:
-        return _by_value(obsdeg._READ.get(name, obsdeg._plain)(value))
+        return _by_value(READ.get(name, plain_option)(value))
     except (TypeError, ValueError):
         # what no option can be is an error when it is judged; until then it is what it was written as
         return value

@@ -1,14 +1,18 @@
-"""Schemes and models: texts with names."""
+"""Texts with names: what schemes and models are, and what files hold."""
 
 from __future__ import annotations
 
+import json
 import os
-import tempfile
-from collections.abc import Iterable
+import sys
+from collections.abc import Mapping
+from decimal import Decimal
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
-from ._texts import Attitude, Number, attitudes, decimal, toml
+from . import _obsdeg
+from ._texts import Rounded, as_json
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -19,6 +23,8 @@ Path_ = Union[str, "os.PathLike[str]"]
 
 def place(path: Path, text: bytes) -> None:
     """Writes a file whole or not at all."""
+    import tempfile
+
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     try:
@@ -50,19 +56,38 @@ def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
 
 
 class Text:
-    """A text with a name: what :class:`Scheme` and :class:`Model` are.
+    """A text with a name: what :class:`Scheme` and :class:`Model` are. It does not change once it is made.
 
-    Attributes:
-        text: what a file holds.
-        name: what errors and reports call it.
+    Attributes
+    ----------
+    text : str
+        What a file holds.
+    name : str
+        What errors and reports call it.
+    rounded : tuple of Rounded
+        Computed angles that were rounded when it was made; see :class:`Scheme`.
     """
 
     kind = "any"
-    __slots__ = ("name", "text")
+    __slots__ = ("_data", "name", "rounded", "text")
+
+    text: str
+    name: str
+    rounded: tuple[Rounded, ...]
+    _data: Any
 
     def __init__(self, text: str, *, name: str = "") -> None:
-        self.text = text
-        self.name = name or f"{self.kind}.toml"
+        self._set(text, name or f"{self.kind}.toml")
+
+    def _set(self, text: str, name: str, rounded: tuple[Rounded, ...] = (), data: Any = None) -> None:
+        for slot, value in (("text", text), ("name", name), ("rounded", rounded), ("_data", data)):
+            object.__setattr__(self, slot, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        advice = "; `replace` makes a changed copy" if hasattr(self, "replace") else ""
+        raise AttributeError(f"{type(self).__name__} does not change: found an assignment to `{name}`{advice}")
+
+    __delattr__ = __setattr__  # type: ignore[assignment]
 
     @classmethod
     def read(cls, path: Path_) -> Self:
@@ -71,14 +96,43 @@ class Text:
         return made
 
     @classmethod
-    def _of(cls, text: str, name: str) -> Any:
+    def _of(cls, text: str, name: str, rounded: tuple[Rounded, ...] = ()) -> Any:
         made = cls.__new__(cls)
-        made.text, made.name = text, name
+        made._set(text, name, rounded)
         return made
 
     def write(self, path: Path_) -> None:
         """To a file."""
         Path(path).write_text(self.text, encoding="utf-8")
+
+    def check(self) -> Self:
+        """Reads it as the engine does, without judging it.
+
+        Returns
+        -------
+        Scheme or Model
+            The same object.
+
+        Raises
+        ------
+        ProblemError
+            What is wrong with it, with its line and column.
+        """
+        try:
+            # reads the text, then finds that a record without a time is none
+            _obsdeg.calibrate(as_json({"sources": [self._source()]}), [("check", b"x\n1\n")])
+        except _obsdeg.ProblemError as problem:
+            # others are of records, or of schemes and models that have no numbers
+            if problem.file is not None or problem.message.startswith(self.name):
+                raise
+        return self
+
+    def _read(self) -> Mapping[str, Any]:
+        """The keys of the text; numbers with a point are decimals."""
+        if self._data is None:
+            object.__setattr__(self, "_data", MappingProxyType(_parsed(self.text, self.name)))
+        data: Mapping[str, Any] = self._data
+        return data
 
     def _source(self) -> dict[str, str]:
         return {"name": self.name, "text": self.text, "must_be": self.kind}
@@ -92,75 +146,37 @@ class Text:
     def __hash__(self) -> int:
         return hash((self.kind, self.text))
 
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        return self
+
     def __reduce__(self) -> tuple[Any, ...]:
-        return (type(self)._of, (self.text, self.name))
+        return (type(self)._of, (self.text, self.name, self.rounded))
 
 
-class Scheme(Text):
-    """A torquing scheme: positions, and how the platform gets from one to the next.
+def _parsed(text: str, name: str) -> dict[str, Any]:
+    """The keys of a text in TOML or JSON.
 
-    Args:
-        angles: a position each: three Euler angles in degrees, exact, or direction letters of X_p, Y_p, Z_p (``"NUE"``).
-        name: what reports call it.
-        carry: what is carried between positions: platform (default), inertial or reset.
-        latitude: in degrees; generic where it is left out.
-        keys: other keys of a scheme file, such as ``slew_rate_deg_s`` below ``simulation={...}``.
+    Raises:
+        ValueError: it is neither.
+        ImportError: this Python reads no TOML.
     """
-
-    kind = "scheme"
-    __slots__ = ()
-
-    def __init__(
-        self,
-        angles: Iterable[Attitude],
-        *,
-        name: str = "",
-        carry: str | None = None,
-        latitude: Number | None = None,
-        **keys: Any,
-    ) -> None:
-        head = {"name": name or None, "carry": carry, **keys}
-        lines = [f"{key} = {toml(value)}" for key, value in head.items() if value is not None]
-        if latitude is not None:
-            lines.append(f"latitude_deg = {decimal(latitude)}")
-        for text in attitudes(angles):
-            lines.append("[[position]]")
-            if "@" in text:
-                raise ValueError(f"found {text!r}; expected an attitude (segments that turn are written in a scheme file)")
-            parts = text.split(",")
-            lines.append(f"attitude = {toml(text)}" if len(parts) == 1 else f"angles_deg = {_angles(parts)}")
-        super().__init__("\n".join(lines) + "\n", name="scheme.toml")
-
-    @classmethod
-    def from_text(cls, text: str, *, name: str = "scheme.toml") -> Scheme:
-        """From the text of a scheme file (TOML)."""
-        made: Scheme = cls._of(text, name)
-        return made
-
-
-def _angles(parts: list[str]) -> str:
-    return "[" + ", ".join(p if _is_number(p) else toml(p) for p in parts) + "]"
-
-
-def _is_number(text: str) -> bool:
     try:
-        float(text)
-    except ValueError:
-        return False
-    return text.strip().lstrip("+-")[:1].isdigit()
-
-
-class Model(Text):
-    """Any system x' = f(x, u, p, t), z = h, as the text of a model file (TOML or JSON)."""
-
-    kind = "model"
-    __slots__ = ()
-
-    @classmethod
-    def from_text(cls, text: str, *, name: str = "model.toml") -> Model:
-        """From the text of a model file (TOML or JSON)."""
-        made: Model = cls._of(text, name)
-        return made
+        if text.lstrip().startswith("{"):
+            found: dict[str, Any] = json.loads(text, parse_float=Decimal)
+            return found
+        if sys.version_info >= (3, 11):
+            import tomllib
+        else:
+            try:
+                import tomli as tomllib
+            except ModuleNotFoundError:
+                raise ImportError("Python 3.10 reads TOML with the package `tomli`, which is not installed") from None
+        return tomllib.loads(text, parse_float=Decimal)
+    except ValueError as e:
+        raise ValueError(f"{name}: found a text that is no TOML ({e}); expected a scheme or a model") from None
 
 
 class Texted(Protocol):
@@ -173,17 +189,3 @@ class Texted(Protocol):
     @property
     def text(self) -> str:
         """A scheme or model."""
-
-
-#: What is judged: a scheme, a model, or a file with one.
-Judged = Union[Scheme, Model, Path_, Texted]
-
-
-def source(what: Judged) -> dict[str, str]:
-    """What a request has of a scheme, a model or a file."""
-    if isinstance(what, Text):
-        return what._source()
-    if hasattr(what, "text") and hasattr(what, "name"):
-        return {"name": str(what.name), "text": str(what.text)}
-    name = os.fspath(what)
-    return {"name": name, "text": read_text(name)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import keyword
 import types
@@ -19,8 +20,11 @@ class Record:
 
     __slots__ = ("_of",)
 
+    if TYPE_CHECKING:
+        _of: dict[str, Any]
+
     def __init__(self, of: dict[str, Any]) -> None:
-        self._of = of
+        object.__setattr__(self, "_of", of)
 
     if not TYPE_CHECKING:
 
@@ -58,14 +62,17 @@ class Record:
         return hash(json.dumps(self._of, sort_keys=True))
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain dicts and lists."""
-        return self._of
+        """As plain dicts and lists, a copy of its own."""
+        return copy.deepcopy(self._of)
 
     def __getstate__(self) -> dict[str, Any]:
         return self._of
 
     def __setstate__(self, of: dict[str, Any]) -> None:
-        self._of = of
+        object.__setattr__(self, "_of", of)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"an answer does not change: found an assignment to `{name}`")
 
 
 class Shape:
@@ -92,6 +99,31 @@ def _key(name: str) -> str:
     return name[:-1] if name.endswith("_") and keyword.iskeyword(name[:-1]) else name
 
 
+def rows(of: Any, table: str) -> list[dict[str, Any]]:
+    """A list of an answer as rows: objects within its objects have dotted names, lists of words are joined by semicolons.
+
+    Raises:
+        ValueError: there is no such list.
+    """
+    if not isinstance(of, dict) or not isinstance(of.get(table), list):
+        lists = [key for key, value in of.items() if isinstance(value, list)] if isinstance(of, dict) else []
+        raise ValueError(f"no list `{table}` in this answer; expected one of {', '.join(lists)}")
+    return [_row(one, "") for one in of[table]]
+
+
+def _row(of: dict[str, Any], above: str) -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    for key, value in of.items():
+        if isinstance(value, dict):
+            row.update(_row(value, f"{above}{key}."))
+        elif isinstance(value, list):
+            if value and not any(isinstance(v, (dict, list)) for v in value):
+                row[above + key] = "; ".join(map(str, value))
+        else:
+            row[above + key] = value
+    return row
+
+
 def untyped(value: Any) -> Any:
     """A value of no known type."""
     if isinstance(value, dict):
@@ -111,7 +143,8 @@ def fields(kind: type) -> dict[str, Read]:
 
 
 def _plain(value: Any) -> Any:
-    return value
+    # what is inside an answer does not change
+    return copy.deepcopy(value) if isinstance(value, (dict, list)) else value
 
 
 def _reader(hint: Any) -> Read:
@@ -125,7 +158,7 @@ def _reader(hint: Any) -> Read:
         return _chosen(records, others[0] if others else _plain) if records or others else _plain
     if origin is list:
         one = _reader(inside[0])
-        return (lambda value: list(value or ())) if one is _plain else (lambda value: [one(v) for v in value or ()])
+        return (lambda value: [_plain(v) for v in value or ()]) if one is _plain else (lambda value: [one(v) for v in value or ()])
     if origin is tuple:
         each = [_reader(k) for k in inside]
         return lambda value: tuple(read(v) for read, v in zip(each, value, strict=True))

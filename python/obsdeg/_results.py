@@ -6,15 +6,17 @@ import io
 import json
 import os
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from html import escape
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from . import _obsdeg, shapes
-from ._records import fields, found
+from ._records import Record, fields, found, rows
+from ._texts import Rounded
 
 if TYPE_CHECKING:
     import pandas
 
-    from ._files import Scheme
+    from ._scheme import Scheme
 
 #: Asks again for an answer whose Rust side is gone, after pickle: (command, request, records).
 _Asked = tuple[str, str, list[tuple[str, bytes | None]] | None]
@@ -23,20 +25,91 @@ _Asked = tuple[str, str, list[tuple[str, bytes | None]] | None]
 class Answer:
     """What a command answers. Keys of its JSON are attributes; that is read when one is asked for."""
 
-    def __init__(self, rust: _obsdeg.Answer | None, asked: _Asked) -> None:
-        self._rust, self._asked = rust, asked
-        self._json: str | None = None
-        self._data: Any = None
+    #: The list of the JSON that is the main table, and the way to it.
+    _main = "quantities"
+
+    def __init__(self, rust: _obsdeg.Answer | None, asked: _Asked | None, rounded: tuple[Rounded, ...] = ()) -> None:
+        # as attributes of answers are set, only faster
+        self.__dict__.update(_rust=rust, _asked=asked, _json=None, _data=None, _rounded=rounded)
+
+    if TYPE_CHECKING:
+        _rust: _obsdeg.Answer | None
+        _asked: _Asked | None
+        _json: str | None
+        _data: Any
+        _rounded: tuple[Rounded, ...]
+
+    @staticmethod
+    def from_json(text: str) -> Answer:
+        """An answer from its JSON, as :meth:`json`, a file of ``-o`` or ``--format json`` has it.
+
+        It has attributes, names, iteration and its main table; what only the engine writes (texts, figures, pages) must be asked
+        for again.
+
+        Parameters
+        ----------
+        text : str
+            JSON of an answer.
+
+        Returns
+        -------
+        Answer
+            Of the class that its layout names, such as :class:`Analysis`.
+
+        Raises
+        ------
+        ValueError
+            The text is no JSON, or has no layout of this version.
+
+        Examples
+        --------
+        >>> import obsdeg
+        >>> answer = obsdeg.analyze([(0, 0, 0), (180, 0, 0)])
+        >>> obsdeg.Answer.from_json(answer.json()) == answer
+        True
+        """
+        data = json.loads(text)
+        if isinstance(data, list) and all(isinstance(one, dict) and one.keys() == {"file", "answer"} for one in data):
+            kind: type[Answer] = Judgements
+        else:
+            layout = data.get("schema") if isinstance(data, dict) else None
+            if layout not in KINDS:
+                raise ValueError(f"found JSON with the layout {layout!r}; expected one of {', '.join(KINDS)}")
+            kind = KINDS[layout]
+        made = kind(None, None)
+        made._json, made._data = text, data
+        return made
 
     def _answer(self) -> _obsdeg.Answer:
         if self._rust is None:
+            if self._asked is None:
+                raise ValueError("found an answer that was read from JSON; expected one of the engine, which alone writes this: ask again")
             command, request, records = self._asked
             self._rust = _obsdeg.answer(command, request) if records is None else _obsdeg.calibrate(request, records)
         return self._rust
 
     @property
+    def rounded(self) -> tuple[Rounded, ...]:
+        """Computed angles and latitudes that were rounded before they were judged, with the numbers given and taken, in degrees."""
+        return self._rounded
+
+    def _rounding(self) -> str:
+        """A sentence on what was rounded; nothing where nothing was."""
+        if not self._rounded:
+            return ""
+        several = f" and {len(self._rounded) - 1} more" if len(self._rounded) > 1 else ""
+        return f"Rounded before it was judged: {self._rounded[0]}{several}"
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_"):
+            raise AttributeError(f"an answer does not change: found an assignment to `{name}`")
+        object.__setattr__(self, name, value)
+
+    @property
     def passed(self) -> bool:
         """Whether the command line would exit with 0: False where something disagrees or is not explained."""
+        if self._asked is None and self._rust is None and isinstance(self._dict().get("passed"), bool):
+            return bool(self._dict()["passed"])
         return self._answer().passed
 
     def json(self) -> str:
@@ -45,11 +118,15 @@ class Answer:
             self._json = self._answer().written("json")
         return self._json
 
-    def to_dict(self) -> Any:
-        """The JSON as plain dicts and lists."""
+    def _dict(self) -> Any:
+        """The JSON as dicts and lists, which are not to be changed."""
         if self._data is None:
             self._data = json.loads(self.json())
         return self._data
+
+    def to_dict(self) -> Any:
+        """The JSON as plain dicts and lists, a copy of its own."""
+        return json.loads(self.json())
 
     def text(self, format: str = "table") -> str:
         """As the command line prints it: table, json, markdown, csv or latex."""
@@ -67,6 +144,8 @@ class Answer:
         """
         import pandas
 
+        if self._rust is None and self._asked is None:
+            return pandas.DataFrame(rows(self._dict(), table or self._main))
         text = self.csv(table)
         return pandas.read_csv(io.StringIO(text)) if text.strip() else pandas.DataFrame()
 
@@ -79,22 +158,25 @@ class Answer:
         def __getattr__(self, name: str) -> Any:
             if name.startswith("_"):
                 raise AttributeError(name)
-            return found(type(self), self.to_dict(), name, "in this answer")
+            return found(type(self), self._dict(), name, "in this answer")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *fields(type(self))]
 
     def __str__(self) -> str:
-        return self.text("table")
+        table = self.text("table")
+        return f"{table}\n{self._rounding()}\n" if self._rounded else table
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._summary()}>"
+        rounded = f"; {self._rounding()}" if self._rounded else ""
+        return f"<{type(self).__name__}: {self._summary()}{rounded}>"
 
     def _summary(self) -> str:
-        return str(self.to_dict()["schema"])
+        return str(self._dict()["schema"])
 
     def _repr_html_(self) -> str:
-        return self._answer().fragment()
+        page = self._answer().fragment()
+        return f"{page}<p>{escape(self._rounding())}</p>" if self._rounded else page
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
         bundle: dict[str, Any] = {"text/plain": str(self), "text/html": self._repr_html_()}
@@ -113,12 +195,12 @@ class Answer:
     def __hash__(self) -> int:
         return hash(self.json())
 
-    def __getstate__(self) -> tuple[_Asked, str]:
-        return self._asked, self.json()
+    def __getstate__(self) -> tuple[_Asked | None, str, tuple[Rounded, ...]]:
+        return self._asked, self.json(), self._rounded
 
-    def __setstate__(self, state: tuple[_Asked, str]) -> None:
+    def __setstate__(self, state: tuple[_Asked | None, str, tuple[Rounded, ...]]) -> None:
         self._rust, self._data = None, None
-        self._asked, self._json = state
+        self._asked, self._json, self._rounded = state
 
 
 def _drawn(of: Answer, *names: str) -> str | None:
@@ -129,32 +211,86 @@ def _drawn(of: Answer, *names: str) -> str | None:
     return None
 
 
+_R = TypeVar("_R", bound=Record)
+
+
+class Named(Generic[_R]):
+    """An answer on unknowns: ``answer["D_FX"]`` is what it says of one, and iteration goes through all in their order."""
+
+    if TYPE_CHECKING:
+
+        quantities: list[_R]
+
+        def _dict(self) -> Any: ...
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the unknowns, in model order."""
+        return [q["name"] for q in self._dict()["quantities"]]
+
+    def __getitem__(self, name: str) -> _R:
+        if not isinstance(name, str):
+            raise TypeError(f"found {name!r}; expected the name of an unknown, such as {self.names[0]!r}")
+        for i, q in enumerate(self._dict()["quantities"]):
+            if q["name"] == name:
+                return self.quantities[i]
+        raise KeyError(f"there is no unknown {name!r} in this answer; there are {', '.join(self.names)}")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[_R]:
+        return iter(self.quantities)
+
+    def __len__(self) -> int:
+        return len(self._dict()["quantities"])
+
+
 class Judgement(Answer):
     """The observable degree of every unknown, of a scheme (:class:`Analysis`) or any system (:class:`SystemAnalysis`)."""
 
     if TYPE_CHECKING:
         rank: int
 
+        def __getitem__(self, name: str) -> Any: ...
+
+        def __iter__(self) -> Iterator[Any]: ...
+
+        def __len__(self) -> int: ...
+
     @property
     def degrees(self) -> dict[str, int | None]:
         """The observable degree by unknown; None where it is not determined."""
-        return {q["name"]: q["degree"] for q in self.to_dict()["quantities"]}
+        return {q["name"]: q["degree"] for q in self._dict()["quantities"]}
 
     @property
     def statuses(self) -> dict[str, shapes.Status]:
         """The status by unknown."""
-        return {q["name"]: q["status"] for q in self.to_dict()["quantities"]}
+        return {q["name"]: q["status"] for q in self._dict()["quantities"]}
 
     def _summary(self) -> str:
-        of = self.to_dict()
+        of = self._dict()
         return f"{len(of['quantities'])} unknowns, rank {of['rank']}"
 
 
-class Analysis(Judgement, shapes.Analysis):
-    """The observable degree of every unknown of a scheme."""
+class Analysis(Named[shapes.Quantity], Judgement, shapes.Analysis):
+    """The observable degree of every unknown of a scheme.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> answer = obsdeg.analyze([(0, 0, 0), (180, 0, 0)])
+    >>> answer["D_FX"].degree, answer["D_FX"].unit
+    (1, 'deg/h')
+    >>> [quantity.name for quantity in answer if quantity.degree == 2]
+    ['D_FY', 'D_IY']
+    """
+
+    def _figure(self) -> str | None:
+        return _drawn(self, "positions.svg")
 
 
-class SystemAnalysis(Judgement, shapes.SystemAnalysis):
+class SystemAnalysis(Named[shapes.SystemQuantity], Judgement, shapes.SystemAnalysis):
     """The observable degree of every unknown of a model."""
 
 
@@ -162,15 +298,19 @@ class Judgements(Answer):
     """The answers on several schemes and models, in their order: a sequence of :class:`Judgement`."""
 
     def __len__(self) -> int:
-        return len(self.to_dict())
+        return len(self._dict())
 
     def __getitem__(self, i: int) -> Judgement:
-        one = self.to_dict()[i]
-        command, request, _ = self._asked
-        asked = json.loads(request)
-        # asked again only for what the JSON of all does not hold
-        part = json.dumps({**asked, "sources": [asked["sources"][i]]})
-        judgement = KINDS[one["answer"]["schema"]](None, (command, part, None))
+        one = self._dict()[i]
+        part: _Asked | None = None
+        if self._asked is not None:
+            command, request, _ = self._asked
+            asked = json.loads(request)
+            # asked again only for what the JSON of all does not hold
+            part = (command, json.dumps({**asked, "sources": [asked["sources"][i]]}), None)
+        judgement = KINDS[one["answer"]["schema"]](None, part)
+        if part is None:
+            judgement._json = json.dumps(one["answer"])
         judgement._data = one["answer"]
         return judgement  # type: ignore[return-value]
 
@@ -180,18 +320,48 @@ class Judgements(Answer):
     @property
     def names(self) -> list[str]:
         """The names of what was judged."""
-        return [one["name"] for one in self.to_dict()]
+        return [one["file"] for one in self._dict()]
 
     def _summary(self) -> str:
         return f"{len(self)} judged"
 
 
 class Comparison(Answer, shapes.Comparison):
-    """Schemes side by side."""
+    """Schemes side by side: ``comparison["a.toml"]`` or ``comparison[0]`` is what it says of one; iteration goes through all."""
+
+    _main = "schemes"
+
+    def __getitem__(self, scheme: str | int) -> shapes.Review:
+        if isinstance(scheme, int):
+            return self.schemes[scheme]
+        names = [one["name"] for one in self._dict()["schemes"]]
+        if scheme not in names:
+            raise KeyError(f"there is no scheme {scheme!r} in this comparison; there are {', '.join(names)}")
+        return self.schemes[names.index(scheme)]
+
+    def __iter__(self) -> Iterator[shapes.Review]:
+        return iter(self.schemes)
+
+    def __len__(self) -> int:
+        return len(self._dict()["schemes"])
 
 
 class Design(Answer, shapes.Design):
-    """Schemes that were found."""
+    """Schemes that were found, the best first: ``design[0]`` is the first, and iteration goes through all."""
+
+    _main = "found"
+
+    def __getitem__(self, place: int) -> shapes.Found:
+        return self.found[place]
+
+    def __iter__(self) -> Iterator[shapes.Found]:
+        return iter(self.found)
+
+    def __len__(self) -> int:
+        return len(self._dict()["found"])
+
+    def __bool__(self) -> bool:
+        return True
 
     def winner(self) -> Scheme:
         """The best scheme that was found.
@@ -218,7 +388,7 @@ class Walks(Answer, shapes.Walks):
 
 
 def _winner(of: Answer) -> Scheme:
-    from ._files import Scheme
+    from ._scheme import Scheme
 
     files = of.files()
     if "winner.toml" not in files:
@@ -230,11 +400,11 @@ class Part(Answer, shapes.Part):
     """A part of a search, to be put together with the others by ``design(merge=...)``."""
 
     def _repr_html_(self) -> str:
-        part = self.to_dict()
+        part = self._dict()
         return f"<p>part {part['part'][0]} of {part['part'][1]}, {'complete' if part['complete'] else 'interrupted'}</p>"
 
 
-class Simulation(Answer, shapes.Simulation):
+class Simulation(Named[shapes.Estimate], Answer, shapes.Simulation):
     """A run of the filter on a scheme against a simulated truth."""
 
     def series(self) -> pandas.DataFrame:
@@ -242,7 +412,7 @@ class Simulation(Answer, shapes.Simulation):
         return _series(self)
 
 
-class SystemRun(Answer, shapes.SystemRun):
+class SystemRun(Named[shapes.SystemEstimate], Answer, shapes.SystemRun):
     """A run of the filter on a model against a simulated truth."""
 
     def series(self) -> pandas.DataFrame:
@@ -256,7 +426,7 @@ def _series(of: Answer) -> pandas.DataFrame:
     return pandas.read_csv(io.BytesIO(of.files()["series.csv"]))
 
 
-class CrossCheck(Answer, shapes.CrossCheck):
+class CrossCheck(Named[shapes.QuantityEvidence], Answer, shapes.CrossCheck):
     """The exact verdicts on a scheme against a filter."""
 
     if TYPE_CHECKING:
@@ -264,14 +434,14 @@ class CrossCheck(Answer, shapes.CrossCheck):
         passed: bool
 
 
-class SystemEvidence(Answer, shapes.SystemEvidence):
+class SystemEvidence(Named[shapes.SystemQuantityEvidence], Answer, shapes.SystemEvidence):
     """The exact verdicts on a model against a filter and integrators."""
 
     if TYPE_CHECKING:
         passed: bool
 
 
-class Calibration(Answer, shapes.Calibration):
+class Calibration(Named[shapes.Estimated], Answer, shapes.Calibration):
     """What a scheme determines, estimated from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
@@ -279,7 +449,7 @@ class Calibration(Answer, shapes.Calibration):
         return self.to_frame("covariance")
 
 
-class SystemCalibration(Answer, shapes.SystemCalibration):
+class SystemCalibration(Named[shapes.SystemEstimated], Answer, shapes.SystemCalibration):
     """What a model determines, estimated from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
@@ -339,9 +509,7 @@ class Report(Answer):
         return self._summary()
 
     def _repr_html_(self) -> str:
-        import html
-
-        return f'<iframe srcdoc="{html.escape(self.html, quote=True)}" width="100%" height="600"></iframe>'
+        return f'<iframe srcdoc="{escape(self.html, quote=True)}" width="100%" height="600"></iframe>'
 
 
 #: Hears how far an answer is: what is done, how much, of how much (if known), sequences examined, best so far; ends it by False.

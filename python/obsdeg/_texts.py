@@ -7,71 +7,190 @@ import operator
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
 from json.encoder import encode_basestring_ascii
-from typing import Any, Union
+from numbers import Rational
+from typing import Any, NamedTuple, Union
 
-#: A decimal number. A float goes through its shortest text, so that 28.2 is 28.2.
-Number = Union[int, float, str, Decimal]
+#: A number that is taken exactly: integers, fractions (also of SymPy) and floats by the rule of :func:`exact`; a text as it is written.
+Number = Union[int, float, str, Decimal, Rational]
 #: Three Euler angles in degrees, three direction letters (``"NUE"``), or a text as on the command line (``"0,0,0@X_p:360"``).
 Attitude = Union[str, Sequence[Number]]
+#: Decimals of an angle in degrees: the engine takes at most nine.
+DIGITS = 9
 
 
-def decimal(x: Number) -> str:
-    """A number as an exact decimal.
+class Rounded(NamedTuple):
+    """A number that was rounded before it was judged."""
+
+    name: str
+    """Name of the number, such as ``alpha of position 2`` or ``latitude``."""
+    given: str
+    """Number as it was given, in degrees."""
+    taken: str
+    """Number as it was judged, in degrees."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.given} taken as {self.taken}"
+
+
+def _no_number(x: Any) -> TypeError:
+    return TypeError(f"found {x!r} of type {type(x).__name__}; expected a number")
+
+
+def exact(x: Number, digits: int | None = DIGITS) -> str:
+    """A number that decides verdicts, as a decimal text.
+
+    A number that is computed (float, `Decimal`, `Fraction`, rational of SymPy) is rounded to `digits` decimals, half to even;
+    an `int` and a text stay as they are. None keeps all digits of the shortest text of a float, which the engine then refuses
+    beyond nine.
 
     Raises:
         TypeError: not a number; a 32-bit or 16-bit float, whose shortest text is not what was written.
-        ValueError: not finite.
+        ValueError: not finite; a fraction without a decimal text where `digits` is None.
     """
     if type(x) is int:
         return str(x)
     if isinstance(x, str):
         return x.strip()
-    if isinstance(x, bool):
-        raise TypeError(f"found {x!r}; expected a number")
-    if isinstance(x, Decimal):
-        if not x.is_finite():
-            raise ValueError(f"found {x}; expected a finite number")
-        return format(x, "f")
     if isinstance(x, float):
-        return decimal(Decimal(float.__repr__(x)))
+        text = float.__repr__(x)
+        whole, point, decimals = text.partition(".")
+        if digits is None or not (point and len(decimals) <= digits and whole.lstrip("-").isdigit() and decimals.isdigit()):
+            return _rounded(Decimal(text), digits)
+        return text
+    if isinstance(x, bool):
+        raise _no_number(x)
+    if isinstance(x, Decimal):
+        return _rounded(x, digits)
     kind = type(x).__name__
     if kind.startswith("float"):
         held = f"it holds {Decimal(float(x))}, which may not be what was written" if float(x) == float(x) else "it is no number"
         raise TypeError(f"found {x!r} of type {kind}: {held}, and numbers are exact here; expected a str, int, Decimal or 64-bit float")
+    if getattr(x, "is_Float", False):
+        # of SymPy
+        return exact(float(x), digits)
     try:
-        return str(operator.index(x))
+        return str(operator.index(x))  # type: ignore[arg-type]
     except TypeError:
-        raise TypeError(f"found {x!r} of type {kind}; expected a number") from None
+        found = _fraction(x)
+    if found is None:
+        raise _no_number(x)
+    return _of_fraction(*found, digits)
 
 
-def attitude(angles: Attitude) -> str:
-    """An attitude as on the command line.
+def _fraction(x: Any) -> tuple[int, int] | None:
+    """Numerator and denominator of a `Fraction` or a rational of SymPy, whose parts are `p` and `q`."""
+    parts = (getattr(x, "numerator", None), getattr(x, "denominator", None))
+    if callable(parts[0]) or parts[0] is None:
+        parts = (getattr(x, "p", None), getattr(x, "q", None))
+    try:
+        return operator.index(parts[0]), operator.index(parts[1])  # type: ignore[arg-type]
+    except TypeError:
+        return None
+
+
+def _rounded(x: Decimal, digits: int | None) -> str:
+    if not x.is_finite():
+        raise ValueError(f"found {x}; expected a finite number")
+    exponent = x.as_tuple().exponent
+    if digits is None or not isinstance(exponent, int) or -exponent <= digits:
+        return format(x, "f")
+    text = format(x, f".{digits}f")
+    return _trimmed(text)
+
+
+def _trimmed(text: str) -> str:
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return "0" if text == "-0" else text
+
+
+def _of_fraction(p: int, q: int, digits: int | None) -> str:
+    if digits is None:
+        from fractions import Fraction
+
+        text = _of_fraction(p, q, 400)
+        if Fraction(text) != Fraction(p, q):
+            raise ValueError(f"found {p}/{q}, which has no decimal text; expected digits=9, or fewer")
+        return text
+    scaled, rest = divmod(abs(p) * 10**digits, q)
+    scaled += 2 * rest > q or (2 * rest == q and scaled % 2)
+    whole, decimals = divmod(scaled, 10**digits)
+    return _trimmed(f"{'-' if p < 0 else ''}{whole}.{decimals:0{digits}d}" if digits else f"{'-' if p < 0 else ''}{whole}")
+
+
+def changed(given: Number, taken: str) -> bool:
+    """True if the text that is judged is not the number that was given."""
+    if isinstance(given, float):
+        text = float.__repr__(given)
+        return taken != text and Decimal(taken) != Decimal(text)
+    if isinstance(given, Decimal):
+        return Decimal(taken) != given
+    found = None if isinstance(given, (int, str)) else _fraction(given)
+    if found is None or found[1] == 1:
+        return False
+    from fractions import Fraction
+
+    return Fraction(taken) != Fraction(*found)
+
+
+def decimal(x: Number) -> str:
+    """A number as a decimal with all its digits; a number of numpy with 32 bits is that of its shortest text.
 
     Raises:
+        TypeError: not a number.
+        ValueError: not finite.
+    """
+    if type(x).__name__ in ("float32", "float16"):
+        return decimal(float(str(x)))
+    found = None if isinstance(x, (int, float, str, Decimal)) else _fraction(x)
+    if found is not None and found[1] != 1:
+        return decimal(found[0] / found[1])
+    return exact(x, None)
+
+
+def attitude(angles: Attitude, digits: int | None = DIGITS, place: int = 1, log: list[Rounded] | None = None) -> str:
+    """An attitude as on the command line.
+
+    Args:
+        digits: decimals to which computed angles are rounded.
+        place: number of the position, from 1.
+        log: takes what was rounded.
+
+    Raises:
+        TypeError: no angles.
         ValueError: not three angles.
     """
     if isinstance(angles, str):
         return angles
-    if isinstance(angles, (bytes, bytearray, set, frozenset, Mapping)) or not isinstance(angles, Iterable):
-        raise TypeError(f"found the position {angles!r}; expected alpha, beta, gamma in degrees, or letters such as 'NUE'")
-    given = list(angles)
-    if len(given) != 3:
-        raise ValueError(f"found {len(given)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
+    if type(angles) not in (tuple, list):
+        if isinstance(angles, (bytes, bytearray, set, frozenset, Mapping)) or not isinstance(angles, Iterable):
+            raise TypeError(f"found the position {angles!r}; expected alpha, beta, gamma in degrees, or letters such as 'NUE'")
+        angles = list(angles)
+    if len(angles) != 3:
+        raise ValueError(f"found {len(angles)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
+    texts = []
     try:
-        return ",".join([decimal(x) for x in given])
+        for x in angles:
+            if type(x) is int:
+                texts.append(str(x))
+                continue
+            text = exact(x, digits)
+            if log is not None and changed(x, text):
+                log.append(Rounded(f"{('alpha', 'beta', 'gamma')[len(texts)]} of position {place}", str(x), text))
+            texts.append(text)
     except (TypeError, ValueError) as e:
         raise type(e)(f"the position {angles!r}: {e}") from None
+    return ",".join(texts)
 
 
-def attitudes(positions: Iterable[Attitude]) -> list[str]:
-    """Attitudes of positions in their order.
+def attitudes(positions: Iterable[Attitude], digits: int | None = DIGITS, log: list[Rounded] | None = None) -> list[str]:
+    """Attitudes of positions in their order; computed angles are rounded to `digits` decimals, and `log` takes which.
 
     Raises:
         TypeError: no list of positions.
     """
     if isinstance(positions, (str, bytes, bytearray, set, frozenset, Mapping)) or not isinstance(positions, Iterable):
         raise TypeError(f"angles: found {positions!r}; expected a list of positions, as in [(0, 0, 0), (180, 0, 0)]")
-    return [attitude(a) for a in positions]
+    return [attitude(a, digits, i, log) for i, a in enumerate(positions, 1)]
 
 
 def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:

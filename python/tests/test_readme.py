@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import doctest
+import importlib
+import inspect
 import shutil
 from pathlib import Path
 
 import obsdeg
 import pytest
 from conftest import ROOT
+from obsdeg import options
 
 PAGES = ["README.md", "python/README.md", "book/src/python.md"]
 
@@ -25,5 +28,28 @@ def test_pages_print_what_they_show(page: str, tmp_path: Path, monkeypatch: pyte
     assert failed.failed == 0
 
 
-def test_docstrings_print_what_they_show() -> None:
-    assert doctest.testmod(obsdeg).failed == 0
+@pytest.mark.parametrize("module", ["obsdeg", "obsdeg._scheme", "obsdeg._model", "obsdeg._results", "obsdeg.campaign"])
+def test_docstrings_print_what_they_show(module: str) -> None:
+    assert doctest.testmod(importlib.import_module(module), optionflags=doctest.ELLIPSIS).failed == 0
+
+
+def test_every_command_and_object_shows_an_example() -> None:
+    of = [getattr(obsdeg, name) for name in obsdeg.__all__]
+    functions = [f for f in of if inspect.isfunction(f)]
+    assert len(functions) >= 9
+    for one in [*functions, obsdeg.Scheme, obsdeg.Model, obsdeg.Scheme.replace, obsdeg.Model.replace, obsdeg.Answer.from_json]:
+        assert "Examples\n" in one.__doc__ and ">>> " in one.__doc__, one
+
+
+@pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "calibrate", "compare", "design", "report"])
+def test_options_are_keyword_parameters(command: str) -> None:
+    parameters = inspect.signature(getattr(obsdeg, command)).parameters
+    known = set(getattr(options, command.title()).__annotations__)
+    assert known <= parameters.keys() and "options" not in parameters
+    assert all(parameters[name].kind is inspect.Parameter.KEYWORD_ONLY for name in known)
+    assert {"digits", "progress"} <= parameters.keys()
+
+
+def test_names_are_those_that_users_need() -> None:
+    assert dir(obsdeg) == sorted({*obsdeg.__all__, "campaign", "importers"})
+    assert all(hasattr(obsdeg, name) for name in dir(obsdeg))

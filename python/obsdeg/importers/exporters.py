@@ -10,6 +10,7 @@ from typing import Any
 
 import sympy  # type: ignore[import-untyped]
 
+from .._files import Text
 from .formula import TIME, Expr, exact, expand, parse, put, text_of
 from .problem import ImportProblem
 from .system import State, System
@@ -19,12 +20,13 @@ _IMPORTED = ("Abs", "Rational", "acos", "asin", "atan", "atan2", "cos", "exp", "
 _KEYS = ("name", "rates", "outputs", "starts", "parameters", "known_inputs", "unknown_inputs", "constants", "definitions")
 
 
-def read_model(text: str) -> System:
+def read_model(model: str | Text) -> System:
     """A system of an obsdeg model, TOML or JSON, without vectors.
 
     Raises:
         ImportProblem: vectors and matrices, segments, experiments with values of their own: what no export has room for.
     """
+    text = model.text if isinstance(model, Text) else model
     if text.lstrip().startswith("{"):
         return _json(text)
     try:
@@ -95,11 +97,11 @@ def _json(text: str) -> System:
     return out
 
 
-def to_si_jl(model: str | System, *, name: str = "ode") -> str:
+def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
     """The text of `@ODEmodel` for StructuralIdentifiability.jl.
 
     Arguments:
-        model: An obsdeg model as text (TOML or JSON), or a system.
+        model: A `Model`, the text of one (TOML or JSON), or a system.
         name: The variable that it is assigned to.
 
     Known constants of any value become outputs of their own, since every constant is unknown there.
@@ -107,7 +109,7 @@ def to_si_jl(model: str | System, *, name: str = "ode") -> str:
     Raises:
         ImportProblem: what the macro has no room for: functions, the time, given starts, unknown inputs, segments, constraints.
     """
-    system = read_model(model) if isinstance(model, str) else model
+    system = model if isinstance(model, System) else read_model(model)
     _plain(system)
     if system.unknown_inputs:
         raise ImportProblem(f"the unknown input `{next(iter(system.unknown_inputs))}`", "known inputs")
@@ -147,13 +149,13 @@ def to_si_jl(model: str | System, *, name: str = "ode") -> str:
     return f"using StructuralIdentifiability\n\n{name} = @ODEmodel(\n" + ",\n".join(lines) + "\n)\n" + tail
 
 
-def to_sympy(model: str | System) -> str:
+def to_sympy(model: str | Text | System) -> str:
     """Python text that says the system with SymPy: `rates`, `outputs` and all else by name; `sympy_system.load` reads it.
 
     Raises:
         ImportProblem: segments, constraints, inputs that are bounded.
     """
-    system = read_model(model) if isinstance(model, str) else model
+    system = model if isinstance(model, System) else read_model(model)
     _plain(system)
     system = _python_names(system)
     names = system.names()

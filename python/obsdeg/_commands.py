@@ -1,0 +1,529 @@
+"""The commands of the command line as functions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+from . import _obsdeg, options
+from ._files import Texted
+from ._model import Model
+from ._progress import heard
+from ._request import Judged, are_positions, request, source, sources
+from ._results import (
+    KINDS,
+    Analysis,
+    Answer,
+    Audit,
+    Calibration,
+    Comparison,
+    CrossCheck,
+    Design,
+    Judgements,
+    Part,
+    Progress,
+    Report,
+    Simulation,
+    SystemAnalysis,
+    SystemCalibration,
+    SystemEvidence,
+    SystemRun,
+    Walks,
+)
+from ._scheme import Scheme
+from ._signatures import named
+from ._texts import DIGITS, Attitude, Rounded
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    Platform = Scheme | Iterable[Attitude]
+    File = str | os.PathLike[str] | Texted
+
+
+def ask(
+    kinds: tuple[type[Answer], ...],
+    command: str,
+    request: str,
+    rounded: list[Rounded],
+    progress: Progress | bool | None = None,
+) -> Any:
+    """What a command answers; where that may be of several kinds it says which."""
+    asked = (command, request, None)
+    if progress is None:
+        return answered(kinds, _obsdeg.answer(command, request), asked, rounded)
+    show, bar = heard(progress)
+    try:
+        return answered(kinds, _obsdeg.answer(command, request, show), asked, rounded)
+    finally:
+        if bar is not None:
+            bar.close()
+
+
+def answered(kinds: tuple[type[Answer], ...], rust: _obsdeg.Answer, asked: Any, rounded: list[Rounded]) -> Any:
+    """An answer of the engine as one of the classes that it may be of."""
+    kind = kinds[0]
+    if len(kinds) > 1:
+        kind = Judgements if rust.layout is None else KINDS[rust.layout]
+    return kind(rust, asked, tuple(rounded))
+
+
+def kinds_of(what: tuple[Any, ...], of_scheme: type[Answer], of_model: type[Answer]) -> tuple[type[Answer], ...]:
+    """The classes that an answer may be of: whether it is a scheme or a model is known of all but files."""
+    if not what or isinstance(what[0], Scheme):
+        return (of_scheme,)
+    if isinstance(what[0], Model):
+        return (of_model,)
+    return (of_scheme,) if are_positions(what[0]) else (of_scheme, of_model)
+
+
+def _one(
+    command: str,
+    kinds: tuple[type[Answer], ...],
+    what: tuple[Judged, ...],
+    options: Mapping[str, Any],
+    digits: int | None,
+    progress: Progress | bool | None,
+) -> Any:
+    """Asks a command that takes angles, schemes or models."""
+    log: list[Rounded] = []
+    if len(what) == 1 and "angles" not in options and are_positions(what[0]):
+        asked = request({"angles": what[0], **options}, digits, log)
+    else:
+        given = sources(what, digits, log) if what else None
+        asked = request(options, digits, log, sources=given)
+    return ask(kinds, command, asked, log, progress)
+
+
+@overload
+def analyze(
+    what: Platform = ..., /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]
+) -> Analysis: ...
+
+
+@overload
+def analyze(
+    what: Model, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]
+) -> SystemAnalysis: ...
+
+
+@overload
+def analyze(
+    what: File, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Analyze]
+) -> Analysis | SystemAnalysis: ...
+
+
+@overload
+def analyze(
+    what: Judged,
+    other: Judged,
+    /,
+    *more: Judged,
+    digits: int | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Analyze],
+) -> Judgements: ...
+
+
+@named(options.Analyze)
+def analyze(*what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any) -> Any:
+    """The observable degree of every unknown of schemes and models.
+
+    Parameters
+    ----------
+    *what : positions, Scheme, Model or path
+        What is judged: one, or several. None where ``angles`` are given.
+    digits : int or None
+        Decimals, 0 to 9, to which computed angles and latitudes are rounded; None rounds nothing. ``answer.rounded`` says what was.
+    progress : callable or bool
+        Called ten times a second; True for a bar of tqdm. Where it returns False the analysis ends with a ``KeyboardInterrupt``,
+        as it does where a key is pressed.
+    **options
+        Those of ``obsdeg analyze``, in :class:`obsdeg.options.Analyze` with their units: ``carry``, ``latitude`` [deg], ``terms``,
+        ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``, ``frame``, ``formulas``, ``seed``, ...
+
+    Returns
+    -------
+    Analysis, SystemAnalysis or Judgements
+        Of a scheme, of a model, or of several.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> answer = obsdeg.analyze([(0, 0, 0), (180, 0, 0)], carry="inertial")
+    >>> answer["D_FX"].degree, answer["D_IX"].status
+    (1, 'not_excited')
+    >>> third = 100 / 3
+    >>> print(obsdeg.analyze(["NUE", (third, 0, 0)]).rounded[0])
+    alpha of position 2: 33.333333333333336 taken as 33.333333333
+    """
+    kinds = (Judgements,) if len(what) > 1 else kinds_of(what, Analysis, SystemAnalysis)
+    return _one("analyze", kinds, what, options, digits, progress)
+
+
+@overload
+def simulate(
+    what: Platform = ..., /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]
+) -> Simulation: ...
+
+
+@overload
+def simulate(
+    what: Model, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]
+) -> SystemRun: ...
+
+
+@overload
+def simulate(
+    what: File, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Simulate]
+) -> Simulation | SystemRun: ...
+
+
+@named(options.Simulate)
+def simulate(*what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any) -> Any:
+    """One run of the filter against a simulated truth.
+
+    Parameters
+    ----------
+    *what : positions, Scheme, Model or path
+        A scheme or model with numbers; none where ``angles`` are given.
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Called ten times a second; where it returns False the run ends with a ``KeyboardInterrupt``.
+    **options
+        Those of ``obsdeg simulate``, in :class:`obsdeg.options.Simulate` with their units: ``dwell`` and ``step`` [s], ``noise`` [g],
+        ``requirement``, ``value`` and ``prior`` [deg, deg/h, deg/h/g], ``truth``, ``filter``, ...
+
+    Returns
+    -------
+    Simulation or SystemRun
+        Of a scheme, or of a model. ``run["D_FX"].sigma`` is in ``run["D_FX"].unit``.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> run = obsdeg.simulate([(0, 0, 0), (180, 0, 0)], carry="inertial", requirement={"D_FX": 0.05})
+    >>> run["D_FX"].outcome, run["D_FX"].sigma < 0.05, run["D_FX"].unit
+    ('reached', True, 'deg/h')
+    """
+    return _one("simulate", kinds_of(what, Simulation, SystemRun), what, options, digits, progress)
+
+
+@overload
+def crosscheck(
+    what: Platform = ..., /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]
+) -> CrossCheck: ...
+
+
+@overload
+def crosscheck(
+    what: Model, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]
+) -> SystemEvidence: ...
+
+
+@overload
+def crosscheck(
+    what: File, /, *, digits: int | None = ..., progress: Progress | bool | None = ..., **options: Unpack[options.Crosscheck]
+) -> CrossCheck | SystemEvidence: ...
+
+
+@named(options.Crosscheck)
+def crosscheck(*what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any) -> Any:
+    """The exact verdicts against a filter; ``passed`` is False where something disagrees.
+
+    Parameters
+    ----------
+    *what : positions, Scheme, Model or path
+        A scheme or model with numbers; none where ``angles`` are given.
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Hears how far it is, and ends it where it returns False; True for a bar of tqdm.
+    **options
+        Those of ``obsdeg crosscheck``, in :class:`obsdeg.options.Crosscheck`: of :func:`simulate`, and ``runs``, ``filter_carry``,
+        ``filter_latitude`` [deg], ``filter_drop``.
+
+    Returns
+    -------
+    CrossCheck or SystemEvidence
+        Of a scheme, or of a model.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial")
+    >>> obsdeg.crosscheck(pair, runs=20).passed
+    True
+    >>> obsdeg.crosscheck(pair, runs=20, filter_carry="platform").passed
+    False
+    """
+    return _one("crosscheck", kinds_of(what, CrossCheck, SystemEvidence), what, options, digits, progress)
+
+
+@named(options.Compare)
+def compare(
+    *what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Unpack[options.Compare]
+) -> Comparison:
+    """Schemes side by side: degrees, and sigmas of the coefficients at the end of each.
+
+    Parameters
+    ----------
+    *what : positions, Scheme or path
+        Two schemes or more; positions are called ``scheme 1``, ``scheme 2``, ...
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Called ten times a second; where it returns False the comparison ends with a ``KeyboardInterrupt``.
+    **options
+        Those of ``obsdeg compare``, in :class:`obsdeg.options.Compare`: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ...
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> three, four = [(0, 0, 0), (180, 0, 0), (90, 0, 0)], [(0, 0, 0), (180, 0, 0), (90, 0, 0), (0, 90, 0)]
+    >>> [scheme.rank for scheme in obsdeg.compare(three, four, carry="inertial")]
+    [(11, 15), (12, 15)]
+    """
+    log: list[Rounded] = []
+    given = sources(what, digits, log)
+    answer: Comparison = ask((Comparison,), "compare", request(options, digits, log, sources=given), log, progress)
+    return answer
+
+
+@overload
+def design(
+    positions: int | None = None,
+    *,
+    part: tuple[int, int],
+    conditions: Platform | File | None = ...,
+    candidates: Literal["cardinal", "free"] | str | Platform | File | None = ...,
+    resume: Part | str | None = ...,
+    digits: int | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Part: ...
+
+
+@overload
+def design(
+    positions: int,
+    *,
+    candidates: Literal["cardinal", "free"] | str | Platform | File | None = ...,
+    part: None = ...,
+    conditions: Platform | File | None = ...,
+    merge: Iterable[Part | str] | None = ...,
+    digits: int | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Design: ...
+
+
+@overload
+def design(
+    positions: int | None = None,
+    *,
+    candidates: Literal["cardinal", "free"] | str | Platform | File | None = ...,
+    part: None = ...,
+    conditions: Platform | File | None = ...,
+    merge: Iterable[Part | str] | None = ...,
+    digits: int | None = ...,
+    progress: Progress | bool | None = ...,
+    **options: Unpack[options.Design],
+) -> Design | Walks: ...
+
+
+@named(options.Design)
+def design(
+    positions: int | None = None,
+    *,
+    candidates: Any = None,
+    part: tuple[int, int] | None = None,
+    conditions: Any = None,
+    resume: Part | str | None = None,
+    merge: Iterable[Part | str] | None = None,
+    digits: int | None = DIGITS,
+    progress: Progress | bool | None = None,
+    **options: Any,
+) -> Any:
+    """Finds schemes: the best of so many positions, or with ``minimum=True`` the fewest that do.
+
+    Parameters
+    ----------
+    positions : int
+        Number of positions.
+    candidates : str, positions, Scheme or path
+        ``"cardinal"``, ``"grid:45"`` [deg], ``"free"``, or a scheme whose positions are chosen from.
+    part : (int, int)
+        (I, N): only part I of N of all sequences; the answer is a :class:`Part`.
+    conditions : Scheme or path
+        A scheme whose conditions hold; as many positions as it has are searched where no number is asked for.
+    resume : Part or str
+        That part as far as it came.
+    merge : iterable of Part or str
+        The parts, put together to the answer of the whole; they know the options of their search. What they list is
+        evaluated again; that they were searched as they state is believed, but for ``check=N`` blocks that are searched again.
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Hears how far the search is; True for a bar of tqdm. Where it returns False, and on a keyboard interrupt, the search
+        ends with the best so far.
+    **options
+        Those of ``obsdeg design``, in :class:`obsdeg.options.Design`: ``minimum``, ``observable``, ``criterion``, ``dwell`` [s],
+        ``max_time`` [s], ``gimbal`` [deg], ...
+
+    Returns
+    -------
+    Design, Part or Walks
+        A :class:`Part` of one with ``part``; :class:`Walks` with ``minimum=True`` where torquer errors are among the ``terms``.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong; nothing was found.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> found = obsdeg.design(4, carry="inertial", observable="D_F")
+    >>> len(found), len(found.winner()), found[0].positions[:2]
+    (10, 4, ['NUE', 'UNW'])
+    """
+    files: dict[str, Any] = {}
+    log: list[Rounded] = []
+    if isinstance(candidates, str) and (candidates in ("cardinal", "free") or candidates.startswith("grid:")):
+        options["candidates"] = candidates
+    elif candidates is not None:
+        files["candidates_file"] = source(candidates, digits, log, "candidates")
+    if conditions is not None:
+        files["conditions_file"] = source(conditions, digits, log, "conditions")
+    if resume is not None:
+        files["resume"] = _part(resume, "resume")
+    if merge is not None:
+        if not merge:
+            raise ValueError("merge: found no part; expected every part of a search")
+        files["merge"] = [_part(p, f"part {i + 1}") for i, p in enumerate(merge)]
+    if part is not None:
+        options["part"] = list(part)
+    if positions is not None:
+        options["positions"] = positions
+    kinds = (Part,) if part is not None else (Design, Walks) if positions is None else (Design,)
+    return ask(kinds, "design", request(options, digits, log, **files), log, progress)
+
+
+def _part(part: Part | str, name: str) -> dict[str, str]:
+    if not isinstance(part, (str, Answer)):
+        raise TypeError(f"{name}: found a {type(part).__name__}; expected a part of a search, or its JSON")
+    return {"name": name, "text": part if isinstance(part, str) else part.json()}
+
+
+@named(options.Report)
+def report(
+    *what: Judged,
+    calibrations: Mapping[str, Calibration | SystemCalibration] | None = None,
+    digits: int | None = DIGITS,
+    progress: Progress | bool | None = None,
+    **options: Unpack[options.Report],
+) -> Report:
+    """The design review of schemes and models, as a page.
+
+    Parameters
+    ----------
+    *what : positions, Scheme, Model or path
+        What is reviewed: one, or several.
+    calibrations : mapping
+        What was estimated from records, by the names that the page calls them.
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Hears how far it is; True for a bar of tqdm.
+    **options
+        Those of ``obsdeg report``, in :class:`obsdeg.options.Report`: of :func:`simulate`, and ``runs``.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> page = obsdeg.report([(0, 0, 0), (180, 0, 0)], runs=2)  # doctest: +SKIP
+    >>> page.write("review.html")  # doctest: +SKIP
+    """
+    log: list[Rounded] = []
+    given = [{"name": name, "source": {"name": name, "text": c.json()}} for name, c in (calibrations or {}).items()]
+    of = sources(what, digits, log)
+    asked = request(options, digits, log, sources=of, calibrations=given, command="obsdeg.report(...) in Python")
+    answer: Report = ask((Report,), "report", asked, log, progress)
+    return answer
+
+
+def paper(*, seed: int = 1) -> Audit:
+    """The equations and claims of the paper against the algebra.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of all random choices.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> obsdeg.paper().passed
+    True
+    """
+    answer: Audit = ask((Audit,), "paper", request({"seed": seed}), [])
+    return answer
+
+
+def load(path: str | os.PathLike[str], **options: Any) -> Scheme | Model:
+    """A scheme or a model from a file, of this program or of others: TOML, JSON, SBML, PEtab, ``@ODEmodel``, STRIKE-GOLDD.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    **options
+        Those of the reader of its kind, such as ``outputs={"y": "A + B"}`` for SBML.
+
+    Raises
+    ------
+    obsdeg.importers.ImportProblem
+        What cannot be imported, by construct and place.
+
+    Examples
+    --------
+    >>> import obsdeg, pathlib, tempfile
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "decay.jl"
+    >>> length = file.write_text("ode = @ODEmodel(\\n    x1'(t) = -a*b*x1(t),\\n    y(t) = x1(t)\\n)\\n")
+    >>> obsdeg.load(file).parameters
+    ('a', 'b')
+    """
+    from .importers import load as imported
+
+    found = imported(Path(path), **options)
+    kind = Scheme if found.kind == "scheme" else Model
+    return kind.from_text(found.text, name=os.fspath(path))

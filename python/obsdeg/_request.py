@@ -1,0 +1,131 @@
+"""What is asked: schemes, models and options as the request that the engine reads."""
+
+from __future__ import annotations
+
+import operator
+import os
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Union
+
+from ._files import Text, Texted, read_text
+from ._model import Model
+from ._scheme import Scheme
+from ._texts import DIGITS, Attitude, Rounded, as_json, assignments, attitudes, changed, decimal, exact
+
+#: A scheme, a model, or the path of a file with one.
+Source = Union[Scheme, Model, str, "os.PathLike[str]", Texted]
+#: What is judged: a scheme, a model, the path of a file with one, or positions.
+Judged = Union[Source, Iterable[Attitude]]
+
+
+def _texts(value: Any) -> list[str]:
+    return [value] if isinstance(value, str) else list(value)
+
+
+def plain(value: Any) -> Any:
+    """A truth value, a text, a whole number, a list or a number as JSON has it."""
+    if isinstance(value, (bool, str, int)):
+        return value
+    if type(value).__name__ in ("bool_", "bool"):
+        # of numpy
+        return bool(value)
+    if hasattr(value, "__index__"):
+        return operator.index(value)
+    return list(value) if isinstance(value, (list, tuple)) else float(decimal(value))
+
+
+def _per_axis(value: Any) -> Any:
+    several = isinstance(value, (list, tuple)) or getattr(value, "ndim", 0) == 1
+    return ",".join(map(decimal, value)) if several else plain(value)
+
+
+def _max_degree(value: Any) -> list[str]:
+    return [str(value)] if isinstance(value, int) else assignments(value)
+
+
+#: How options are read that are not as JSON has them.
+READ: dict[str, Callable[[Any], Any]] = {
+    "angles": attitudes,
+    "latitude": exact,
+    "filter_latitude": exact,
+    "round": decimal,
+    "requirement": assignments,
+    "bench": assignments,
+    "value": assignments,
+    "prior": assignments,
+    "estimate": assignments,
+    "max_degree": _max_degree,
+    "terms": lambda value: ",".join(_texts(value)),
+    "combination": _texts,
+    "gimbal": _texts,
+    "observable": _texts,
+    "profile": _texts,
+    "angle_random_walk": _per_axis,
+    "rate_random_walk": _per_axis,
+    "bias_instability": _per_axis,
+}
+#: Options that decide verdicts and are read exactly, beside the angles.
+_EXACT = ("latitude", "filter_latitude")
+
+
+def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[Rounded] | None = None, **files: Any) -> str:
+    """A request as JSON.
+
+    Args:
+        options: options by name; None is one that was not given.
+        digits: decimals to which computed angles and latitudes are rounded; None keeps all.
+        log: takes what was rounded.
+        files: texts of files, and lists of them; what is empty is left out.
+    """
+    asked: dict[str, Any] = {}
+    for name, value in options.items():
+        if value is None:
+            continue
+        if type(value) is bool:
+            asked[name] = value
+        elif name == "angles":
+            asked[name] = attitudes(value, digits, log)
+        elif name in _EXACT:
+            text = asked[name] = exact(value, digits)
+            if log is not None and changed(value, text):
+                log.append(Rounded(name, str(value), text))
+        else:
+            asked[name] = READ.get(name, plain)(value)
+    for name, value in files.items():
+        if value:
+            asked[name] = value
+    return as_json(asked)
+
+
+def are_positions(what: Any) -> bool:
+    """True if it is a list of positions, and not a scheme, a model or the path of a file."""
+    return not isinstance(what, (Text, str, os.PathLike)) and not hasattr(what, "text") and isinstance(what, Iterable)
+
+
+def source(what: Judged, digits: int | None = DIGITS, log: list[Rounded] | None = None, name: str = "scheme.toml") -> dict[str, str]:
+    """What a request has of a scheme, a model, a file, or positions, which are a scheme of this name.
+
+    Raises:
+        TypeError: none of these.
+    """
+    if isinstance(what, Text):
+        if log is not None and what.rounded:
+            log.extend(what.rounded)
+        return what._source()
+    if hasattr(what, "text") and hasattr(what, "name"):
+        return {"name": str(what.name), "text": str(what.text)}
+    if are_positions(what):
+        scheme = Scheme(what, digits=digits)  # type: ignore[arg-type]
+        return {**source(scheme, digits, log), "name": name}
+    if not isinstance(what, (str, os.PathLike)):
+        raise TypeError(f"found {what!r} of type {type(what).__name__}; expected a Scheme, a Model, the path of a file, or a list of positions")
+    file = os.fspath(what)
+    return {"name": file, "text": read_text(file)}
+
+
+def sources(what: Iterable[Judged], digits: int | None, log: list[Rounded]) -> list[dict[str, str]]:
+    """What a request has of schemes, models and files in their order."""
+    several = list(what)
+    if len(several) == 1:
+        return [source(several[0], digits, log)]
+    return [source(w, digits, log, f"scheme {i}") for i, w in enumerate(several, 1)]
