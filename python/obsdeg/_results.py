@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator
 from html import escape
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from . import _obsdeg, shapes
+from . import _obsdeg, _plots, shapes
 from ._records import Record, fields, found, rows
 from ._texts import Rounded
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
     from ._scheme import Scheme
 
@@ -176,17 +178,16 @@ class Answer:
 
     def _repr_html_(self) -> str:
         page = self._answer().fragment()
-        return f"{page}<p>{escape(self._rounding())}</p>" if self._rounded else page
+        if self._rounded:
+            page += f"<p>{escape(self._rounding())}</p>"
+        return page + (self._figure() or "")
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
         bundle: dict[str, Any] = {"text/plain": str(self), "text/html": self._repr_html_()}
-        figure = self._figure()
-        if figure is not None:
-            bundle["text/html"] += figure
         return {kind: data for kind, data in bundle.items() if (not include or kind in include) and (not exclude or kind not in exclude)}
 
     def _figure(self) -> str | None:
-        """The picture that belongs below the answer in a notebook, as SVG."""
+        """The picture that belongs below the answer in a notebook, as HTML or SVG."""
         return None
 
     def __eq__(self, other: object) -> bool:
@@ -209,6 +210,107 @@ def _drawn(of: Answer, *names: str) -> str | None:
         if name in files:
             return files[name].decode("utf-8")
     return None
+
+
+class Drawn(Answer):
+    """An answer that has a picture."""
+
+    def plot(self, *, figure: Figure | SubFigure | None = None) -> list[Axes]:
+        """Draws the answer with matplotlib.
+
+        Parameters
+        ----------
+        figure : matplotlib Figure or SubFigure, optional
+            Where it is drawn; a new figure of pyplot if left out.
+
+        Returns
+        -------
+        list of matplotlib Axes
+            The panels, for titles and lines of your own; ``axes[0].figure.savefig("answer.png")`` writes the picture.
+
+        Raises
+        ------
+        ImportError
+            matplotlib is not installed (``pip install 'obsdeg[plots]'``).
+
+        Examples
+        --------
+        >>> import obsdeg
+        >>> pair = [(0, 0, 0), (180, 0, 0)]
+        >>> axes = obsdeg.compare(pair, [*pair, "DNE"], carry="inertial").plot()
+        >>> axes[0].get_xlabel()
+        'predicted sigma [unit of the unknown]; without a mark: not observable'
+        """
+        return self._draw(_plots.figure_of(*self._size()) if figure is None else figure)
+
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        raise NotImplementedError
+
+    def _size(self) -> tuple[float, float]:
+        """Width and height in inches."""
+        return 7.0, _plots.height_of(len(self._dict().get("quantities", ())))
+
+    def _figure(self) -> str | None:
+        return _plots.picture(self._draw, *self._size())
+
+
+class Run(Drawn):
+    """A run of a filter, whose estimates are drawn over time too."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def names(self) -> list[str]: ...
+
+    def series(self) -> pandas.DataFrame:
+        """Truth, estimate and sigma over time; a column each, with its unit. It is made once, which takes seconds: the engine
+        draws the figures of the run with it."""
+        if "_series" not in self.__dict__:
+            import pandas
+
+            self._series = pandas.read_csv(io.BytesIO(self.files()["series.csv"]))
+        found: pandas.DataFrame = self._series
+        return found.copy()
+
+    def plot(self, *names: str, figure: Figure | SubFigure | None = None) -> list[Axes]:
+        """Draws the run with matplotlib: sigmas of all unknowns, or the histories of some.
+
+        Parameters
+        ----------
+        *names : str
+            Unknowns whose truth, estimate and sigma are drawn over time, a panel each; without names the sigmas of all unknowns
+            at the start and at the end, with what was predicted and what is required.
+        figure : matplotlib Figure or SubFigure, optional
+            Where it is drawn; a new figure of pyplot if left out.
+
+        Returns
+        -------
+        list of matplotlib Axes
+            The panels.
+
+        Raises
+        ------
+        ImportError
+            matplotlib is not installed (``pip install 'obsdeg[plots]'``).
+        KeyError
+            There is no such unknown.
+
+        Examples
+        --------
+        >>> import obsdeg
+        >>> run = obsdeg.simulate([(0, 0, 0), (180, 0, 0)], carry="inertial")
+        >>> len(run.plot())
+        1
+        """
+        for name in names:
+            if name not in self.names:
+                raise KeyError(f"there is no unknown {name!r} in this run; there are {', '.join(self.names)}")
+        size = (7.0, 1.0 + 1.7 * len(names)) if names else self._size()
+        canvas = _plots.figure_of(*size) if figure is None else figure
+        return _plots.histories(self, names, canvas) if names else self._draw(canvas)  # type: ignore[arg-type]
+
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.simulation(self, figure)  # type: ignore[arg-type]
 
 
 _R = TypeVar("_R", bound=Record)
@@ -326,7 +428,7 @@ class Judgements(Answer):
         return f"{len(self)} judged"
 
 
-class Comparison(Answer, shapes.Comparison):
+class Comparison(Drawn, shapes.Comparison):
     """Schemes side by side: ``comparison["a.toml"]`` or ``comparison[0]`` is what it says of one; iteration goes through all."""
 
     _main = "schemes"
@@ -345,8 +447,14 @@ class Comparison(Answer, shapes.Comparison):
     def __len__(self) -> int:
         return len(self._dict()["schemes"])
 
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.comparison(self, figure)
 
-class Design(Answer, shapes.Design):
+    def _size(self) -> tuple[float, float]:
+        return 7.0, _plots.height_of(max((len(one["quantities"]) for one in self._dict()["schemes"]), default=1))
+
+
+class Design(Drawn, shapes.Design):
     """Schemes that were found, the best first: ``design[0]`` is the first, and iteration goes through all."""
 
     _main = "found"
@@ -373,6 +481,12 @@ class Design(Answer, shapes.Design):
 
     def _figure(self) -> str | None:
         return _drawn(self, "front.svg", "positions.svg")
+
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.design(self, figure)
+
+    def _size(self) -> tuple[float, float]:
+        return 9.0, _plots.height_of(min(20, len(self)))
 
 
 class Walks(Answer, shapes.Walks):
@@ -404,57 +518,62 @@ class Part(Answer, shapes.Part):
         return f"<p>part {part['part'][0]} of {part['part'][1]}, {'complete' if part['complete'] else 'interrupted'}</p>"
 
 
-class Simulation(Named[shapes.Estimate], Answer, shapes.Simulation):
+class Simulation(Named[shapes.Estimate], Run, shapes.Simulation):
     """A run of the filter on a scheme against a simulated truth."""
 
-    def series(self) -> pandas.DataFrame:
-        """Truth, estimate and sigma over time."""
-        return _series(self)
-
-
-class SystemRun(Named[shapes.SystemEstimate], Answer, shapes.SystemRun):
+class SystemRun(Named[shapes.SystemEstimate], Run, shapes.SystemRun):
     """A run of the filter on a model against a simulated truth."""
 
-    def series(self) -> pandas.DataFrame:
-        """Truth, estimate and sigma over time."""
-        return _series(self)
-
-
-def _series(of: Answer) -> pandas.DataFrame:
-    import pandas
-
-    return pandas.read_csv(io.BytesIO(of.files()["series.csv"]))
-
-
-class CrossCheck(Named[shapes.QuantityEvidence], Answer, shapes.CrossCheck):
+class CrossCheck(Named[shapes.QuantityEvidence], Drawn, shapes.CrossCheck):
     """The exact verdicts on a scheme against a filter."""
 
     if TYPE_CHECKING:
         # of the answer and of its JSON, which are the same
         passed: bool
 
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.crosscheck(self, figure)
 
-class SystemEvidence(Named[shapes.SystemQuantityEvidence], Answer, shapes.SystemEvidence):
+    def _size(self) -> tuple[float, float]:
+        return 7.0, 4.5
+
+
+class SystemEvidence(Named[shapes.SystemQuantityEvidence], Drawn, shapes.SystemEvidence):
     """The exact verdicts on a model against a filter and integrators."""
 
     if TYPE_CHECKING:
         passed: bool
 
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.system_evidence(self, figure)
 
-class Calibration(Named[shapes.Estimated], Answer, shapes.Calibration):
+
+class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
     """What a scheme determines, estimated from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
         """The covariance matrix of the estimates."""
         return self.to_frame("covariance")
 
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.calibration(self, figure)
 
-class SystemCalibration(Named[shapes.SystemEstimated], Answer, shapes.SystemCalibration):
+    def _size(self) -> tuple[float, float]:
+        return 7.0, 2.5 + _plots.height_of(len(self))
+
+
+class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalibration):
     """What a model determines, estimated from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
         """The covariance matrix of the estimates."""
         return self.to_frame("covariance")
+
+    def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        return _plots.system_calibration(self, figure)
+
+    def _size(self) -> tuple[float, float]:
+        return 7.0, 2.5 + _plots.height_of(len(self))
 
 
 class Audit(Answer, shapes.Audit):

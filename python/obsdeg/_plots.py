@@ -1,0 +1,270 @@
+"""Pictures of answers, by matplotlib, which is loaded when one is drawn."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from . import _results
+
+    Canvas = Figure | SubFigure
+
+#: Inches of a row with a name, and most names that are written.
+_ROW, _NAMES = 0.24, 60
+
+
+def figure_of(width: float, height: float) -> Figure:
+    """An empty figure of pyplot, in inches.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib import pyplot
+    except ModuleNotFoundError:
+        raise ImportError("plot() draws with the package `matplotlib`, which is not installed: pip install 'obsdeg[plots]'") from None
+    return pyplot.figure(figsize=(width, height), layout="constrained")
+
+
+def picture(draw: Callable[[Canvas], list[Axes]], width: float, height: float) -> str | None:
+    """A picture in a page, as HTML; None where matplotlib is not installed."""
+    try:
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError:
+        return None
+    figure = Figure(figsize=(width, height), layout="constrained")
+    draw(figure)
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=80, metadata={"Software": None})
+    return f'<img alt="plot" src="data:image/png;base64,{base64.b64encode(data.getvalue()).decode("ascii")}">'
+
+
+def height_of(names: int) -> float:
+    """Height in inches of a panel with so many names."""
+    return 1.0 + _ROW * max(4, min(names, _NAMES))
+
+
+#: A group of points beside names: label, values (None where there is none), marker, colour, True if it is filled.
+_Group = tuple[str, Sequence[Any], str, str, bool]
+
+
+def _dots(axes: Axes, labels: Sequence[str], groups: Sequence[_Group], x: str) -> None:
+    """Positive numbers by name, on a logarithmic axis; the first name is the uppermost."""
+    places = range(len(labels))
+    drawn = False
+    for label, values, marker, colour, filled in groups:
+        points = [(v, i) for i, v in zip(places, values, strict=True) if v is not None and v > 0]
+        if points:
+            face = colour if filled or marker in "|x" else "none"
+            size = 14 if marker == "|" else 6
+            axes.plot(*zip(*points, strict=True), linestyle="", marker=marker, color=colour, markerfacecolor=face, markersize=size, label=label)
+            drawn = True
+    axes.set_xlabel(x)
+    axes.set_ylim(len(labels) - 0.4, -0.6)
+    if drawn:
+        axes.set_xscale("log")
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize="small")
+    if len(labels) <= _NAMES:
+        axes.set_yticks(list(places), labels)
+    axes.tick_params(labelsize="small")
+    axes.grid(axis="x", alpha=0.3)
+    axes.grid(axis="y", alpha=0.15)
+
+
+def _panels(canvas: Canvas, count: int, **options: Any) -> list[Axes]:
+    found: list[Axes] = list(canvas.subplots(count, 1, squeeze=False, **options)[:, 0])
+    return found
+
+
+def simulation(of: _results.Simulation | _results.SystemRun, canvas: Canvas) -> list[Axes]:
+    """Sigmas at the start and at the end of a run, what was predicted and what is required."""
+    rows = of.to_dict()["quantities"]
+    labels = [f"{q['name']} [{q['unit']}]" if q["unit"] else q["name"] for q in rows]
+    groups: list[_Group] = [
+        ("prior", [q["prior_sigma"] for q in rows], "o", "0.5", False),
+        ("end of the run", [q["sigma"] for q in rows], "o", "tab:blue", True),
+        ("predicted", [q.get("predicted_sigma") for q in rows], "x", "tab:orange", True),
+        ("required", [q.get("required_sigma") for q in rows], "|", "tab:red", True),
+    ]
+    axes = canvas.subplots()
+    _dots(axes, labels, groups, "sigma [unit of the unknown]")
+    return [axes]
+
+
+def histories(of: _results.Simulation | _results.SystemRun, names: Sequence[str], canvas: Canvas) -> list[Axes]:
+    """Truth, estimate and sigma over time, a panel per unknown."""
+    series = of.series()
+    units = {q["name"]: q["unit"] for q in of.to_dict()["quantities"]}
+    time = next(c for c in series if c == "t_s" or c == "t" or c.startswith("t_"))
+    panels = _panels(canvas, len(names), sharex=True)
+    runs = series.groupby("experiment") if "experiment" in series else [(None, series)]
+    for axes, name in zip(panels, names, strict=True):
+        columns = {kind: next(c for c in series if c.startswith(f"{name}_{kind}")) for kind in ("true", "estimate", "sigma")}
+        for i, (_, run) in enumerate(runs):
+            t, estimate, sigma = run[time], run[columns["estimate"]], run[columns["sigma"]]
+            axes.fill_between(t, estimate - sigma, estimate + sigma, color="tab:blue", alpha=0.2, label=None if i else "one sigma")
+            axes.plot(t, estimate, color="tab:blue", label=None if i else "estimate")
+            axes.plot(t, run[columns["true"]], color="black", linestyle="--", label=None if i else "truth")
+        # the first samples, which know next to nothing, would set the scale
+        settled = series.iloc[len(series) // 10 :]
+        low = min((settled[columns["estimate"]] - settled[columns["sigma"]]).min(), series[columns["true"]].min())
+        high = max((settled[columns["estimate"]] + settled[columns["sigma"]]).max(), series[columns["true"]].max())
+        margin = 0.05 * (high - low) or 1.0
+        axes.set_ylim(low - margin, high + margin)
+        axes.set_ylabel(f"{name} [{units[name]}]" if units[name] else name, fontsize="small")
+        axes.grid(alpha=0.3)
+        for part in of.to_dict().get("timeline", [])[1:]:
+            axes.axvline(part["start_s"], color="0.7", linewidth=0.8)
+    panels[0].legend(fontsize="small", ncols=3, loc="upper right")
+    panels[-1].set_xlabel("time [s]" if time == "t_s" else "time")
+    return panels
+
+
+def comparison(of: _results.Comparison, canvas: Canvas) -> list[Axes]:
+    """Sigmas of the coefficients at the end of each scheme."""
+    schemes = of.to_dict()["schemes"]
+    names = list(dict.fromkeys(q["name"] for s in schemes for q in s["quantities"]))
+    tables = [{q["name"]: q for q in s["quantities"]} for s in schemes]
+    units = {n: next(t[n]["unit"] for t in tables if n in t) for n in names}
+    groups: list[_Group] = []
+    for i, (scheme, table) in enumerate(zip(schemes, tables, strict=True)):
+        sigmas = [table[n]["sigma"] if n in table and table[n]["status"] == "observable" else None for n in names]
+        groups.append((scheme["name"], sigmas, "os^vDP*"[i % 7], f"C{i}", True))
+    required = [next((t[n]["requirement"] for t in tables if n in t and t[n].get("requirement")), None) for n in names]
+    groups.append(("required", required, "|", "tab:red", True))
+    axes = canvas.subplots()
+    _dots(axes, [f"{n} [{units[n]}]" for n in names], groups, "predicted sigma [unit of the unknown]; without a mark: not observable")
+    return [axes]
+
+
+def design(of: _results.Design, canvas: Canvas) -> list[Axes]:
+    """The criterion of the schemes that were found, and its least value in a total time."""
+    answer = of.to_dict()
+    found, front = answer["found"], answer["front"]
+    search = answer["search"] or {}
+    value = f"{search.get('criterion', 'criterion')} [{search.get('unit', '')}]"
+    count = 1 + (len(front) > 1)
+    panels = list(canvas.subplots(1, count, squeeze=False)[0]) if found else []
+    if found:
+        shown = found[:20]
+        labels = [" ".join(f["positions"]) if len(f["positions"]) <= 8 else f"{len(f['positions'])} positions" for f in shown]
+        panels[0].plot([f["value"] for f in shown], range(len(shown)), "o", color="tab:blue")
+        panels[0].set_yticks(range(len(shown)), labels, fontsize="x-small")
+        panels[0].invert_yaxis()
+        # equal values differ by rounding, which is not to be seen
+        least, most = shown[0]["value"], shown[-1]["value"]
+        if abs(most - least) < 1e-3 * abs(least):
+            panels[0].set_xlim(sorted((0.9 * least, 1.1 * least)))
+        panels[0].ticklabel_format(axis="x", useOffset=False)
+        panels[0].set_xlabel(value)
+        panels[0].set_title("Schemes found, best first", fontsize="medium")
+        panels[0].grid(alpha=0.3)
+    if found and count == 2:
+        panels[1].step([f["total_s"] for f in front], [f["value"] for f in front], where="post", color="0.6")
+        panels[1].plot([f["total_s"] for f in front], [f["value"] for f in front], "o", color="tab:orange")
+        for f in front:
+            panels[1].annotate(f" {len(f['positions'])}", (f["total_s"], f["value"]), fontsize="small")
+        panels[1].set_yscale("log")
+        panels[1].set_xlabel("total time [s]")
+        panels[1].set_ylabel(value)
+        panels[1].set_title("Least value by time; numbers of positions", fontsize="medium")
+        panels[1].grid(alpha=0.3)
+    return panels
+
+
+def calibration(of: _results.Calibration, canvas: Canvas) -> list[Axes]:
+    """Residuals over time, and sigmas beside what was predicted and is required."""
+    answer = of.to_dict()
+    panels = _panels(canvas, 2, height_ratios=[1, max(1.0, _ROW * len(answer["quantities"]) / 2.2)])
+    for i, series in enumerate(answer["series"]):
+        t, residual, sigma = zip(*series["points"], strict=True) if series["points"] else ((), (), ())
+        label = series["channel"] if len(answer["records"]) == 1 else f"{series['record']}, {series['channel']}"
+        panels[0].plot(t, [r / s for r, s in zip(residual, sigma, strict=True)], ".", markersize=3, color=f"C{i}", label=label)
+    _residuals(panels[0], "time [s]")
+    _estimates(panels[1], answer["quantities"])
+    return panels
+
+
+def system_calibration(of: _results.SystemCalibration, canvas: Canvas) -> list[Axes]:
+    """Residuals over time, and sigmas of the estimates."""
+    import pandas
+
+    answer = of.to_dict()
+    panels = _panels(canvas, 2, height_ratios=[1, max(1.0, _ROW * len(answer["quantities"]) / 2.2)])
+    residuals = pandas.read_csv(io.BytesIO(of.files()["residuals.csv"]))
+    for i, (name, rows) in enumerate(residuals.groupby("output", sort=False)):
+        panels[0].plot(rows["t"], rows["residual"] / rows["sigma"], ".", color=f"C{i}", label=str(name))
+    _residuals(panels[0], "time")
+    _estimates(panels[1], answer["quantities"])
+    return panels
+
+
+def _residuals(axes: Axes, time: str) -> None:
+    axes.axhline(0, color="0.6", linewidth=0.8)
+    for level in (-2, 2):
+        axes.axhline(level, color="0.6", linewidth=0.8, linestyle=":")
+    axes.set_xlabel(time)
+    axes.set_ylabel("residual [sigma]")
+    axes.legend(fontsize="small", ncols=4, loc="upper right")
+    axes.grid(alpha=0.3)
+
+
+def _estimates(axes: Axes, rows: list[dict[str, Any]]) -> None:
+    """Sigmas beside the estimates in words."""
+
+    def label(q: dict[str, Any]) -> str:
+        if q["estimate"] is None or q["sigma"] is None:
+            return f"{q['name']}: not determined"
+        return f"{q['name']} = {q['estimate']:.4g} \u00b1 {q['sigma']:.2g} {q['unit']}".rstrip()
+
+    groups: list[_Group] = [
+        ("rescaled", [q["sigma_rescaled"] for q in rows], "o", "0.4", False),
+        ("by the noise", [q["sigma"] for q in rows], "o", "tab:blue", True),
+        ("predicted", [q.get("predicted_sigma") for q in rows], "x", "tab:orange", True),
+    ]
+    _dots(axes, [label(q) for q in rows], groups, "sigma of the estimate [unit of the unknown]")
+
+
+def crosscheck(of: _results.CrossCheck, canvas: Canvas) -> list[Axes]:
+    """Sigma against the dwell, by accuracy order."""
+    axes = canvas.subplots()
+    seen: set[Any] = set()
+    for curve in of.to_dict()["slopes"]:
+        order = curve["accuracy_order"]
+        points = [(x, y) for x, y in curve["points"] if y > 0]
+        if not points:
+            continue
+        label = "not observable" if order is None else f"accuracy order {order}"
+        style = {"color": "0.7", "linestyle": "--"} if order is None else {"color": f"C{order}"}
+        axes.loglog(*zip(*points, strict=True), **style, linewidth=1, label=None if order in seen else label)
+        seen.add(order)
+    axes.set_xlabel("dwell of a position [s]")
+    axes.set_ylabel("sigma [unit of the unknown]")
+    axes.set_title("Slope of sigma: minus accuracy order minus one half", fontsize="medium")
+    if seen:
+        axes.legend(fontsize="small")
+    axes.grid(alpha=0.3)
+    return [axes]
+
+
+def system_evidence(of: _results.SystemEvidence, canvas: Canvas) -> list[Axes]:
+    """Slopes of sigma against the horizon, predicted and measured."""
+    rows = of.to_dict()["quantities"]
+    axes = canvas.subplots()
+    for key, marker, colour in (("predicted", "o", "0.4"), ("measured", "x", "tab:blue")):
+        points = [(q["slope"][key], i) for i, q in enumerate(rows) if q["slope"][key] is not None]
+        if points:
+            face = "none" if marker == "o" else colour
+            axes.plot(*zip(*points, strict=True), linestyle="", marker=marker, color=colour, markerfacecolor=face, label=key)
+    axes.set_yticks(range(len(rows)), [q["name"] for q in rows], fontsize="small")
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_xlabel("slope of log sigma against log horizon")
+    axes.legend(fontsize="small")
+    axes.grid(alpha=0.3)
+    return [axes]
