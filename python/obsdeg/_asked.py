@@ -66,7 +66,7 @@ def digest(asked: Any) -> str:
 
 
 def _canonical(name: str, value: Any) -> Any:
-    if name == "scheme":
+    if name in ("scheme", "model", "tags"):
         return value
     try:
         return _by_value(READ.get(name, plain_option)(value))

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, overload
 
 from . import _obsdeg, options
 from ._commands import answered, kinds_of
 from ._files import Texted, read_text
+from ._frames import arrays, record
 from ._model import Model
 from ._progress import heard
-from ._request import Judged, request, source
+from ._request import Judged, are_positions, request, source
 from ._results import Answer, Calibration, Progress, SystemCalibration
 from ._scheme import Scheme
 from ._signatures import named
 from ._texts import DIGITS, Attitude, Rounded
 
 if TYPE_CHECKING:
-    import pandas
     from typing_extensions import Unpack
+
+    #: A file, a text stream, a frame, or columns by name.
+    Record = Any
 
     class _Calibrate(options.Calibrate, total=False):
         prior: Calibration | SystemCalibration | str | os.PathLike[str]
@@ -29,17 +32,30 @@ if TYPE_CHECKING:
 
 @overload
 def calibrate(
-    what: Scheme | Iterable[Attitude], *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]
+    what: Scheme | Iterable[Attitude],
+    *records: Record,
+    t: Any = ...,
+    f: Any = ...,
+    position: Any = ...,
+    **options: Unpack[_Calibrate],
 ) -> Calibration: ...
 
 
 @overload
-def calibrate(what: Model, *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]) -> SystemCalibration: ...
+def calibrate(
+    what: Model, *records: Record, t: Any = ..., outputs: Mapping[str, Any] | None = ..., **options: Unpack[_Calibrate]
+) -> SystemCalibration: ...
 
 
 @overload
 def calibrate(
-    what: str | os.PathLike[str] | Texted, *records: str | os.PathLike[str] | pandas.DataFrame, **options: Unpack[_Calibrate]
+    what: str | os.PathLike[str] | Texted,
+    *records: Record,
+    t: Any = ...,
+    f: Any = ...,
+    position: Any = ...,
+    outputs: Mapping[str, Any] | None = ...,
+    **options: Unpack[_Calibrate],
 ) -> Calibration | SystemCalibration: ...
 
 
@@ -47,6 +63,10 @@ def calibrate(
 def calibrate(
     what: Judged,
     *records: Any,
+    t: Any = None,
+    f: Any = None,
+    position: Any = None,
+    outputs: Mapping[str, Any] | None = None,
     prior: Any = None,
     digits: int | None = DIGITS,
     progress: Progress | bool | None = None,
@@ -54,12 +74,25 @@ def calibrate(
 ) -> Any:
     """What a scheme or model determines, estimated from the records of its runs; ``passed`` is False where the model does not explain them.
 
+    Records are files, frames or arrays. Missing values (None, NaN, null, empty cells) are samples that are not there; the
+    answer counts them by column (``answer.records[0].empty_cells`` of a scheme).
+
     Parameters
     ----------
     what : Scheme, Model, positions or path
         The scheme or model.
-    *records : path or pandas.DataFrame
-        Files (CSV, Parquet), or frames whose columns are named as in files (``t [s]``, ``fx [g]``).
+    *records : path, text stream, frame or mapping
+        Files (CSV, Parquet), streams of CSV, frames of pandas, or of polars, pyarrow and others with the C interface of Arrow,
+        or columns by name. Columns are named as in files: ``t [s]``, ``position``, ``fx [g]``, ``fy [g]``, ``fz [g]``; of a model
+        ``t`` in its unit and its outputs. An index of pandas that is a time is the time. Dates count from 1970 in UTC.
+    t : array, optional
+        Times of a record of arrays, in s, of a model in its unit; or dates, or spans of time.
+    f : array of shape (n, 3), frame of three columns, or mapping, optional
+        Specific force along X, Y, Z of the platform, in g.
+    position : array, optional
+        Position of every sample: its name, or its number from 1; 0, None, NaN or an empty text where it is at none.
+    outputs : mapping of arrays, optional
+        Outputs and known inputs of a model, by name, in their units.
     prior : Calibration, SystemCalibration or path
         A calibration before, or the file that ``obsdeg calibrate -o`` wrote of it.
     digits : int or None
@@ -78,15 +111,17 @@ def calibrate(
     Raises
     ------
     ProblemError
-        What is wrong with a record, with its line.
+        What is wrong with a record, with its line; the header is line 1 of a frame or of arrays.
+    TypeError, ValueError
+        What is no record; arrays of different lengths.
 
     Examples
     --------
-    >>> import obsdeg, pandas
+    >>> import obsdeg
     >>> decay = obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"})
-    >>> record = pandas.DataFrame({"t": [0, 1, 2, 3], "y": [1.0, 0.6065, 0.3679, 0.2231]})
-    >>> round(obsdeg.calibrate(decay, record)["k"].estimate, 3)
-    0.5
+    >>> fit = obsdeg.calibrate(decay, t=[0, 1, 2, 3], outputs={"y": [1.0, 0.6065, None, 0.2231]})
+    >>> round(fit["k"].estimate, 3), fit.outputs[0].measurements
+    (0.5, 3)
     """
     log: list[Rounded] = []
     files: dict[str, Any] = {"sources": [source(what, digits, log)]}
@@ -94,11 +129,14 @@ def calibrate(
         text = prior.json() if isinstance(prior, Answer) else read_text(prior)
         files["before"] = {"name": "prior", "text": text}
     asked = request(options, digits, log, **files)
-    given = [_record(r, i) for i, r in enumerate(records)]
-    if not given:
-        raise TypeError("no record; expected files or pandas DataFrames of the runs, after the scheme or model")
-    show, bar = heard(progress)
+    given = [record(r, i) for i, r in enumerate(records, 1)]
     kinds = kinds_of((what,), Calibration, SystemCalibration)
+    time = "t [s]" if outputs is None else "t"
+    if (more := arrays(t, f, position, outputs, _names(what), time)) is not None:
+        given.append(more)
+    if not given:
+        raise TypeError("no record; expected files, frames or arrays of the runs, after the scheme or model")
+    show, bar = heard(progress)
     try:
         return answered(kinds, _obsdeg.calibrate(asked, given, show), ("calibrate", asked, given), log)
     finally:
@@ -106,10 +144,8 @@ def calibrate(
             bar.close()
 
 
-def _record(record: Any, i: int) -> tuple[str, bytes | None]:
-    if hasattr(record, "to_csv"):
-        return f"record {i + 1}", record.to_csv(index=False).encode()
-    if not isinstance(record, (str, os.PathLike)):
-        kind = type(record).__name__
-        raise TypeError(f"record {i + 1}: found a {kind}; expected a file (CSV, Parquet) or a pandas DataFrame, as to_pandas() of others gives")
-    return os.fspath(record), None
+def _names(what: Judged) -> list[str]:
+    """The names of the positions of a scheme; none of what is not read yet."""
+    if not isinstance(what, Scheme):
+        return [f"p{i}" for i in range(1, len(list(what)) + 1)] if are_positions(what) else []  # type: ignore[arg-type]
+    return [str(table.get("name") or f"p{i}") for i, table in enumerate(what._read()["position"], 1)]

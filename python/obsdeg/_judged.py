@@ -21,32 +21,44 @@ _MEASURED = Simulate.__optional_keys__ - Analyze.__optional_keys__
 _JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
 
 
-def _rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
+#: Keys of a task that are no options.
+WHAT = ("scheme", "model", "tags")
+
+
+def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
     """What is found of a task, a row per unknown."""
-    given: Any = task.get("scheme")
-    what = []
-    if "scheme" in task:
-        what = [given if isinstance(given, obsdeg.Scheme) else obsdeg.Scheme.from_text(given)]
-    options = {name: value for name, value in task.items() if name != "scheme"}
+    what: list[Any] = []
+    for key_, kind in (("scheme", obsdeg.Scheme), ("model", obsdeg.Model)):
+        if key_ in task:
+            given = task[key_]
+            what.append(given if isinstance(given, kind) else kind.from_text(given))
+    if len(what) > 1:
+        raise ValueError("found a scheme and a model; expected one of them")
+    options = {name: value for name, value in task.items() if name not in WHAT}
     exact = {"solutions": False, "omitted": False, **{k: v for k, v in options.items() if k not in _MEASURED}}
     verdicts = obsdeg.analyze(*what, **exact).to_dict()
     numbers = {}
     if _MEASURED & options.keys():
         run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
         numbers = {q["name"]: q for q in run["quantities"]}
-    asked = _options(task)
     rows = []
     for q in verdicts["quantities"]:
         n = numbers.get(q["name"], {})
         verdict = {"name": q["name"], "status": q["status"], "degree": q.get("degree")}
         number = {name: n.get(name) for name in ("sigma", "unit", "outcome")}
-        rows.append({**asked, "rank": verdicts["rank"], **verdict, **number, "error": None})
+        rows.append({"rank": verdicts["rank"], **verdict, **number, "error": None})
     return rows
+
+
+def _rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What was asked and what is found of a task, a row per unknown."""
+    asked = _options(task)
+    return [{**asked, **row} for row in judged_rows(task)]
 
 
 def _options(task: Mapping[str, Any]) -> dict[str, Any]:
     """The columns that say what was asked."""
-    return {"task": name_of(task), **{name: str(value) for name, value in task.items() if name != "scheme"}}
+    return {"task": name_of(task), **{name: str(value) for name, value in task.items() if name not in WHAT}}
 
 
 def name_of(task: Mapping[str, Any]) -> str:
@@ -71,10 +83,11 @@ FOUND = {
 
 def row_of(task: Mapping[str, Any], error: BaseException) -> dict[str, Any]:
     """The row of a task that has no answer."""
-    return {**_options(task), **dict.fromkeys(FOUND), "error": _said(error)}
+    return {**_options(task), **dict.fromkeys(FOUND), "error": said(error)}
 
 
-def _said(error: BaseException) -> str:
+def said(error: BaseException) -> str:
+    """An error as a row says it."""
     return str(error) if isinstance(error, INPUT) else f"{type(error).__name__}: {error}"
 
 

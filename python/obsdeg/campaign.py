@@ -35,11 +35,12 @@ import obsdeg
 from ._asked import digest, key
 from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
-from ._judged import FOUND, Judged, judge, name_of, parquet, row_of
+from ._judged import FOUND, WHAT, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
+from ._sweeps import read, table, threads
 from ._work import END, INPUT, CampaignError, Ended, Work
 
-__all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "run", "sweep"]
+__all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "read", "run", "sweep", "table", "threads"]
 
 #: Seconds of work in a file of a sweep, where chunks follow the measured time.
 FILE_SECONDS = 10.0
@@ -273,12 +274,13 @@ def sweep(
         folder: holds the files, one a chunk, named by what it asks, written by the workers where they see the
             folder; one sweep at a time works in it. Tasks that are there are not asked again, whatever the
             chunks; tasks are the same where their options have the same values: 0, ``"0"`` and
-            ``numpy.float64(0)`` are one. Read all with ``pandas.read_parquet(folder)``. The column ``task``
+            ``numpy.float64(0)`` are one. :func:`read` gives all as a tidy table with numbers and tags. The column ``task``
             holds all options of a row as JSON; each option of the first 500 tasks is a column of text too,
             others in the files where a task has them (pandas shows the columns of one file: take those from
             ``task``).
         tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is a
-            :class:`obsdeg.Scheme`, or the text of a scheme file. A task with options that only
+            :class:`obsdeg.Scheme`, or the text of a scheme file, ``model`` a :class:`obsdeg.Model` or its text;
+            ``tags`` are names and values of your own. A task with options that only
             :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated
             too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` says
             whether it is a measured one; elsewhere these are empty.
@@ -325,7 +327,7 @@ def _sweep(
     again: deque[list[dict[str, Any]]] = deque()
     rest = iter(tasks)
     first = list(islice(rest, FIRST))
-    options = [name for task in first for name in task if name != "scheme"]
+    options = [name for task in first for name in task if name not in WHAT]
     columns = list(dict.fromkeys(["task", *options, *FOUND]))
 
     def wrong(end: Ended, task: dict[str, Any]) -> None:

@@ -53,7 +53,7 @@ def test_files_and_parts(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="no record; expected files"):
         obsdeg.calibrate("examples/bench-day/scheme.toml")
     with pytest.raises(TypeError, match="record 1: found a dict; expected a file"):
-        obsdeg.calibrate("examples/bench-day/scheme.toml", {})  # type: ignore[arg-type]
+        obsdeg.calibrate("examples/bench-day/scheme.toml", {})
 
 
 def test_campaigns(tmp_path: Path) -> None:

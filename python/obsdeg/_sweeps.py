@@ -1,0 +1,174 @@
+"""Sweeps as tidy tables: a row per unknown of a task, numbers as numbers, with tags of the user's own."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from ._judged import FOUND, WHAT, judged_rows, said
+from ._work import INPUT
+
+if TYPE_CHECKING:
+    import pandas
+
+#: Tasks that a thread or worker takes at a time.
+_CHUNK = 20
+_NUMBERS = ("latitude", "filter_latitude")
+_WIDTH: dict[str, str] = {"rank": "Int64", "degree": "Int64", "sigma": "float64"}
+
+
+def threads() -> Executor:
+    """A thread for each core: the engine works beside the interpreter."""
+    return ThreadPoolExecutor(os.cpu_count() or 1)
+
+
+def table(
+    tasks: Iterable[Mapping[str, Any]],
+    *,
+    executor: Callable[[], Executor] = threads,
+    errors: Literal["record", "raise"] = "record",
+    heard: Callable[[int], None] | None = None,
+) -> pandas.DataFrame:
+    """Judges many schemes and models: a tidy table with a row per unknown, in the order of the tasks.
+
+    Parameters
+    ----------
+    tasks : iterable of mappings
+        As of :func:`sweep`: options of :func:`obsdeg.analyze` each (and of :func:`obsdeg.simulate`, where sigmas are
+        wanted), with ``angles``, ``scheme`` or ``model``, and ``tags``: names and values of your own, which are columns.
+    executor : callable
+        Makes an executor of :mod:`concurrent.futures`; by default threads of this process, one a core.
+    errors : {"record", "raise"}
+        A task that cannot be judged has one row with the message in the column ``error``, or ends the sweep.
+    heard : callable, optional
+        Told how many tasks are done.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns: ``task`` (number of the task, from 0), the tags, the options that are numbers or texts, ``rank``, ``name``, ``status``,
+        ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``; ``error`` where there is one.
+        ``table.set_index([...]).to_xarray()`` makes a data set of xarray of it.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong with a task, with ``errors="raise"``.
+
+    Examples
+    --------
+    >>> from obsdeg import campaign
+    >>> rows = campaign.table(dict(angles=[(0, 0, 0), (180, 0, 0), (x, 0, 0)], tags={"x": x}) for x in (0, 30, 60))
+    >>> rows[rows.status == "observable"].groupby("x").size().to_dict()
+    {0: 7, 30: 11, 60: 11}
+    """
+    from .campaign import run
+
+    if errors not in ("raise", "record"):
+        raise ValueError(f"errors: found {errors!r}; expected 'raise' or 'record'")
+    found: dict[int, list[dict[str, Any]]] = {}
+    done = 0
+    for _, chunk in run(partial(_judged, record=errors == "record"), _chunks(tasks), executor=executor):
+        for number, rows in chunk:
+            found[number] = rows
+        done += len(chunk)
+        if heard is not None:
+            heard(done)
+    return _frame([row for number in sorted(found) for row in found[number]])
+
+
+def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
+    """The files of a :func:`sweep` as the tidy table that :func:`table` makes, whatever options each task has.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of a sweep. Tasks are numbered in the order of their texts.
+
+    Returns
+    -------
+    pandas.DataFrame
+        As :func:`table`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from obsdeg import campaign
+    >>> tasks = campaign.grid(angles=[[(0, 0, 0), (180, 0, 0)]], latitude=[0, 45])
+    >>> rows = campaign.read(campaign.sweep(tempfile.mkdtemp(), tasks, executor=campaign.threads))
+    >>> rows.groupby("latitude")["rank"].first().to_dict()
+    {0: 8, 45: 8}
+    """
+    import pyarrow.parquet
+
+    by_task: dict[str, list[dict[str, Any]]] = {}
+    for file in sorted(Path(folder).glob("*.parquet")):
+        names = ["task", *FOUND]
+        for row in pyarrow.parquet.read_table(file, columns=names).to_pylist():
+            by_task.setdefault(row.pop("task"), []).append(row)
+    rows: list[dict[str, Any]] = []
+    for number, text in enumerate(sorted(by_task)):
+        rows += [{**_asked(number, json.loads(text)), **row} for row in by_task[text]]
+    return _frame(rows)
+
+
+def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, dict[str, Any]]]]:
+    left = enumerate(map(dict, tasks))
+    while chunk := list(islice(left, _CHUNK)):
+        yield chunk
+
+
+def _judged(chunk: list[tuple[int, dict[str, Any]]], *, record: bool) -> list[tuple[int, list[dict[str, Any]]]]:
+    """The rows of some tasks."""
+    found = []
+    for number, task in chunk:
+        asked = _asked(number, task)
+        try:
+            rows = judged_rows(task)
+        except INPUT as problem:
+            if not record:
+                raise
+            rows = [{**dict.fromkeys(FOUND), "error": said(problem)}]
+        found.append((number, [{**asked, **row} for row in rows]))
+    return found
+
+
+def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns of a row that say what was asked."""
+    options = {name: _value(name, value) for name, value in task.items() if name not in (*WHAT, "angles")}
+    tags = {name: value.item() if hasattr(value, "item") else value for name, value in dict(task.get("tags") or {}).items()}
+    return {"task": number, **tags, **{n: v for n, v in options.items() if n not in tags}}
+
+
+def _value(name: str, value: Any) -> Any:
+    """An option as a number or a text."""
+    if hasattr(value, "item"):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if isinstance(value, str):
+        if name not in _NUMBERS:
+            return value
+    elif not hasattr(value, "__float__"):
+        return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+    try:
+        return float(value)
+    except ValueError:
+        return value
+
+
+def _frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
+    import pandas
+
+    names = list(dict.fromkeys(name for row in rows for name in row if name not in FOUND))
+    frame = pandas.DataFrame(rows, columns=[*names, *FOUND])
+    for name, kind in _WIDTH.items():
+        frame[name] = frame[name].astype(kind)
+    unused = [name for name in ("sigma", "unit", "outcome", "error") if frame[name].isna().all()]
+    return frame.drop(columns=unused)

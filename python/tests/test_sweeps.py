@@ -1,0 +1,90 @@
+"""Sweeps as tidy tables: what each task says is what it says when it is asked alone."""
+
+from __future__ import annotations
+
+import re
+from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import obsdeg
+import pytest
+from obsdeg import campaign
+
+numpy = pytest.importorskip("numpy")
+pandas = pytest.importorskip("pandas")
+PAIR = [(0, 0, 0), (180, 0, 0)]
+
+
+def test_rows_are_those_of_each_task_alone() -> None:
+    tasks: list[dict[str, Any]] = [
+        dict(angles=[*PAIR, (x, 0, 0)], latitude=latitude, carry="inertial", tags={"x": x, "group": "pairs"})
+        for x in numpy.linspace(0, 90, 4)
+        for latitude in (0, Decimal("28.2"), "60")
+    ]
+    rows = campaign.table(tasks)
+    assert list(rows) == ["task", "x", "group", "latitude", "carry", "rank", "name", "status", "degree"]
+    assert rows["x"].dtype == float and rows["latitude"].dtype == float and rows["degree"].dtype == "Int64"
+    assert len(rows) == 12 * 15 and list(rows["task"].unique()) == list(range(12))
+    for number, task in enumerate(tasks):
+        own = obsdeg.analyze(task["angles"], latitude=task["latitude"], carry="inertial", solutions=False)
+        mine = rows[rows["task"] == number]
+        assert set(mine["x"]) == {task["tags"]["x"]} and set(mine["latitude"]) == {float(task["latitude"])}
+        assert dict(zip(mine["name"], mine["status"], strict=True)) == own.statuses and set(mine["rank"]) == {own.rank}
+        assert [None if pandas.isna(d) else d for d in mine["degree"]] == list(own.degrees.values())
+
+
+def test_models_schemes_and_runs() -> None:
+    decay = obsdeg.Model(states={"x": "-a*b*x"}, outputs={"y": "x"})
+    better = decay.replace(outputs={"z": "a"})
+    rows = campaign.table([dict(model=m, tags={"outputs": len(m.outputs)}) for m in (decay, better)] + [dict(model=decay.text, tags={"outputs": 0})])
+    statuses = {n: dict(zip(of["name"], of["status"], strict=True)) for n, of in rows.groupby("outputs")}
+    assert statuses == {0: obsdeg.analyze(decay).statuses, 1: obsdeg.analyze(decay).statuses, 2: obsdeg.analyze(better).statuses}
+    scheme = obsdeg.Scheme(PAIR, carry="inertial", latitude=28.2)
+    runs = campaign.table(dict(scheme=scheme, noise=noise, angle_random_walk=0) for noise in (1e-5, 2e-5))
+    for noise, of in runs.groupby("noise"):
+        own = obsdeg.simulate(scheme, noise=noise, angle_random_walk=0)  # type: ignore[arg-type]
+        for column in ("sigma", "unit", "outcome"):
+            assert dict(zip(of["name"], of[column], strict=True)) == {q.name: getattr(q, column) for q in own}
+
+
+def test_errors_are_rows() -> None:
+    tasks: list[dict[str, Any]] = [dict(angles=PAIR, latitude=45), dict(angles=PAIR, latitude=95), dict(angles=[(0, 0)]), dict(angles=PAIR, latitud=3)]
+    tasks.append(dict(model="[states]", scheme="", tags={"x": 1}))
+    rows = campaign.table(tasks)
+    wrong = rows[rows["error"].notna()].set_index("task")["error"]
+    assert list(wrong.index) == [1, 2, 3, 4] and rows["error"].isna().sum() == 15
+    for number, part in {1: "95 is out of range", 2: "found 2 angles", 3: "no option `latitud`", 4: "a scheme and a model"}.items():
+        assert part in wrong[number]
+    with pytest.raises(obsdeg.ProblemError, match="95 is out of range"):
+        campaign.table(tasks[:2], errors="raise")
+    with pytest.raises(ValueError, match="errors: found 'ignore'"):
+        campaign.table([], errors="ignore")  # type: ignore[arg-type]
+
+
+def test_a_folder_is_read_as_the_same_table(tmp_path: Path) -> None:
+    tasks: list[dict[str, Any]] = [dict(angles=[*PAIR, (x, 0, 0)], tags={"x": x}) for x in (0, 45)]
+    tasks += [dict(angles=PAIR, latitude=latitude, terms=["F", "I"]) for latitude in (10, 20.5)]
+    tasks += [dict(model=obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"}), tags={"x": 0.5}), dict(angles=PAIR, latitude=95)]
+    campaign.sweep(tmp_path, tasks, chunk=2, errors="record", executor=lambda: ThreadPoolExecutor(1))
+    rows, own = campaign.read(tmp_path), campaign.table(tasks)
+    keys = ["x", "latitude", "terms", "name", "status", "degree", "rank", "error"]
+    plain = [frame[keys].astype(object).where(frame[keys].notna(), None) for frame in (rows, own)]
+    mine, theirs = (sorted(map(repr, of.itertuples(index=False, name=None))) for of in plain)
+    # whole numbers beside others are floats in one and not in the other
+    assert [re.sub(r"\b(\d+)\.0\b", r"\1", m) for m in mine] == [re.sub(r"\b(\d+)\.0\b", r"\1", t) for t in theirs]
+    assert rows["x"].dtype == float and rows["latitude"].dtype == float
+    # nothing is asked again, models and tags among it
+    files = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")}
+    campaign.sweep(tmp_path, tasks, errors="record", executor=lambda: ThreadPoolExecutor(1))
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")} == files
+
+
+def test_a_table_by_processes_and_as_xarray() -> None:
+    tasks = [dict(angles=[*PAIR, (x, 0, 0)], latitude=lat, tags={"x": x}) for x in (0, 30) for lat in (0, 45)]
+    rows = campaign.table(tasks)
+    assert campaign.table(tasks, executor=campaign.processes).equals(rows)
+    xarray = pytest.importorskip("xarray", reason="xarray is not installed")
+    data = rows.set_index(["x", "latitude", "name"])[["rank"]].astype(int).to_xarray()
+    assert isinstance(data, xarray.Dataset) and data["rank"].sel(x=30, latitude=45, name="D_FX") == rows["rank"].iloc[-1]
