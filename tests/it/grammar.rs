@@ -78,7 +78,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "count-limit" => &["0", "1", "18446744073709551615", "-1"],
         "work-limit" => &["1", "700", "0", "1000000001", "x"],
         "check" => &["0", "1", "-1", "x"],
-        "solutions" => &["off", "maybe"],
+        "solutions" | "omitted" => &["off", "maybe"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
         "symbolic-limit" => &["0", "1", "1000", "18446744073709551615", "-1"],

@@ -45,7 +45,8 @@ fn wrong_words_are_caught(on_every_unknown: bool) {
         // the first of every kind: the others are judged alike
         let kind = |u: &PredictedUnknown| (u.status, u.degree, u.accuracy_order, u.order_at_end);
         let is_first = |i: usize| right.unknowns[..i].iter().all(|u| kind(u) != kind(&right.unknowns[i]));
-        let chosen = (0..right.unknowns.len()).filter(|&i| (on_every_unknown && s.carry == Carry::Platform) || is_first(i));
+        let chosen = (0..right.unknowns.len())
+            .filter(|&i| (on_every_unknown && s.carry == Carry::Platform) || is_first(i));
         for (i, u) in chosen.map(|i| (i, &right.unknowns[i])) {
             if u.degree.is_some() {
                 add(

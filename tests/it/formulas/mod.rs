@@ -111,7 +111,8 @@ fn stations(json: &Json) -> Vec<String> {
 /// Everything that is printed about one scheme.
 fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen) {
     let (scheme, case) = (draw.scheme(), draw.case());
-    let options = AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame, omitted: false };
+    let options =
+        AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame, omitted: false };
     let a: Analysis = analyze(&scheme, options, worker).expect("analysed");
     let written = |format| obsdeg_report::written(&a, format, Layout::default()).expect("written");
     let document = written(Format::Latex);
