@@ -35,7 +35,9 @@ def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
     if len(what) > 1:
         raise ValueError("found a scheme and a model; expected one of them")
     options = {name: value for name, value in task.items() if name not in WHAT}
-    exact = {"solutions": False, "omitted": False, **{k: v for k, v in options.items() if k not in _MEASURED}}
+    # classes are of schemes
+    bare = {"solutions": False} if "model" in task else {"solutions": False, "omitted": False}
+    exact = {**bare, **{k: v for k, v in options.items() if k not in _MEASURED}}
     verdicts = obsdeg.analyze(*what, **exact).to_dict()
     numbers = {}
     if _MEASURED & options.keys():

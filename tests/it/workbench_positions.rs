@@ -279,10 +279,18 @@ fn it_keeps_up() {
         "sigmas",
         "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
-    // in the quietest of a few drags: other tests run beside this one
-    let mut quickest: Option<[f64; 2]> = None;
+    // what the engine alone takes, by the same question: other tests run beside this one, and slow both
+    let alone = format!(
+        "(async () => {{ const times = []; for (let i = 0; i < 21; i++) {{ const from = performance.now(); \
+         await obsdeg.ask('verdicts', [{{ sources: [{{ name: 'six.toml', text: {} }}], solutions: false, omitted: false }}]); \
+         times.push(performance.now() - from); }} return times.sort((a, b) => a - b)[10]; }})()",
+        json!(six)
+    );
+    // in the best of a few drags
+    let mut least = f64::INFINITY;
     for round in 0..5 {
         b.value("performance.clearMeasures(), 1");
+        let engine = b.value(&alone).as_f64().expect("milliseconds");
         let ends = [10.0, 170.0].map(|angle| if round % 2 == 0 { angle } else { 180.0 - angle });
         let (from, to) = (thumb(b, "alpha", ends[0]), thumb(b, "alpha", ends[1]));
         drag(b, from, to, 60, Duration::from_millis(30));
@@ -292,17 +300,15 @@ fn it_keeps_up() {
         assert!(times.len() > 10, "{times:?}");
         let found = [0.5, 0.95].map(|part| times[((times.len() - 1) as f64 * part) as usize]);
         eprintln!(
-            "from input to table, {} inputs: median {:.1} ms, 95 % {:.1} ms",
+            "from input to table, {} inputs: median {:.1} ms, 95 % {:.1} ms; the engine alone {engine:.1} ms",
             times.len(),
             found[0],
             found[1]
         );
-        if quickest.is_none_or(|q| found[0] < q[0]) {
-            quickest = Some(found);
-        }
+        least = least.min(found[0] / engine);
     }
-    // a frame of the display in two: the table follows the hand
-    assert!(quickest.is_some_and(|[median, _]| median < 30.0), "{quickest:?} ms");
+    // questions that another overtakes are left out, and the table is drawn in no more time than the engine takes
+    assert!(least < 3.0, "{least} times what the engine takes");
     // a crash is said, and the next question is answered
     let said = b.value("obsdeg.ask('nothing there', []).then(() => 'answered', p => p.message)");
     assert!(
