@@ -4,7 +4,7 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 12] = [
-    ("analyze", 45),
+    ("analyze", 46),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 48),
