@@ -576,8 +576,8 @@ class Analysis(Shape):
     carries: list[CarryReport]
     """Verdicts under the other carries, where they differ."""
     omitted: OmittedVerdicts | None
-    """Exact classes of the errors that the scheme does not estimate; null where none are computed (rotating segments, the drift as
-    unknown, very many columns).
+    """Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where none are computed (rotating
+    segments, the drift as unknown, very many columns).
     """
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
