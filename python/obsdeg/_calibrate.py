@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, overload
 from . import _obsdeg, options
 from ._commands import answered, kinds_of
 from ._files import Texted, read_text
-from ._frames import arrays, record
 from ._model import Model
 from ._progress import heard
 from ._request import Judged, are_positions, request, source
@@ -123,6 +122,8 @@ def calibrate(
     >>> round(fit["k"].estimate, 3), fit.outputs[0].measurements
     (0.5, 3)
     """
+    from ._frames import arrays, record
+
     log: list[Rounded] = []
     files: dict[str, Any] = {"sources": [source(what, digits, log)]}
     if prior is not None:

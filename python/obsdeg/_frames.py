@@ -105,7 +105,8 @@ def _label(position: Any, names: Sequence[str]) -> Any:
     if isinstance(position, (int, float)) and not isinstance(position, bool) and position == position:
         number = int(position)
         if number != position or number < 0 or (names and number > len(names)):
-            raise ValueError(f"position: found {position!r}; expected a name, or a number from 1 to {len(names) or 'that of the last'} (0: none)")
+            last = len(names) or "that of the last"
+            raise ValueError(f"position: found {position!r}; expected a name, or a number from 1 to {last} (0: none)")
         return None if number == 0 else names[number - 1] if names else f"p{number}"
     return position
 

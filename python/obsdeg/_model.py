@@ -271,7 +271,10 @@ def _toml(data: Mapping[str, Any]) -> str:
 
 
 def _tables(tables: Mapping[str, Any]) -> str:
-    return "".join(f"\n[{_key(name)}]\n" + "".join(f"{_key(str(k))} = {_value(v)}\n" for k, v in table.items()) for name, table in tables.items())
+    lines = []
+    for name, table in tables.items():
+        lines += [f"\n[{_key(name)}]\n", *(f"{_key(str(k))} = {_value(v)}\n" for k, v in table.items())]
+    return "".join(lines)
 
 
 def _key(name: str) -> str:

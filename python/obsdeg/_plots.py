@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +36,9 @@ def picture(draw: Callable[[Canvas], list[Axes]], width: float, height: float) -
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         return None
+    import base64
+    import io
+
     figure = Figure(figsize=(width, height), layout="constrained")
     draw(figure)
     data = io.BytesIO()
@@ -63,7 +64,8 @@ def _dots(axes: Axes, labels: Sequence[str], groups: Sequence[_Group], x: str) -
         if points:
             face = colour if filled or marker in "|x" else "none"
             size = 14 if marker == "|" else 6
-            axes.plot(*zip(*points, strict=True), linestyle="", marker=marker, color=colour, markerfacecolor=face, markersize=size, label=label)
+            style: dict[str, Any] = {"linestyle": "", "marker": marker, "color": colour, "markerfacecolor": face, "markersize": size}
+            axes.plot(*zip(*points, strict=True), **style, label=label)
             drawn = True
     axes.set_xlabel(x)
     axes.set_ylim(len(labels) - 0.4, -0.6)
@@ -193,6 +195,8 @@ def calibration(of: _results.Calibration, canvas: Canvas) -> list[Axes]:
 
 def system_calibration(of: _results.SystemCalibration, canvas: Canvas) -> list[Axes]:
     """Residuals over time, and sigmas of the estimates."""
+    import io
+
     import pandas
 
     answer = of.to_dict()

@@ -118,7 +118,8 @@ def source(what: Judged, digits: int | None = DIGITS, log: list[Rounded] | None 
         scheme = Scheme(what, digits=digits)  # type: ignore[arg-type]
         return {**source(scheme, digits, log), "name": name}
     if not isinstance(what, (str, os.PathLike)):
-        raise TypeError(f"found {what!r} of type {type(what).__name__}; expected a Scheme, a Model, the path of a file, or a list of positions")
+        expected = "a Scheme, a Model, the path of a file, or a list of positions"
+        raise TypeError(f"found {what!r} of type {type(what).__name__}; expected {expected}")
     file = os.fspath(what)
     return {"name": file, "text": read_text(file)}
 

@@ -238,7 +238,8 @@ def _angle(text: str, place: int) -> Decimal | str:
         _decimals(text, f"position {place}")
         return Decimal(text)
     if not _NAME.fullmatch(text):
-        raise ValueError(f"position {place}: found the angle {text!r}; expected decimal degrees such as -90 or 12.5, or a name such as alpha")
+        expected = "decimal degrees such as -90 or 12.5, or a name such as alpha"
+        raise ValueError(f"position {place}: found the angle {text!r}; expected {expected}")
     return text
 
 
