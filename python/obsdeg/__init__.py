@@ -73,6 +73,7 @@ __all__ = [
     "Record",
     "Report",
     "Scheme",
+    "SensorNoise",
     "Simulation",
     "SystemAnalysis",
     "SystemCalibration",
@@ -81,6 +82,7 @@ __all__ = [
     "Text",
     "Walks",
     "__version__",
+    "allan",
     "analyze",
     "calibrate",
     "compare",
@@ -452,6 +454,30 @@ def calibrate(what: Judged, *records: Any, prior: Any = None, progress: Progress
     show, bar = heard(progress)
     try:
         return _as(_kinds((what,), Calibration, SystemCalibration), _obsdeg.calibrate(request, given, show), ("calibrate", request, given))
+    finally:
+        if bar is not None:
+            bar.close()
+
+
+def allan(record: str | os.PathLike[str] | pandas.DataFrame, *, progress: Progress | bool | None = None, **options: Unpack[options.Allan]) -> SensorNoise:
+    """The noise of gyros and accelerometers at rest: overlapping Allan deviation, coefficients with sigma, and the settings for simulations.
+
+    Args:
+        record: a file (CSV, Parquet), or a pandas DataFrame whose columns are named as in files (``t [s]``, ``wx [deg/h]``, ``fx [g]``).
+        progress: hears how far it is, and ends it where it returns False; ``True`` for a bar of tqdm.
+        options: those of ``obsdeg allan``: ``column``, ``confidence``, ``gravity`` [m/s^2].
+
+    Returns:
+        A :class:`SensorNoise`; ``passed`` is False where noise of these kinds does not explain the deviations.
+
+    Raises:
+        ProblemError: what is wrong with the record, with its line.
+    """
+    request, given = _request(options), [_record(record, 0)]
+    show, bar = heard(progress)
+    try:
+        answer: SensorNoise = _as((SensorNoise,), _obsdeg.allan(request, given, show), ("allan", request, given))
+        return answer
     finally:
         if bar is not None:
             bar.close()

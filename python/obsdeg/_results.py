@@ -31,7 +31,7 @@ class Answer:
     def _answer(self) -> _obsdeg.Answer:
         if self._rust is None:
             command, request, records = self._asked
-            self._rust = _obsdeg.answer(command, request) if records is None else _obsdeg.calibrate(request, records)
+            self._rust = _obsdeg.answer(command, request) if records is None else getattr(_obsdeg, command)(request, records)
         return self._rust
 
     @property
@@ -279,6 +279,10 @@ class Calibration(Answer, shapes.Calibration):
         return self.to_frame("covariance")
 
 
+class SensorNoise(Answer, shapes.SensorNoiseReport):
+    """Noise of sensors at rest, by the Allan deviation of a record."""
+
+
 class SystemCalibration(Answer, shapes.SystemCalibration):
     """What a model determines, estimated from records."""
 
@@ -305,6 +309,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.system-evidence/1": SystemEvidence,
     "obsdeg.calibration/1": Calibration,
     "obsdeg.system-calibration/1": SystemCalibration,
+    "obsdeg.allan/1": SensorNoise,
     "obsdeg.audit/1": Audit,
 }
 
