@@ -55,12 +55,12 @@ fn the_table_is_one_of_a_scheme() {
     let found = json(&["allan", RECORD, "--format", "json"]);
     let table = found["simulation_table"].as_str().expect("a table");
     assert!(table.contains("angle_random_walk_deg_sqrt_h = [0.0"), "{table}");
-    assert!(
-        table.contains("accelerometer_noise_g = 0.00002") || table.contains("accelerometer_noise_g = 1.9"),
-        "{table}"
-    );
-    let (_folder, at) = scratch();
-    let path = at.join("scheme.toml").display().to_string();
+    // 2e-5 g, by 4096 samples: 1/sqrt(2 4096) of itself (1 sigma)
+    let key = table.lines().find_map(|l| l.strip_prefix("accelerometer_noise_g = ")).expect("the key");
+    let noise: f64 = key.parse().expect("a number");
+    assert!((noise / 2e-5 - 1.0).abs() < 4.0 / 8192f64.sqrt(), "{table}");
+    let (folder, _) = scratch();
+    let path = folder.path().join("scheme.toml").display().to_string();
     let scheme = "name = 's'\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
     std::fs::write(&path, format!("name = 's'\n{table}{}", &scheme["name = 's'\n".len()..]))
         .expect("written");
@@ -72,8 +72,8 @@ fn the_table_is_one_of_a_scheme() {
 fn what_is_wrong_is_named() {
     refused(&["allan", RECORD, "--column", "wz"], &["no column `wz`", "`wx [deg/h]`, `fx [g]`"]);
     refused(&["allan", "examples/lotka-volterra/model.toml"], &["model.toml"]);
-    let (_folder, at) = scratch();
-    let path = at.join("short.csv").display().to_string();
+    let (folder, _) = scratch();
+    let path = folder.path().join("short.csv").display().to_string();
     let rows: String = (0..50).map(|k| format!("{k},{}\n", f64::from(k).sin())).collect();
     std::fs::write(&path, format!("t [s],wx [deg/h]\n{rows}")).expect("written");
     refused(&["allan", &path], &["column `wx [deg/h]`: 50 samples", "expected 128 or more"]);

@@ -32,7 +32,7 @@ pub struct SensorNoiseReport {
     pub columns: Vec<ColumnNoise>,
     /// Keys of a `[simulation]` table for the noise that is resolved.
     pub settings: Vec<NoiseSetting>,
-    /// Those keys as the `[simulation]` table of a scheme file, in TOML.
+    /// Text of the `[simulation]` table of a scheme file with the keys of `settings`, in TOML.
     pub simulation_table: String,
     /// Statements on the record and on how noise maps to settings.
     pub notes: Vec<String>,
@@ -42,9 +42,9 @@ pub struct SensorNoiseReport {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorKind {
-    /// Gyro: a rate of rotation.
+    /// Gyro: the column is a rate of rotation.
     Gyro,
-    /// Accelerometer: a specific force.
+    /// Accelerometer: the column is a specific force.
     Accelerometer,
 }
 
@@ -63,7 +63,7 @@ pub struct ColumnNoise {
     pub empty_cells: usize,
     /// Number of cells far from both neighbours, which were left out.
     pub left_out: usize,
-    /// First lines of the record with such cells; at most 20.
+    /// Numbers of the first lines with cells that were left out (dimensionless); at most 20.
     pub left_out_lines: Vec<u64>,
     /// Mean of the samples, in the unit of `unit`.
     pub mean: f64,
@@ -98,7 +98,7 @@ pub enum NoiseKind {
 /// Noise coefficient of a sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NoiseCoefficient {
-    /// Kind of the noise.
+    /// Kind of the noise that the coefficient is of.
     pub noise: NoiseKind,
     /// Name of the coefficient in words.
     pub name: String,
@@ -119,7 +119,7 @@ pub struct NoiseCoefficient {
 /// Overlapping Allan deviation at one cluster time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AllanDeviation {
-    /// Cluster time, in s.
+    /// Cluster time of the deviation, in s.
     pub tau_s: f64,
     /// Number of samples of a cluster.
     pub samples: usize,
@@ -140,6 +140,6 @@ pub struct AllanDeviation {
 pub struct NoiseSetting {
     /// Key of the table, with its unit, such as `angle_random_walk_deg_sqrt_h`.
     pub key: String,
-    /// Values in the unit that the key names: one, or those of the gyros X, Y, Z.
+    /// Values in the unit that `key` names: one, or those of the gyros X, Y, Z.
     pub values: Vec<f64>,
 }

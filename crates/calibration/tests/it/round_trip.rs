@@ -384,9 +384,8 @@ fn positions_are_found() {
     );
     for (a, b) in labelled.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
-        println!("FOUND {} {}", a.name, (x - y) / s);
         assert!(
-            (x - y).abs() < 2.0 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.1,
+            (x - y).abs() < 0.6 * s && (b.sigma.expect("there") / s - 1.0).abs() < 0.1,
             "{}: {x} {y} +- {s}",
             a.name
         );
@@ -488,9 +487,9 @@ fn noise_is_estimated() {
     }
 }
 
-/// Two positions at the drifts of the paper, where psi grows to degrees: what nothing determines is held
-/// where the first estimate is, 0 or twice the truth. What is determined follows by less than two of its
-/// sigmas, which count the width of the box, and is what the bench had.
+/// Two positions at the drifts of the paper, where psi grows to degrees: what nothing determines is in a box about
+/// the first estimate, 0 or twice the truth. Both estimates of what is determined are right, and they differ by less
+/// than two sigmas: two that are independent would by sqrt(2) sigmas (1 sigma), and these rest on the same data.
 #[test]
 fn what_is_held_bends_little() {
     let bench = Bench { seed: 21, ..Bench::default() };
@@ -512,13 +511,6 @@ fn what_is_held_bends_little() {
     for (u, v) in a.quantities.iter().chain(&a.combinations).zip(b.quantities.iter().chain(&b.combinations)) {
         assert_eq!((&u.name, u.determined), (&v.name, v.determined));
         if let (Some(x), Some(y), Some(s)) = (u.estimate, v.estimate, u.sigma) {
-            println!(
-                "BEND {} {x} {y} s {s} open {:?} kappa {:?} by {}",
-                u.name,
-                u.open_sigma,
-                a.curvature,
-                (x - y) / s
-            );
             assert!((x - y).abs() < 2.0 * s, "{}: {x} {y} +- {s}", u.name);
             compared += 1;
         }
