@@ -92,15 +92,25 @@ impl Budget {
         !self.over
     }
 
+    /// Puts a row into a space, and counts what that took beyond an elimination; false if it is beyond the limit.
+    fn insert<S: Values>(&mut self, space: &mut S::Space, row: &[S::Element]) -> bool {
+        let before = space.refined();
+        space.insert(row);
+        self.spend((space.refined() - before).saturating_mul(product::<S::Element>()))
+    }
+
     /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where they are beyond
-    /// the limit.
+    /// the limit. `from` is the space that the rows are from.
     fn short_vectors<S: Values>(
         &mut self,
         f: &S,
         rows: &[Vec<S::Element>],
+        from: &S::Space,
         span: &mut S::Space,
     ) -> Vec<Vec<S::Element>> {
-        let products = products_of_short_vectors(rows.len(), span.columns());
+        // what was made anew there is made anew here, row by row
+        let again = if from.refined() > 0 { rows.len() as u64 } else { 1 };
+        let products = products_of_short_vectors(rows.len(), span.columns()).saturating_mul(again);
         let short = self.short.saturating_add(products.saturating_mul(product::<S::Element>()));
         if short > self.limit.operations() {
             self.over = true;
@@ -201,7 +211,9 @@ fn symmetries_in<S: Values>(
             let row = here.span.row(i);
             let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
             let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
-            basis.insert(&both);
+            if !budget.insert::<S>(&mut basis, &both) {
+                break;
+            }
         }
         verdict = spent.operations;
         at = Some(here);
@@ -216,7 +228,7 @@ fn symmetries_in<S: Values>(
     let mut tangents = space(n);
     let mut out = Symmetries::default();
     let short = match !budget.over && basis.gap().is_decisive(S::BITS) {
-        true => budget.short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
+        true => budget.short_vectors(&f, &basis.null_space(), &basis, &mut space(2 * n)),
         false => Vec::new(),
     };
     for v in short {
@@ -266,7 +278,7 @@ fn symmetries_in<S: Values>(
     if out.found.len() + out.polynomial.len() < defect {
         let among_excited = |v: &Vec<S::Element>| support_in(&f, v).iter().all(|&c| excited[c]);
         let rest: Vec<Vec<S::Element>> = at.span.null_space().into_iter().filter(among_excited).collect();
-        let moving = budget.short_vectors(&f, &rest, &mut tangents);
+        let moving = budget.short_vectors(&f, &rest, &at.span, &mut tangents);
         out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
     }
     out.invariants = invariants(&f, n, &out.found, &at, &mut budget);
@@ -316,7 +328,9 @@ fn directions<S: Values>(
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
             let entries = moved.iter().flat_map(|&m| values.iter().map(move |x| f.mul(&row[m], x)));
-            basis.insert(&entries.collect::<Vec<_>>());
+            if !budget.insert::<S>(&mut basis, &entries.collect::<Vec<_>>()) {
+                return Ok(Vec::new());
+            }
         }
         still = if basis.rank() == rank { still + 1 } else { 0 };
         if still == 2 {
@@ -329,7 +343,7 @@ fn directions<S: Values>(
     }
     let here: Vec<S::Element> = products.iter().map(|p| value(at, p)).collect();
     let mut out = Vec::new();
-    for v in budget.short_vectors(f, &basis.null_space(), &mut space(moved.len() * width)) {
+    for v in budget.short_vectors(f, &basis.null_space(), &basis, &mut space(moved.len() * width)) {
         let mut tangent = vec![f.zero(); tangents.columns()];
         for (part, &m) in v.chunks_exact(width).zip(moved) {
             tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
@@ -374,7 +388,7 @@ fn invariants<S: Values>(
         // the null vectors of what is not moved are units
         let kept: Vec<Vec<S::Element>> =
             rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
-        for m in budget.short_vectors(f, &kept, &mut space()) {
+        for m in budget.short_vectors(f, &kept, &rows, &mut space()) {
             let Some(k) = rationals(f, &m) else { continue };
             let exponents = integers(&k);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i
