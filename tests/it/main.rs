@@ -28,6 +28,7 @@ mod language;
 mod laws;
 mod licences;
 mod models;
+mod not_estimated;
 mod program;
 mod reference_verdicts;
 mod release;
