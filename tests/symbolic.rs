@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use obsdeg_symbolic::protocol::CheckTerm;
-use obsdeg_symbolic::{Check, Dynamics, Job, Order, Request, System, Worker, WorkerConfig, WorkerError};
+use obsdeg_symbolic::{
+    Check, Dynamics, Job, Order, Request, System, Waiting, Worker, WorkerConfig, WorkerError,
+};
 
 #[path = "../crates/cli/lock.rs"]
 mod lock;
@@ -18,7 +20,7 @@ fn worker_of(limit: u64) -> Worker {
         arguments: vec!["symbolic-worker".into()],
         limit,
         wait: std::time::Duration::from_secs(600),
-        waiting: || {},
+        waiting: Waiting::silent(),
     })
 }
 
@@ -206,6 +208,107 @@ fn a_held_engine_keeps_no_verdict_waiting() {
     assert!(answer["notes"].to_string().contains("held the symbolic engine for more than 0 s"), "{answer}");
     let mark = &answer["engine_busy"];
     assert!(mark["waited_s"] == 0 && mark["advice"].to_string().contains("--engine-wait"), "{mark}");
+}
+
+/// The note while another process keeps the engine says what is missing, as the answer with the engine shows
+/// it to be, and nothing else; with a limit of 0 nobody is waited for, and the same is missing.
+#[test]
+fn what_is_missing_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let answer = |angles: &str, more: &[&str]| -> serde_json::Value {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+        command.args(["analyze", "--angles", angles, "--angles", "NUE", "--format", "json", "-q"]);
+        let output = command.args(more).env("XDG_RUNTIME_DIR", folder.path()).output().expect("it runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    };
+    let note = |answer: &serde_json::Value| -> Option<(String, String)> {
+        let list = answer["notes"].as_array().expect("notes");
+        let own = list.iter().filter_map(|n| n.as_str()).find_map(|n| n.split_once(", therefore: "));
+        own.map(|(why, missing)| (why.into(), missing.into()))
+    };
+    let list = |a: &serde_json::Value, key: &str| a[key].as_array().expect("a list").clone();
+    let mut kinds = std::collections::BTreeSet::new();
+    for angles in ["alpha,0,0", "25,0,0"] {
+        let held = hold(&folder.path().join("obsdeg-symbolic.lock"));
+        let began = std::time::Instant::now();
+        let none = answer(angles, &["--symbolic-limit", "0", "--engine-wait", "300"]);
+        assert!(began.elapsed().as_secs() < 200, "a held lock is waited for at a limit of 0");
+        let busy = answer(angles, &["--engine-wait", "0"]);
+        drop(held);
+        let whole = answer(angles, &["--engine-wait", "300", "--symbolic-limit", "20"]);
+        assert_eq!(note(&whole), None);
+        let (why, missing) = note(&busy).expect("a note");
+        assert!(why.contains("held the symbolic engine for more than 0 s"), "{why}");
+        let (why, same) = note(&none).expect("a note");
+        assert!(why.contains("reached its limit, 0 units of work") && same == missing, "{why}: {same}");
+        assert!(none["engine_busy"].is_null() && busy["engine_busy"]["waited_s"] == 0);
+        let judged = |key: &str, name: &str| -> Vec<(String, serde_json::Value)> {
+            let all = list(&busy, key).into_iter().filter(|q| q["degree"].is_u64());
+            all.map(|q| (q[name].as_str().expect("a name").to_string(), q["solution"].clone())).collect()
+        };
+        let judged = [judged("quantities", "name"), judged("combinations", "expression")].concat();
+        let names = |of: &dyn Fn(&serde_json::Value) -> bool| -> String {
+            let all: Vec<&str> =
+                judged.iter().filter(|(_, s)| of(s)).map(|(name, _)| name.as_str()).collect();
+            all.join(", ")
+        };
+        let unsolved = names(&|s| s.is_null());
+        let decimal = names(&|s| s["found_by"] == "floating_point");
+        let expressions = |a: &serde_json::Value| -> Vec<serde_json::Value> {
+            list(a, "combinations").iter().map(|c| c["expression"].clone()).collect()
+        };
+        let open = |a: &serde_json::Value| {
+            let unnamed = |v: &serde_json::Value| v.as_array().expect("a vector")[0]["coefficient"].is_null();
+            list(a, "null_space").iter().filter(|v| unnamed(v)).count()
+        };
+        for (clause, holds) in [
+            (format!("no solutions of {unsolved}"), !unsolved.is_empty()),
+            (format!("solutions in decimals of {decimal}"), !decimal.is_empty()),
+            ("left out of the list".into(), expressions(&busy) != expressions(&whole)),
+            (format!("{} unobservable directions without coefficients", open(&busy)), open(&busy) > 0),
+            ("degenerate angles".into(), busy["degenerate_loci"] != whole["degenerate_loci"]),
+        ] {
+            assert_eq!(missing.contains(&clause), holds, "{angles}: {clause}: {missing}");
+            kinds.extend(holds.then(|| clause.split_whitespace().last().map(String::from)));
+        }
+        assert!(open(&whole) == 0 && !missing.contains("formulas of Z"), "{missing}");
+    }
+    assert!(kinds.len() >= 4, "{kinds:?}");
+}
+
+/// Of named angles the verdicts are said while the engine is waited for: before the answer, in the words of
+/// an answer without solutions.
+#[test]
+fn verdicts_are_said_before_the_engine_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let held = hold(&folder.path().join("obsdeg-symbolic.lock"));
+    let scheme = ["analyze", "--angles", "alpha,0,0", "--angles", "NUE", "--engine-wait", "3000"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+    command.args(scheme).env("XDG_RUNTIME_DIR", folder.path());
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut errors = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut said = String::new();
+    while !said.contains("degrees: ") {
+        assert!(errors.read_line(&mut said).expect("text") > 0, "{said}");
+    }
+    assert!(child.try_wait().expect("a process").is_none(), "it has not answered");
+    drop(held);
+    errors.read_to_string(&mut String::new()).expect("text");
+    let output = child.wait_with_output().expect("it ends");
+    let first =
+        String::from_utf8_lossy(&output.stdout).lines().nth(1).expect("a sentence").trim().to_string();
+    assert!(said.contains(&first), "{said}: {first}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
+    let output =
+        command.args(scheme).args(["--solutions", "off", "--format", "json"]).output().expect("it runs");
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let line = said.lines().find_map(|l| l.trim().strip_prefix("degrees: ")).expect("degrees");
+    let degrees: Vec<&str> = line.split(", ").collect();
+    for (q, said) in answer["quantities"].as_array().expect("a list").iter().zip(&degrees) {
+        let degree = q["degree"].as_u64().map_or_else(|| "not observable".into(), |k| k.to_string());
+        assert_eq!(*said, format!("{} {degree}", q["name"].as_str().expect("a name")));
+    }
 }
 
 /// No model starts the engine: with expressions, of every third reference model, nothing is missing while another

@@ -1,13 +1,14 @@
 //! `obsdeg analyze`: the degree tables of schemes and models.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
-use obsdeg_commands::{Analyze, Given, Host, Input, analyze, title};
+use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, title};
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
-use crate::engine::{EngineArguments, notice};
+use crate::engine::{EngineArguments, Meanwhile, notice};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Output, write_files};
@@ -59,12 +60,13 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
         [(_, Input::Model(_))] => "judging the model",
         _ => "solving symbolically (--solutions off leaves it out)",
     };
-    let (judged, banner) = a.engine.lend(message, target.quiet, |worker| {
+    let read = Arc::new(read);
+    let (judged, banner) = a.engine.lend(message, target.quiet, verdicts(&a.asked, &read), |worker| {
         Ok(analyze(&a.asked, &read, &mut Host { worker, ..Host::silent() })?)
     })?;
     if let Some(folder) = &a.figures {
         let mut figures = Vec::new();
-        for (name, input) in &read {
+        for (name, input) in read.iter() {
             let Input::Scheme(scheme) = input else { continue };
             let mut file = position_figure(scheme);
             if read.len() > 1 {
@@ -77,4 +79,14 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.output.write(&judged)?;
     notice(&banner, target.quiet);
     Ok(())
+}
+
+/// The verdicts without solutions, a line each: what is said while the engine is waited for.
+fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> Meanwhile {
+    let asked = Analyze { solutions: false, formulas: false, ..asked.clone() };
+    let read = Arc::clone(read);
+    Box::new(move || {
+        let found = analyze(&asked, &read, &mut Host::silent());
+        found.map_or_else(|_| Vec::new(), |judged| judged.verdicts())
+    })
 }

@@ -1,10 +1,11 @@
 //! The symbolic engine as the commands use it.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
 use obsdeg_commands::whole;
-use obsdeg_symbolic::{Worker, WorkerConfig, WorkerError};
+use obsdeg_symbolic::{Waiting, Worker, WorkerConfig, WorkerError};
 
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
@@ -27,8 +28,9 @@ pub(crate) struct EngineArguments {
 }
 
 impl EngineArguments {
-    /// The symbolic engine in a process of its own, if this build has one; nothing starts yet.
-    pub(crate) fn worker(&self, quiet: bool) -> Result<Option<Worker>, Failure> {
+    /// The symbolic engine in a process of its own, if this build has one; nothing starts yet. `meanwhile`
+    /// gives what can be said while others hold it.
+    pub(crate) fn worker(&self, quiet: bool, meanwhile: Meanwhile) -> Result<Option<Worker>, Failure> {
         if !cfg!(feature = "symbolica") {
             return Ok(None);
         }
@@ -39,7 +41,10 @@ impl EngineArguments {
             arguments: vec!["symbolic-worker".into()],
             limit: self.symbolic_limit,
             wait: Duration::from_secs(self.engine_wait),
-            waiting: if quiet { || {} } else { say_waiting },
+            waiting: match quiet {
+                true => Waiting::silent(),
+                false => Waiting(Arc::new(move || say_waiting(&meanwhile()))),
+            },
         })))
     }
 
@@ -48,9 +53,10 @@ impl EngineArguments {
         &self,
         message: &'static str,
         quiet: bool,
+        meanwhile: Meanwhile,
         work: impl FnOnce(Option<&mut Worker>) -> Result<T, Failure>,
     ) -> Result<(T, Vec<String>), Failure> {
-        let mut worker = self.worker(quiet)?;
+        let mut worker = self.worker(quiet, meanwhile)?;
         let spinner = Spinner::start(message, quiet);
         let found = work(worker.as_mut());
         drop(spinner);
@@ -72,10 +78,20 @@ pub(crate) fn say_busy(worker: &Worker) {
     }
 }
 
-fn say_waiting() {
+/// What is known without the engine, line by line: asked for once, when the wait for it has lasted a second.
+pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
+
+/// Says that the engine is waited for, and the verdicts, which need none.
+fn say_waiting(meanwhile: &[String]) {
     eprintln!(
         "waiting for another obsdeg process: the symbolic engine runs once per user (--solutions off needs none; Ctrl-C ends the wait)"
     );
+    if !meanwhile.is_empty() {
+        eprintln!("verdicts, which do not wait for it:");
+    }
+    for line in meanwhile {
+        say(line);
+    }
 }
 
 /// The banner of the engine is its licence notice: whole, and after the answer.

@@ -91,7 +91,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let calibrations = a.calibration.iter().map(|path| calibration(path));
     let calibrations = calibrations.collect::<Result<Vec<_>, _>>()?;
     let origin = origin(command(), sources.iter().chain(calibrations.iter().map(|c| &c.source)));
-    let mut worker = a.engine.worker(a.target.quiet)?;
+    let mut worker = a.engine.worker(a.target.quiet, Box::new(Vec::new))?;
     let bar = Bar::start(a.target.quiet);
     let going = |now| {
         bar.shows(&now);

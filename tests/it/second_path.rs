@@ -49,6 +49,17 @@ impl Rref {
         true
     }
 
+    fn contains(&self, row: &[Q]) -> bool {
+        let mut row = row.to_vec();
+        for (pivot, basis) in &self.rows {
+            let factor = row[*pivot].clone();
+            for (x, b) in row.iter_mut().zip(basis) {
+                *x -= &factor * b;
+            }
+        }
+        row.iter().all(|x| *x == q(0, 1))
+    }
+
     fn has_unit(&self, c: usize) -> bool {
         let zero = q(0, 1);
         self.rows.iter().any(|(p, row)| *p == c && row.iter().enumerate().all(|(j, x)| j == c || *x == zero))
@@ -74,6 +85,18 @@ fn c_n(t: &[Q; 3]) -> [[Q; 3]; 3] {
 /// Rank profile and degrees by the equations in platform axes (2), (3), (6), straight from the text
 /// of the method, with 15 unknowns (psi^c, D) and the state transported by the carry.
 fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, Vec<Option<usize>>) {
+    let (profile, degree, _) = oracle_with_psi(tangents, carry, w_n, w_u);
+    (profile, degree)
+}
+
+/// The same, and the degrees of psi^c at the start of every position.
+#[expect(clippy::type_complexity, reason = "a name for it would be used here alone")]
+fn oracle_with_psi(
+    tangents: &[[Q; 3]],
+    carry: Carry,
+    w_n: &Q,
+    w_u: &Q,
+) -> (Vec<usize>, Vec<Option<usize>>, Vec<[Option<usize>; 3]>) {
     let zero = q(0, 1);
     let reset = carry == Carry::Reset;
     let n = if reset { 3 * tangents.len() + 12 } else { 15 };
@@ -133,6 +156,7 @@ fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, V
     }
     let mut basis = Rref { columns: n, rows: Vec::new() };
     let (mut profile, mut degree) = (Vec::new(), vec![None; n]);
+    let mut psi = vec![[None; 3]; tangents.len()];
     let times = |row: &[Q], m: &[Vec<Q>]| -> Vec<Q> {
         (0..m[0].len())
             .map(|j| row.iter().zip(m).filter(|(x, _)| **x != zero).map(|(x, r)| x * &r[j]).sum())
@@ -150,7 +174,7 @@ fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, V
             *chain = chain.iter().map(|row| times(row, &dynamics[i])).collect();
         }
         if !grew {
-            return (profile, degree);
+            return (profile, degree, psi);
         }
         let order = profile.len();
         for (c, d) in degree.iter_mut().enumerate() {
@@ -158,8 +182,69 @@ fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, V
                 *d = Some(order);
             }
         }
+        for (map, degrees) in maps.iter().zip(&mut psi) {
+            for (row, d) in map.iter().zip(degrees) {
+                if d.is_none() && basis.contains(row) {
+                    *d = Some(order);
+                }
+            }
+        }
         profile.push(basis.rows.len());
     }
+}
+
+/// What is said to differ under the other carries does, and all of it: psi at the start of a position,
+/// `psi_x@2`, is the same quantity under all carries, and only under reset carry an unknown.
+#[test]
+fn carries_are_compared_in_the_same_quantities() {
+    let mut rng = SplitMix64::new(33);
+    let (w_n, w_u) = (q(7, 3), q(-5, 11));
+    let mut of_positions = 0;
+    for round in 0..24 {
+        let n = 2 + rng.below(3) as usize;
+        let steps: Vec<[i64; 3]> = (0..n).map(|_| std::array::from_fn(|_| rng.below(3) as i64 - 1)).collect();
+        let tangents: Vec<[Q; 3]> = steps.iter().map(|p| p.map(|k| q(k, 1))).collect();
+        let attitudes: Vec<String> =
+            steps.iter().map(|p| p.map(|k| (90 * k).to_string()).join(",")).collect();
+        let carry = Carry::ALL[round % 3];
+        let attitudes: Vec<&str> = attitudes.iter().map(String::as_str).collect();
+        let a = crate::schemes::judged(&crate::schemes::scheme(&attitudes, carry));
+        let of = |carry: Carry| {
+            let (_, degree, psi) = oracle_with_psi(&tangents, carry, &w_n, &w_u);
+            let mut out: Vec<(String, Option<usize>)> = Vec::new();
+            for (i, degrees) in psi.iter().enumerate() {
+                out.extend(
+                    ["x", "y", "z"].iter().zip(degrees).map(|(k, d)| (format!("psi_{k}@{}", i + 1), *d)),
+                );
+            }
+            let names =
+                ["F", "I", "O", "S"].iter().flat_map(|t| ["X", "Y", "Z"].map(|g| format!("D_{t}{g}")));
+            out.extend(names.zip(degree[degree.len() - 12..].iter().copied()));
+            out
+        };
+        assert_eq!(a.carries.len(), 2);
+        for other in &a.carries {
+            let reset = [carry, other.carry].contains(&Carry::Reset);
+            let pairs = of(carry).into_iter().zip(of(other.carry));
+            let differ = pairs
+                .filter(|(here, there)| here.1 != there.1)
+                .map(|(here, there)| (here.0, here.1, there.1));
+            // without reset carry psi of the first position is the unknown
+            let named = differ.filter_map(|(name, here, there)| match name.split_once('@') {
+                Some((psi, "1")) if !reset => Some((psi.to_string(), here, there)),
+                Some(_) if !reset => None,
+                _ => Some((name, here, there)),
+            });
+            let mut expected: Vec<_> = named.collect();
+            let said = other.differs.iter().map(|d| (d.name.clone(), d.here.degree, d.there.degree));
+            let mut said: Vec<_> = said.filter(|d| d.1 != d.2).collect();
+            of_positions += said.iter().filter(|d| d.0.contains('@') && !d.0.ends_with("@1")).count();
+            expected.sort();
+            said.sort();
+            assert_eq!(said, expected, "{attitudes:?} {carry} {}", other.carry);
+        }
+    }
+    assert!(of_positions > 20, "{of_positions}");
 }
 
 fn engine(tangents: &[[(i64, i64); 3]], carry: Carry, rng: &mut SplitMix64) -> Degrees {

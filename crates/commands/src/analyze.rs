@@ -126,6 +126,36 @@ pub enum Judgements {
     Several(Several<Judged>),
 }
 
+impl Judged {
+    /// The first sentence, then every unknown with its degree.
+    fn verdicts(&self) -> [String; 2] {
+        let degree = |name: &str, degree: Option<usize>| match degree {
+            Some(k) => format!("{name} {k}"),
+            None => format!("{name} not observable"),
+        };
+        let degrees: Vec<String> = match self {
+            Self::Scheme(a) => a.quantities.iter().map(|q| degree(&q.name, q.degree)).collect(),
+            Self::Model(a) => a.quantities.iter().map(|q| degree(&q.name, q.degree)).collect(),
+        };
+        let first = self.sentences().into_iter().next().unwrap_or_default();
+        [first, format!("degrees: {}", degrees.join(", "))]
+    }
+}
+
+impl Judgements {
+    /// The verdicts in lines of text: the first sentence of each answer, and its degrees.
+    pub fn verdicts(&self) -> Vec<String> {
+        match self {
+            Self::One(one) => one.verdicts().to_vec(),
+            Self::Several(Several(all)) => {
+                let lines =
+                    |(name, one): &(String, Judged)| one.verdicts().map(|line| format!("{name}: {line}"));
+                all.iter().flat_map(lines).collect()
+            }
+        }
+    }
+}
+
 impl Answer for Judgements {
     fn layout(&self) -> Option<&str> {
         match self {

@@ -171,8 +171,8 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
     let mut out: Vec<String> = a.carries.iter().map(line).collect();
     if a.carries.iter().flat_map(|c| &c.differs).any(|d| d.name.contains('@')) {
         out.push(
-            "psi of one position (psi_x@2) is an unknown of reset carry alone: it is compared with psi at the first position, which the other \
-             carry hands on to all"
+            "psi of one position (psi_x@2) is an unknown of reset carry alone: under the other carry the same quantity, psi in the axes of c \
+             where that position begins, is judged as a combination of its unknowns"
                 .into(),
         );
     }

@@ -2,8 +2,10 @@
 //! another is given (`target/debug/obsdeg`). A worker that cannot be had is an answer too.
 #![allow(clippy::print_stdout, reason = "an example")]
 
+use std::sync::Arc;
+
 use obsdeg_symbolic::protocol::System;
-use obsdeg_symbolic::{Job, Request, Worker, WorkerConfig};
+use obsdeg_symbolic::{Job, Request, Waiting, Worker, WorkerConfig};
 
 fn main() {
     let program = std::env::args().nth(1).unwrap_or_else(|| "obsdeg".into());
@@ -12,7 +14,7 @@ fn main() {
         arguments: vec!["symbolic-worker".into()],
         limit: 1,
         wait: std::time::Duration::from_secs(600),
-        waiting: || println!("waiting for another process of this user"),
+        waiting: Waiting(Arc::new(|| println!("waiting for another process of this user"))),
     });
     let rows = [["c_a", "0"], ["0", "r_2"]].map(|row| row.map(String::from).to_vec());
     let right = ["1", "c_a"].map(String::from).to_vec();

@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,23 @@ const MAX_LINE: usize = 4 << 20;
 const MAX_BANNER: usize = 64 << 10;
 /// How long another process may hold the lock before that is said.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Called while the worker waits.
+#[derive(Clone)]
+pub struct Waiting(pub Arc<dyn Fn() + Send + Sync>);
+
+impl Waiting {
+    /// Nobody is told.
+    pub fn silent() -> Self {
+        Self(Arc::new(|| {}))
+    }
+}
+
+impl std::fmt::Debug for Waiting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Waiting")
+    }
+}
 
 /// How to start the worker.
 #[derive(Debug, Clone)]
@@ -27,7 +45,7 @@ pub struct WorkerConfig {
     /// Longest time, over all requests, that other processes of this user may keep the worker from its turn.
     pub wait: Duration,
     /// Called once when the worker has waited a second for its turn.
-    pub waiting: fn(),
+    pub waiting: Waiting,
 }
 
 /// Why there is no answer.
@@ -135,11 +153,15 @@ impl Worker {
         self.running = None;
     }
 
-    /// Sends one request and waits for its answer: the expressions, and whether a check held.
+    /// Sends one request and waits for its answer: the expressions, and whether a check held. With a limit of
+    /// 0 no process starts, and nobody is waited for.
     ///
     /// # Errors
     /// [`WorkerError::Failed`] when the job failed; anything else when the process did, now or before.
     pub fn ask(&mut self, request: &Request) -> Result<(Vec<String>, bool), WorkerError> {
+        if self.config.limit == 0 {
+            return Err(self.down(WorkerError::OverLimit { limit: 0 }));
+        }
         match &self.failure {
             None | Some(WorkerError::OverLimit { .. }) => {}
             Some(reason) => return Err(reason.clone()),
@@ -193,7 +215,7 @@ impl Worker {
                     return Err(WorkerError::Busy { seconds: self.config.wait.as_secs() });
                 }
                 None if !said => {
-                    (self.config.waiting)();
+                    (self.config.waiting.0)();
                     said = true;
                 }
                 None => {}
@@ -298,7 +320,7 @@ mod tests {
             arguments: vec!["-c".into(), script.into()],
             limit: u64::MAX,
             wait: Duration::from_secs(60),
-            waiting: || {},
+            waiting: Waiting::silent(),
         })
     }
 
@@ -366,9 +388,9 @@ mod tests {
             let answer = r#"echo 'obsdeg:{"values":{"values":["x"],"verified":false}}'"#;
             let script = format!("echo 'obsdeg:\"waiting\"'; sleep {seconds}; {READY} {answer}");
             let mut worker = scripted(&script);
-            worker.config.waiting = || {
+            worker.config.waiting = Waiting(Arc::new(|| {
                 SAID.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            };
+            }));
             assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], false)));
         };
         wait("1.5");
@@ -391,6 +413,18 @@ mod tests {
         (worker.config.wait, worker.patience) = (Duration::from_secs(1000), Duration::from_secs(1000));
         assert!(matches!(worker.ask(&request()), Err(WorkerError::OverLimit { .. })));
         assert!(worker.patience <= Duration::from_millis(999_500), "{:?}", worker.patience);
+    }
+
+    /// Without work that is allowed nothing starts, so that nobody is waited for.
+    #[test]
+    fn a_limit_of_zero_starts_nothing() {
+        let folder = std::env::temp_dir().join(format!("obsdeg-limit-{}", std::process::id()));
+        let mut worker = scripted(&format!("touch {}; exec sleep 60", folder.display()));
+        worker.config.limit = 0;
+        for _ in 0..2 {
+            assert_eq!(worker.ask(&request()), Err(WorkerError::OverLimit { limit: 0 }));
+        }
+        assert!(worker.running.is_none() && !folder.exists());
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! ```
 //! use std::time::Duration;
 //!
-//! use obsdeg_symbolic::{Dynamics, Job, Request, Worker, WorkerConfig, WorkerError};
+//! use obsdeg_symbolic::{Dynamics, Job, Request, Waiting, Worker, WorkerConfig, WorkerError};
 //!
 //! let oscillator = Dynamics {
 //!     states: vec!["x".into(), "v".into()],
@@ -20,7 +20,13 @@
 //! let job = Job::Derive { dynamics: oscillator, order: 2 };
 //! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
 //! // a program that is not there costs an answer, nothing else
-//! let config = WorkerConfig { program: "no/such/program".into(), arguments: vec![], limit: 1, wait: Duration::ZERO, waiting: || {} };
+//! let config = WorkerConfig {
+//!     program: "no/such/program".into(),
+//!     arguments: vec![],
+//!     limit: 1,
+//!     wait: Duration::ZERO,
+//!     waiting: Waiting::silent(),
+//! };
 //! assert!(matches!(Worker::new(config).ask(&request), Err(WorkerError::Start { .. })));
 //! ```
 
@@ -30,5 +36,5 @@ pub mod protocol;
 #[cfg(feature = "symbolica")]
 pub mod worker;
 
-pub use client::{Worker, WorkerConfig, WorkerError};
+pub use client::{Waiting, Worker, WorkerConfig, WorkerError};
 pub use protocol::{Check, Dynamics, Job, Order, Request, Response, System};

@@ -509,7 +509,7 @@ fn formulas_of_the_engine_give_the_truth() {
         arguments: vec!["symbolic-worker".into()],
         limit: 60,
         wait: std::time::Duration::from_secs(600),
-        waiting: || {},
+        waiting: obsdeg_symbolic::Waiting::silent(),
     });
     let mut seen = Seen::default();
     for (kind, most, n, turning) in [

@@ -1,6 +1,7 @@
 //! The main job: everything that is said about one scheme, as plain data.
 
 mod answer;
+mod carries;
 mod remedies;
 
 use obsdeg_symbolic::{Worker, WorkerError};
@@ -11,8 +12,7 @@ pub use crate::findings::AnalysisError;
 
 use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::degrees;
-use crate::degree::findings::Findings;
-use crate::degree::status::{Difference, Verdict};
+use crate::degree::status::Verdict;
 use crate::engine::EngineBusy;
 use crate::findings::{CombinationFinding, Judged, SchemeFindings};
 use crate::model::attitude::Matrix3;
@@ -21,12 +21,12 @@ use crate::model::path::TurnAt;
 use crate::model::platform::{Platform, Point};
 use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
-use crate::model::{Angle, Carry, OmittedModel, Position, Scheme, SchemeError, Source, Term, Unknowns};
+use crate::model::{Angle, Carry, OmittedModel, Position, Scheme, Source, Term, Unknowns};
 use crate::omitted::omitted_verdicts;
 use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
-use crate::solution::loci::loci;
+use crate::solution::loci::{Found, loci};
 use crate::solution::print::{StationLabel, stations, terms, text};
 use crate::solution::solver::{Frame, Functional, Solver};
 
@@ -80,12 +80,14 @@ pub fn analyze(
     let combinations: Vec<CombinationReport> =
         findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
     let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
+    // without an engine, and without a reason of their own
+    let untold_loci = found.is_ok();
     let found = printer.noted(found).unwrap_or_default();
-    printer.notes.extend(found.incomplete);
+    printer.notes.extend(found.incomplete.clone());
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
     printer.notes.extend(term_notes(scheme));
-    let (carries, untold) = carry_reports(&platform, &findings.verdicts)?;
+    let (carries, untold) = carries::carry_reports(&platform, verdicts, &findings.verdicts)?;
     let to_resolve = remedies::remedies(&platform, verdicts, &findings.verdicts, &carries);
     printer.notes.extend(untold);
     let omitted = options.omitted.then(|| OmittedModel::new(&platform));
@@ -98,18 +100,20 @@ pub fn analyze(
                 .into(),
         );
     }
-    let solved = quantities.iter().map(|q| (q.degree, &q.solution));
-    let mut solved = solved.chain(combinations.iter().map(|c| (c.degree, &c.solution)));
-    let exact = |s: &Option<Solution>| s.as_ref().is_some_and(|s| s.found_by != FoundBy::FloatingPoint);
-    let wanting = solved.any(|(degree, s)| degree.is_some() && !exact(s));
-    let sought = options.solutions && !course && (wanting || !scheme.generic_names().is_empty());
+    let asked = (options.solutions && !course, untold_loci && !scheme.generic_names().is_empty());
+    let wanting = Wanting::new(&quantities, &combinations, &findings, &found, asked);
+    let wanting = Wanting {
+        left_out: printer.solver.left_out(),
+        formulas: options.formulas && formulas.is_none(),
+        ..wanting
+    };
+    let sought = (options.solutions && !course || wanting.formulas) && wanting.any();
     if sought {
-        let note = engine_note(built, &mut printer.solver);
+        let note = engine_note(built, &mut printer.solver, &wanting);
         printer.notes.extend(note);
     }
     let failure = printer.solver.worker().and_then(|w| w.failure().cloned());
-    let missing = sought || (options.formulas && formulas.is_none());
-    let engine_busy = failure.filter(|_| missing).and_then(|failure| EngineBusy::of(&failure));
+    let engine_busy = failure.filter(|_| sought).and_then(|failure| EngineBusy::of(&failure));
 
     Ok(Analysis {
         schema: SCHEMA.into(),
@@ -245,30 +249,96 @@ fn null_report(platform: &Platform, v: &NullVector) -> Vec<Component> {
     pairs.map(|((c, _), k)| Component { name: name(*c), coefficient: Some(k.to_string()) }).collect()
 }
 
-/// Says why solutions are not symbolic, if they are not.
-fn engine_note(built: bool, solver: &mut Solver<'_>) -> Option<String> {
-    if !built {
-        return Some(
-            "built without the symbolic engine: coefficients are reconstructed from the prime fields where \
-             they are rationals and square roots, and decimals elsewhere"
-                .into(),
+/// What an answer lacks that the symbolic engine gives.
+#[derive(Debug, Default)]
+struct Wanting {
+    /// What is observable and has a solution in decimals.
+    decimals: Vec<String>,
+    /// What is observable and has no solution.
+    unsolved: Vec<String>,
+    /// Number of combinations that are left out, since nobody gave their coefficients.
+    left_out: usize,
+    /// Number of unobservable directions without coefficients.
+    directions: usize,
+    /// True if degenerate angles may be missing.
+    loci: bool,
+    /// True if the formulas of Z that were asked for are missing.
+    formulas: bool,
+}
+
+impl Wanting {
+    fn new(
+        quantities: &[Quantity],
+        combinations: &[CombinationReport],
+        findings: &SchemeFindings,
+        found: &Found,
+        (solutions, generic): (bool, bool),
+    ) -> Self {
+        let quantities = quantities.iter().map(|q| (&q.name, q.degree, &q.solution));
+        let all = quantities.chain(combinations.iter().map(|c| (&c.expression, c.degree, &c.solution)));
+        let (mut decimals, mut unsolved) = (Vec::new(), Vec::new());
+        for (name, _, solution) in all.filter(|(_, degree, _)| solutions && degree.is_some()) {
+            match solution {
+                None => unsolved.push(name.clone()),
+                Some(s) if s.found_by == FoundBy::FloatingPoint => decimals.push(name.clone()),
+                Some(_) => {}
+            }
+        }
+        let directions = findings.null_space.iter().filter(|v| v.components.is_none()).count();
+        Self {
+            decimals,
+            unsolved,
+            directions,
+            loci: found.incomplete.is_some() || generic && found.loci.is_none(),
+            ..Self::default()
+        }
+    }
+
+    fn any(&self) -> bool {
+        !self.parts().is_empty()
+    }
+
+    /// A clause for each kind.
+    fn parts(&self) -> Vec<String> {
+        let count =
+            |n: usize, one: &str, many: &str| if n == 1 { one.to_string() } else { format!("{n} {many}") };
+        let mut out = Vec::new();
+        let mut say = |holds: bool, text: String| out.extend(holds.then_some(text));
+        say(!self.unsolved.is_empty(), format!("no solutions of {}", self.unsolved.join(", ")));
+        say(!self.decimals.is_empty(), format!("solutions in decimals of {}", self.decimals.join(", ")));
+        say(
+            self.left_out > 0,
+            format!(
+                "{} left out of the list, or written by psi^n and eps^n of single positions",
+                count(self.left_out, "one combination", "combinations")
+            ),
         );
-    }
-    if solver.too_many_angles() {
-        return Some(
-            "too many different angles for formulas in their sines and cosines: coefficients are decimals \
-             where they are no rationals and square roots"
-                .into(),
+        say(
+            self.directions > 0,
+            format!(
+                "{} without coefficients",
+                count(self.directions, "one unobservable direction", "unobservable directions")
+            ),
         );
+        say(self.loci, "an incomplete list of degenerate angles".into());
+        say(self.formulas, "no formulas of Z".into());
+        out
     }
-    let failure = solver.worker().and_then(|w| w.failure().cloned())?;
-    if matches!(failure, WorkerError::OverLimit { .. }) && !solver.given_up() {
-        return None;
-    }
-    Some(format!(
-        "formulas were given up ({failure}): coefficients are reconstructed from the prime fields where they \
-         are rationals and square roots, and decimals elsewhere"
-    ))
+}
+
+/// Says what is missing since the symbolic engine gave no formulas, and why; `None` where that is not why.
+fn engine_note(built: bool, solver: &mut Solver<'_>, wanting: &Wanting) -> Option<String> {
+    let failure = solver.worker().and_then(|w| w.failure().cloned());
+    let why = match failure {
+        _ if !built => "built without the symbolic engine".into(),
+        _ if solver.too_many_angles() => {
+            "too many different angles for formulas in their sines and cosines".into()
+        }
+        Some(WorkerError::OverLimit { .. }) if !solver.given_up() && !wanting.formulas => return None,
+        Some(failure) => format!("formulas were given up ({failure})"),
+        None => return None,
+    };
+    Some(format!("{why}, therefore: {}", wanting.parts().join("; ")))
 }
 
 fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, AnalysisError> {
@@ -382,44 +452,4 @@ fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
     let stations = platform.scheme().stations();
     let starts = (0..point.turns.len()).filter(|&i| !stations[i].continues);
     starts.map(|i| point.turns_to(i).into_iter().map(turn).collect()).collect()
-}
-
-/// What is found under the other carries, and why nothing is under one of them.
-fn carry_reports(
-    platform: &Platform,
-    verdicts: &Findings,
-) -> Result<(Vec<CarryReport>, Option<String>), AnalysisError> {
-    let scheme = platform.scheme();
-    if scheme.unknowns == Unknowns::Drift {
-        return Ok((Vec::new(), None));
-    }
-    let (mut out, mut untold) = (Vec::new(), None);
-    for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
-        let other = match Platform::new(Scheme { carry, ..scheme.clone() }) {
-            Err(SchemeError::Path(e)) => {
-                untold = Some(format!("nothing is said of {carry} carry: {e}"));
-                continue;
-            }
-            other => other?,
-        };
-        let there = degrees(&other, verdicts.seed)?;
-        // under reset carry every position has a psi of its own: each is held against the psi of the other carry
-        let reset = [scheme.carry, carry].contains(&Carry::Reset);
-        let one = |name: &str| name.split('@').next().unwrap_or(name).to_string();
-        let pairs = (0..platform.names().len()).flat_map(|c| (0..other.names().len()).map(move |d| (c, d)));
-        let differs = pairs.filter_map(|(c, d)| {
-            let (name, of) = (&platform.names()[c], &other.names()[d]);
-            let same = name == of || reset && one(name) == one(of);
-            let (here, there) = (verdicts.verdict(c), Verdict::of(&there, d));
-            let longer = if name.len() < of.len() { of } else { name };
-            (same && here != there).then(|| Difference { name: longer.clone(), here, there })
-        });
-        out.push(CarryReport {
-            carry,
-            unknowns: other.names().len(),
-            differs: differs.collect(),
-            rank_profile: there.rank_profile.clone(),
-        });
-    }
-    Ok((out, untold))
 }

@@ -105,7 +105,9 @@ pub(crate) fn combinations(
         let mut support = support(&vector);
         let lead = lead(platform, &support);
         support.sort_by_key(|c| *c != lead);
-        let functional = combination_coefficients(platform, solver, &support, &vector, degree)?;
+        let functional = combination_coefficients(platform, solver, &support, &vector, degree);
+        solver.left_out += usize::from(functional.is_none());
+        let functional = functional?;
         let name = readable_sum(platform, &functional.terms)?;
         Some(Combination { name, vector, functional: Some(functional), degree })
     };

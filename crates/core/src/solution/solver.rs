@@ -68,6 +68,8 @@ pub struct Solver<'a> {
     pub(super) frame: Frame,
     /// Per station: its position, and the axis if it turns there.
     pub(super) stations: Vec<(usize, Option<Axis>)>,
+    /// Number of combinations that were left out.
+    pub(super) left_out: usize,
 }
 
 impl<'a> Solver<'a> {
@@ -114,6 +116,7 @@ impl<'a> Solver<'a> {
             worker,
             frame,
             stations,
+            left_out: 0,
         }
     }
 
@@ -125,6 +128,11 @@ impl<'a> Solver<'a> {
     /// Whether a formula was too much work, so that no other was attempted.
     pub(crate) fn given_up(&self) -> bool {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
+    }
+
+    /// Number of sparse combinations that are not listed, because their coefficients were not found.
+    pub(crate) fn left_out(&self) -> usize {
+        self.left_out
     }
 
     /// The symbols of the formulas.
