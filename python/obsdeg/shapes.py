@@ -674,6 +674,19 @@ class SymmetryReport(Record):
     """Unknowns that the symmetry changes."""
 
 
+class BranchSide(Record):
+    """Side of a branch of abs or sign on which the verdicts were computed."""
+
+    __slots__ = ()
+
+    condition: str
+    """Condition on the argument of abs or sign that holds at the start of the runs at both random points, and with it where the verdicts
+    hold: `t - 7 < 0`. An argument that had either sign is named with both.
+    """
+    of_time: bool
+    """True if the argument depends on the time."""
+
+
 class DigitsReport(Record):
     """Margin of rank decisions in real numbers of many digits, at two random points."""
 
@@ -701,7 +714,7 @@ class SystemAnalysis(Shape):
     description: str
     """Description of the system, as in its file."""
     equations: list[str]
-    """Equations, `x' = ...` and `y = ...`, as written."""
+    """Equations as written: `u = ...` of known inputs that are functions of time, definitions, `x' = ...`, `y = ...`."""
     rank_profile: list[int]
     """Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order."""
     rank: int
@@ -741,9 +754,11 @@ class SystemAnalysis(Shape):
     rests_on_bound: bool
     """True if a verdict holds up to the bound on the order only."""
     branches: list[str]
-    """Functions of unknowns that have branches (abs, sign, roots, asin, acos). The verdicts hold on the branch of points near one, or
-    where the model is undefined there, on the first branch that was found.
+    """Functions with branches (abs, sign, roots, asin, acos) of unknowns, inputs, generic constants or the time. The verdicts hold on
+    the branch of points near one, or where the model is undefined there, on the first branch that was found.
     """
+    branch_sides: list[BranchSide]
+    """Sides of the branches of abs and sign on which the verdicts hold."""
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
     note: str | None

@@ -469,8 +469,8 @@ fn constraints_that_cannot_hold_are_named() {
         ("['2*k = 6']", "nothing unknown; expected states or parameters in it"),
         ("['x = w']", "`w` is not known here"),
         ("['p = x']", "expected the same shape on both sides of `-`, found a vector of 2 - a scalar"),
-        ("['x = 1', 'x = 2']", "no point was found at which it holds"),
-        ("['x = 1', 'x^2 = 2']", "no point was found at which it holds"),
+        ("['x = 1', 'x = 2']", "no real point was found at which it holds"),
+        ("['x = 1', 'x^2 = 2']", "no real point was found at which it holds"),
     ] {
         let text = format!(
             "name='c'\nconstraints={constraints}\nknown_inputs={{u='generic'}}\n[constants]\nk='generic'\n[states]\nx='u*k'\nz={{equation=0, initial=1}}\n'p[2]'=0\n[outputs]\ny='x + z'"

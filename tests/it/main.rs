@@ -3,6 +3,7 @@
 
 #[cfg(unix)]
 mod book;
+mod branches;
 mod browser;
 mod calibrate;
 mod chain;
@@ -28,6 +29,7 @@ mod language;
 mod laws;
 mod licences;
 mod models;
+mod points;
 mod program;
 mod reference_verdicts;
 mod release;

@@ -99,6 +99,16 @@ fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usiz
     Block::table(heading, [left("combination"), left("status"), right("degree")], list.iter().map(row))
 }
 
+/// The side of branches in time to which verdicts at a generic time are limited: ` where t - 7 < 0`; empty if
+/// the time is in no abs and no sign.
+fn side_in_time(a: &SystemAnalysis) -> String {
+    let of_time = a.branch_sides.iter().filter(|s| s.of_time).map(|s| s.condition.as_str());
+    match words::names(of_time) {
+        none if none.is_empty() => none,
+        conditions => format!(" where {conditions}"),
+    }
+}
+
 impl Answer for SystemAnalysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -175,12 +185,13 @@ impl Answer for SystemAnalysis {
         }
         assumed.extend(self.time.as_ref().map(|time| {
             let at = match time.as_str() {
-                "generic" => "a generic time (verdicts of almost every time)".into(),
+                "generic" => format!("a generic time (verdicts of almost every time{})", side_in_time(self)),
                 time => format!("t = {time}, where the run begins"),
             };
             format!(
-                "the equations or known inputs hold the time: judged at {at}, in later segments at a generic time; `time` in the file sets \
-                 another, or \"generic\""
+                "the equations or known inputs hold the time: judged at {at}, in later segments at a generic time{}; `time` in the file sets \
+                 another, or \"generic\"",
+                if time == "generic" { String::new() } else { side_in_time(self) }
             )
         }));
         if !self.constraints.is_empty() {
@@ -213,8 +224,12 @@ impl Answer for SystemAnalysis {
         );
         if !self.branches.is_empty() {
             assumed.push(format!(
-                "{}: one branch was looked at, that of points near one (positive unknowns), or where the model is not defined there, of the first point that was found; others may have other verdicts",
-                words::names(self.branches.iter().map(String::as_str))
+                "{}: one branch was looked at, that of points near one (positive unknowns), or where the model is not defined there, of the first point that was found{}; others may have other verdicts",
+                words::names(self.branches.iter().map(String::as_str)),
+                match words::names(self.branch_sides.iter().map(|s| s.condition.as_str())) {
+                    none if none.is_empty() => none,
+                    conditions => format!(", where {conditions}"),
+                }
             ));
         }
         if !self.combinations.is_empty() {

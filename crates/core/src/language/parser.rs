@@ -399,11 +399,17 @@ pub fn parse_components(text: &str, shapes: &Shapes) -> Result<Components, Expre
     Ok(components(read, &value))
 }
 
-/// Parses `a = b` as `a - b`; `norm(v) = c`, or `|v| = c`, as `dot(v, v) - c^2`, and so every root that stands alone on the left: it needs no root then.
+/// Parses `a = b` as `a - b`; `norm(v) = c`, or `|v| = c`, as `dot(v, v) - c^2`, and so every root that
+/// stands alone on the left: it needs no root then. The second expression is such a `c`, which is not
+/// negative where the equation holds.
 ///
 /// # Errors
 /// [`ExpressionError`] with the place in the text.
-pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, ExpressionError> {
+pub fn parse_equation(
+    text: &str,
+    shapes: &Shapes,
+) -> Result<(Components, Option<Expression>), ExpressionError> {
+    let mut other_side = None;
     let (read, value) = read(text, Names::Plain, shapes, |input| {
         let start = input.current_token_start();
         let bars = symbol(input, "|").is_some();
@@ -434,11 +440,12 @@ pub fn parse_equation(text: &str, shapes: &Shapes) -> Result<Components, Express
             input.reset(&start);
             return wrong(input, "a root or norm equal to what is not negative");
         }
+        other_side = Some(own);
         input.state.vectors = true;
         let square = binary(input, '*', &right, &right)?;
         binary(input, '-', &Value { entries: vec![argument], ..left }, &square)
     })?;
-    Ok(components(read, &value))
+    Ok((components(read, &value), other_side))
 }
 
 fn components(read: Reading<'_>, value: &Value) -> Components {

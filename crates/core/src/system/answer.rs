@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::constraints::slots_of;
-use super::dag::Op;
+use super::branches::{BranchSide, branches};
 use super::error::ModelError;
 use super::fibre::{Count, values_taken};
 use super::functions::gcd;
@@ -15,7 +14,6 @@ use super::rows::Unknown;
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
-use crate::language::Function;
 use crate::remedies::Remedies;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
@@ -35,7 +33,8 @@ pub struct SystemAnalysis {
     pub name: String,
     /// Description of the system, as in its file.
     pub description: String,
-    /// Equations, `x' = ...` and `y = ...`, as written.
+    /// Equations as written: `u = ...` of known inputs that are functions of time, definitions, `x' = ...`,
+    /// `y = ...`.
     pub equations: Vec<String>,
     /// Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order.
     pub rank_profile: Vec<usize>,
@@ -73,9 +72,12 @@ pub struct SystemAnalysis {
     pub closed: bool,
     /// True if a verdict holds up to the bound on the order only.
     pub rests_on_bound: bool,
-    /// Functions of unknowns that have branches (abs, sign, roots, asin, acos). The verdicts hold on the
-    /// branch of points near one, or where the model is undefined there, on the first branch that was found.
+    /// Functions with branches (abs, sign, roots, asin, acos) of unknowns, inputs, generic constants or the
+    /// time. The verdicts hold on the branch of points near one, or where the model is undefined there, on
+    /// the first branch that was found.
     pub branches: Vec<String>,
+    /// Sides of the branches of abs and sign on which the verdicts hold.
+    pub branch_sides: Vec<BranchSide>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
     /// Reason why solving expressions were not sought, or not all of them; null otherwise.
@@ -276,22 +278,6 @@ fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Opti
     None
 }
 
-/// The functions with branches that are taken of what is not known.
-fn branches(compiled: &Compiled) -> Vec<String> {
-    let known = |s: usize| matches!(compiled.roles[s], Role::Constant(_) | Role::KnownInput(_) | Role::Time);
-    let branched = [Function::Abs, Function::Sign, Function::Sqrt, Function::Asin, Function::Acos];
-    let taken = |f: Function| {
-        compiled.dag.ops.iter().any(|op| {
-            // a sign is the derivative of a size
-            matches!(*op, Op::Primitive { function, of, .. } if function == f
-                && !(f == Function::Sign && compiled.dag.has(Function::Abs, of))
-                && !slots_of(&compiled.dag, of).into_iter().all(known))
-        })
-    };
-    let named = Function::ALL.iter().filter(|(_, f)| branched.contains(f) && taken(*f));
-    named.map(|(name, _)| name.to_string()).collect()
-}
-
 fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
     match (count, unique) {
         (Ok(1) | Err(_), true) => NumberOfSolutions::OneByExpression,
@@ -361,6 +347,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
         branches: Vec::new(),
+        branch_sides: judged.sides.clone(),
         to_resolve: Remedies::default(),
         note: None,
         counting_order: None,

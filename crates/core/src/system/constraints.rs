@@ -1,4 +1,4 @@
-//! Random points at which the constraints of a model hold, in a prime field (in real numbers: `values`).
+//! Random points at which the constraints of a model hold, in a prime field (in real numbers: `newton`).
 //!
 //! Constraints are solved block by block. A block is all that hold no value left to choose but those of one of them; all of its constraints but one
 //! must be linear in the values that are solved for. So they leave a line, and on it the last one is a polynomial in one unknown, of which
@@ -15,6 +15,8 @@ use super::work::{PER_NODE, Step, Work};
 
 /// Draws of a block: half of all quadratic equations have a root in a field.
 const TRIES: usize = 60;
+/// Draws of a block that leaves no value to choose: only which of its roots is drawn differs.
+const TRIES_OF_POINTS: usize = 4;
 /// Highest degree of a constraint on a line.
 const MAX_DEGREE: usize = 400;
 /// Operations of a root of a polynomial and of its interpolation, for the square of its degree: powers modulo the
@@ -179,7 +181,8 @@ pub(crate) fn hold(
         let found = match slots.is_empty() {
             true => holds(values),
             false => {
-                (0..TRIES).any(|_| solve(&block_of, &slots, values, f, rng, work).is_some() && holds(values))
+                let tries = if slots.len() <= block.len() { TRIES_OF_POINTS } else { TRIES };
+                (0..tries).any(|_| solve(&block_of, &slots, values, f, rng, work).is_some() && holds(values))
             }
         };
         if !found {

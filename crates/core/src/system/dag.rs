@@ -2,7 +2,7 @@
 //!
 //! A function holds its derivative as well: `dF = weight d(of)`, the weight being a node like any other.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::language::{Expression, Function, Node};
 
@@ -63,6 +63,9 @@ pub struct Dag {
     pub(super) functions: HashMap<(Function, usize), usize>,
     /// Values of slots that are rational and never change, by slot: what an exponent may be made of.
     pub(super) definite: HashMap<usize, (i64, i64)>,
+    /// Logarithms that stand for a power whose exponent is no whole number and no half of one: nobody wrote
+    /// them.
+    pub(super) powers: HashSet<usize>,
 }
 
 impl Dag {

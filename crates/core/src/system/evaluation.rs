@@ -1,12 +1,12 @@
 //! Evaluation of a model's numbers and functions in prime fields and in real numbers of many digits.
 
-use obsdeg_exact::{Ball, Field, RealSpace, Reals, RowSpace, Scalars, SplitMix64, Transform};
+use obsdeg_exact::{Ball, Field, Reals, Scalars, SplitMix64, Transform};
 
 use super::constraints::hold;
 use super::dag::Dag;
-use super::taylor::{Signal, Singular, Taylor};
+use super::newton::hold_by_newton;
 use super::values::{NotHeld, Values};
-use super::work::{Step, Work, product};
+use super::work::Work;
 use crate::language::{Function, from_i128};
 
 /// An element as if at random, of a kind of function and its argument.
@@ -71,8 +71,16 @@ impl Values for Field {
         }
     }
 
+    fn is_positive(&self, _: &u64) -> Option<bool> {
+        None
+    }
+
     fn random(&self, rng: &mut SplitMix64, _: usize) -> u64 {
         rng.below(self.modulus())
+    }
+
+    fn near(&self, _: f64, _: i64, _: &mut SplitMix64) -> Option<u64> {
+        None
     }
 
     fn coefficient(&self, rng: &mut SplitMix64) -> u64 {
@@ -163,6 +171,10 @@ impl<const N: usize> Values for Reals<N> {
         }
     }
 
+    fn is_positive(&self, x: &Ball<N>) -> Option<bool> {
+        (!x.is_zero()).then(|| x.is_positive())
+    }
+
     /// A rational number of 60 bits: of the first attempts in (1/4, 5/4); then of either sign, the larger the later.
     fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Ball<N> {
         let digits = Ball::from_i64((rng.next_u64() >> 4) as i64).shifted(-60);
@@ -174,6 +186,12 @@ impl<const N: usize> Values for Reals<N> {
         let place = rng.below(2 * places) as i64 - (places as i64).min(4);
         let far = size.shifted(place);
         if rng.below(2) == 0 { far } else { far.neg() }
+    }
+
+    fn near(&self, x: f64, bits: i64, rng: &mut SplitMix64) -> Option<Ball<N>> {
+        let part = Ball::from_i64((rng.next_u64() >> 4) as i64).shifted(-60 - bits);
+        let size = if x == 0.0 { Ball::from_i64(1) } else { Ball::from_f64(x) };
+        Some(Ball::from_f64(x).add(&size.mul(&part)))
     }
 
     fn coefficient(&self, rng: &mut SplitMix64) -> Ball<N> {
@@ -191,73 +209,4 @@ impl<const N: usize> Values for Reals<N> {
     ) -> Result<(), NotHeld> {
         hold_by_newton(dag, constraints, values, free, work)
     }
-}
-
-/// Steps of Newton's method to a point where constraints hold: they double the digits.
-const STEPS: usize = 60;
-
-/// The nearest point at which constraints hold, about: Newton's steps of least length, from the random values. What is left of the constraints
-/// is in the error of the values.
-fn hold_by_newton<const N: usize>(
-    dag: &Dag,
-    constraints: &[usize],
-    values: &mut [Ball<N>],
-    free: &[bool],
-    work: &Work,
-) -> Result<(), NotHeld> {
-    let failed = NotHeld::Constraint(0);
-    let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
-    // the rank of the rows, their products, and the system of these
-    let (rows, columns) = (constraints.len() as u64, places.len() as u64);
-    let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
-    let operations = pairs.saturating_mul(product::<Ball<N>>());
-    for _ in 0..STEPS {
-        work.take(Step::Constraints, operations, 0)?;
-        let signal = |s: usize| Signal::Constant {
-            value: values[s],
-            lane: places.iter().position(|place| *place == s),
-        };
-        let signals = (0..values.len()).map(signal).collect();
-        let starts = vec![None; values.len()];
-        let seed = SplitMix64::new(0);
-        let at = Taylor::new(dag, Reals::<N>, places.len(), signals, &starts, constraints, false, seed, work)
-            .map_err(|e| if e == Singular::Refused { NotHeld::Refused } else { failed })?;
-        // independent rows (J | -g): those that add to the rank of J
-        let (mut rank, mut rows) = (RealSpace::new(Reals, places.len()), Vec::new());
-        let mut off = f64::NEG_INFINITY;
-        for &node in constraints {
-            let mut row = vec![Ball::ZERO; places.len()];
-            for (&lane, x) in at.lanes_of(node).iter().zip(at.dual(node, 0)) {
-                row[lane as usize] = x.midpoint();
-            }
-            off = off.max(at.start(node).midpoint().size_log2());
-            if rank.insert(&row) {
-                rows.push((row, at.start(node).midpoint().neg()));
-            }
-        }
-        let done = -(Ball::<N>::BITS as f64) + 24.0;
-        if off <= done {
-            for &s in &places {
-                values[s] = values[s].midpoint().widened(done);
-            }
-            return Ok(());
-        }
-        // the step J' y with J J' y = -g
-        let (m, dot) = (rows.len(), |a: &[Ball<N>], b: &[Ball<N>]| Reals.dot(&Ball::ZERO, a.iter().zip(b)));
-        let mut system = RealSpace::new(Reals, m + 1);
-        for (row, g) in &rows {
-            let mut line: Vec<Ball<N>> = rows.iter().map(|(other, _)| dot(row, other)).collect();
-            line.push(g.neg());
-            system.insert(&line);
-        }
-        let solution = system.null_space();
-        let [y] = solution.as_slice() else { return Err(failed) };
-        let scale = y[m].inverse().ok_or(failed)?;
-        for (k, &s) in places.iter().enumerate() {
-            for ((row, _), weight) in rows.iter().zip(y) {
-                values[s] = values[s].add(&row[k].mul(weight).mul(&scale)).midpoint();
-            }
-        }
-    }
-    Err(failed)
 }

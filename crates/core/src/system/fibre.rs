@@ -63,7 +63,7 @@ pub(super) enum NotCounted {
     TooMany,
     /// The start or an input is special.
     #[error(
-        "starts, inputs or segments are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
+        "starts, inputs, segments or constraints are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
     )]
     NotClosed,
     /// Two points disagree.
@@ -363,7 +363,8 @@ fn state_weights(compiled: &Compiled) -> Vec<u32> {
             break;
         }
     }
-    weights
+    // what constraints alone hold has a weight too: without one its powers have no end
+    weights.into_iter().map(|weight| weight.max(STATE)).collect()
 }
 
 /// The equations at a random point, with derivatives of the outputs up to `order`.

@@ -1,9 +1,10 @@
 //! Functions in the graph, each with its derivative.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
-use super::constraints::below;
+use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
+use super::intervals::{Interval, of_node};
 use crate::language::Function;
 
 /// Largest integer exponent.
@@ -30,6 +31,11 @@ impl Dag {
         for i in below(self, node) {
             let value = match self.ops[i] {
                 Op::Number { mantissa, decimals } => {
+                    // 2.000 is 2
+                    let (mut mantissa, mut decimals) = (mantissa, decimals);
+                    while decimals > 0 && mantissa % 10 == 0 {
+                        (mantissa, decimals) = (mantissa / 10, decimals - 1);
+                    }
                     let ten = 10i64.checked_pow(decimals.unsigned_abs())?;
                     let m = i64::try_from(mantissa).ok()?;
                     if decimals < 0 { (m.checked_mul(ten)?, 1) } else { reduced(m, ten)? }
@@ -71,6 +77,20 @@ impl Dag {
         Ok(self.quotient(one, power))
     }
 
+    /// True if a node is made of numbers, and of constants whose values are known, and is proven to be beyond
+    /// what [`Self::rational`] holds.
+    fn is_beyond_powers(&self, node: usize) -> bool {
+        let largest = i64::MAX as f64;
+        let given = |s: &usize| self.definite.get(s).map(|&(p, q)| p as f64 / q as f64);
+        let slots = slots_of(self, node);
+        let known: Option<BTreeMap<usize, f64>> = slots.iter().map(|s| Some((*s, given(s)?))).collect();
+        known.is_some_and(|known| {
+            let size =
+                of_node(self, node, &known.into_iter().map(|(s, x)| (s, Interval::about(x))).collect());
+            size.low > largest || size.high < -largest
+        })
+    }
+
     /// `x^e`: repeated products for an integer, roots for half of one, else `exp(e log x)`.
     pub(super) fn power(&mut self, x: usize, e: usize) -> Result<usize, DagError> {
         match self.rational(e) {
@@ -79,8 +99,13 @@ impl Dag {
                 let root = self.function(Function::Sqrt, x);
                 self.integer_power(root, m)
             }
+            None if self.is_beyond_powers(e) => Err(DagError::TooLarge("an exponent above 1000")),
             _ => {
+                let written = self.has(Function::Log, x);
                 let log = self.function(Function::Log, x);
+                if !written {
+                    self.powers.insert(log);
+                }
                 let exponent = self.product(e, log);
                 Ok(self.function(Function::Exp, exponent))
             }

@@ -4,12 +4,13 @@ use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
+use super::branches::{BranchSide, Signs, sided, sides};
 use super::dag::{Dag, Op};
 use super::error::ModelError;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, SystemModel};
-use super::real_points::has_real_point;
-use super::rows::{Layout, SystemRows, random_field};
+use super::real_points::{dependent_at_points, real_point};
+use super::rows::{Layout, Maker, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Work};
@@ -20,6 +21,16 @@ use crate::language::Function;
 
 /// Pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
+
+/// Operations of verdicts in prime fields up to which they are compared with those at a real point, where
+/// constraints hold.
+const COMPARED: u64 = 2_000_000;
+
+/// Primes that are tried until constraints have a point.
+const PRIMES: usize = 20;
+
+/// Points that are drawn in each.
+const POINTS: usize = 2;
 
 /// Largest bound on the probability of a wrong verdict with which a verdict is given.
 const CERTAIN: f64 = 1e-9;
@@ -47,6 +58,8 @@ pub struct Judgement {
     pub work: u64,
     /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
     pub rests_on_bound: bool,
+    /// Sides of the branches of abs and sign at the two points.
+    pub sides: Vec<BranchSide>,
 }
 
 /// What the verdicts on a system rest on.
@@ -118,6 +131,8 @@ pub(crate) struct At<S: Values> {
     closed: bool,
     gap: Gap,
     steps: Steps<S>,
+    /// Signs of the arguments of abs and sign.
+    signs: Signs,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
@@ -217,7 +232,8 @@ fn climbed<S: Values>(
     let values = rows.values(compiled, layout, model.constants.len());
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
-    Ok(At { degrees, combinations, span: basis, values, ended, closed, gap, steps })
+    let signs = rows.signs(&sided(compiled));
+    Ok(At { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
 /// Where the model has no value, in words.
@@ -231,13 +247,23 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
         Singular::Constraint(c) => {
             let (of, message) = (
                 &model.constraints[c],
-                "no point was found at which it holds; expected constraints that can be solved one by one, or together where all but one are linear",
+                format!(
+                    "no point was found at which it holds, from {points} starts; give one under [simulation.values]"
+                ),
             );
-            return of.place.error(message.into(), 0..of.text.len());
+            return of.place.error(message, 0..of.text.len());
         }
+        Singular::Dependent(c) => return dependent_at_points(model, c),
         // said before, with what was too much
         Singular::Refused => return refuse("the limit of work".into()),
         Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
+        Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => (
+            node,
+            format!(
+                "a power whose exponent is not known as a whole number or half of one is defined for a positive base alone, which it was at \
+                 none of {points} points that were tried"
+            ),
+        ),
         Singular::Domain(node, function) => (
             node,
             format!("{} is not defined here at any of {points} points that were tried", name(function)),
@@ -305,7 +331,8 @@ fn judge_within(
     (seed, bound): (u64, Option<usize>),
     spent: &mut Spent,
 ) -> Result<Judgement, ModelError> {
-    let layout = checked_layout(model, compiled, bound)?;
+    let mut layout = checked_layout(model, compiled, bound)?;
+    layout.dependent = real_point(model, compiled, &layout, seed, spent)?;
     let rational = compiled.dag.is_rational();
     if !rational {
         let mut rng = model.random(seed, "values of functions");
@@ -316,14 +343,18 @@ fn judge_within(
         if let Some(count) = independent
             && let Ok(judged) = judge_in_fields(model, apart, &layout, seed, spent)
         {
-            has_real_point(model, compiled, &layout, seed, spent)?;
             return Ok(Judgement { independent_functions: Some(count), ..judged });
         }
         return judge_by_digits(model, compiled, &layout, seed, spent);
     }
-    let judged = judge_in_fields(model, compiled, &layout, seed, spent)?;
-    has_real_point(model, compiled, &layout, seed, spent)?;
-    Ok(Judgement { independent_functions: Some(0), ..judged })
+    match judge_in_fields(model, compiled, &layout, seed, spent) {
+        // constraints with real points that were found in no prime field
+        Err(_) if !compiled.constraints.is_empty() => judge_by_digits(model, compiled, &layout, seed, spent),
+        Ok(judged) if !holds_at_real_point(model, compiled, &layout, &judged, spent) => {
+            judge_by_digits(model, compiled, &layout, seed, spent)
+        }
+        judged => Ok(Judgement { independent_functions: Some(0), ..judged? }),
+    }
 }
 
 /// Judges a model in two prime fields: a rational one, or one whose functions have independent values.
@@ -342,11 +373,20 @@ fn judge_in_fields(
     for attempt in 0..ATTEMPTS {
         let mut judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
-            let field = match order {
-                1 => random_field(&mut rng),
+            let draw = |rng: &mut SplitMix64| match order {
+                1 => random_field(rng),
                 // it has divisors enough
-                _ => RootField::random(order, &mut rng).map_or_else(|_| random_field(&mut rng), |k| k.field),
+                _ => RootField::random(order, rng).map_or_else(|_| random_field(rng), |k| k.field),
             };
+            let mut field = draw(&mut rng);
+            // constraints that leave points alone have one modulo some primes
+            let mut own = model.random(seed, &format!("points of constraints, attempt {attempt}, field {i}"));
+            for _ in 1..PRIMES {
+                if can_hold(model, compiled, layout, field, &mut own, spent) {
+                    break;
+                }
+                field = draw(&mut rng);
+            }
             climb_at(model, compiled, layout, field, &mut rng, spent).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
@@ -372,6 +412,52 @@ fn judge_in_fields(
     )))
 }
 
+/// False if verdicts in prime fields are others than those at a real point: constraints may be met in several
+/// parts, and one of these may have no real point, as where x = 1 or x^2 + y^2 = 0. True where the comparison
+/// would take too much work, or decides nothing.
+fn holds_at_real_point(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    judged: &Judgement,
+    spent: &mut Spent,
+) -> bool {
+    if compiled.constraints.is_empty() || judged.work > COMPARED {
+        return true;
+    }
+    let mut rng = model.random(judged.findings.seed, "verdicts, real point of the constraints");
+    match climb_at(model, compiled, layout, Reals::<4>, &mut rng, spent) {
+        Ok(at) if at.gap.is_decisive(Reals::<4>::BITS) => {
+            let asked = at.combinations == judged.findings.asked;
+            asked && at.degrees == judged.findings.degrees
+        }
+        _ => true,
+    }
+}
+
+/// True if a point at which the constraints hold was found in a prime field.
+fn can_hold(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    field: Field,
+    rng: &mut SplitMix64,
+    spent: &mut Spent,
+) -> bool {
+    if compiled.constraints.is_empty() {
+        return true;
+    }
+    let work = Work::new(model.work_limit);
+    let maker = Maker { model, compiled, layout, field, work: &work };
+    let free = maker.free(0);
+    let found = (0..POINTS).any(|attempt| {
+        let Some(mut values) = maker.values(rng, attempt) else { return false };
+        field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, rng, &work).is_ok()
+    });
+    spent.add(&work);
+    found
+}
+
 /// Judges a model by real numbers, whether it is rational or not: the other way to the same verdicts.
 ///
 /// # Errors
@@ -382,8 +468,9 @@ pub fn judge_in_digits(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
-    let layout = checked_layout(model, compiled, bound)?;
-    judge_by_digits(model, compiled, &layout, seed, &mut Spent::default())
+    let (mut layout, mut spent) = (checked_layout(model, compiled, bound)?, Spent::default());
+    layout.dependent = real_point(model, compiled, &layout, seed, &mut spent)?;
+    judge_by_digits(model, compiled, &layout, seed, &mut spent)
 }
 
 fn judge_by_digits(
@@ -453,7 +540,8 @@ fn pair<const A: usize, const B: usize>(
     let gap = first.gap.and(second.gap);
     let certainty =
         SystemCertainty::Digits(ByDigits { digits, nonzero: decimal(gap.nonzero), zero: decimal(gap.zero) });
-    Ok(Ok(Judgement::of(layout.clone(), first, certainty, seed)))
+    let sides = sides(model, compiled, &[first.signs.clone(), second.signs]);
+    Ok(Ok(Judgement { sides, ..Judgement::of(layout.clone(), first, certainty, seed) }))
 }
 
 impl<S: Values> At<S> {
@@ -478,6 +566,7 @@ impl Judgement {
             span: None,
             fields: None,
             independent_functions: None,
+            sides: Vec::new(),
             work: 0,
         }
     }

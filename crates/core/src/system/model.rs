@@ -176,6 +176,9 @@ pub struct SystemModel {
     pub segments: Vec<Segment>,
     /// What is zero at the start of every experiment: expressions of states, parameters and constants, with the equation as their text.
     pub constraints: Vec<PlacedExpression>,
+    /// What is not negative where the constraints hold: the other sides of those with a root alone on the
+    /// left, which is taken squared.
+    pub not_negative: Vec<PlacedExpression>,
     /// Combinations to be judged.
     pub combinations: Vec<PlacedExpression>,
     /// Time at which the first segment begins.
@@ -252,6 +255,8 @@ pub struct Compiled {
     pub segments: Vec<CompiledSegment>,
     /// The nodes of the constraints: zero at the start.
     pub constraints: Vec<usize>,
+    /// The nodes that are not negative where the constraints hold.
+    pub not_negative: Vec<usize>,
     /// The nodes of the combinations.
     pub combinations: Vec<usize>,
     /// Where each division and root was written first.
@@ -318,6 +323,7 @@ impl Compiled {
             starts: given(&self.starts),
             segments: self.segments.iter().map(segment).collect(),
             constraints: all(&self.constraints),
+            not_negative: all(&self.not_negative),
             combinations: all(&self.combinations),
             places: self.places.iter().map(|(i, place)| (nodes[*i], place.clone())).collect(),
         }
@@ -348,15 +354,32 @@ pub struct CompiledSegment {
 }
 
 impl SystemModel {
-    /// The equations as written, definitions first: `a = ...`, `x' = ...`, `y = ...`; what one text says of all entries of a vector
-    /// stands once.
+    /// The equations as written, known inputs that are functions of time first, then definitions: `u = ...`,
+    /// `a = ...`, `x' = ...`, `y = ...`; what one text says of all entries of a vector stands once. An
+    /// experiment with a function of its own is named.
     pub(crate) fn equations(&self) -> Vec<String> {
+        let mut inputs = Vec::new();
+        for (i, (named, _)) in self.known_inputs.iter().enumerate() {
+            let of = |e: usize| match self.known_input(e, i) {
+                KnownInput::Function(f) => Some(f),
+                KnownInput::Generic | KnownInput::Polynomial(_) => None,
+            };
+            let all: Vec<_> = (0..self.own.len().max(1)).map(of).collect();
+            let text = |f: Option<&PlacedExpression>| f.map(|f| f.text.clone());
+            if all.iter().all(|f| text(*f) == text(all[0])) {
+                inputs.extend(all[0].map(|f| (&named.name, String::new(), f)));
+                continue;
+            }
+            let own = all.into_iter().enumerate().filter_map(|(e, f)| Some((e, f?)));
+            inputs.extend(own.map(|(e, f)| (&named.name, format!(" in experiment {}", e + 1), f)));
+        }
+        let inputs = inputs.iter().map(|(name, at, f)| (*name, at.as_str(), *f));
         let definitions = self.definitions.iter().map(|(n, e)| (n, "", e));
         let states = self.states.iter().map(|s| (&s.named.name, "'", &s.equation));
         let outputs = self.outputs.iter().map(|(n, e)| (&n.name, "", e));
         let base = |name: &str| name.split('[').next().unwrap_or_default().to_string();
         let mut out = Vec::new();
-        let all: Vec<_> = definitions.chain(states).chain(outputs).collect();
+        let all: Vec<_> = inputs.chain(definitions).chain(states).chain(outputs).collect();
         for (i, (name, sign, e)) in all.iter().enumerate() {
             let same = |j: usize| all.get(j).is_some_and(|o| base(o.0) == base(name) && o.2.place == e.place);
             match (i > 0 && same(i - 1), same(i + 1)) {
@@ -390,6 +413,23 @@ impl SystemModel {
             (Some((_, formula)), _) | (None, Constant::Value(formula)) => Some(formula),
             (None, Constant::Generic) => None,
         }
+    }
+
+    /// The value that the file gives for a simulation of what has this role, in an experiment (counted from
+    /// 0).
+    pub(super) fn given(&self, role: Role, experiment: usize) -> Option<f64> {
+        let name = match role {
+            Role::State(i) => &self.states[i].named.name,
+            Role::Parameter(i) => &self.parameters[i].name,
+            Role::Constant(i) => &self.constants[i].0.name,
+            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => return None,
+        };
+        self.simulation.value(name, experiment)
+    }
+
+    /// The names of all slots.
+    pub(super) fn slot_names(&self) -> Vec<String> {
+        self.roles().into_iter().map(|(name, _)| name).collect()
     }
 
     /// All names with their roles, in slot order.
@@ -625,6 +665,10 @@ impl SystemModel {
             self.check_constraint(&dag, &roles, made, formula)?;
             constraints.push(made);
         }
+        let mut not_negative = Vec::new();
+        for formula in &self.not_negative {
+            not_negative.push(node(&mut dag, formula, &names)?);
+        }
         let mut combinations = Vec::new();
         for formula in &self.combinations {
             combinations.push(node(&mut dag, formula, &names)?);
@@ -636,6 +680,7 @@ impl SystemModel {
             starts,
             segments,
             constraints,
+            not_negative,
             combinations,
             places,
         })

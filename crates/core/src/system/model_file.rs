@@ -80,7 +80,8 @@ pub struct ModelFile {
     #[schemars(with = "Option<serde_json::Value>")]
     time: Option<Spanned<Value>>,
     /// Equations that hold at the start of every experiment, as `norm(q) = 1`. There must be a real point
-    /// that meets them. Random starts lie on them, and their differentials are known.
+    /// that meets them and at which their gradients are independent; where none is found, one near
+    /// `simulation.values` is. Random starts lie on them, and their differentials are known.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     constraints: Vec<Spanned<String>>,
@@ -471,7 +472,9 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     }
     model.time = file.time.as_ref().map_or(Ok(StartTime::Zero), |time| r.time(time))?;
     for c in &file.constraints {
-        model.constraints.extend(r.constraint(c)?);
+        let (constraints, not_negative) = r.constraint(c)?;
+        model.constraints.extend(constraints);
+        model.not_negative.extend(not_negative);
     }
     for c in &file.combinations {
         let what = format!("the combination {}", c.get_ref());

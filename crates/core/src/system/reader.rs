@@ -196,19 +196,23 @@ impl Reader<'_> {
         Ok(Formulas { shape: read.shape, parts: read.entries.into_iter().map(part).collect() })
     }
 
-    /// The entries of `left - right` of an equation; their text is the equation.
-    pub(super) fn constraint(&self, equation: &Spanned<String>) -> Result<Vec<PlacedExpression>, ModelError> {
+    /// The entries of `left - right` of an equation, and what is not negative where it holds; their text is
+    /// the equation.
+    pub(super) fn constraint(
+        &self,
+        equation: &Spanned<String>,
+    ) -> Result<(Vec<PlacedExpression>, Option<PlacedExpression>), ModelError> {
         let (text, span) = (equation.get_ref(), equation.span());
         let offset = self.text[span.clone()].find(text.as_str()).map(|o| span.start + o);
         let place = Place { what: format!("the constraint {}", excerpt(text)), offset };
-        let read = parse_equation(text, &self.shapes).map_err(|e| {
+        let (read, size) = parse_equation(text, &self.shapes).map_err(|e| {
             let mut error = place.error(e.to_string(), e.span());
             error.span.get_or_insert(span);
             error
         })?;
         let part =
             |expression| PlacedExpression { text: text.trim().into(), expression, place: place.clone() };
-        Ok(read.entries.into_iter().map(part).collect())
+        Ok((read.entries.into_iter().map(part).collect(), size.map(part)))
     }
 
     /// The expressions of the entries of `name`, whose shape is known; 0 stands for every entry.

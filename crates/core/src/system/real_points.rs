@@ -1,32 +1,54 @@
 //! Real points at which the constraints of a model hold: prime fields have points where there is no real one.
 
-use obsdeg_exact::Reals;
+use obsdeg_exact::{Ball, Reals, SplitMix64};
 
 use super::error::ModelError;
-use super::model::{Compiled, Role, StateStart, SystemModel};
+use super::held::{CLOSE, distinct};
+use super::intervals::range;
+use super::model::{Compiled, SystemModel};
+use super::newton::{hold_by_newton, off};
 use super::rows::{Layout, Maker};
+use super::taylor::{Signal, Singular, Taylor};
 use super::values::{NotHeld, Values};
-use super::work::{Spent, Work};
+use super::work::{Refused, Spent, Work};
 
-/// Starts of Newton's method: the values of the file first, then random points, the later the farther.
+/// Starts of Newton's method: near the values of the file first, then random points, the later the farther.
 const TRIES: usize = 200;
 /// Random attempts from one start to the next: sizes grow with them.
 const FARTHER: usize = 10;
+/// Starts from which only points with dependent gradients were reached, before no other kind is expected.
+const DEPENDENT: usize = 20;
+/// Points near a point at which it is tried whether constraints follow from the others.
+const NEARBY: usize = 3;
+/// Relative residual, as a power of two, below which a constraint holds at such a point.
+const HOLDS: f64 = -128.0;
 
-/// Looks for a real point at which all constraints hold.
+/// What was found at one start.
+enum Found {
+    /// A point, and the number of constraints that follow from the others there.
+    Point(usize),
+    /// A point at which gradients of constraints depend on each other, though the constraints do not.
+    Dependent(usize),
+    Nothing,
+}
+
+/// Looks for a real point at which all constraints hold and their gradients are independent. The number of
+/// constraints that follow from the others there.
 ///
 /// # Errors
-/// [`ModelError`] where none was found, or where the search is beyond the limit of work.
-pub(super) fn has_real_point(
+/// [`ModelError`] where the signs of both sides contradict, where constraints hold only where gradients depend
+/// on each other, where no point was found, and where the search is beyond the limit of work.
+pub(super) fn real_point(
     model: &SystemModel,
     compiled: &Compiled,
     layout: &Layout,
     seed: u64,
     spent: &mut Spent,
-) -> Result<(), ModelError> {
+) -> Result<usize, ModelError> {
     if model.constraints.is_empty() {
-        return Ok(());
+        return Ok(0);
     }
+    signs(model, compiled)?;
     let work = Work::new(model.work_limit);
     let found = sought(model, compiled, layout, seed, &work);
     spent.add(&work);
@@ -39,52 +61,137 @@ fn sought(
     layout: &Layout,
     seed: u64,
     work: &Work,
-) -> Result<(), ModelError> {
-    let Some(first) = model.constraints.first() else { return Ok(()) };
-    let field = Reals::<4>;
-    let maker = Maker { model, compiled, layout, field, work };
+) -> Result<usize, ModelError> {
+    let Some(first) = model.constraints.first() else { return Ok(0) };
+    let maker = Maker { model, compiled, layout, field: Reals::<4>, work };
     let mut rng = model.random(seed, "real points");
-    let free: Vec<bool> = (compiled.roles.iter())
-        .map(|role| match *role {
-            Role::State(i) => !matches!(model.states[i].start, StateStart::Value(_)),
-            Role::Parameter(_) => true,
-            Role::Constant(c) => compiled.constants(0)[c].is_none(),
-            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
-        })
-        .collect();
+    let free = maker.free(0);
+    let mut dependent: Vec<usize> = Vec::new();
     for attempt in 0..TRIES {
         let Some(mut values) = maker.values(&mut rng, attempt * FARTHER) else { continue };
-        if attempt == 0 {
-            for (slot, value) in nominal(model, compiled).into_iter().enumerate() {
-                values[slot] =
-                    value.filter(|_| free[slot]).map_or(values[slot], obsdeg_exact::Ball::from_f64);
-            }
+        if let Some(&bits) = CLOSE.get(attempt) {
+            maker.near_given(0, &free, &mut values, bits, &mut rng);
         }
-        match field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut rng, work) {
-            Ok(()) => return Ok(()),
-            Err(NotHeld::Refused) => break,
-            Err(_) => {}
+        match from_start(&maker, values, &free, &mut rng) {
+            Ok(Found::Point(following)) => return Ok(following),
+            Ok(Found::Dependent(c)) => dependent.push(c),
+            Ok(Found::Nothing) => {}
+            Err(Refused) => break,
         }
+        if dependent.len() >= DEPENDENT && dependent.len() > attempt / 2 {
+            break;
+        }
+    }
+    if let Some(&c) = dependent.first() {
+        return Err(dependent_at_points(model, c));
     }
     work.refused().map_or(Ok(()), Err)?;
     let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
     let message = format!(
-        "no real point was found at which it holds{all}, in {TRIES} tries from random points; if there is one, give it under \
-         [simulation.values]"
+        "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}; if there is one, give it under \
+         [simulation.values]",
+        if maker.gives_start() { ", the first three near the values given" } else { "" }
     );
     Err(first.place.error(message, 0..first.text.len()))
 }
 
-/// The value that the file gives for a simulation, of every slot.
-fn nominal(model: &SystemModel, compiled: &Compiled) -> Vec<Option<f64>> {
-    let value = |role: &Role| {
-        let name = match *role {
-            Role::State(i) => &model.states[i].named.name,
-            Role::Parameter(i) => &model.parameters[i].name,
-            Role::Constant(i) => &model.constants[i].0.name,
-            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => return None,
-        };
-        model.simulation.values.get(name).copied()
+/// The refusal of a constraint at whose points gradients depend on each other.
+pub(super) fn dependent_at_points(model: &SystemModel, c: usize) -> ModelError {
+    let own = &model.constraints[c];
+    let message = "at the points found at which it holds its gradient vanishes or depends on those of the other constraints, so that \
+                   derivatives do not say what it leaves free; expected constraints with independent gradients (x = 0 and y = 0 in \
+                   place of x^2 + y^2 = 0, and none that follows from the others)";
+    own.place.error(message.into(), 0..own.text.len())
+}
+
+/// Refuses constraints that the signs of their sides contradict, or that hold only where their sides touch.
+fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
+    for experiment in 0..compiled.experiments.len() {
+        for (root, &node) in model.not_negative.iter().zip(&compiled.not_negative) {
+            let refuse = |message: &str| Err(root.place.error(message.into(), 0..root.text.len()));
+            match range(compiled, node, experiment) {
+                right if right.high <= 0.0 && right.excludes_zero() => {
+                    return refuse(
+                        "no real point meets it: its right side is negative everywhere, which a root or norm never is",
+                    );
+                }
+                right if right.high <= 0.0 => {
+                    return refuse(
+                        "it holds only where both sides are zero, because its right side is never positive and a root or norm never \
+                         negative; expected these conditions as constraints of their own",
+                    );
+                }
+                _ => {}
+            }
+        }
+        for (own, &node) in model.constraints.iter().zip(&compiled.constraints) {
+            let refuse = |message: String| Err(own.place.error(message, 0..own.text.len()));
+            let difference = range(compiled, node, experiment);
+            let (sign, bound) = match (difference.low >= 0.0, difference.high <= 0.0) {
+                (true, _) => ("negative", difference.low),
+                (_, true) => ("positive", difference.high),
+                _ => continue,
+            };
+            if bound != 0.0 || difference.excludes_zero() {
+                let sign = if sign == "negative" { "positive" } else { "negative" };
+                return refuse(format!(
+                    "no real point meets it: its left side minus its right side is {sign} everywhere"
+                ));
+            }
+            return refuse(format!(
+                "its left side minus its right side is never {sign}: where it holds, its gradient vanishes and says nothing; expected the \
+                 conditions themselves as constraints (x = 0 and y = 0 in place of x^2 + y^2 = 0)"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Newton's method from one start, and what the point is.
+fn from_start(
+    maker: &Maker<'_, '_, Reals<4>>,
+    mut values: Vec<Ball<4>>,
+    free: &[bool],
+    rng: &mut SplitMix64,
+) -> Result<Found, Refused> {
+    let compiled = maker.compiled;
+    let (dag, all) = (&compiled.dag, distinct(&compiled.constraints));
+    let place = |c: usize| compiled.constraints.iter().position(|node| *node == all[c]).unwrap_or(0);
+    match hold_by_newton(dag, &all, &mut values, free, maker.work) {
+        Ok(()) => {}
+        Err(NotHeld::Constraint(_)) => return Ok(Found::Nothing),
+        Err(NotHeld::Dependent(c)) => return Ok(Found::Dependent(place(c))),
+        Err(NotHeld::Refused) => return Err(Refused),
+    }
+    if !are_not_negative(maker, &values) {
+        return Ok(Found::Nothing);
+    }
+    let independent = match maker.independent(&all, &values, free) {
+        Ok(independent) => independent,
+        Err(Singular::Refused) => return Err(Refused),
+        Err(_) => return Ok(Found::Nothing),
     };
-    compiled.roles.iter().map(value).collect()
+    let Some(other) = (0..all.len()).find(|c| !independent.contains(c)) else { return Ok(Found::Point(0)) };
+    // the others hold wherever the independent ones do, or only at points like this one
+    let kept: Vec<usize> = independent.iter().map(|&c| all[c]).collect();
+    let others: Vec<usize> = (0..all.len()).filter(|c| !independent.contains(c)).map(|c| all[c]).collect();
+    let follow = (0..NEARBY).all(|_| {
+        let mut nearby: Vec<Ball<4>> = values.iter().map(Ball::midpoint).collect();
+        for (x, _) in nearby.iter_mut().zip(free).filter(|(_, free)| **free) {
+            *x = Reals::<4>.near(x.to_f64(), CLOSE[0], rng).unwrap_or(*x);
+        }
+        hold_by_newton(dag, &kept, &mut nearby, free, maker.work).is_ok()
+            && off(dag, &others, &nearby, maker.work).is_some_and(|off| off < HOLDS)
+    });
+    Ok(if follow { Found::Point(others.len()) } else { Found::Dependent(place(other)) })
+}
+
+/// True if no root that constraints hold would be negative at a point.
+fn are_not_negative(maker: &Maker<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
+    let compiled = maker.compiled;
+    let signals = values.iter().map(|value| Signal::Constant { value: *value, lane: None }).collect();
+    let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
+    let nodes = &compiled.not_negative;
+    let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, maker.work);
+    at.is_ok_and(|at| nodes.iter().all(|&node| !at.start(node).is_negative()))
 }

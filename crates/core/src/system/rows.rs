@@ -4,6 +4,7 @@ use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
 use super::adjoint::Adjoint;
+use super::branches::Signs;
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
@@ -39,6 +40,8 @@ pub struct Layout {
     pub bound: usize,
     /// The point is generic and every input is, so that an order that adds nothing is the end.
     pub closed: bool,
+    /// Number of constraints that follow from the others where these hold.
+    pub dependent: usize,
 }
 
 impl Layout {
@@ -92,7 +95,7 @@ impl Layout {
                 }
             }
         }
-        Self { unknowns, bound, closed }
+        Self { unknowns, bound, closed, dependent: 0 }
     }
 
     pub(super) fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
@@ -155,14 +158,14 @@ pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
 }
 
 /// Rows over the unknowns.
-type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
+pub(super) type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
 
 /// What the runs of one experiment share at a point.
 pub(super) struct Point<S: Values> {
-    signals: Vec<Signal<S::Element>>,
-    initial: Vec<Option<Initial<S::Element>>>,
-    seed: u64,
-    experiment: usize,
+    pub(super) signals: Vec<Signal<S::Element>>,
+    pub(super) initial: Vec<Option<Initial<S::Element>>>,
+    pub(super) seed: u64,
+    pub(super) experiment: usize,
 }
 
 /// Everything a point is made from.
@@ -302,67 +305,6 @@ impl<'a, S: Values> Maker<'a, '_, S> {
             }
         }
         Ok(())
-    }
-
-    /// Moves states, and in the first experiment what all share, to where the constraints hold.
-    fn hold_constraints(
-        &self,
-        point: &mut Point<S>,
-        first: bool,
-        rng: &mut SplitMix64,
-    ) -> Result<(), Singular> {
-        let compiled = self.compiled;
-        if compiled.constraints.is_empty() {
-            return Ok(());
-        }
-        let value = |slot: usize| match (&point.signals[slot], &point.initial[slot]) {
-            (Signal::Constant { value, .. }, _) => *value,
-            (_, Some(start)) => start.0,
-            _ => self.field.zero(),
-        };
-        let mut values: Vec<S::Element> = (0..compiled.roles.len()).map(value).collect();
-        let free = |role: &Role| match *role {
-            Role::State(_) => true,
-            Role::Parameter(_) => first,
-            Role::Constant(c) => first && compiled.constants(point.experiment)[c].is_none(),
-            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
-        };
-        let free: Vec<bool> = compiled.roles.iter().map(free).collect();
-        let mut own = SplitMix64::new(rng.next_u64());
-        self.field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own, self.work)?;
-        for (slot, x) in values.into_iter().enumerate() {
-            match (&mut point.signals[slot], &mut point.initial[slot]) {
-                (Signal::Constant { value, .. }, _) => *value = x,
-                (_, Some(start)) => start.0 = x,
-                _ => {}
-            }
-        }
-        Ok(())
-    }
-
-    /// The differentials of the constraints, and whether their first derivatives are zero here: then the motion keeps them, and the
-    /// point is generic among those that hold them.
-    fn constraints(&self, point: &Point<S>) -> Result<(Rows<S>, bool), Singular> {
-        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
-        if compiled.constraints.is_empty() {
-            return Ok((Vec::new(), true));
-        }
-        let mut seen = Taylor::new(
-            &compiled.dag,
-            f.clone(),
-            lanes,
-            point.signals.clone(),
-            &point.initial,
-            &compiled.constraints,
-            true,
-            SplitMix64::new(point.seed),
-            self.work,
-        )?;
-        let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
-        let rows = compiled.constraints.iter().map(row).collect();
-        seen.advance();
-        let kept = compiled.constraints.iter().all(|&node| f.is_zero(&seen.value(node, 1)));
-        Ok((rows, kept))
     }
 
     /// The series of a run.
@@ -522,7 +464,7 @@ fn given(list: &[Option<usize>]) -> Vec<(usize, usize)> {
 }
 
 /// A row with zeros where it has no lanes.
-fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
+pub(super) fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
     let mut out = vec![f.zero(); lanes];
     for (&lane, x) in support.iter().zip(row) {
         out[lane as usize] = *x;
@@ -578,7 +520,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         for experiment in 0..model.experiments.max(1) {
             let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
             maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
-            maker.hold_constraints(&mut point, experiment == 0, rng)?;
+            maker.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
             let value = |slot: usize| match &point.signals[slot] {
                 Signal::Constant { value, .. } => Some(*value),
                 _ => None,
@@ -631,6 +573,15 @@ impl<'a, S: Values> SystemRows<'a, S> {
     /// The gradients of the combinations at the start of the first run.
     pub(crate) fn combinations(&self) -> &[Vec<S::Element>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
+    }
+
+    /// Signs of some nodes at the start of every run, where they take part.
+    pub(crate) fn signs(&self, nodes: &[usize]) -> Signs {
+        let sign = |run: &Run<'_, S>, node: usize| {
+            let taylor = &run.taylor;
+            taylor.takes_part(node).then(|| self.field.is_positive(&taylor.start(node))).flatten()
+        };
+        nodes.iter().map(|&node| self.runs.iter().map(|run| sign(run, node)).collect()).collect()
     }
 
     /// How clear the ranks of single runs were.

@@ -67,6 +67,8 @@ pub(crate) enum Singular {
     Kink(usize, Function),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
+    /// Constraints whose gradients depend on each other here, this one among them.
+    Dependent(usize),
     /// Values or gradients beyond the limit of work, which says what was too much.
     Refused,
 }
@@ -81,6 +83,7 @@ impl From<NotHeld> for Singular {
     fn from(reason: NotHeld) -> Self {
         match reason {
             NotHeld::Constraint(c) => Self::Constraint(c),
+            NotHeld::Dependent(c) => Self::Dependent(c),
             NotHeld::Refused => Self::Refused,
         }
     }

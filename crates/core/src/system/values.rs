@@ -11,6 +11,8 @@ use crate::language::Function;
 pub(crate) enum NotHeld {
     /// This constraint could not be solved.
     Constraint(usize),
+    /// Only points were found at which the gradients of the constraints depend on each other, this one among them.
+    Dependent(usize),
     /// The work is beyond its limit.
     Refused,
 }
@@ -49,8 +51,13 @@ pub(crate) trait Values: Scalars {
     fn pi(&self) -> Self::Element;
     /// The true value of a function; `None` where it is not defined.
     fn function(&self, function: Function, x: &Self::Element) -> Option<Self::Element>;
+    /// True if a number is positive, false if it is negative; `None` where it is zero or has no sign.
+    fn is_positive(&self, x: &Self::Element) -> Option<bool>;
     /// A random value of something generic at the given attempt to find a point.
     fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Self::Element;
+    /// A random number that shares so many bits with a given one (with 0: is below one by them); `None` where
+    /// numbers have no distance.
+    fn near(&self, x: f64, bits: i64, rng: &mut SplitMix64) -> Option<Self::Element>;
     /// A random Taylor coefficient of a generic signal.
     fn coefficient(&self, rng: &mut SplitMix64) -> Self::Element;
     /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero.

@@ -1,0 +1,102 @@
+//! Branches of functions: those that a model has, and the sides of them on which it was judged.
+
+use std::collections::BTreeSet;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::constraints::slots_of;
+use super::dag::Op;
+use super::model::{Compiled, Role, SystemModel};
+use super::text::text;
+use crate::language::Function;
+
+/// Side of a branch of abs or sign on which the verdicts were computed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct BranchSide {
+    /// Condition on the argument of abs or sign that holds at the start of the runs at both random points,
+    /// and with it where the verdicts hold: `t - 7 < 0`. An argument that had either sign is named with both.
+    pub condition: String,
+    /// True if the argument depends on the time.
+    pub of_time: bool,
+}
+
+/// True if the values that a slot takes are not all given.
+fn varies(compiled: &Compiled, slot: usize) -> bool {
+    match compiled.roles[slot] {
+        Role::Constant(c) => (0..compiled.experiments.len()).any(|e| compiled.constants(e)[c].is_none()),
+        _ => true,
+    }
+}
+
+/// True if a node depends on something that is not given.
+fn open(compiled: &Compiled, node: usize) -> bool {
+    slots_of(&compiled.dag, node).into_iter().any(|s| varies(compiled, s))
+}
+
+/// Functions with branches that are taken of what is not given: unknowns, inputs, generic constants or the
+/// time.
+pub(super) fn branches(compiled: &Compiled) -> Vec<String> {
+    let branched = [Function::Abs, Function::Sign, Function::Sqrt, Function::Asin, Function::Acos];
+    let taken = |f: Function| {
+        compiled.dag.ops.iter().any(|op| {
+            // a sign is the derivative of a size
+            matches!(*op, Op::Primitive { function, of, .. } if function == f
+                && !(f == Function::Sign && compiled.dag.has(Function::Abs, of))
+                && open(compiled, of))
+        })
+    };
+    let named = Function::ALL.iter().filter(|(_, f)| branched.contains(f) && taken(*f));
+    named.map(|(name, _)| name.to_string()).collect()
+}
+
+/// Arguments of abs and sign that are not given, in the order of the graph.
+pub(super) fn sided(compiled: &Compiled) -> Vec<usize> {
+    let of = |op: &Op| match *op {
+        Op::Primitive { function: Function::Abs | Function::Sign, of, .. } => Some(of),
+        _ => None,
+    };
+    let all: BTreeSet<usize> = compiled.dag.ops.iter().filter_map(of).collect();
+    all.into_iter().filter(|&node| open(compiled, node)).collect()
+}
+
+/// True where an argument is positive at the start of a run, false where it is negative; `None` where it
+/// takes no part. By argument, then by run: experiment by experiment, segment by segment.
+pub(crate) type Signs = Vec<Vec<Option<bool>>>;
+
+/// The sides of the branches at two points, in words.
+pub(super) fn sides(model: &SystemModel, compiled: &Compiled, points: &[Signs; 2]) -> Vec<BranchSide> {
+    let names = model.slot_names();
+    let segments = compiled.segments.len().max(1);
+    let label = |run: usize| {
+        let experiment = (model.experiments > 1).then(|| format!("experiment {}", run / segments + 1));
+        let segment = (segments > 1).then(|| format!("segment {}", run % segments + 1));
+        experiment.into_iter().chain(segment).collect::<Vec<_>>().join(", ")
+    };
+    let side = |positive: bool| if positive { "> 0" } else { "< 0" };
+    let mut out = Vec::new();
+    for (k, node) in sided(compiled).into_iter().enumerate() {
+        let [first, second] = points.each_ref().map(|signs| signs.get(k).cloned().unwrap_or_default());
+        let runs = first.iter().zip(&second).enumerate().filter_map(|(run, pair)| match pair {
+            (Some(a), Some(b)) if a == b => Some((run, side(*a).to_string())),
+            (Some(a), Some(b)) => {
+                Some((run, format!("{} at one point and {} at the other", side(*a), side(*b))))
+            }
+            _ => None,
+        });
+        let runs: Vec<(usize, String)> = runs.collect();
+        let Some((_, one)) = runs.first() else { continue };
+        let argument =
+            text(&compiled.dag, node, &names).unwrap_or_else(|| "an argument too long to print".into());
+        let condition = match runs.iter().all(|(_, side)| side == one) {
+            true => format!("{argument} {one}"),
+            false => {
+                let each = runs.iter().map(|(run, side)| format!("{argument} {side} ({})", label(*run)));
+                each.collect::<Vec<_>>().join(", ")
+            }
+        };
+        let of_time = slots_of(&compiled.dag, node).into_iter().any(|s| compiled.roles[s] == Role::Time);
+        out.push(BranchSide { condition, of_time });
+    }
+    out
+}

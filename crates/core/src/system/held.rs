@@ -1,0 +1,162 @@
+//! Points of any field at which the constraints of a model hold, and how many of these are independent there.
+
+use std::collections::BTreeSet;
+
+use obsdeg_exact::{RowSpace, SplitMix64};
+
+use super::constraints::slots_of;
+use super::model::{Role, StateStart};
+use super::rows::{Maker, Point, Rows, dense};
+use super::taylor::{Signal, Singular, Taylor};
+use super::values::Values;
+use super::work::{Step, product};
+
+/// Bits that random starts near given values share with these, attempt by attempt.
+pub(super) const CLOSE: [i64; 3] = [10, 25, 40];
+
+impl<S: Values> Maker<'_, '_, S> {
+    /// Moves states, and in the first experiment what all share, to where the constraints hold.
+    pub(super) fn hold_constraints(
+        &self,
+        point: &mut Point<S>,
+        first: bool,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Result<(), Singular> {
+        let compiled = self.compiled;
+        if compiled.constraints.is_empty() {
+            return Ok(());
+        }
+        let value = |slot: usize| match (&point.signals[slot], &point.initial[slot]) {
+            (Signal::Constant { value, .. }, _) => *value,
+            (_, Some(start)) => start.0,
+            _ => self.field.zero(),
+        };
+        let mut values: Vec<S::Element> = (0..compiled.roles.len()).map(value).collect();
+        // what all share was moved in the first experiment
+        let all = self.free(point.experiment);
+        let shared = |role: &Role| !matches!(role, Role::State(_));
+        let free: Vec<bool> =
+            all.iter().zip(&compiled.roles).map(|(free, role)| *free && (first || !shared(role))).collect();
+        let mut own = SplitMix64::new(rng.next_u64());
+        if attempt % 2 == 0 {
+            let bits = CLOSE[attempt / 2 % CLOSE.len()];
+            self.near_given(point.experiment, &free, &mut values, bits, &mut own);
+        }
+        self.field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own, self.work)?;
+        let distinct = distinct(&compiled.constraints);
+        let independent = self.independent(&distinct, &values, &all)?;
+        if independent.len() + self.layout.dependent < distinct.len() {
+            let dependent = (0..distinct.len()).find(|c| !independent.contains(c)).unwrap_or(0);
+            let place = compiled.constraints.iter().position(|node| *node == distinct[dependent]);
+            return Err(Singular::Dependent(place.unwrap_or(0)));
+        }
+        for (slot, x) in values.into_iter().enumerate() {
+            match (&mut point.signals[slot], &mut point.initial[slot]) {
+                (Signal::Constant { value, .. }, _) => *value = x,
+                (_, Some(start)) => start.0 = x,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// What constraints can move: states, parameters and generic constants.
+    pub(super) fn free(&self, experiment: usize) -> Vec<bool> {
+        let free = |role: &Role| match *role {
+            Role::State(i) => !matches!(self.model.states[i].start, StateStart::Value(_)),
+            Role::Parameter(_) => true,
+            Role::Constant(c) => self.compiled.constants(experiment)[c].is_none(),
+            Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => false,
+        };
+        self.compiled.roles.iter().map(free).collect()
+    }
+
+    /// Moves `free` values that constraints hold to near those that the file gives for a simulation: they
+    /// share so many bits.
+    pub(super) fn near_given(
+        &self,
+        experiment: usize,
+        free: &[bool],
+        values: &mut [S::Element],
+        bits: i64,
+        rng: &mut SplitMix64,
+    ) {
+        let dag = &self.compiled.dag;
+        let held: BTreeSet<usize> =
+            self.compiled.constraints.iter().flat_map(|&node| slots_of(dag, node)).collect();
+        for slot in held.into_iter().filter(|&slot| free[slot]) {
+            let given = self.model.given(self.compiled.roles[slot], experiment);
+            if let Some(near) = given.and_then(|x| self.field.near(x, bits, rng)) {
+                values[slot] = near;
+            }
+        }
+    }
+
+    /// True if the file gives the value of something that a constraint can move.
+    pub(super) fn gives_start(&self) -> bool {
+        let free = self.free(0);
+        let slots = self.compiled.constraints.iter().flat_map(|&node| slots_of(&self.compiled.dag, node));
+        slots.into_iter().any(|s| free[s] && self.model.given(self.compiled.roles[s], 0).is_some())
+    }
+
+    /// Which of some constraints are independent of those before them at a point, by their derivatives in
+    /// what is `free`.
+    pub(super) fn independent(
+        &self,
+        constraints: &[usize],
+        values: &[S::Element],
+        free: &[bool],
+    ) -> Result<Vec<usize>, Singular> {
+        let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
+        let lane = |slot: usize| places.iter().position(|place| *place == slot);
+        let signal =
+            |(slot, value): (usize, &S::Element)| Signal::Constant { value: *value, lane: lane(slot) };
+        let signals = values.iter().enumerate().map(signal).collect();
+        let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
+        let (dag, f) = (&self.compiled.dag, self.field.clone());
+        let at = Taylor::new(dag, f, places.len(), signals, &starts, constraints, false, seed, self.work)?;
+        let (rows, columns) = (constraints.len() as u64, places.len() as u64);
+        let elimination = rows.saturating_mul(rows).saturating_mul(columns);
+        self.work.take(Step::Constraints, elimination.saturating_mul(product::<S::Element>()), 0)?;
+        let mut space = S::Space::new(self.field.clone(), places.len());
+        let mut out = Vec::new();
+        for (c, &node) in constraints.iter().enumerate() {
+            if space.insert(&dense(&self.field, places.len(), at.lanes_of(node), at.dual(node, 0))) {
+                out.push(c);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The differentials of the constraints, and whether their first derivatives are zero here: then the
+    /// motion keeps them, and the point is generic among those that hold them.
+    pub(super) fn constraints(&self, point: &Point<S>) -> Result<(Rows<S>, bool), Singular> {
+        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
+        if compiled.constraints.is_empty() {
+            return Ok((Vec::new(), true));
+        }
+        let mut seen = Taylor::new(
+            &compiled.dag,
+            f.clone(),
+            lanes,
+            point.signals.clone(),
+            &point.initial,
+            &compiled.constraints,
+            true,
+            SplitMix64::new(point.seed),
+            self.work,
+        )?;
+        let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
+        let rows = compiled.constraints.iter().map(row).collect();
+        seen.advance();
+        let kept = compiled.constraints.iter().all(|&node| f.is_zero(&seen.value(node, 1)));
+        Ok((rows, kept))
+    }
+}
+
+/// The nodes of a list, each once: entries that mirror each other are one node.
+pub(super) fn distinct(nodes: &[usize]) -> Vec<usize> {
+    let first = |(i, node): (usize, &usize)| (!nodes[..i].contains(node)).then_some(*node);
+    nodes.iter().enumerate().filter_map(first).collect()
+}

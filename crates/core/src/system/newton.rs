@@ -1,0 +1,297 @@
+//! Real points at which constraints hold, by Newton's method in many digits.
+
+use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
+
+use super::dag::{Dag, Op};
+use super::taylor::{Signal, Taylor};
+use super::values::NotHeld;
+use super::work::{Step, Work, product};
+
+/// Steps of Newton's method from one start: near a point they double the digits.
+const STEPS: usize = 80;
+/// Steps in a row that gain less than two bits each, near a point: at one whose gradients are independent
+/// none does.
+const SLOW: usize = 12;
+/// Most terms into which the sum that a constraint is will be taken apart.
+const TERMS: usize = 64;
+/// Relative residual, as a power of two, below which a point is near.
+const NEAR: f64 = -16.0;
+/// Logarithm of the ratio of sides from which on a point is far from holding a constraint.
+const FAR: f64 = 0.5;
+/// What a step from far away must gain of that logarithm, or half of it.
+const GAIN: f64 = 0.2;
+/// Bits by which a step may be longer than the point is far from zero.
+const LONGEST: f64 = 6.0;
+
+/// A constraint as a sum of terms: true for what is subtracted.
+struct Sum {
+    node: usize,
+    terms: Vec<(bool, usize)>,
+}
+
+impl Sum {
+    fn new(dag: &Dag, node: usize) -> Self {
+        let (mut terms, mut open) = (Vec::new(), vec![(false, node)]);
+        while let Some((minus, i)) = open.pop() {
+            match dag.ops[i] {
+                Op::Add(a, b) => open.extend([(minus, a), (minus, b)]),
+                Op::Subtract(a, b) => open.extend([(minus, a), (!minus, b)]),
+                _ => terms.push((minus, i)),
+            }
+            if terms.len() + open.len() > TERMS {
+                return Self { node, terms: vec![(false, node)] };
+            }
+        }
+        Self { node, terms }
+    }
+}
+
+/// Constraints and their derivatives at a point.
+struct Linear<const N: usize> {
+    /// By constraint.
+    rows: Vec<Row<N>>,
+    /// Largest residual relative to its terms, as a power of two.
+    off: f64,
+    /// The constraint that has it.
+    worst: usize,
+    /// Largest residual relative to how much its constraint changes where what it holds changes by its size,
+    /// as a power of two.
+    shift: f64,
+    /// How far the point is from holding the constraints: the largest logarithm of a ratio of sides.
+    far: f64,
+    /// True if every residual is as small as the rounding of its terms.
+    holds: bool,
+}
+
+/// One constraint at a point: its derivatives and its value, of the sum of its terms and of the logarithm of
+/// the ratio of the positive ones and the negative ones, where there are both.
+struct Row<const N: usize> {
+    sum: (Vec<Ball<N>>, Ball<N>),
+    ratio: Option<(Vec<Ball<N>>, Ball<N>)>,
+}
+
+/// What a step is taken in.
+struct Newton<'a> {
+    dag: &'a Dag,
+    sums: Vec<Sum>,
+    places: Vec<usize>,
+    work: &'a Work,
+}
+
+impl Newton<'_> {
+    /// Constraints and their derivatives at a point; `None` where one is not defined, or beyond the limit of work.
+    fn linear<const N: usize>(&self, values: &[Ball<N>]) -> Option<Linear<N>> {
+        let signal = |s: usize| Signal::Constant {
+            value: values[s],
+            lane: self.places.iter().position(|place| *place == s),
+        };
+        let signals = (0..values.len()).map(signal).collect();
+        let starts = vec![None; values.len()];
+        let roots: Vec<usize> =
+            self.sums.iter().flat_map(|s| s.terms.iter().map(|t| t.1).chain([s.node])).collect();
+        let lanes = self.places.len();
+        let at = Taylor::new(
+            self.dag,
+            Reals::<N>,
+            lanes,
+            signals,
+            &starts,
+            &roots,
+            false,
+            SplitMix64::new(0),
+            self.work,
+        );
+        let at = at.ok()?;
+        // the rank of the rows, their products, and the system of these
+        let (rows, columns) = (self.sums.len() as u64, lanes as u64);
+        let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
+        self.work.take(Step::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
+        let here: Vec<Ball<N>> = self.places.iter().map(|&s| values[s]).collect();
+        let nothing = f64::NEG_INFINITY;
+        let mut out =
+            Linear { rows: Vec::new(), off: nothing, worst: 0, shift: nothing, far: 0.0, holds: true };
+        for (c, sum) in self.sums.iter().enumerate() {
+            let mut sides = [Ball::ZERO; 2];
+            let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
+            for &(minus, term) in &sum.terms {
+                let value = at.start(term).midpoint();
+                // on the side on which it is positive
+                let side = usize::from(minus != value.is_negative());
+                sides[side] = sides[side].add(&if value.is_negative() { value.neg() } else { value });
+                for (&lane, x) in at.lanes_of(term).iter().zip(at.dual(term, 0)) {
+                    let x = if value.is_negative() { x.neg() } else { *x };
+                    slopes[side][lane as usize] = slopes[side][lane as usize].add(&x);
+                }
+            }
+            let sides = sides.map(|side| side.midpoint());
+            let row: Vec<Ball<N>> = slopes[0].iter().zip(&slopes[1]).map(|(a, b)| a.sub(b)).collect();
+            let ratio = ratio(&sides, &slopes);
+            // how much it changes where what it holds changes by its size
+            let change = row.iter().zip(&here).map(|(slope, x)| slope.size_log2() + x.size_log2().max(0.0));
+            let change = change.fold(f64::NEG_INFINITY, f64::max);
+            let scale = if ratio.is_some() { size(&sides) } else { change };
+            let value = at.start(sum.node);
+            let left = value.midpoint();
+            out.shift = out.shift.max(left.size_log2() - change);
+            let off = if left.is_zero() { f64::NEG_INFINITY } else { left.size_log2() - scale };
+            // what rounding makes of the terms, and of what they are made of
+            let bits = Ball::<N>::BITS as f64;
+            let rounding = value.radius_log2().max(change - bits) - scale + 8.0;
+            out.holds &= off <= rounding.min(-bits / 2.0).max(24.0 - bits);
+            if off > out.off {
+                (out.off, out.worst) = (off, c);
+            }
+            out.far = out.far.max(ratio.as_ref().map_or(0.0, |(_, log)| log.to_f64().abs()));
+            out.rows.push(Row { sum: (row, left), ratio });
+        }
+        Some(out)
+    }
+
+    /// The shortest step `J' y` with `J J' y = -g` for independent rows J; `by_ratio`: of the logarithms,
+    /// where there are any.
+    fn step<const N: usize>(&self, linear: &Linear<N>, by_ratio: bool) -> Option<Vec<Ball<N>>> {
+        let mut space = RealSpace::new(Reals, self.places.len());
+        let mut rows: Vec<(Vec<Ball<N>>, Ball<N>)> = Vec::new();
+        for row in &linear.rows {
+            let (slopes, value) = row.ratio.as_ref().filter(|_| by_ratio).unwrap_or(&row.sum);
+            if space.insert(slopes) {
+                rows.push((slopes.iter().map(Ball::midpoint).collect(), *value));
+            }
+        }
+        let dot = |a: &[Ball<N>], b: &[Ball<N>]| Reals.dot(&Ball::ZERO, a.iter().zip(b));
+        let m = rows.len();
+        let mut system = RealSpace::new(Reals, m + 1);
+        for (row, g) in &rows {
+            let mut line: Vec<Ball<N>> = rows.iter().map(|(other, _)| dot(row, other)).collect();
+            line.push(*g);
+            system.insert(&line);
+        }
+        let solution = system.null_space();
+        let [y] = solution.as_slice() else { return None };
+        let scale = y[m].inverse()?;
+        let entry = |k: usize| {
+            let sum = rows.iter().zip(y).fold(Ball::ZERO, |sum, ((row, _), w)| sum.add(&row[k].mul(w)));
+            sum.mul(&scale).midpoint()
+        };
+        Some((0..self.places.len()).map(entry).collect())
+    }
+
+    /// The values after a step, halved so many times.
+    fn after<const N: usize>(&self, values: &[Ball<N>], step: &[Ball<N>], halved: i64) -> Vec<Ball<N>> {
+        let mut out = values.to_vec();
+        for (&s, dx) in self.places.iter().zip(step) {
+            out[s] = values[s].add(&dx.shifted(-halved)).midpoint();
+        }
+        out
+    }
+
+    /// A step from far away that leads nearer: that of the logarithms, by which a high power is near its
+    /// value soon, or that of the sums, whichever leads nearest, shorter where neither does. `None` where
+    /// none was found.
+    fn from_far<const N: usize>(
+        &self,
+        values: &[Ball<N>],
+        linear: &Linear<N>,
+    ) -> Option<(Vec<Ball<N>>, Linear<N>)> {
+        let mut best: Option<(Vec<Ball<N>>, Linear<N>)> = None;
+        for halved in [0, 1, 2, 4, 7] {
+            for by_ratio in [true, false] {
+                let Some(step) = self.step(linear, by_ratio) else { continue };
+                let there = self.after(values, &step, halved);
+                if let Some(next) = self.linear(&there)
+                    && best.as_ref().is_none_or(|(_, best)| next.far < best.far)
+                {
+                    best = Some((there, next));
+                }
+            }
+            if best.as_ref().is_some_and(|(_, best)| best.far < (linear.far - GAIN).max(linear.far / 2.0)) {
+                return best;
+            }
+        }
+        None
+    }
+}
+
+/// Derivatives and value of `log(P/N)`.
+fn ratio<const N: usize>(
+    sides: &[Ball<N>; 2],
+    slopes: &[Vec<Ball<N>>; 2],
+) -> Option<(Vec<Ball<N>>, Ball<N>)> {
+    let [above, below] = [sides[0].inverse()?, sides[1].inverse()?];
+    let value = sides[0].mul(&below).ln()?.midpoint();
+    let row = slopes[0].iter().zip(&slopes[1]);
+    Some((row.map(|(a, b)| a.mul(&above).sub(&b.mul(&below))).collect(), value))
+}
+
+/// `log2` of the largest entry.
+fn size<const N: usize>(list: &[Ball<N>]) -> f64 {
+    list.iter().map(Ball::size_log2).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// A point near the values at which the constraints hold: Newton's steps of least length in the `free` ones.
+/// What is left of the constraints is in the error of the values.
+///
+/// # Errors
+/// [`NotHeld`], with the constraint that is farthest off.
+pub(super) fn hold_by_newton<const N: usize>(
+    dag: &Dag,
+    constraints: &[usize],
+    values: &mut [Ball<N>],
+    free: &[bool],
+    work: &Work,
+) -> Result<(), NotHeld> {
+    let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
+    let newton =
+        Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
+    // what was refused once stays refused
+    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(NotHeld::Refused, |()| reason);
+    let (mut before, mut slow, mut stuck) = (f64::INFINITY, 0, false);
+    let mut linear = newton.linear(values).ok_or_else(|| failed(NotHeld::Constraint(0)))?;
+    for _ in 0..STEPS {
+        let nowhere = NotHeld::Constraint(linear.worst);
+        if linear.far > FAR && !stuck {
+            if let Some((there, next)) = newton.from_far(values, &linear) {
+                values.copy_from_slice(&there);
+                (linear, slow) = (next, 0);
+                continue;
+            }
+            stuck = true;
+        }
+        let step = newton.step(&linear, false).ok_or_else(|| failed(nowhere))?;
+        let here: Vec<Ball<N>> = newton.places.iter().map(|&s| values[s]).collect();
+        let (length, far) = (size(&step), size(&here).max(0.0));
+        if linear.holds {
+            let error = (length + 8.0).max(far - Ball::<N>::BITS as f64 + 24.0);
+            newton.places.iter().for_each(|&s| values[s] = values[s].midpoint().widened(error));
+            return Ok(());
+        }
+        // what holds some of them and is no nearer to the others
+        if length <= far - Ball::<N>::BITS as f64 + 8.0 {
+            return Err(failed(nowhere));
+        }
+        // near a point where gradients depend on each other steps shrink by a constant factor
+        let near = linear.off.min(linear.shift) < NEAR;
+        slow = if near && length > before - 2.0 { slow + 1 } else { 0 };
+        if slow >= SLOW {
+            return Err(NotHeld::Dependent(linear.worst));
+        }
+        before = length;
+        let shorter = (length - far - LONGEST).max(0.0).ceil() as i64;
+        let there = newton.after(values, &step, shorter);
+        values.copy_from_slice(&there);
+        linear = newton.linear(values).ok_or_else(|| failed(nowhere))?;
+    }
+    Err(failed(NotHeld::Constraint(linear.worst)))
+}
+
+/// Residual of the constraint that is farthest off, relative to its terms, as a power of two; `None` where
+/// there is none.
+pub(super) fn off<const N: usize>(
+    dag: &Dag,
+    constraints: &[usize],
+    values: &[Ball<N>],
+    work: &Work,
+) -> Option<f64> {
+    let sums = constraints.iter().map(|&node| Sum::new(dag, node)).collect();
+    Some(Newton { dag, sums, places: Vec::new(), work }.linear(values)?.off)
+}

@@ -1,0 +1,154 @@
+//! Sentences on the time and on branches: where verdicts are said to hold they do.
+
+use obsdeg_core::degree::Status;
+use obsdeg_core::language::{Names, evaluate_f64, parse_with};
+use obsdeg_core::system::{SystemAnalysis, SystemOptions, analyze_system, model_file};
+
+fn judged(text: &str) -> SystemAnalysis {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// As it is printed, in one line.
+fn printed(a: &SystemAnalysis) -> String {
+    let text = obsdeg_report::written(a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+    text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn value(text: &str, t: f64) -> f64 {
+    evaluate_f64(&parse_with(text, Names::Plain).expect("an expression"), &|_| t)
+}
+
+/// x' = a + b u(t): b moves the output while u is not zero, alone while it changes. At times on the side that
+/// is said, and not on the other, this is the verdict.
+#[test]
+fn verdicts_hold_on_the_side_that_is_said() {
+    let model = |input: &str, time: &str| {
+        format!(
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+        )
+    };
+    let times = [-9.3, -4.0, -1.7, 0.4, 2.2, 5.1, 8.3, 9.9];
+    for (input, time, condition) in [
+        ("1 + sign(t - 7)", "time = 'generic'", "t - 7 < 0"),
+        ("1 + sign(t - 7)", "time = 8", "t - 7 > 0"),
+        ("1 + sign(t - 7)", "", "t - 7 < 0"),
+        ("abs(t + 3) + t + 3", "time = 'generic'", "t + 3 > 0"),
+        ("abs(t + 3) + t + 3", "time = -5", "t + 3 < 0"),
+        ("1 + sign(2*t^2 - 50)", "time = 'generic'", "2*t^2 - 50 < 0"),
+    ] {
+        let a = judged(&model(input, time));
+        let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
+        assert_eq!(said, [condition], "{input} {time}");
+        assert!(a.branch_sides[0].of_time && a.equations.contains(&format!("u = {input}")));
+        let text = printed(&a);
+        assert!(text.contains(&format!("where {condition}")), "{text}");
+        let almost_every = text.contains("almost every time where");
+        assert_eq!(almost_every, time.contains("generic"), "{text}");
+        let (argument, sign) = condition
+            .rsplit_once(" < 0")
+            .map_or_else(|| (condition.trim_end_matches(" > 0"), 1.0), |(argument, _)| (argument, -1.0));
+        let mut sides = [0, 0];
+        for t in times {
+            let holds = value(argument, t) * sign > 0.0;
+            let (u, later) = (value(input, t), value(input, t + 0.01));
+            let expected = match (u == 0.0 && later == 0.0, u == later) {
+                (true, _) => [Status::Observable, Status::NotExcited],
+                (_, true) => [Status::Inseparable; 2],
+                _ => [Status::Observable; 2],
+            };
+            // where the time is given what never moves the output is not seen up to the bound
+            let status = |n: &str| match a.quantities.iter().find(|q| q.name == n).expect("it").status {
+                Status::NotSeen if expected[1] == Status::NotExcited => Status::NotExcited,
+                Status::NotSeen => Status::Inseparable,
+                status => status,
+            };
+            let found = ["a", "b"].map(status);
+            assert_eq!(found == expected, holds, "{input} {time} at {t}: {found:?}");
+            sides[usize::from(holds)] += 1;
+        }
+        assert!(sides[0] > 0 && sides[1] > 0);
+    }
+    // without a branch none is named
+    let a = judged(&model("t^2", "time = 'generic'"));
+    assert!(a.branch_sides.is_empty() && a.branches.is_empty());
+    assert!(printed(&a).contains("(verdicts of almost every time)"));
+}
+
+/// Of unknowns, known inputs and later segments the sides are said as well; an argument that is given has
+/// none.
+#[test]
+fn sides_of_all_arguments_are_said() {
+    let a = judged("name='m'\nparameters=['a']\n[states]\nx='-a*abs(x)'\n[outputs]\ny='x*sign(a - 9)'");
+    let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
+    assert_eq!(said, ["x > 0", "a - 9 < 0"]);
+    assert!(a.branch_sides.iter().all(|s| !s.of_time));
+    let text = printed(&a);
+    assert!(text.contains("where x > 0, a - 9 < 0; others may have other verdicts"), "{text}");
+    let a = judged(
+        "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\ne=0\n[[segment]]\n\
+         [[segment]]\nconstants={e='1'}",
+    );
+    let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
+    assert_eq!(said, ["t - 2 < 0"]);
+}
+
+/// The section on the system defines every name in a solution that is no unknown and no output, inputs of
+/// single experiments too.
+#[test]
+fn solutions_rest_on_what_is_printed() {
+    let a = judged(
+        "name='m'\nparameters=['a', 'b']\ntime=2\nknown_inputs={u={function='t^2'}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'",
+    );
+    assert!(a.equations.contains(&"u = t^2".to_string()), "{:?}", a.equations);
+    assert!(printed(&a).contains("The system u = t^2"), "{}", printed(&a));
+    let solution = a.quantities.iter().find(|q| q.name == "b").and_then(|q| q.solution.clone());
+    let solution = solution.expect("an expression");
+    // y' = a + b t^2, y'' = 2 b t, at a = 0.7, b = 1.3
+    let known = |name: &str| match name {
+        "y" => 0.4,
+        "y_" => 0.7 + 1.3 * 4.0,
+        "y__" => 2.0 * 1.3 * 2.0,
+        "u" => 4.0,
+        "u_" => 4.0,
+        "u__" => 2.0,
+        "a" => 0.7,
+        "t" => 2.0,
+        _ => f64::NAN,
+    };
+    let text = solution.replace("''", "__").replace('\'', "_");
+    let found = evaluate_f64(&parse_with(&text, Names::Plain).expect("an expression"), &known);
+    assert!((found - 1.3).abs() < 1e-12, "{solution}: {found}");
+    let a = judged(
+        "name='m'\nparameters=['a']\nknown_inputs={u={function='t'}}\n[states]\nx='a*u'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\n\
+         known_inputs={u={function='t^3'}}",
+    );
+    for line in ["u in experiment 1 = t", "u in experiment 2 = t^3"] {
+        assert!(a.equations.iter().any(|e| e == line), "{line}: {:?}", a.equations);
+    }
+}
+
+/// A power with an exponent beyond all limits is refused as that, and no logarithm is named that nobody
+/// wrote.
+#[test]
+fn powers_are_refused_as_powers() {
+    let refused = |output: &str| {
+        let text =
+            format!("name='m'\nparameters=['a', 'b']\n[states]\nx='0'\n[outputs]\ny='{output}'\nz='x'");
+        let model = model_file::read(&text);
+        let found = model.and_then(|m| analyze_system(&m, SystemOptions::default()));
+        found.err().unwrap_or_else(|| panic!("{output} is judged")).to_string()
+    };
+    for output in ["a^(10^40) + b", "a^(-10^40) + b", "a^1e30 + b", "a^1001 + b", "(a + b)^(3*10^39/3)"] {
+        let said = refused(output);
+        assert!(said.contains("an exponent above 1000") && !said.contains("log"), "{output}: {said}");
+    }
+    let said = refused("(-1 - a^2)^(1/3) + b");
+    assert!(said.contains("a power whose exponent") && !said.contains("log"), "{said}");
+    assert!(refused("log(-1 - a^2) + b").contains("log is not defined here"));
+    for (output, exponent) in [("a^2.000 + b", 2.0), ("a^(3 - 1) + b", 2.0), ("a^(1/3) + b", 1.0 / 3.0)] {
+        let text =
+            format!("name='m'\nparameters=['a', 'b']\n[states]\nx='0'\n[outputs]\ny='{output}'\nz='b'");
+        assert_eq!(judged(&text).quantities.iter().filter(|q| q.degree == Some(0)).count(), 2, "{exponent}");
+    }
+}

@@ -1,0 +1,210 @@
+//! Sentences on constraints: those that are refused have no usable real point, and those that are judged have
+//! one.
+
+use obsdeg_core::language::{Names, evaluate_f64, parse_with};
+use obsdeg_core::system::{ModelError, SystemAnalysis, SystemOptions, analyze_system, model_file};
+
+/// The answer on a model of states x and y that do not move, of which y is the output, or why there is none.
+fn judged(constraints: &[&str], rest: &str, seed: u64) -> Result<SystemAnalysis, ModelError> {
+    let list: Vec<String> = constraints.iter().map(|c| format!("'{c}'")).collect();
+    let text = format!(
+        "name='m'\nconstraints=[{}]\nparameters=['a']\n[states]\nx='0'\ny='0'\n[outputs]\nz='y'\nw='a'\n{rest}",
+        list.join(", ")
+    );
+    model_file::read(&text).and_then(|m| {
+        analyze_system(&m, SystemOptions { seed, solutions: false, ..SystemOptions::default() })
+    })
+}
+
+fn refusal(constraints: &[&str], rest: &str) -> String {
+    match judged(constraints, rest, 1) {
+        Ok(a) => panic!("{constraints:?}: judged, {:?}", a.rank_profile),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// The difference of the sides of an equation in x, y and a.
+fn difference(constraint: &str) -> impl Fn([f64; 3]) -> f64 + use<> {
+    let (left, right) = constraint.split_once(" = ").expect("an equation");
+    let text = format!("({}) - ({right})", left.replace("norm([x, y])", "sqrt(x^2 + y^2)"));
+    let e = parse_with(&text, Names::Plain).expect("an expression");
+    move |p| {
+        evaluate_f64(&e, &|name| match name {
+            "x" => p[0],
+            "y" => p[1],
+            "a" => p[2],
+            _ => f64::NAN,
+        })
+    }
+}
+
+/// Points on a grid from -3 to 3.
+fn grid() -> impl Iterator<Item = [f64; 3]> {
+    let line = || (-12..=12).map(|k| f64::from(k) / 4.0);
+    line().flat_map(move |x| line().flat_map(move |y| line().map(move |a| [x, y, a])))
+}
+
+/// Where signs of the sides contradict there is no real point, which a grid of points confirms; a sign that
+/// agrees is no reason.
+#[test]
+fn sides_of_other_signs_are_refused() {
+    for constraint in [
+        "norm([x, y]) = -1 - a^2",
+        "x^2 + y^2 = -1",
+        "x^2 + y^2 + 1/(x^2 + 1) = 0",
+        "x^10 + (x - y)^4 = -a^2 - 0.5",
+        "-x^2 - 3 = (x*y)^2",
+    ] {
+        let said = refusal(&[constraint], "");
+        assert!(said.contains("no real point meets it"), "{constraint}: {said}");
+        let of = difference(constraint);
+        let signs: Vec<f64> = grid().map(|p| of(p).signum()).collect();
+        assert!(signs.iter().all(|s| *s == signs[0]), "{constraint}");
+    }
+    // the value of a constant decides
+    for (value, refused) in
+        [("'-1'", true), ("'-sqrt(2)'", true), ("'2 - 3'", true), ("'1'", false), ("'3 - 2'", false)]
+    {
+        for constraint in ["norm([x, y]) = r", "x^2 + y^2 = r"] {
+            let found = judged(&[constraint], &format!("[constants]\nr={value}"), 1);
+            match found {
+                Ok(a) => assert!(!refused && a.rank == 3, "{constraint} {value}"),
+                Err(e) => {
+                    assert!(refused && e.to_string().contains("no real point meets it"), "{value}: {e}")
+                }
+            }
+        }
+    }
+    let said = refusal(&["sqrt(x) = -y^2"], "");
+    assert!(said.contains("holds only where both sides are zero"), "{said}");
+    // a root of an expression that may be of either sign
+    assert_eq!(judged(&["sqrt(x) = a"], "", 1).expect("judged").rank, 3);
+}
+
+/// Constraints that have real points are judged whatever the seed: their points by hand.
+#[test]
+fn points_are_found_whatever_the_seed() {
+    let golden = [(3.0 + 5f64.sqrt()) / 2.0, (3.0 - 5f64.sqrt()) / 2.0];
+    let fifth = 5f64.powf(0.1);
+    for (constraints, point) in [
+        (&["x^10 = 5"][..], [fifth, 0.0]),
+        (&["x^100 = 5"], [5f64.powf(0.01), 0.0]),
+        (&["x^5 - x = 1"], [1.167_303_978_261_418_7, 0.0]),
+        (&["x*y = 1", "x + y = 3"], golden),
+        (&["x^1000 + y^1000 = 2"], [1.0, 1.0]),
+        (&["x^2 + y^2 = 2", "x*y = 1/2"], [(1.0 + 3f64.sqrt()) / 2.0, (3f64.sqrt() - 1.0) / 2.0]),
+        (&["x^7*y^3 = 1e30"], [1000.0, 1000.0]),
+    ] {
+        for constraint in constraints {
+            let of = difference(constraint);
+            assert!(of([point[0], point[1], 0.0]).abs() < 1e-9 * (1.0 + of([0.0; 3]).abs()), "{constraint}");
+        }
+        for seed in 1..=5 {
+            let a = judged(constraints, "", seed).unwrap_or_else(|e| panic!("{constraints:?}, {seed}: {e}"));
+            // y and a are outputs; x follows from a constraint that holds it
+            let x = a.quantities.iter().find(|q| q.name == "x").expect("x");
+            assert_eq!((a.rank, x.degree), (3, Some(0)), "{constraints:?} {seed}");
+        }
+    }
+}
+
+/// Of several parts of which one alone has real points the verdicts are those of that one: x = 1 says x, x^2
+/// + y^2 = 0 says neither.
+#[test]
+fn verdicts_are_those_of_real_points() {
+    for seed in 1..=8 {
+        let text =
+            "name='m'\nconstraints=['(x^2 + y^2)*(x - 1) = 0']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'";
+        let model = model_file::read(text).expect("a model");
+        let a = analyze_system(&model, SystemOptions { seed, solutions: false, ..SystemOptions::default() });
+        let a = a.expect("judged");
+        let degree = |n: &str| a.quantities.iter().find(|q| q.name == n).expect("it").degree;
+        assert_eq!((a.rank, degree("x"), degree("y")), (1, Some(0), None), "{seed}");
+    }
+}
+
+/// An unknown that a constraint alone holds is counted like any other: R^2 = 4 has two values, S and I as
+/// many as without it.
+#[test]
+fn what_constraints_alone_hold_is_counted() {
+    use obsdeg_core::system::NumberOfSolutions as Number;
+    let counted = |constraint: &str| {
+        let text =
+            format!("name='m'\n{constraint}\n[states]\nS='-S*I'\nI='S*I - I'\nR='I'\n[outputs]\ny='I'");
+        let model = model_file::read(&text).expect("a model");
+        let a = analyze_system(&model, SystemOptions::default()).expect("judged");
+        ["S", "I", "R"]
+            .map(|n| a.quantities.iter().find(|q| q.name == n).expect("it").number_of_solutions.clone())
+    };
+    let [s, i, none] = counted("");
+    assert_eq!((&s, &i, none), (&Some(Number::OneByExpression), &Some(Number::OneByExpression), None));
+    let [with_s, with_i, r] = counted("constraints=['R^2 = 4']");
+    assert_eq!((s, i), (with_s, with_i));
+    let Some(Number::Undecided(reason)) = r else { panic!("{r:?}") };
+    assert!(reason.contains("constraints are not generic: there are several"), "{reason}");
+    let [_, _, r] = counted("constraints=['R = 2']");
+    assert_eq!(r, Some(Number::Counted(1)));
+}
+
+/// Where no point was found the number of starts is said, and a point that the file gives is used: in prime
+/// fields and in many digits.
+#[test]
+fn tries_are_said_and_given_points_used() {
+    // positive, which no rule of signs shows
+    let said = refusal(&["x^2 + y^2 + x*y + 1 = 0"], "");
+    assert!(said.contains("no real point was found") && said.contains("from 200 starts"), "{said}");
+    assert!(said.contains("give it under [simulation.values]"), "{said}");
+    let of = difference("x^2 + y^2 + x*y + 1 = 0");
+    assert!(grid().all(|p| of(p) > 0.0));
+    let far = "(x - 100000)^2 + (y - 100000)^2 + (x - 100000)^2*(y - 100000)^2 = 0.000001";
+    let values = "[simulation]\nvalues={x=100000.001, y=100000.0}";
+    assert_eq!(judged(&[far], values, 1).expect("a point is given").rank, 3);
+    let text = format!(
+        "name='m'\nconstraints=['{far}']\n[states]\nx='0'\ny='0'\n[outputs]\nz='sqrt(y) + abs(x)'\n{values}"
+    );
+    let model = model_file::read(&text).expect("a model");
+    let a = analyze_system(&model, SystemOptions { solutions: false, ..SystemOptions::default() });
+    let a = a.unwrap_or_else(|e| panic!("in many digits: {e}"));
+    assert!(a.digits.is_some() && a.rank == 2, "{:?}", a.rank_profile);
+}
+
+/// Constraints whose gradients depend on each other where they hold say less than they seem to: the points
+/// are these alone, so that a verdict from gradients would be wrong.
+#[test]
+fn dependent_gradients_are_refused() {
+    for (constraints, point) in [
+        (&["x^2 + y^2 = 0"][..], [0.0, 0.0]),
+        (&["(x - y)^2 = 0"], [0.7, 0.7]),
+        (&["(x - y)^3 = 0"], [0.7, 0.7]),
+        (&["x^4 + y^4 = x^2*y^2"], [0.0, 0.0]),
+        (&["x^2 + y^2 = 1", "x = 1"], [1.0, 0.0]),
+        (&["x^2 + y^2 = 1", "x*y = 1/2"], [0.5f64.sqrt(), 0.5f64.sqrt()]),
+    ] {
+        let given = format!("[simulation]\nvalues={{x={:?}, y={:?}}}", point[0], point[1]);
+        for rest in ["", &given] {
+            let said = refusal(constraints, rest);
+            assert!(said.contains("gradient vanishes"), "{constraints:?}: {said}");
+        }
+        // two columns of finite differences: all minors vanish
+        let gradient = |constraint: &&str| {
+            let (of, h) = (difference(constraint), 1e-6);
+            let at = |dx: f64, dy: f64| of([point[0] + dx, point[1] + dy, 0.0]);
+            assert!(at(0.0, 0.0).abs() < 1e-12, "{constraint}");
+            [(at(h, 0.0) - at(-h, 0.0)) / (2.0 * h), (at(0.0, h) - at(0.0, -h)) / (2.0 * h)]
+        };
+        let rows: Vec<[f64; 2]> = constraints.iter().map(gradient).collect();
+        match rows[..] {
+            [one] => assert!(one.iter().all(|x| x.abs() < 1e-6), "{constraints:?}"),
+            [a, b] => assert!((a[0] * b[1] - a[1] * b[0]).abs() < 1e-6, "{constraints:?}"),
+            _ => panic!("{constraints:?}"),
+        }
+    }
+    // one that follows from the others is no such constraint, nor is one of several parts that is met
+    // elsewhere
+    for constraints in [&["x = 1", "y = 2", "x + y = 3"][..], &["x^2 = 1", "x = 1"], &["x^2*(y - 2) = 0"]] {
+        for seed in 1..=4 {
+            let a = judged(constraints, "", seed).unwrap_or_else(|e| panic!("{constraints:?}: {e}"));
+            assert_eq!(a.rank, if constraints.len() > 1 { 3 } else { 2 }, "{constraints:?}");
+        }
+    }
+}
