@@ -106,9 +106,9 @@ pub(crate) fn combinations(
         let lead = lead(platform, &support);
         support.sort_by_key(|c| *c != lead);
         let functional = combination_coefficients(platform, solver, &support, &vector, degree);
-        solver.left_out += usize::from(functional.is_none());
-        let functional = functional?;
-        let name = readable_sum(platform, &functional.terms)?;
+        let found = functional.and_then(|f| Some((readable_sum(platform, &f.terms)?, f)));
+        solver.left_out += usize::from(found.is_none());
+        let (name, functional) = found?;
         Some(Combination { name, vector, functional: Some(functional), degree })
     };
     let mut out: Vec<Combination> = chosen.into_iter().filter_map(sum).collect();

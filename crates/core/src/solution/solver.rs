@@ -130,7 +130,7 @@ impl<'a> Solver<'a> {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }
 
-    /// Number of sparse combinations that are not listed, because their coefficients were not found.
+    /// Number of sparse combinations that are not listed, because their coefficients were not found, or in decimals alone.
     pub(crate) fn left_out(&self) -> usize {
         self.left_out
     }

@@ -39,7 +39,7 @@ impl<S: Values> Maker<'_, '_, S> {
         let free: Vec<bool> =
             all.iter().zip(&compiled.roles).map(|(free, role)| *free && (first || !shared(role))).collect();
         let mut own = SplitMix64::new(rng.next_u64());
-        if attempt % 2 == 0 {
+        if attempt.is_multiple_of(2) {
             let bits = CLOSE[attempt / 2 % CLOSE.len()];
             self.near_given(point.experiment, &free, &mut values, bits, &mut own);
         }

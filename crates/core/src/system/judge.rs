@@ -348,8 +348,10 @@ fn judge_within(
         return judge_by_digits(model, compiled, &layout, seed, spent);
     }
     match judge_in_fields(model, compiled, &layout, seed, spent) {
-        // constraints with real points that were found in no prime field
-        Err(_) if !compiled.constraints.is_empty() => judge_by_digits(model, compiled, &layout, seed, spent),
+        // constraints with real points that were found in no prime field, though the work was allowed
+        Err(_) if !compiled.constraints.is_empty() && !spent.refused => {
+            judge_by_digits(model, compiled, &layout, seed, spent)
+        }
         Ok(judged) if !holds_at_real_point(model, compiled, &layout, &judged, spent) => {
             judge_by_digits(model, compiled, &layout, seed, spent)
         }
@@ -455,7 +457,8 @@ fn can_hold(
         field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, rng, &work).is_ok()
     });
     spent.add(&work);
-    found
+    // beyond its limit another prime is of no use
+    found || work.refused().is_some()
 }
 
 /// Judges a model by real numbers, whether it is rational or not: the other way to the same verdicts.

@@ -188,7 +188,7 @@ impl Newton<'_> {
     /// A step from far away that leads nearer: that of the logarithms, by which a high power is near its
     /// value soon, or that of the sums, whichever leads nearest, shorter where neither does. `None` where
     /// none was found.
-    fn from_far<const N: usize>(
+    fn nearer<const N: usize>(
         &self,
         values: &[Ball<N>],
         linear: &Linear<N>,
@@ -245,12 +245,12 @@ pub(super) fn hold_by_newton<const N: usize>(
         Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
     // what was refused once stays refused
     let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(NotHeld::Refused, |()| reason);
-    let (mut before, mut slow, mut stuck) = (f64::INFINITY, 0, false);
+    let (mut before, mut far_before, mut slow, mut stuck) = (f64::INFINITY, f64::INFINITY, 0, false);
     let mut linear = newton.linear(values).ok_or_else(|| failed(NotHeld::Constraint(0)))?;
     for _ in 0..STEPS {
         let nowhere = NotHeld::Constraint(linear.worst);
         if linear.far > FAR && !stuck {
-            if let Some((there, next)) = newton.from_far(values, &linear) {
+            if let Some((there, next)) = newton.nearer(values, &linear) {
                 values.copy_from_slice(&there);
                 (linear, slow) = (next, 0);
                 continue;
@@ -269,13 +269,13 @@ pub(super) fn hold_by_newton<const N: usize>(
         if length <= far - Ball::<N>::BITS as f64 + 8.0 {
             return Err(failed(nowhere));
         }
-        // near a point where gradients depend on each other steps shrink by a constant factor
-        let near = linear.off.min(linear.shift) < NEAR;
-        slow = if near && length > before - 2.0 { slow + 1 } else { 0 };
+        // near a point where gradients depend on each other steps shrink by a constant factor, and so do both sides
+        let stays = linear.far > FAR && linear.far > far_before - GAIN / 2.0 && linear.shift < NEAR;
+        slow = if (linear.off < NEAR || stays) && length > before - 2.0 { slow + 1 } else { 0 };
         if slow >= SLOW {
             return Err(NotHeld::Dependent(linear.worst));
         }
-        before = length;
+        (before, far_before) = (length, linear.far);
         let shorter = (length - far - LONGEST).max(0.0).ceil() as i64;
         let there = newton.after(values, &step, shorter);
         values.copy_from_slice(&there);

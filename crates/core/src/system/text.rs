@@ -78,8 +78,10 @@ impl Writer<'_> {
         }
         // numbers first
         factors.sort_by_key(|f| !matches!(self.dag.ops[f.0], Op::Number { .. }));
-        let minus = factors.first().is_some_and(|f| self.dag.is(f.0, -1) && f.1 == 1);
-        let shown = &factors[usize::from(minus)..];
+        let signs = factors.iter().find(|f| self.dag.is(f.0, -1)).map_or(0, |f| f.1);
+        let minus = !signs.is_multiple_of(2);
+        factors.retain(|f| !self.dag.is(f.0, -1));
+        let shown = &factors[..];
         let mut parts = Vec::new();
         for (k, &(factor, power)) in shown.iter().enumerate() {
             let plain = power == 1 && k == 0 && !minus && matches!(self.dag.ops[factor], Op::Number { .. });
@@ -88,6 +90,9 @@ impl Writer<'_> {
                 1 => self.operand(factor, Binding::Product)?,
                 _ => format!("{}^{power}", self.operand(factor, Binding::Power)?),
             });
+        }
+        if parts.is_empty() {
+            parts.push("1".into());
         }
         let text = format!("{}{}", if minus { "-" } else { "" }, parts.join("*"));
         let binding = match (text.starts_with('-'), shown) {
@@ -143,8 +148,10 @@ mod tests {
             ("x - -2*y", "x - (-2*y)"),
             ("2.50*x + 0.03", "2.5*x + 0.03"),
             ("sin(x - y)^2", "sin(x - y)^2"),
-            ("(x/y)^2 - (-x)^2", "(x/y)^2 - (-x)^2"),
-            ("x - 3*(-y)", "x - 3*(-y)"),
+            ("(x/y)^2 - (-x)^2", "(x/y)^2 - x^2"),
+            ("-(-(x + y))*2", "2*(x + y)"),
+            ("x + (-1)*(-1)", "x + 1"),
+            ("x - 3*(-y)", "x - (-3*y)"),
             ("2*x - y*-3", "2*x - (-3*y)"),
         ] {
             let mut dag = Dag::default();
