@@ -34,16 +34,17 @@ impl EngineArguments {
         if !cfg!(feature = "symbolica") {
             return Ok(None);
         }
+        let wait = self.engine_wait;
         let program = std::env::current_exe()
             .map_err(|e| Failure::internal(format!("cannot find the program itself: {e}")))?;
         Ok(Some(Worker::new(WorkerConfig {
             program,
             arguments: vec!["symbolic-worker".into()],
             limit: self.symbolic_limit,
-            wait: Duration::from_secs(self.engine_wait),
+            wait: Duration::from_secs(wait),
             waiting: match quiet {
                 true => Waiting::silent(),
-                false => Waiting(Arc::new(move || say_waiting(&meanwhile()))),
+                false => Waiting(Arc::new(move || say_waiting(wait, &meanwhile()))),
             },
         })))
     }
@@ -68,23 +69,31 @@ impl EngineArguments {
     }
 }
 
-/// What is missing since other processes held the engine, and how to get it; quiet or not.
+/// What is missing without the engine, and how to get it; quiet or not.
 pub(crate) fn say_busy(worker: &Worker) {
-    if let Some(WorkerError::Busy { seconds }) = worker.failure() {
-        say(&format!(
-            "solutions that need the symbolic engine are missing: another obsdeg process held it for more than \
-             {seconds} s. Run the command again, or wait longer (--engine-wait)"
-        ));
-    }
+    let why = match worker.failure() {
+        Some(WorkerError::Busy { seconds: 0 }) => {
+            "another obsdeg process holds it, and --engine-wait 0 does not wait. Run the command again, or wait (--engine-wait)".into()
+        }
+        Some(WorkerError::Busy { seconds }) => format!(
+            "another obsdeg process held it for more than {seconds} s. Run the command again, or wait longer (--engine-wait)"
+        ),
+        Some(WorkerError::OverLimit { limit: 0 }) => "--symbolic-limit 0 switches it off".into(),
+        _ => return,
+    };
+    say(&format!(
+        "what needs the symbolic engine is missing or in decimals (the notes of the answer say what): {why}"
+    ));
 }
 
 /// What is known without the engine, line by line: asked for once, when the wait for it has lasted a second.
 pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 
-/// Says that the engine is waited for, and the verdicts, which need none.
-fn say_waiting(meanwhile: &[String]) {
+/// Says that the engine is waited for, at most how many seconds, and the verdicts, which need none.
+fn say_waiting(wait: u64, meanwhile: &[String]) {
     eprintln!(
-        "waiting for another obsdeg process: the symbolic engine runs once per user (--solutions off needs none; Ctrl-C ends the wait)"
+        "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once per user, and --solutions off \
+         does without it; Ctrl-C ends this command"
     );
     if !meanwhile.is_empty() {
         eprintln!("verdicts, which do not wait for it:");

@@ -84,13 +84,112 @@ fn sides_of_all_arguments_are_said() {
     assert_eq!(said, ["x > 0", "a - 9 < 0"]);
     assert!(a.branch_sides.iter().all(|s| !s.of_time));
     let text = printed(&a);
-    assert!(text.contains("where x > 0, a - 9 < 0; others may have other verdicts"), "{text}");
+    assert!(text.contains("of one branch, where x > 0, a - 9 < 0 (chosen by unknowns near one"), "{text}");
     let a = judged(
         "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\ne=0\n[[segment]]\n\
          [[segment]]\nconstants={e='1'}",
     );
     let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
     assert_eq!(said, ["t - 2 < 0"]);
+}
+
+fn judged_with(text: &str, seed: u64) -> SystemAnalysis {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    let options = SystemOptions { seed, solutions: false, ..SystemOptions::default() };
+    analyze_system(&model, options).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// Later segments begin later: nothing is seen that only times before the start show (b moves v until t = 4
+/// alone), and what is passed stays passed.
+#[test]
+fn later_segments_begin_later() {
+    let segments = "[[segment]]\n[[segment]]\n[[segment]]";
+    for seed in 1..=6 {
+        for (time, rank) in [("5", 1), ("0", 2)] {
+            let a = judged_with(
+                &format!(
+                    "name='m'\ntime={time}\nparameters=['b']\n[states]\nv='b*(abs(t - 4) - t + 4)'\n[outputs]\ny='v'\n{segments}"
+                ),
+                seed,
+            );
+            assert_eq!(a.rank, rank, "{time} {seed}: {:?}", a.branch_sides);
+        }
+        for shift in ["1", "2", "3/2"] {
+            let a = judged_with(
+                &format!(
+                    "name='m'\ntime='generic'\nparameters=['a', 'b']\n[states]\nx='a + b*sign(t - {shift})'\n[outputs]\ny='x'\n{segments}"
+                ),
+                seed,
+            );
+            let said = &a.branch_sides[0].condition;
+            assert!(!said.contains("at the other"), "{shift} {seed}: {said}");
+            let before = said.split("> 0").skip(1).any(|later| later.contains("< 0"));
+            assert!(!before, "{shift} {seed}: {said}");
+            // two sides of the sign tell a from b, one does not
+            let both = said.contains("> 0") && said.contains("< 0");
+            assert_eq!(a.rank, if both { 3 } else { 2 }, "{shift} {seed}: {said}");
+        }
+    }
+}
+
+/// Symmetries, combinations and remedies are those of the side on which the verdicts hold. By hand, for p > q:
+/// y = 2 b (p - q) + p q, where one of b, p, q tells the others; for p < q: y = p q without b. And for x' = a + b |x - y|:
+/// y and a move together.
+#[test]
+fn all_that_is_said_is_of_one_side() {
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in 1..=8 {
+        let a = judged_with(
+            "name='m'\nparameters=['p', 'q', 'b']\n[outputs]\ny='b*(abs(p - q) + p - q) + p*q'\nz='p - q'",
+            seed,
+        );
+        let said = a.branch_sides[0].condition.as_str();
+        seen.insert(said.to_string());
+        let words: Vec<&str> = a.symmetries.iter().map(|s| s.words.as_str()).collect();
+        let status = |n: &str| a.quantities.iter().find(|q| q.name == n).expect("it").status;
+        match said {
+            "p - q > 0" => {
+                assert!(words.iter().all(|w| !w.contains("multiply b by c")), "{seed}: {words:?}");
+                assert_eq!(status("b"), Status::Inseparable, "{seed}");
+                let text = printed(&a);
+                assert!(text.contains("To resolve p, q, b: know one of them"), "{text}");
+            }
+            "p - q < 0" => assert_eq!((status("b"), a.rank), (Status::NotExcited, 2), "{seed}"),
+            other => panic!("{seed}: {other}"),
+        }
+        let a = judged_with(
+            "name='m'\nparameters=['a', 'b']\n[states]\nx='a + b*abs(x - y)'\ny='-1'\n[outputs]\no='x'",
+            seed,
+        );
+        assert!(a.other_directions.is_empty(), "{seed}: {:?}", a.branch_sides);
+        assert_eq!(a.symmetries.len(), a.unobservable_directions, "{seed}");
+    }
+    assert_eq!(seen.len(), 2, "both sides: {seen:?}");
+}
+
+/// Functions that are not defined at the start because of its time name the key that chooses another.
+#[test]
+fn a_time_that_can_not_be_is_named() {
+    for (input, time, named) in [
+        ("log(t)", "", true),
+        ("log(t - 3)", "time = 2", true),
+        ("1/t", "", true),
+        ("sqrt(t)", "", true),
+        ("sign(t - 7)", "time = 7", true),
+        ("log(-1 - t^2)", "time = 'generic'", false),
+    ] {
+        let text = format!(
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+        );
+        let model = model_file::read(&text).expect("a model");
+        let said = analyze_system(&model, SystemOptions::default()).expect_err(input).to_string();
+        assert_eq!(said.contains("`time` in the file chooses another"), named, "{input}: {said}");
+        if named {
+            let other = model_file::read(&text.replace(&format!("\n{time}\n"), "\ntime = 9\n"));
+            let found = analyze_system(&other.expect("a model"), SystemOptions::default());
+            assert!(found.is_ok(), "{input} at 9: {:?}", found.err().map(|e| e.to_string()));
+        }
+    }
 }
 
 /// The section on the system defines every name in a solution that is no unknown and no output, inputs of

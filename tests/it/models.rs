@@ -382,6 +382,38 @@ fn a_filter_is_not_asked_what_it_cannot_know() {
     }
 }
 
+/// A constraint is known, so that no error along its gradient is judged: with it a run is as consistent as
+/// without it, and has a degree of freedom less, however narrow priors are.
+#[test]
+fn what_a_constraint_holds_is_not_judged() {
+    const RUNS: u64 = 12;
+    let text = |constraint: &str, prior: f64| {
+        format!(
+            "name='attitude'\n{constraint}\n[constants]\ng=[0, 0, 1]\nm=[1, 0, 0]\n[known_inputs]\n'w[3]'='generic'\n\
+             [parameters]\n'b[3]'={{unit='rad/s'}}\n[states]\n'q[4]'='qdot(q, w - b)'\n\
+             [outputs]\nacc='transpose(R(q))*g'\nmag='transpose(R(q))*m'\n\
+             [simulation]\nduration=20\nstep=0.2\nvalues={{q=[0.5, 0.5, 0.5, 0.5], b=[0.01, 0.02, -0.01]}}\n\
+             priors={{q={prior}, b={prior}}}\nnoise={{acc=0.001, mag=0.01}}\n\
+             inputs={{w=['0.1*sin(t)', '0.2', '0.1*cos(t)']}}"
+        )
+    };
+    for prior in [5e-4, 5e-6] {
+        for (constraint, held) in [("constraints=['norm(q) = 1']", 1), ("", 0)] {
+            let model = model_file::read(&text(constraint, prior)).expect("a model");
+            let runs = (1..=RUNS).map(|seed| simulate_system(&model, seed).expect("a run").0.consistency);
+            let runs: Vec<_> = runs.collect();
+            let free = (7 - held) as f64;
+            for c in &runs {
+                assert_eq!((c.held_directions, c.unresolved_directions), (held, 0), "{prior}");
+                assert_eq!(c.nees_limit, chi_square_band(free, 1.0, 0.999).1);
+            }
+            let mean = runs.iter().map(|c| c.nees).sum::<f64>() / RUNS as f64;
+            let band = chi_square_band(free, RUNS as f64, 0.9999);
+            assert!((band.0..=band.1).contains(&mean), "{prior} {constraint}: {mean}, {band:?}");
+        }
+    }
+}
+
 /// Slopes, prior inflation and null vectors of the information confirm the exact verdicts on every example that has numbers.
 #[test]
 fn the_information_confirms_the_verdicts() {

@@ -168,6 +168,43 @@ fn tries_are_said_and_given_points_used() {
     assert!(a.digits.is_some() && a.rank == 2, "{:?}", a.rank_profile);
 }
 
+/// Expanded squares plus a positive number have no real point: far away, where large terms cancel, none is
+/// taken for one.
+#[test]
+fn sums_of_expanded_squares_have_no_point() {
+    for (constraint, squares) in [
+        ("x^2 + y^2 = 2*x*y - 1", "(x - y)^2 + 1"),
+        ("x^2 + 2*x*y + y^2 + 1/100 = 0", "(x + y)^2 + 1/100"),
+        ("x^2*y^2 - 2*x*y + 1 + x^2 = 0", "(x*y - 1)^2 + x^2"),
+        ("x^2*y^2 - 2*x*y + 2 = 0", "(x*y - 1)^2 + 1"),
+        ("4*x^2 - 4*x*y + y^2 = -1/9", "(2*x - y)^2 + 1/9"),
+        ("x^4 - 2*x^2*y^2 + y^4 + 1 = 0", "(x^2 - y^2)^2 + 1"),
+    ] {
+        let (of, sum) = (difference(constraint), difference(&format!("{squares} = 0")));
+        for p in grid() {
+            let (a, b) = (of(p), sum(p));
+            assert!((a - b).abs() < 1e-9 * (1.0 + b) && b > 0.0, "{constraint}");
+        }
+        for rest in ["", "[simulation]\nvalues={x=0.5, y=0.25}"] {
+            let said = refusal(&[constraint], rest);
+            assert!(said.contains("no real point was found"), "{constraint}: {said}");
+            let advice = if rest.is_empty() { "give it under" } else { "give values nearer to it" };
+            assert!(said.contains(advice), "{said}");
+        }
+    }
+}
+
+/// Constraints that hold in several ways are judged in one, and the answer says so.
+#[test]
+fn one_of_several_ways_is_named() {
+    for (constraint, named) in [("x^2 - y^2 = 0", true), ("x*y = 0", true), ("x + y = 1", false)] {
+        let a = judged(&[constraint], "", 1).expect("judged");
+        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(text.contains("can hold in several ways"), named, "{text}");
+    }
+}
+
 /// Constraints whose gradients depend on each other where they hold say less than they seem to: the points
 /// are these alone, so that a verdict from gradients would be wrong.
 #[test]

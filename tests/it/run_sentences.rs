@@ -130,6 +130,52 @@ fn filters_that_are_not_to_be_trusted_are_named() {
     assert!(consistent > 0, "a run that looks right");
 }
 
+/// A filter with full attitudes follows a platform that has them: a truth that nobody states is exact, and is
+/// named. One that is stated as linear is refused, as is such a filter that is wrong on purpose.
+#[test]
+fn the_truth_is_one_that_the_filter_can_follow() {
+    for (filter, expected) in [("linear", "linear"), ("extended", "exact"), ("iterated", "exact")] {
+        let arguments = [&["simulate", "-q"], &P1_P2[..], &["--filter", filter]].concat();
+        let answer = json(&[&arguments[..], &["--format", "json"]].concat());
+        assert_eq!(answer["conditions"]["truth"], expected, "{filter}");
+        let named = said(&arguments).contains("truth exact, as a filter with full attitudes needs");
+        assert_eq!(named, expected == "exact", "{filter}");
+        let keys = answer["conditions"]["by_default"].to_string();
+        assert_eq!(keys.contains("\"truth\""), expected == "exact", "{keys}");
+    }
+    let crosscheck = |more: &[&str]| {
+        let arguments = [&["crosscheck", "-q", "--runs", "20"], &P1_P2[..], more].concat();
+        json(&[&arguments[..], &["--format", "json"]].concat())
+    };
+    for (more, filter, passes) in [
+        (&[][..], "linear", true),
+        (&["--filter", "extended"], "extended", false),
+        (&["--filter", "iterated"], "iterated", true),
+    ] {
+        let answer = crosscheck(more);
+        assert_eq!(answer["monte_carlo"]["filter"], filter);
+        let anees = &answer["monte_carlo"]["statistics"][0];
+        assert!(anees["name"].as_str().is_some_and(|n| n.starts_with("ANEES")), "{anees}");
+        assert_eq!(anees["pass"], passes, "{filter}: {anees}");
+    }
+    let refused = |command: &str, more: &[&str]| {
+        let output = run(&[&[command, "-q"], &P1_P2[..], more].concat());
+        assert!(!output.status.success() && stdout(&output).is_empty(), "{command} {more:?}");
+        joined(&crate::program::stderr(&output))
+    };
+    for command in ["simulate", "crosscheck"] {
+        for filter in ["extended", "iterated"] {
+            let said = refused(command, &["--truth", "linear", "--filter", filter]);
+            assert!(said.contains(&format!("the {filter} filter has full attitudes")), "{said}");
+            assert!(said.contains("expected truth = \"exact\""), "{said}");
+        }
+    }
+    for wrong in [["--filter-carry", "reset"], ["--filter-drop", "p2"], ["--filter-latitude", "10"]] {
+        let said = refused("crosscheck", &[&wrong[..], &["--filter", "extended"]].concat());
+        assert!(said.contains("wrong on purpose") && said.contains("found the extended filter"), "{said}");
+    }
+}
+
 /// The report of such a run advises against its sigmas too.
 #[test]
 fn reports_do_not_call_untrusted_filters_right() {

@@ -151,7 +151,7 @@ pub struct ConditionOptions {
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
 
-    /// What the simulated truth is (default: linear)
+    /// Model of the simulated truth (default: linear; with --filter extended or iterated exact)
     #[arg(long, value_name = "LEVEL", value_parser = one_of(TRUTHS))]
     pub truth: Option<Truth>,
 

@@ -97,6 +97,19 @@ fn formula(f: &Formula) -> Typeset {
     }
 }
 
+/// The degenerate angles, and the reason why some may be missing.
+fn degenerate_angles(a: &Analysis) -> Option<Block> {
+    let mut lines: Vec<String> = a.degenerate_loci.iter().flatten().map(words::locus).collect();
+    lines.extend(a.degenerate_loci.as_ref().map(|loci| words::loci(loci)));
+    let incomplete = a.degenerate_loci_incomplete.as_ref();
+    lines.extend(incomplete.map(|why| format!("there may be others: {why}")));
+    let heading = match incomplete {
+        Some(_) => "Degenerate angles (the list may lack some)",
+        None => "Degenerate angles",
+    };
+    Block::list_if_any(heading, lines)
+}
+
 impl Answer for Analysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -114,10 +127,7 @@ impl Answer for Analysis {
         let silent = words::not_excited(self);
         let silent = (!silent.is_empty()).then(|| silent.join(", "));
         blocks.extend(Block::list_if_any("Not excited (never moves Z)", Vec::from_iter(silent)));
-        if let Some(loci) = &self.degenerate_loci {
-            let lines = loci.iter().map(words::locus).chain([words::loci(loci)]);
-            blocks.push(Block::list("Degenerate angles", lines.collect()));
-        }
+        blocks.extend(degenerate_angles(self));
         blocks.extend(Block::formulas(
             "Z in n, and psi, eps in n at each position",
             self.formulas.iter().flatten().map(formula),

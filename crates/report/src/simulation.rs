@@ -259,7 +259,10 @@ impl Answer for Simulation {
         if !self.combinations.is_empty() {
             blocks.push(table("Combinations (psi: of the end)", &self.combinations));
         }
-        blocks.extend(Block::list_if_any("Known from the prior only: whose", priors(&self.quantities)));
+        blocks.extend(Block::list_if_any(
+            "Known from the prior only: on which priors",
+            priors(&self.quantities),
+        ));
         blocks.extend(omitted::blocks(&self.omitted, ""));
         blocks.push(Block::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {

@@ -89,9 +89,18 @@ pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
     let reasons: Vec<String> = r.differs.iter().map(|why| reason(*why, c)).collect();
     let why = match reasons.is_empty() {
         true => String::new(),
-        false => format!(", since the run has {}", reasons.join(" and ")),
+        false => format!(", since the run has {}", listed(&reasons)),
     };
     format!("{verdict} its sigmas are {} to {} times the predicted ones{why}", of(low), of(high))
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(parts: &[String]) -> String {
+    match parts {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// `3.92`, `0.0012`: three digits are enough for a ratio.
@@ -101,9 +110,9 @@ fn ratio(x: f64) -> String {
 
 fn reason(why: RunDiffers, c: &ConditionsReport) -> String {
     match why {
-        RunDiffers::RandomDrift => format!("a random drift of {}, which nothing states", c.drift_noise),
-        RunDiffers::Prior => "priors that nothing states".into(),
-        RunDiffers::FullAttitudes => "full attitudes, where the prediction is that of small angles".into(),
+        RunDiffers::RandomDrift => format!("a random drift of {} (not stated)", c.drift_noise),
+        RunDiffers::Prior => "priors (not stated)".into(),
+        RunDiffers::FullAttitudes => "full attitudes (the prediction is that of small angles)".into(),
     }
 }
 
@@ -217,6 +226,7 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> 
         "accelerometer_noise_g" => format!("noise of Z {:e} g", c.accelerometer_noise_g),
         "step_s" => format!("steps of {} s", c.step_s),
         "dwell_s" => "1000 s at a position".into(),
+        "truth" => "truth exact, as a filter with full attitudes needs".into(),
         "drift_noise" => format!("random drift {}", c.drift_noise),
         "values" => {
             let of = scaled(c);

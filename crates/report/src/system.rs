@@ -42,7 +42,7 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
             // no "-0"
             let least = d.nonzero_log10.round() + 0.0;
             format!(
-                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{least} of its row), {zero}; no probability belongs to it; seed {seed}",
+                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{least} relative to the largest number of its row), {zero}; no probability belongs to it; seed {seed}",
                 d.digits[0], d.digits[1]
             )
         }
@@ -107,6 +107,19 @@ fn side_in_time(a: &SystemAnalysis) -> String {
         none if none.is_empty() => none,
         conditions => format!(" where {conditions}"),
     }
+}
+
+/// The branch of abs, sign, roots, asin and acos on which verdicts hold.
+fn branch(a: &SystemAnalysis) -> String {
+    let functions = words::names(a.branches.iter().map(String::as_str));
+    let sides = words::names(a.branch_sides.iter().map(|s| s.condition.as_str()));
+    let point = "unknowns near one, or where the model is not defined there, the first point that was found";
+    let chosen = match (sides.is_empty(), a.branch_sides.iter().all(|s| s.of_time)) {
+        (true, _) => format!("that of {point}"),
+        (_, true) => format!("where {sides} (`time` in the file chooses another)"),
+        (..) => format!("where {sides} (chosen by {point})"),
+    };
+    format!("{functions}: the verdicts are those of one branch, {chosen}; others may have other verdicts")
 }
 
 impl Answer for SystemAnalysis {
@@ -189,15 +202,21 @@ impl Answer for SystemAnalysis {
                 time => format!("t = {time}, where the run begins"),
             };
             format!(
-                "the equations or known inputs hold the time: judged at {at}, in later segments at a generic time{}; `time` in the file sets \
-                 another, or \"generic\"",
+                "the equations or known inputs depend on the time: judged at {at}; segments after the first, if there are any, at a generic \
+                 time{}; `time` in the file sets another, or \"generic\"",
                 if time == "generic" { String::new() } else { side_in_time(self) }
             )
         }));
         if !self.constraints.is_empty() {
+            // linear ones hold in one way
+            let several = self.constraints.iter().any(|c| c.contains(['*', '^']));
             assumed.push(format!(
-                "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0",
-                self.constraints.join(", ")
+                "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
+                self.constraints.join(", "),
+                match several {
+                    true => "; where it can hold in several ways (x*y = 0 by x = 0 or by y = 0), they are those of one: state that one to choose",
+                    false => "",
+                }
             ));
         }
         assumed.push(if self.closed {
@@ -219,18 +238,12 @@ impl Answer for SystemAnalysis {
         )
     });
         assumed.push(
-            "observable is meant locally: around a generic point no other value gives the same outputs; how many values there are in all is said where it was decided"
+            "observable and degree are meant locally: around a generic point no other value gives the same outputs up to that order; how many \
+             values there are in all is said where it was decided, and the expression of an only one may use derivatives of higher orders"
                 .into(),
         );
         if !self.branches.is_empty() {
-            assumed.push(format!(
-                "{}: one branch was looked at, that of points near one (positive unknowns), or where the model is not defined there, of the first point that was found{}; others may have other verdicts",
-                words::names(self.branches.iter().map(String::as_str)),
-                match words::names(self.branch_sides.iter().map(|s| s.condition.as_str())) {
-                    none if none.is_empty() => none,
-                    conditions => format!(", where {conditions}"),
-                }
-            ));
+            assumed.push(branch(self));
         }
         if !self.combinations.is_empty() {
             assumed.push("the number of solutions of a combination is not counted".into());
@@ -266,7 +279,7 @@ impl Answer for SystemAnalysis {
 /// When the run of a model that holds the time begins.
 fn begins_at(time: f64) -> String {
     format!(
-        "the equations or known inputs hold the time: the run begins at t = {time} (1 where the file says \"generic\")"
+        "the equations or known inputs depend on the time: the run begins at t = {time} (1 where the file says \"generic\")"
     )
 }
 

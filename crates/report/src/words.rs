@@ -512,6 +512,22 @@ pub(crate) fn band((low, high): (f64, f64)) -> String {
     format!("{}..{}", number(low), number(high))
 }
 
+/// `; without ...`: the directions that the NEES leaves out; empty if there are none.
+fn left_out(c: &Consistency) -> String {
+    let directions = |k: usize| format!("{k} {}", if k == 1 { "direction" } else { "directions" });
+    let held = match c.held_directions {
+        0 => String::new(),
+        k => format!("; without {} that constraints hold", directions(k)),
+    };
+    match c.unresolved_directions {
+        0 => held,
+        k => format!(
+            "{held}; without {} that are not resolvable: the filter claims to know them more than a million times better than any unknown",
+            directions(k)
+        ),
+    }
+}
+
 /// Whether a run is credible, and its figures.
 pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
     vec![
@@ -526,13 +542,7 @@ pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
             number(c.nees),
             band(c.nees_band),
             number(c.nees_limit),
-            match c.unresolved_directions {
-                0 => String::new(),
-                k => format!(
-                    "; without {k} {} in which the filter believes to know more than a million times more than of any unknown: not resolvable",
-                    if k == 1 { "direction" } else { "directions" }
-                ),
-            }
+            left_out(c)
         ),
         format!("innovations white: probability {}", number(c.whiteness_probability)),
     ]

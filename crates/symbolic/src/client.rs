@@ -77,7 +77,7 @@ pub enum WorkerError {
     )]
     Ended,
     /// More work than the limit.
-    #[error("the symbolic engine reached its limit, {limit} units of work")]
+    #[error("{}", over_limit(*limit))]
     OverLimit {
         /// The limit.
         limit: u64,
@@ -94,6 +94,13 @@ pub enum WorkerError {
         /// Why.
         reason: String,
     },
+}
+
+fn over_limit(limit: u64) -> String {
+    match limit {
+        0 => "the symbolic engine is switched off by a limit of 0 (--symbolic-limit)".into(),
+        _ => format!("the symbolic engine reached its limit, {limit} units of work (--symbolic-limit)"),
+    }
 }
 
 struct Running {

@@ -159,7 +159,7 @@ fn schemes_at_the_edge_agree() {
             let measured = after("inflation ").or_else(|| after("correlation ")).expect("a number");
             let exact = after("many digits ").expect("a number");
             assert!((measured - exact).abs() < 1e-3 * exact.abs(), "{seed}: {why}");
-            assert!(why.contains("as the filter shows"), "{seed}: {why}");
+            assert!(why.contains("the filter in doubles shows the same"), "{seed}: {why}");
         }
     }
     // an ordinary readout of gimbals, and separations to both sides of the prior's width

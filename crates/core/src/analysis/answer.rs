@@ -62,6 +62,9 @@ pub struct Analysis {
     pub to_resolve: Remedies,
     /// Conditions on generic angles under which a verdict changes; null if they were not computed.
     pub degenerate_loci: Option<Vec<Locus>>,
+    /// Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if it has
+    /// all that one equation describes.
+    pub degenerate_loci_incomplete: Option<String>,
     /// Formulas of Z and its derivatives, position by position; null if not asked for.
     pub formulas: Option<Vec<Formula>>,
     /// Axes in which Z is printed in solutions.

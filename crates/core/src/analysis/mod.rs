@@ -83,7 +83,11 @@ pub fn analyze(
     // without an engine, and without a reason of their own
     let untold_loci = found.is_ok();
     let found = printer.noted(found).unwrap_or_default();
-    printer.notes.extend(found.incomplete.clone());
+    let generic = !scheme.generic_names().is_empty();
+    let incomplete_loci = match found.loci {
+        None if untold_loci && generic => Some("not sought without the symbolic engine".into()),
+        _ => found.incomplete.clone(),
+    };
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
     printer.notes.extend(term_notes(scheme));
@@ -100,7 +104,7 @@ pub fn analyze(
                 .into(),
         );
     }
-    let asked = (options.solutions && !course, untold_loci && !scheme.generic_names().is_empty());
+    let asked = (options.solutions && !course, untold_loci && generic);
     let wanting = Wanting::new(&quantities, &combinations, &findings, &found, asked);
     let wanting = Wanting {
         left_out: printer.solver.left_out(),
@@ -136,6 +140,7 @@ pub fn analyze(
         omitted,
         to_resolve,
         degenerate_loci: found.loci,
+        degenerate_loci_incomplete: incomplete_loci,
         formulas,
         frame: options.frame,
         gimbals: scheme.gimbal_report(),

@@ -212,7 +212,7 @@ impl FromStr for Assignment {
 /// What a scheme file says of a run; what it leaves out has defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
-    /// linear (default) or exact.
+    /// linear or exact; left out, exact with a filter that has full attitudes, and linear otherwise.
     pub truth: Option<Truth>,
     /// linear, extended or iterated; when left out, linear where the small-angle model holds.
     pub filter: Option<FilterKind>,

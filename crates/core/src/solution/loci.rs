@@ -119,7 +119,7 @@ pub(crate) fn loci(
         let factors = match worker.ask(&request) {
             Ok((factors, _)) => factors,
             Err(e) => {
-                incomplete = Some(format!("the list of degenerate angles may lack some: {e}"));
+                incomplete = Some(e.to_string());
                 break;
             }
         };
@@ -191,7 +191,7 @@ pub(crate) fn loci(
     };
     if undecided > 0 {
         let few = format!(
-            "the list of degenerate angles may lack some: of {undecided} {} it is not known whether angles meet {} or what changes there",
+            "of {undecided} {} it is not known whether angles meet {} or what changes there",
             if undecided == 1 { "condition" } else { "conditions" },
             if undecided == 1 { "it" } else { "them" },
         );

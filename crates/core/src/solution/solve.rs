@@ -91,7 +91,7 @@ pub(crate) enum Unsolved {
     #[error("formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted")]
     TooManyAngles,
     /// The engine was refused, or gave up.
-    #[error("the symbolic engine gave no formula for it")]
+    #[error("no formula of it came from the symbolic engine")]
     NoFormula,
     /// A broken promise: found, and wrong.
     #[error("it did not survive its substitution: please report this scheme")]

@@ -44,6 +44,12 @@ pub(super) enum NotCounted {
     /// A function in an equation.
     #[error("solutions are counted for models without functions only")]
     NotRational,
+    /// Decided in real numbers.
+    #[error(
+        "solutions are counted in prime fields, and the verdicts were decided in real numbers (constraints that follow from each other, \
+         or hold in no prime field)"
+    )]
+    InDigits,
     /// Too many unknowns.
     #[error("there are more than {UNKNOWNS} unknowns")]
     TooLarge,
@@ -101,7 +107,8 @@ pub(super) fn values_taken(
     let proven = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
     let at = |i: usize| -> Vec<Count> {
         let Some(fields) = judged.fields else {
-            return vec![Err(NotCounted::NotRational); degrees.degree.len()];
+            let why = if compiled.dag.is_rational() { NotCounted::InDigits } else { NotCounted::NotRational };
+            return vec![Err(why); degrees.degree.len()];
         };
         if degrees.degree.len() > UNKNOWNS {
             return vec![Err(NotCounted::TooLarge); degrees.degree.len()];

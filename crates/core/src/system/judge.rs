@@ -5,10 +5,11 @@ use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
 use super::branches::{BranchSide, Signs, sided, sides};
+use super::constraints::slots_of;
 use super::dag::{Dag, Op};
 use super::error::ModelError;
 use super::independent::independent_functions;
-use super::model::{Compiled, MAX_UNKNOWNS, Role, SystemModel};
+use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
 use super::rows::{Layout, Maker, SystemRows, random_field};
 use super::taylor::Singular;
@@ -283,6 +284,14 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
             ),
         ),
     };
+    let of_time = slots_of(&compiled.dag, node).into_iter().any(|s| compiled.roles[s] == Role::Time);
+    let message = match model.time {
+        StartTime::Generic => message,
+        _ if !of_time => message,
+        _ => format!(
+            "{message}; it depends on the time, which is that of the start: `time` in the file chooses another, or \"generic\""
+        ),
+    };
     match compiled.places.get(&node) {
         Some((place, span)) => place.error(message, span.clone()),
         None => ModelError { what: "the model".into(), message, span: None },
@@ -295,21 +304,26 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
 /// # Errors
 /// [`ModelError`].
 pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Judgement, ModelError> {
-    judge_counted(model, seed, bound, &mut Spent::default())
+    judge_compiled(model, &model.compile()?, seed, bound)
 }
 
-/// Judges a model, and adds the operations at all points to those that were `spent`, whether or not there is a verdict.
+/// Judges a change of a judged model, on the same sides of abs and sign where it has as many. Adds the operations
+/// at all points to those that were `spent`, whether or not there is a verdict.
 ///
 /// # Errors
 /// [`ModelError`].
-pub(super) fn judge_counted(
+pub(super) fn judge_beside(
+    judged: &Judgement,
     model: &SystemModel,
-    seed: u64,
     bound: Option<usize>,
     spent: &mut Spent,
 ) -> Result<Judgement, ModelError> {
     let compiled = model.compile()?;
-    judge_within(model, &compiled, (seed, bound), spent)
+    let shape = |signs: &Signs| -> Vec<usize> { signs.iter().map(Vec::len).collect() };
+    let runs = compiled.segments.len().max(1) * model.experiments.max(1);
+    let own = vec![runs; sided(&compiled).len()];
+    let sides = judged.layout.sides.clone().filter(|sides| shape(sides) == own);
+    judge_within(model, &compiled, (judged.findings.seed, bound), sides, spent)
 }
 
 /// Judges a model that was compiled.
@@ -322,16 +336,18 @@ pub fn judge_compiled(
     seed: u64,
     bound: Option<usize>,
 ) -> Result<Judgement, ModelError> {
-    judge_within(model, compiled, (seed, bound), &mut Spent::default())
+    judge_within(model, compiled, (seed, bound), None, &mut Spent::default())
 }
 
+/// `sides`: those on which points should be.
 fn judge_within(
     model: &SystemModel,
     compiled: &Compiled,
     (seed, bound): (u64, Option<usize>),
+    sides: Option<Signs>,
     spent: &mut Spent,
 ) -> Result<Judgement, ModelError> {
-    let mut layout = checked_layout(model, compiled, bound)?;
+    let mut layout = Layout { sides, ..checked_layout(model, compiled, bound)? };
     layout.dependent = real_point(model, compiled, &layout, seed, spent)?;
     let rational = compiled.dag.is_rational();
     if !rational {
@@ -491,7 +507,13 @@ fn judge_by_digits(
             Err(why) => reason = why,
         }
     }
-    Err(refuse(format!("undecided, because {reason}")))
+    let other = match compiled.constraints.is_empty() {
+        true => "",
+        false => {
+            "; points near values that hold the constraints, given under [simulation.values], may decide it"
+        }
+    };
+    Err(refuse(format!("undecided, because {reason}{other}")))
 }
 
 fn refuse(message: String) -> ModelError {
@@ -523,6 +545,12 @@ fn pair<const A: usize, const B: usize>(
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
     let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
     let unclear = |gap: Gap, digits: usize| {
+        // bounds wider than what they bound
+        if gap.zero >= 0.0 {
+            return format!(
+                "with {digits} digits the numbers that decide a rank lose all of them to rounding"
+            );
+        }
         format!(
             "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of the rest is 10^{:.0}",
             decimal(gap.zero),
@@ -533,6 +561,8 @@ fn pair<const A: usize, const B: usize>(
     if !first.gap.is_decisive(64 * A as i64) {
         return Ok(Err(unclear(first.gap, digits[0])));
     }
+    // all other points are on the side of this one
+    let layout = &Layout { sides: Some(first.signs.clone()), ..layout.clone() };
     let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1), spent)?;
     if !second.gap.is_decisive(64 * B as i64) {
         return Ok(Err(unclear(second.gap, digits[1])));

@@ -271,7 +271,8 @@ impl Reader<'_> {
                 functions.into_iter().map(KnownInput::Function).collect()
             }
             Value::Table(t) => {
-                self.known_keys(&what, t, &span, &["polynomial", "unit", "description"])?;
+                // a function was looked for above
+                self.known_keys(&what, t, &span, &["polynomial", "function", "unit", "description"])?;
                 vec![KnownInput::Polynomial(self.polynomial(&what, t, &span)?); named.len()]
             }
             _ => {

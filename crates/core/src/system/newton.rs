@@ -10,8 +10,12 @@ use super::work::{Step, Work, product};
 /// Steps of Newton's method from one start: near a point they double the digits.
 const STEPS: usize = 80;
 /// Steps in a row that gain less than two bits each, near a point: at one whose gradients are independent
-/// none does.
-const SLOW: usize = 12;
+/// none does. So many that what is left of the constraints falls far below what it is where they hold nowhere.
+const SLOW: usize = 40;
+/// Length, as a power of two, of the first of them at most.
+const SHORT: f64 = -8.0;
+/// Bits by which the step from a point at which constraints hold is shorter than the point is far from zero.
+const STILL: f64 = 32.0;
 /// Most terms into which the sum that a constraint is will be taken apart.
 const TERMS: usize = 64;
 /// Relative residual, as a power of two, below which a point is near.
@@ -57,6 +61,8 @@ struct Linear<const N: usize> {
     /// Largest residual relative to how much its constraint changes where what it holds changes by its size,
     /// as a power of two.
     shift: f64,
+    /// Largest residual, as a power of two.
+    residual: f64,
     /// How far the point is from holding the constraints: the largest logarithm of a ratio of sides.
     far: f64,
     /// True if every residual is as small as the rounding of its terms.
@@ -108,8 +114,15 @@ impl Newton<'_> {
         self.work.take(Step::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
         let here: Vec<Ball<N>> = self.places.iter().map(|&s| values[s]).collect();
         let nothing = f64::NEG_INFINITY;
-        let mut out =
-            Linear { rows: Vec::new(), off: nothing, worst: 0, shift: nothing, far: 0.0, holds: true };
+        let mut out = Linear {
+            rows: Vec::new(),
+            off: nothing,
+            worst: 0,
+            shift: nothing,
+            residual: nothing,
+            far: 0.0,
+            holds: true,
+        };
         for (c, sum) in self.sums.iter().enumerate() {
             let mut sides = [Ball::ZERO; 2];
             let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
@@ -133,6 +146,7 @@ impl Newton<'_> {
             let value = at.start(sum.node);
             let left = value.midpoint();
             out.shift = out.shift.max(left.size_log2() - change);
+            out.residual = out.residual.max(left.size_log2());
             let off = if left.is_zero() { f64::NEG_INFINITY } else { left.size_log2() - scale };
             // what rounding makes of the terms, and of what they are made of
             let bits = Ball::<N>::BITS as f64;
@@ -246,6 +260,8 @@ pub(super) fn hold_by_newton<const N: usize>(
     // what was refused once stays refused
     let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(NotHeld::Refused, |()| reason);
     let (mut before, mut far_before, mut slow, mut stuck) = (f64::INFINITY, f64::INFINITY, 0, false);
+    // residual and size of the point where steps became slow
+    let mut from = (f64::INFINITY, 0.0);
     let mut linear = newton.linear(values).ok_or_else(|| failed(NotHeld::Constraint(0)))?;
     for _ in 0..STEPS {
         let nowhere = NotHeld::Constraint(linear.worst);
@@ -260,7 +276,8 @@ pub(super) fn hold_by_newton<const N: usize>(
         let step = newton.step(&linear, false).ok_or_else(|| failed(nowhere))?;
         let here: Vec<Ball<N>> = newton.places.iter().map(|&s| values[s]).collect();
         let (length, far) = (size(&step), size(&here).max(0.0));
-        if linear.holds {
+        // where constraints hold in the limit alone, the next step is as long as the way so far
+        if linear.holds && length <= far - STILL {
             let error = (length + 8.0).max(far - Ball::<N>::BITS as f64 + 24.0);
             newton.places.iter().for_each(|&s| values[s] = values[s].midpoint().widened(error));
             return Ok(());
@@ -271,8 +288,17 @@ pub(super) fn hold_by_newton<const N: usize>(
         }
         // near a point where gradients depend on each other steps shrink by a constant factor, and so do both sides
         let stays = linear.far > FAR && linear.far > far_before - GAIN / 2.0 && linear.shift < NEAR;
-        slow = if (linear.off < NEAR || stays) && length > before - 2.0 { slow + 1 } else { 0 };
-        if slow >= SLOW {
+        slow = if (linear.off < NEAR || stays) && length < SHORT && length > before - 2.0 {
+            slow + 1
+        } else {
+            0
+        };
+        if slow == 0 {
+            from = (linear.residual, far);
+        }
+        // towards a point residuals fall by more than a bit a step; away from all points they stay, or the point does not
+        let settles = from.0 - linear.residual >= SLOW as f64 && far < from.1 + 1.0;
+        if slow >= SLOW && settles {
             return Err(NotHeld::Dependent(linear.worst));
         }
         (before, far_before) = (length, linear.far);

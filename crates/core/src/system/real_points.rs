@@ -88,9 +88,12 @@ fn sought(
     work.refused().map_or(Ok(()), Err)?;
     let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
     let message = format!(
-        "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}; if there is one, give it under \
-         [simulation.values]",
-        if maker.gives_start() { ", the first three near the values given" } else { "" }
+        "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}",
+        match maker.gives_start() {
+            true =>
+                ", the first three near the values given under [simulation.values]; if there is one, give values nearer to it",
+            false => "; if there is one, give it under [simulation.values]",
+        }
     );
     Err(first.place.error(message, 0..first.text.len()))
 }

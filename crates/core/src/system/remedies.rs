@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use obsdeg_exact::Reals;
 
-use super::judge::{Judgement, climb_at, judge_counted};
+use super::judge::{Judgement, climb_at, judge_beside};
 use super::model::{
     Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
 };
@@ -28,7 +28,6 @@ const MOST_ALIKE: usize = 6;
 struct Search<'a> {
     model: &'a SystemModel,
     judged: &'a Judgement,
-    seed: u64,
     order: Option<usize>,
     /// Columns of unknowns that are not observable and are spoken of.
     open: Vec<usize>,
@@ -72,7 +71,7 @@ pub(super) fn remedies(
     let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
     let out = Remedies::default();
-    let mut search = Search { model, judged, seed, order, open, roles, budget, left, ended: false, out };
+    let mut search = Search { model, judged, order, open, roles, budget, left, ended: false, out };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -219,7 +218,7 @@ impl Search<'_> {
         let last = self.judged.findings.degrees.rank_profile.len().saturating_sub(1);
         let order = if closed { Some(last) } else { self.order };
         let mut spent = Spent::default();
-        let judged = judge_counted(&model, self.seed, order, &mut spent);
+        let judged = judge_beside(self.judged, &model, order, &mut spent);
         self.left = self.left.saturating_sub(spent.operations);
         if spent.refused && judged.is_err() {
             self.ended = true;

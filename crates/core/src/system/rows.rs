@@ -4,7 +4,7 @@ use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
 
 use super::adjoint::Adjoint;
-use super::branches::Signs;
+use super::branches::{Signs, sided};
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
@@ -42,6 +42,9 @@ pub struct Layout {
     pub closed: bool,
     /// Number of constraints that follow from the others where these hold.
     pub dependent: usize,
+    /// Signs of the arguments of abs and sign that points should have, those of the first one: verdicts are of
+    /// one side. `None` before the first point.
+    pub(super) sides: Option<Signs>,
 }
 
 impl Layout {
@@ -95,7 +98,7 @@ impl Layout {
                 }
             }
         }
-        Self { unknowns, bound, closed, dependent: 0 }
+        Self { unknowns, bound, closed, dependent: 0, sides: None }
     }
 
     pub(super) fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
@@ -156,6 +159,9 @@ pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
         }
     }
 }
+
+/// Points that are drawn until one is on the side that is asked for.
+const SIDES: usize = 200;
 
 /// Rows over the unknowns.
 pub(super) type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
@@ -487,13 +493,27 @@ impl<'a, S: Values> SystemRows<'a, S> {
     ) -> Result<Self, Singular> {
         let mut last = Singular::Division(0);
         let maker = Maker { model, compiled, layout, field, work };
-        for attempt in 0..S::ATTEMPTS {
+        let (mut attempt, mut tries, mut elsewhere) = (0, 0, None);
+        while attempt < S::ATTEMPTS {
             match Self::at(&maker, work, rng, attempt) {
-                Err(singular) if singular != Singular::Refused => last = singular,
+                Err(singular) if singular != Singular::Refused => {
+                    last = singular;
+                    attempt += 1;
+                }
+                Ok(rows) if tries < SIDES && !rows.is_on_side(compiled, layout) => {
+                    elsewhere = Some(rows);
+                    tries += 1;
+                }
+                Err(Singular::Refused) if elsewhere.is_some() => break,
                 found => return found,
             }
         }
-        Err(last)
+        elsewhere.ok_or(last)
+    }
+
+    /// True if the arguments of abs and sign have the signs that the layout asks for.
+    fn is_on_side(&self, compiled: &Compiled, layout: &Layout) -> bool {
+        layout.sides.as_ref().is_none_or(|sides| *sides == self.signs(&sided(compiled)))
     }
 
     fn at(
@@ -535,12 +555,16 @@ impl<'a, S: Values> SystemRows<'a, S> {
             maker.set_states(&mut point, &given(&compiled.starts))?;
             let (known, kept) = maker.constraints(&point)?;
             let mut generic = kept && model.states.iter().all(|s| s.start == StateStart::Unknown);
+            let mut begins = time;
             for (number, segment) in segments.iter().enumerate() {
                 if number > 0
                     && let Some(slot) = maker.slot_of(Role::Time)
                 {
-                    // when a later segment begins is not given
-                    point.signals[slot] = Signal::Time { value: f.random(rng, 0) };
+                    // when a later segment begins is not given, but it is later
+                    let lasts = f.random(rng, 0);
+                    let lasts = if f.is_positive(&lasts) == Some(false) { f.neg(&lasts) } else { lasts };
+                    begins = f.add(&begins, &lasts);
+                    point.signals[slot] = Signal::Time { value: begins };
                 }
                 maker.set_constants(&mut point, &segment.constants, true)?;
                 maker.set_states(&mut point, &segment.carry)?;

@@ -165,6 +165,12 @@ fn truth(
     if scheme.rotates() {
         return Err(SimulationError::CrosscheckRotation);
     }
+    conditions.check_truth()?;
+    if let Some(filter) = conditions.filter.filter(|_| !options.filter.is_none())
+        && conditions.has_full_attitudes()
+    {
+        return Err(SimulationError::WrongOnPurpose { filter: filter.name() });
+    }
     if options.filter.dropped.is_some() && scheme.positions.len() < 2 {
         return Err(SimulationError::DroppedOnly);
     }
@@ -264,7 +270,7 @@ fn against(
 /// When evidence b, c and f of doubles is not resolvable, in words.
 fn filter_method() -> String {
     format!(
-        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits say that the prior of the filter is \
+        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits say that the diffuse prior is \
          too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding may make a tenth of the limit; f: where \
          the filter is off by less than {OFF_DEG} deg, \
          or where what it cannot explain of the truths drawn need not show in {MANY_RUNS} runs",

@@ -114,9 +114,14 @@ impl<'a> Resolution<'a> {
         let Some(exact) = self.exact().map(of) else { return Some(UNKNOWN.into()) };
         if !close(exact) {
             let same = (measured - exact).abs() <= SAME * exact.abs();
-            let doubles = if same { "as the filter shows" } else { "and the filter shows neither" };
+            let doubles = if same {
+                "the filter in doubles shows the same"
+            } else {
+                "the filter in doubles shows neither"
+            };
             return Some(format!(
-                "by many digits {exact:.4} at the prior of the filter, which is too narrow to show {limit:.0}; {doubles}"
+                "by many digits {exact:.4} at the diffuse prior of this evidence (the program's own, whatever --prior says), which is too narrow to show \
+                 {limit:.0}; {doubles}"
             ));
         }
         let Some(rounded) = self.rounded() else { return Some(UNKNOWN.into()) };

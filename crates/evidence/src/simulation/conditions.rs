@@ -19,7 +19,7 @@ use crate::requirements::Basis;
 pub struct Conditions {
     /// How the truth is generated.
     pub truth: Truth,
-    /// Which filter; `None`: the linear one while its model holds, the iterated one where it does not.
+    /// Filter that is asked for; `None`: the linear one while its model holds, the iterated one where it does not.
     pub filter: Option<FilterKind>,
     /// Largest step, in s; a position is divided into equal steps.
     pub step_s: f64,
@@ -75,6 +75,8 @@ pub struct Stated {
     pub azimuth_noise: bool,
     /// Random drift, `drift_noise` or an angle random walk of the gyros.
     pub drift_noise: bool,
+    /// Model of the truth.
+    pub truth: bool,
 }
 
 /// The latitude of a scheme that names none, in degrees (the paper's is not given).
@@ -162,8 +164,13 @@ impl Conditions {
         stated.azimuth_noise |= settings.azimuth_noise_deg.is_some();
         stated.drift_noise |=
             settings.drift_noise.is_some() || settings.angle_random_walk_deg_sqrt_h.is_some();
+        stated.truth |= settings.truth.is_some();
         set(&mut self.truth, settings.truth);
         self.filter = settings.filter.or(self.filter);
+        // a filter with full attitudes is that of a platform that has them
+        if !stated.truth {
+            self.truth = if self.has_full_attitudes() { Truth::Exact } else { Self::default().truth };
+        }
         set(&mut self.step_s, settings.step_s);
         set(&mut self.dwell_s, settings.dwell_s);
         set(&mut self.accelerometer_noise_g, settings.accelerometer_noise_g);
@@ -244,7 +251,7 @@ impl Conditions {
     /// The conditions that are stated; what differs from the program's own values is.
     pub fn states(&self) -> Stated {
         let own = Self::default();
-        let Stated { step, dwell, accelerometer_noise, azimuth_noise, drift_noise } = self.stated;
+        let Stated { step, dwell, accelerometer_noise, azimuth_noise, drift_noise, truth } = self.stated;
         Stated {
             step: step || self.step_s != own.step_s,
             dwell: dwell || self.dwell_s != own.dwell_s,
@@ -252,6 +259,25 @@ impl Conditions {
                 || self.accelerometer_noise_g != own.accelerometer_noise_g,
             azimuth_noise: azimuth_noise || self.azimuth_noise_deg != own.azimuth_noise_deg,
             drift_noise: drift_noise || self.drift_noise != own.drift_noise,
+            truth,
+        }
+    }
+
+    /// True if the filter that is asked for has full attitudes.
+    pub fn has_full_attitudes(&self) -> bool {
+        self.filter.is_some_and(|filter| filter != FilterKind::Linear)
+    }
+
+    /// Checks that the truth of a run is one that the filter can follow.
+    ///
+    /// # Errors
+    /// [`SimulationError::LinearTruth`].
+    pub(crate) fn check_truth(&self) -> Result<(), SimulationError> {
+        match self.filter {
+            Some(filter) if filter != FilterKind::Linear && self.truth == Truth::Linear => {
+                Err(SimulationError::LinearTruth { filter: filter.name() })
+            }
+            _ => Ok(()),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Whether a run is credible: innovations and errors against what the filter believes of them.
 
+use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
 use obsdeg_ekf::{Covariance, EkfError};
 use schemars::JsonSchema;
@@ -43,6 +44,9 @@ pub struct Consistency {
     /// Number of directions that the NEES leaves out: a filter linearised at its estimates claims to know
     /// them more than a million times better than the unknowns themselves. 0 for a linear model.
     pub unresolved_directions: usize,
+    /// Number of directions that the NEES leaves out because constraints of the model hold them: nothing is
+    /// estimated there. 0 for a platform.
+    pub held_directions: usize,
     /// Band of 95 % of the NEES, dimensionless.
     pub nees_band: (f64, f64),
     /// Upper end of the acceptance band of 99.9 % of the NEES, dimensionless. A small NEES is no evidence:
@@ -69,6 +73,8 @@ pub(crate) struct Outcomes<'a> {
     pub covariance: &'a Covariance,
     /// Name and error over sigma of what is reported.
     pub normalised: Vec<(&'a str, f64)>,
+    /// Columns T (shape n x k) of which T' error is what constraints leave free; `None`: all of it.
+    pub free: Option<DMatrix<f64>>,
     /// Directions with a sigma below this part of the unknowns' own are left out of the NEES.
     pub resolution: f64,
 }
@@ -83,9 +89,15 @@ impl Consistency {
         let samples = run.whitened.len() / run.outputs;
         let count = samples as f64;
         let nis = run.whitened.iter().map(|v| v * v).sum::<f64>() / count;
-        let of = Nees::of_covariance(run.covariance)?;
+        let (of, free) = match &run.free {
+            None => (Nees::of_covariance(run.covariance)?, states),
+            Some(free) => {
+                run.error = (free.transpose() * DVector::from_column_slice(&run.error)).as_slice().to_vec();
+                (Nees::new(&(free.transpose() * run.covariance.matrix() * free))?, free.ncols())
+            }
+        };
         let (nees, n) = match run.resolution {
-            0.0 => (of.of(&mut run.error)?, states),
+            0.0 => (of.of(&mut run.error)?, free),
             least => of.resolved(&run.error, least)?,
         };
         let lags = LAGS.min(samples / 4).max(1);
@@ -115,7 +127,8 @@ impl Consistency {
             nis_band: chi_square_band(outputs, count, CONFIDENCE),
             nis_wide_band,
             nees,
-            unresolved_directions: states - n,
+            unresolved_directions: free - n,
+            held_directions: states - free,
             nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE),
             nees_limit,
             whiteness_probability: whiteness,
@@ -128,7 +141,6 @@ impl Consistency {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
     use obsdeg_ekf::Form;
     use obsdeg_exact::SplitMix64;
 
@@ -144,6 +156,7 @@ mod tests {
             error: error.to_vec(),
             covariance: &p,
             normalised: vec![("a", error[0]), ("b", error[1])],
+            free: None,
             resolution: 0.0,
         };
         Consistency::of(run).expect("judged")

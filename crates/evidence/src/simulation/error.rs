@@ -46,6 +46,23 @@ pub enum SimulationError {
     /// The exact truth turns an attitude by coefficients.
     #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     ExactDrift,
+    /// A truth of small angles is no motion of a platform.
+    #[error(
+        "the {filter} filter has full attitudes, and a linear truth is the small-angle model itself, which no platform follows: expected \
+         truth = \"exact\" (or none stated) with this filter, or filter = \"linear\""
+    )]
+    LinearTruth {
+        /// The filter, in a word.
+        filter: &'static str,
+    },
+    /// A filter that leaves out a position or a carry is looked at in its linear model.
+    #[error(
+        "a filter that is wrong on purpose (another carry, a position left out) is the linear one; found the {filter} filter"
+    )]
+    WrongOnPurpose {
+        /// The filter, in a word.
+        filter: &'static str,
+    },
     /// Full attitudes have no turns at once.
     #[error(
         "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew rate (slew_rate_deg_s, --slew-rate), \

@@ -351,6 +351,7 @@ pub(crate) fn choose(
     conditions: &Conditions,
     validity: &Validity,
 ) -> Result<(FilterKind, FilterReason), SimulationError> {
+    conditions.check_truth()?;
     let steps = plan.segments.iter().map(|s| s.steps).sum::<usize>();
     match conditions.filter {
         Some(FilterKind::Iterated) if steps > MAX_ITERATED_STEPS => {

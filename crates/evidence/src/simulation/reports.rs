@@ -46,6 +46,7 @@ fn chosen_for_run(scheme: &Scheme, unknowns: &[String], conditions: &Conditions)
         !stated.is_empty() && left
     };
     let own = [
+        ("truth", !conditions.states().truth && conditions.has_full_attitudes()),
         ("drift_noise", !conditions.states().drift_noise && conditions.drift_noise.amount() > 0.0),
         ("values", conditions.stated_values().is_empty()),
         ("other_values", some_left(conditions.stated_values())),

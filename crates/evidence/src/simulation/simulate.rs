@@ -79,6 +79,7 @@ fn summary(
         error: record.last_error.clone(),
         covariance: &record.last_covariance,
         normalised: quantities.iter().map(|q| (q.name.as_str(), q.error_over_sigma)).collect(),
+        free: None,
         resolution: 0.0,
     })?;
     let noise_floor = noise_floor(scheme, conditions, prediction)?;

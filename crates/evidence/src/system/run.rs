@@ -247,6 +247,54 @@ fn initial_error(
     (draw(&gains, noise), p)
 }
 
+/// Directions in which the unknowns are free where constraints hold them, to first order: carried on with the
+/// motion, in units of the priors.
+struct Tangent {
+    /// Orthonormal columns, n x k.
+    basis: DMatrix<f64>,
+    prior: DVector<f64>,
+}
+
+impl Tangent {
+    /// At the start; `None` for a model without constraints.
+    fn new(numeric: &Numeric<'_>, truth: &DVector<f64>, prior: &[f64]) -> Option<Self> {
+        let (_, rows) = numeric.constraints(truth);
+        let prior = DVector::from_column_slice(prior);
+        let mut basis = DMatrix::identity(prior.len(), prior.len());
+        for row in rows.row_iter() {
+            let row = row.transpose().component_mul(&prior);
+            let free = basis.transpose() * &row;
+            // one that repeats another holds nothing more
+            if free.norm() > KNOWN * row.norm() {
+                basis = complement(&basis, &free);
+            }
+        }
+        (basis.ncols() < prior.len()).then_some(Self { basis, prior })
+    }
+
+    /// Behind a motion with these derivatives.
+    fn carry(&mut self, phi: &DMatrix<f64>) {
+        let n = self.prior.len();
+        let scaled = DMatrix::from_fn(n, n, |i, j| phi[(i, j)] * self.prior[j] / self.prior[i]);
+        self.basis = (scaled * &self.basis).qr().q();
+    }
+
+    /// The columns by which an error in the units of the filter is read along the free directions.
+    fn columns(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.prior.len(), self.basis.ncols(), |i, j| self.basis[(i, j)] / self.prior[i])
+    }
+}
+
+/// Orthonormal columns of the span of `basis` that are orthogonal to `basis * direction`: a reflection that
+/// turns the direction into the first axis, without that axis.
+fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
+    let mut v = direction / direction.norm();
+    v[0] += v[0].signum();
+    let v = v.normalize();
+    let reflected = basis - (basis * &v) * (v.transpose() * 2.0);
+    reflected.columns(1, basis.ncols() - 1).into_owned()
+}
+
 /// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn from the prior, random numbers
 /// come from `seed`.
 ///
@@ -271,6 +319,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
     let estimate = &truth + error;
     let stopped = |time: f64| move |error| RunError::Filter { time, duration, error };
     let mut filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0))?;
+    let mut tangent = Tangent::new(&numeric, &truth, &prior);
     let mut traces = Traces {
         names: numeric.names.clone(),
         units: numeric.states.iter().map(|s| unit(model, s)).collect(),
@@ -297,6 +346,9 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         let (behind, _) = numeric.carry(part, begin, &truth);
         let (x, phi) = numeric.carry(part, begin, filter.x());
         if behind != truth || x != *filter.x() {
+            if let Some(tangent) = &mut tangent {
+                tangent.carry(&numeric.carry(part, begin, &truth).1);
+            }
             truth = behind;
             // a jump that forgets a state leaves its variance: as good as known
             let p = &phi * filter.covariance().matrix() * phi.transpose();
@@ -309,7 +361,11 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         for k in 0..samples as usize {
             interrupt::check();
             let t = begin + k as f64 * dt;
-            truth = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?.x;
+            let moved = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?;
+            truth = moved.x;
+            if let Some(tangent) = &mut tangent {
+                tangent.carry(&moved.phi);
+            }
             filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
             let mut z = measurement.h(t + dt, &truth);
             for (z, sigma) in z.iter_mut().zip(&sigmas) {
@@ -327,6 +383,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
         error: (filter.x() - &truth).as_slice().to_vec(),
         covariance: filter.covariance(),
         normalised: estimates.iter().map(|e| (e.name.as_str(), e.error_over_sigma)).collect(),
+        free: tangent.map(|t| t.columns()),
         resolution: RESOLUTION,
     });
     Ok((

@@ -88,7 +88,8 @@ pub struct SchemeFile {
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SimulationEntry {
-    /// Model that generates the truth: linear (default) or exact.
+    /// Model that generates the truth: linear or exact; left out, exact with a filter that has full attitudes
+    /// (extended, iterated), and linear otherwise.
     pub(super) truth: Option<Truth>,
     /// Filter: linear, extended or iterated; when left out, linear where the small-angle model holds.
     pub(super) filter: Option<FilterKind>,
