@@ -299,6 +299,24 @@ fn remedies_of_all_models_are_true() {
     assert!(of_models(1) > 300);
 }
 
+/// A search for symmetries that uses up its work leaves enough for the changes: all eight of this model are tried, and each
+/// that resolves something is true by a verdict of its own.
+#[test]
+fn a_search_for_symmetries_leaves_work_for_changes() {
+    let (_, value, text) = models().into_iter().find(|m| m.0 == "seaijrc_covid").expect("a reference model");
+    let model = json::read(&text).expect("a model");
+    let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+    let answer = analyze_system(&model, options).expect("an answer");
+    assert!(answer.note.expect("a note").contains("not all symmetries were sought"));
+    let remedies = answer.to_resolve;
+    assert_eq!((remedies.verdicts, &remedies.not_tried[..], remedies.remedies.len()), (8, &[][..], 8));
+    let before = judged_model(&text);
+    for remedy in &remedies.remedies {
+        let found = wrong(remedy, &before, &judged_model(&changed_model(&value, &remedy.changes)));
+        assert_eq!(found, [] as [String; 0]);
+    }
+}
+
 fn p1_p2() -> Scheme {
     scheme_file::read("[[position]]\nattitude = \"NUE\"\n[[position]]\nattitude = \"NDW\"\n")
         .expect("a scheme")

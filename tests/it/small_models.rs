@@ -235,8 +235,8 @@ fn small_texts_that_ask_for_too_much_are_refused() {
     }
 }
 
-/// Models of the generator whose work was not counted once: an elimination of long polynomials, and remedies of a model that
-/// is judged in many digits.
+/// Models of the generator whose work was not counted once: an elimination of long polynomials, remedies of a model that is
+/// judged in many digits, and rows that lose so many digits that all of them are made anew for every row.
 #[test]
 fn models_that_took_too_long_end() {
     let drawn = |seed: u64| model(&mut SplitMix64::of(seed, "small models", &["any"]));
@@ -250,6 +250,12 @@ fn models_that_took_too_long_end() {
     assert!(all("not_excited"), "{blind}");
     let resolve = blind["to_resolve"].to_string();
     assert!(resolve.contains("a larger --work-limit allows more"), "{resolve}");
+    let lossy = answered(&drawn(7447), &[]).expect("judged");
+    assert!(
+        lossy["note"].as_str().expect("a note").contains("not all symmetries were sought"),
+        "{}",
+        lossy["note"]
+    );
 }
 
 /// Constraints, functions and powers whose work grows faster than their text: each ends within the limits, refused with the

@@ -91,6 +91,10 @@ pub trait RowSpace: Clone + Debug {
     fn gap(&self) -> Gap {
         Gap::OPEN
     }
+    /// Products of numbers beyond those of an elimination so far: of rows that were made anew since their errors were wide.
+    fn refined(&self) -> u64 {
+        0
+    }
 }
 
 impl Scalars for Field {

@@ -14,7 +14,7 @@ use super::real_points::{dependent_at_points, real_point};
 use super::rows::{Layout, Maker, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
-use super::work::{Spent, Work};
+use super::work::{Spent, Step, Work, product};
 use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
@@ -212,7 +212,11 @@ fn climbed<S: Values>(
     let mut found = vec![None; gradients.len()];
     let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
     let mut steps = Steps { field: field.clone(), rows: Vec::new() };
+    let (mut refined, product) = (0, product::<S::Element>());
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
+        // rows that were made anew; what is refused ends the climb
+        let again = basis.refined() - std::mem::replace(&mut refined, basis.refined());
+        let _refused = work.take(Step::Derivatives(order), again.saturating_mul(product), 0);
         for (degree, gradient) in found.iter_mut().zip(&gradients) {
             if degree.is_none() && basis.contains(gradient) {
                 *degree = Some(order);

@@ -9,7 +9,7 @@ use super::model::{
     Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
 };
 use super::values::Values;
-use super::work::{Spent, WorkLimit};
+use super::work::Spent;
 use crate::language::{Expression, Node};
 use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
 
@@ -212,7 +212,9 @@ impl Search<'_> {
             return None;
         }
         let mut model = changed(self.model, &changes);
-        model.work_limit = WorkLimit::within(self.left);
+        // a point more than is left, where that is little: the memory that is allowed goes with the operations
+        let most = self.left.max(self.judged.work.saturating_mul(8));
+        model.work_limit = self.model.work_limit.within(most);
         // given values add nothing beyond the last order of the model itself
         let closed = !self.judged.rests_on_bound && changes.iter().all(|c| c.known().is_some());
         let last = self.judged.findings.degrees.rank_profile.len().saturating_sub(1);

@@ -8,7 +8,7 @@ use super::branches::{Signs, sided};
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
-use super::work::{Cost, Step, Sweeps, Work};
+use super::work::{Cost, Step, Sweeps, Work, product};
 use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
@@ -407,6 +407,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                     return None;
                 }
                 let mut grew = false;
+                let before = whole.refined() + seen.refined();
                 for row in
                     rows_of(&mut taylor, adjoint.as_mut(), self.compiled.outputs(point.experiment), order)
                 {
@@ -420,6 +421,10 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                     }
                     seen.insert(&through);
                 }
+                let again = whole.refined() + seen.refined() - before;
+                self.work
+                    .take(Step::Derivatives(order), again.saturating_mul(product::<S::Element>()), 0)
+                    .ok()?;
                 if !grew {
                     break;
                 }
@@ -692,7 +697,7 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
             if !self.work.spend(order, &cost_of(&run.taylor, sweeps, run.outputs.len())) {
                 return false;
             }
-            let mut grew = false;
+            let (mut grew, before) = (false, run.own.refined());
             // a constraint is an output of which only the start is known
             for row in run.known.iter().filter(|_| order == 0) {
                 sink(row);
@@ -702,6 +707,10 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
                 let new = sink(&row);
                 // where runs share the rank, each has to be followed until its own stalls
                 grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&row) };
+            }
+            let again = (run.own.refined() - before).saturating_mul(product::<S::Element>());
+            if self.work.take(Step::Derivatives(order), again, 0).is_err() {
+                return false;
             }
             run.done = match run.end {
                 End::Stagnation => !grew,

@@ -15,6 +15,8 @@ use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, 
 const POINTS: usize = 8;
 /// Most unknowns among which directions that are polynomials in them are sought.
 const MOVED: usize = 16;
+/// Verdicts on changes for which work is left, where they take no more than a tenth of it.
+const RESERVED: u64 = 40;
 /// Points that these take, at most.
 const POLYNOMIAL_POINTS: usize = 400;
 /// Their highest degree.
@@ -75,6 +77,8 @@ pub struct Symmetries {
 /// for short vectors as many again.
 struct Budget {
     limit: WorkLimit,
+    /// Operations that the changes that are tried afterwards may need.
+    reserved: u64,
     spent: u64,
     /// Operations of the searches for short vectors.
     short: u64,
@@ -85,22 +89,33 @@ struct Budget {
 impl Budget {
     /// Counts operations before they are done; false if they are beyond the limit.
     fn spend(&mut self, operations: u64) -> bool {
-        self.over |= self.spent.saturating_add(operations) > self.limit.operations();
+        let most = self.limit.operations().saturating_sub(self.reserved);
+        self.over |= self.spent.saturating_add(operations) > most;
         if !self.over {
             self.spent += operations;
         }
         !self.over
     }
 
+    /// Puts a row into a space, and counts what that took beyond an elimination; false if it is beyond the limit.
+    fn insert<S: Values>(&mut self, space: &mut S::Space, row: &[S::Element]) -> bool {
+        let before = space.refined();
+        space.insert(row);
+        self.spend((space.refined() - before).saturating_mul(product::<S::Element>()))
+    }
+
     /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where they are beyond
-    /// the limit.
+    /// the limit. `from` is the space that the rows are from.
     fn short_vectors<S: Values>(
         &mut self,
         f: &S,
         rows: &[Vec<S::Element>],
+        from: &S::Space,
         span: &mut S::Space,
     ) -> Vec<Vec<S::Element>> {
-        let products = products_of_short_vectors(rows.len(), span.columns());
+        // what was made anew there is made anew here, row by row
+        let again = if from.refined() > 0 { rows.len() as u64 } else { 1 };
+        let products = products_of_short_vectors(rows.len(), span.columns()).saturating_mul(again);
         let short = self.short.saturating_add(products.saturating_mul(product::<S::Element>()));
         if short > self.limit.operations() {
             self.over = true;
@@ -115,8 +130,8 @@ impl Budget {
         let limit = self.limit.0;
         self.over.then(|| {
             format!(
-                "not all symmetries were sought: the search takes more operations than one verdict may, beyond --work-limit {limit} ({:.1e} \
-                 operations); a larger --work-limit allows more",
+                "not all symmetries were sought: with the changes tried after it the search takes more operations than one verdict may, beyond \
+                 --work-limit {limit} ({:.1e} operations); a larger --work-limit allows more",
                 self.limit.operations() as f64
             )
         })
@@ -188,7 +203,8 @@ fn symmetries_in<S: Values>(
     }
     let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
     let rank = judged.findings.degrees.rank();
-    let mut budget = Budget { limit: model.work_limit, spent: 0, short: 0, over: false };
+    let reserved = judged.work.saturating_mul(RESERVED).min(model.work_limit.operations() / 10);
+    let mut budget = Budget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false };
     // a verdict rests on two points
     let mut verdict = judged.work / 2;
     for point in 0..POINTS {
@@ -201,7 +217,9 @@ fn symmetries_in<S: Values>(
             let row = here.span.row(i);
             let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
             let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
-            basis.insert(&both);
+            if !budget.insert::<S>(&mut basis, &both) {
+                break;
+            }
         }
         verdict = spent.operations;
         at = Some(here);
@@ -216,7 +234,7 @@ fn symmetries_in<S: Values>(
     let mut tangents = space(n);
     let mut out = Symmetries::default();
     let short = match !budget.over && basis.gap().is_decisive(S::BITS) {
-        true => budget.short_vectors(&f, &basis.null_space(), &mut space(2 * n)),
+        true => budget.short_vectors(&f, &basis.null_space(), &basis, &mut space(2 * n)),
         false => Vec::new(),
     };
     for v in short {
@@ -266,7 +284,7 @@ fn symmetries_in<S: Values>(
     if out.found.len() + out.polynomial.len() < defect {
         let among_excited = |v: &Vec<S::Element>| support_in(&f, v).iter().all(|&c| excited[c]);
         let rest: Vec<Vec<S::Element>> = at.span.null_space().into_iter().filter(among_excited).collect();
-        let moving = budget.short_vectors(&f, &rest, &mut tangents);
+        let moving = budget.short_vectors(&f, &rest, &at.span, &mut tangents);
         out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
     }
     out.invariants = invariants(&f, n, &out.found, &at, &mut budget);
@@ -316,7 +334,9 @@ fn directions<S: Values>(
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
             let entries = moved.iter().flat_map(|&m| values.iter().map(move |x| f.mul(&row[m], x)));
-            basis.insert(&entries.collect::<Vec<_>>());
+            if !budget.insert::<S>(&mut basis, &entries.collect::<Vec<_>>()) {
+                return Ok(Vec::new());
+            }
         }
         still = if basis.rank() == rank { still + 1 } else { 0 };
         if still == 2 {
@@ -329,7 +349,7 @@ fn directions<S: Values>(
     }
     let here: Vec<S::Element> = products.iter().map(|p| value(at, p)).collect();
     let mut out = Vec::new();
-    for v in budget.short_vectors(f, &basis.null_space(), &mut space(moved.len() * width)) {
+    for v in budget.short_vectors(f, &basis.null_space(), &basis, &mut space(moved.len() * width)) {
         let mut tangent = vec![f.zero(); tangents.columns()];
         for (part, &m) in v.chunks_exact(width).zip(moved) {
             tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
@@ -374,7 +394,7 @@ fn invariants<S: Values>(
         // the null vectors of what is not moved are units
         let kept: Vec<Vec<S::Element>> =
             rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
-        for m in budget.short_vectors(f, &kept, &mut space()) {
+        for m in budget.short_vectors(f, &kept, &rows, &mut space()) {
             let Some(k) = rationals(f, &m) else { continue };
             let exponents = integers(&k);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i

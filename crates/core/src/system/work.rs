@@ -56,9 +56,9 @@ impl WorkLimit {
 }
 
 impl WorkLimit {
-    /// The largest limit that allows no more than these operations.
-    pub(super) fn within(operations: u64) -> Self {
-        Self(operations / UNIT)
+    /// The smallest limit that allows these operations, at most this one.
+    pub(super) fn within(self, operations: u64) -> Self {
+        Self(operations.div_ceil(UNIT).min(self.0))
     }
 
     /// The limit in bytes of memory.
@@ -318,6 +318,7 @@ mod tests {
         assert_eq!(work.take(Step::Constraints, 0, 0), Err(Refused));
         let message = work.refused().expect("refused").to_string();
         assert!(message.contains("gradients of its operations take 5.0e5 bytes"), "{message}");
+        assert_eq!([0, 1, UNIT, UNIT + 1, 9 * UNIT].map(|n| WorkLimit(3).within(n).0), [0, 1, 1, 2, 3]);
         let mut spent = Spent::default();
         spent.add(&work);
         spent.add(&work);
