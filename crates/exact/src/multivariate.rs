@@ -38,6 +38,21 @@ fn product(a: &[(u32, u32)], b: &[(u32, u32)]) -> Monomial {
     out
 }
 
+/// Number of choices of `k` among `n`; `u64::MAX` where it is larger.
+fn binomial(n: u64, k: u64) -> u64 {
+    let Some(rest) = n.checked_sub(k) else { return 0 };
+    let mut out = 1u64;
+    for i in 0..k.min(rest) {
+        // out (n - i) / (i + 1) is whole, and never smaller than out
+        let next = u128::from(out) * u128::from(n - i) / u128::from(i + 1);
+        match u64::try_from(next) {
+            Ok(next) => out = next,
+            Err(_) => return u64::MAX,
+        }
+    }
+    out
+}
+
 impl Polynomial {
     /// A number.
     pub fn constant(x: u64) -> Self {
@@ -133,6 +148,8 @@ impl Polynomial {
 
     /// Adds a term.
     pub fn put(&mut self, f: &Field, m: Monomial, c: u64) {
+        #[cfg(test)]
+        tests::PUT.set(tests::PUT.get() + 1);
         if c == 0 {
             return;
         }
@@ -172,16 +189,21 @@ impl Polynomial {
         out
     }
 
-    /// Products of coefficients that [`replaced`](Self::replaced) takes at most with a value of this many terms.
+    /// Number of products of coefficients, and of terms that stay as they are, in [`replaced`](Self::replaced) with a value
+    /// of this many terms: exact where no two products of monomials of the value are equal, otherwise an upper bound.
     pub fn products_of_replaced(&self, v: u32, terms: usize) -> u64 {
-        let (power, own) = (u64::from(self.degree_in(v)), self.len() as u64);
-        // a power k of t terms has at most (k + t - 1 over t - 1)
-        let more = (terms as u64).saturating_sub(1).min(power);
-        let most = power.saturating_add(terms as u64).saturating_sub(1);
-        let highest =
-            (0..more).fold(1u128, |n, i| (n * u128::from(most - i) / u128::from(i + 1)).min(1 << 60)) as u64;
-        let powers = highest.saturating_mul(power).saturating_mul(terms as u64);
-        powers.saturating_add(own.saturating_mul(highest))
+        let (power, t) = (u64::from(self.degree_in(v)), terms as u64);
+        // the power k has (k + t - 1 over k) terms; the sum of these for k < p is (p + t - 1 over t)
+        let powers = match power {
+            0 => 0,
+            _ => t.saturating_mul(binomial(power.saturating_add(t) - 1, t)),
+        };
+        let own = self.terms.keys().map(|m| match m.iter().find(|p| p.0 == v) {
+            None => 1,
+            Some(_) if t == 0 => 0,
+            Some(&(_, k)) => binomial(u64::from(k).saturating_add(t) - 1, k.into()),
+        });
+        own.fold(powers, u64::saturating_add)
     }
 
     /// With `value` in place of a variable.
@@ -230,34 +252,80 @@ impl Polynomial {
 mod tests {
     use super::*;
 
-    /// By counting: the powers of a sum up to the one that is put in, and its terms with every term.
+    thread_local! {
+        /// Number of calls of [`Polynomial::put`]: one for each product of coefficients and each term that is copied.
+        pub(super) static PUT: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
+    }
+
+    /// Terms that `replaced` really puts, and the count made before.
+    fn put_and_counted(p: &Polynomial, value: &Polynomial) -> (u64, u64) {
+        let f = Field::new((1 << 60) + 33);
+        let counted = p.products_of_replaced(0, value.len());
+        PUT.set(0);
+        p.replaced(&f, 0, value);
+        (PUT.get(), counted)
+    }
+
+    /// A sum of as many variables, the first of which is `x1`, and a polynomial with one term for each pair of exponents: of
+    /// `x0`, and of a variable that occurs nowhere else.
+    fn sum_and_terms(terms: u32, exponents: &[u32]) -> (Polynomial, Polynomial) {
+        let f = Field::new((1 << 60) + 33);
+        let (mut value, mut p) = (Polynomial::default(), Polynomial::default());
+        (0..terms).for_each(|i| value.put(&f, vec![(i + 1, 1)], f.one()));
+        for (i, &e) in exponents.iter().enumerate() {
+            let other = (100 + i as u32, 1);
+            p.put(&f, if e == 0 { vec![other] } else { vec![(0, e), other] }, f.one());
+        }
+        (value, p)
+    }
+
+    /// What is counted beforehand is what is done, for sums of different variables: one power among many low ones too.
     #[test]
     fn products_of_what_is_put_in() {
-        let f = Field::new((1 << 60) + 33);
-        for (power, terms) in [(1, 1), (3, 1), (5, 2), (4, 3), (7, 4), (2, 9)] {
-            let mut p = Polynomial::default();
-            p.put(&f, vec![(0, power)], f.one());
-            p.put(&f, vec![(0, 1), (20, 1)], f.one());
-            let mut value = Polynomial::default();
-            (0..terms).for_each(|i| value.put(&f, vec![(i + 1, 1)], f.one()));
-            let (mut products, mut last) = (0, Polynomial::constant(f.one()));
-            for _ in 0..power {
-                products += (last.len() * value.len()) as u64;
-                let mut next = Polynomial::default();
-                next.add_product(&f, &last, &value);
-                last = next;
+        let exponents: [&[u32]; 9] =
+            [&[1], &[3], &[5, 1], &[4, 4, 4], &[7, 1, 1, 1, 1, 0], &[2, 0], &[0, 0], &[12], &[1; 40]];
+        for exponents in exponents {
+            for terms in [0, 1, 2, 3, 4, 9] {
+                let (value, p) = sum_and_terms(terms, exponents);
+                let (put, counted) = put_and_counted(&p, &value);
+                assert_eq!(put, counted, "{terms} terms, {exponents:?}");
             }
-            products += (last.len() + value.len()) as u64;
-            let bound = p.products_of_replaced(0, value.len());
-            // every power is counted as large as the highest
-            let most = products * u64::from(power) * terms.max(2) as u64;
-            assert!(bound >= products && bound <= most, "{bound} {products}");
-            assert_eq!(p.highest_power(), power);
         }
-        // refused long before it is formed
+        // by hand: 3 (1 + 3 + 6 + 10 + 15) for the powers of three terms up to the fifth, 21 and 3 for the terms themselves
+        let (value, p) = sum_and_terms(3, &[5, 1]);
+        assert_eq!(put_and_counted(&p, &value), (3 * 35 + 21 + 3, 3 * 35 + 21 + 3));
+    }
+
+    /// Where products of monomials are equal, fewer are done than are counted.
+    #[test]
+    fn equal_products_are_counted_apart() {
+        let f = Field::new((1 << 60) + 33);
+        let (_, p) = sum_and_terms(0, &[6, 2]);
+        // 1 + x1 + x1^2: its power k has 2k + 1 terms
+        let mut value = Polynomial::constant(f.one());
+        (1..3).for_each(|e| value.put(&f, vec![(1, e)], f.one()));
+        let (put, counted) = put_and_counted(&p, &value);
+        assert_eq!(put, 3 * (1 + 3 + 5 + 7 + 9 + 11) + 13 + 5);
+        assert_eq!(counted, 3 * (1 + 3 + 6 + 10 + 15 + 21) + 28 + 6);
+    }
+
+    /// Counts that are too large for a number of 64 bits, long before the powers are formed.
+    #[test]
+    fn counts_beyond_64_bits_are_the_largest() {
+        let f = Field::new((1 << 60) + 33);
         let mut p = Polynomial::default();
         p.put(&f, vec![(0, 1000)], f.one());
-        assert!(p.products_of_replaced(0, 4) > 100_000_000 && p.products_of_replaced(0, 60) > 1 << 59);
+        // 4 (1003 over 4) + (1003 over 3)
+        assert_eq!(p.products_of_replaced(0, 4), 4 * 41_917_125_250 + 167_668_501);
+        assert_eq!(p.products_of_replaced(0, 60), u64::MAX);
+        p.put(&f, vec![(0, u32::MAX)], f.one());
+        assert_eq!(p.products_of_replaced(0, usize::MAX), u64::MAX);
+        assert_eq!(p.highest_power(), u32::MAX);
         assert_eq!(Polynomial::constant(f.one()).products_of_replaced(0, 60), 1);
+        assert_eq!(
+            [(5, 2), (2, 5), (0, 0), (67, 33)].map(|(n, k)| binomial(n, k)),
+            [10, 0, 1, 14_226_520_737_620_288_370]
+        );
+        assert_eq!(binomial(68, 34), u64::MAX);
     }
 }
