@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
-from . import _obsdeg
+from . import _obsdeg, _toml
 from ._texts import Rounded, as_json
 
 if TYPE_CHECKING:
@@ -167,14 +166,7 @@ def _parsed(text: str, name: str) -> dict[str, Any]:
         if text.lstrip().startswith("{"):
             found: dict[str, Any] = json.loads(text, parse_float=Decimal)
             return found
-        if sys.version_info >= (3, 11):
-            import tomllib
-        else:
-            try:
-                import tomli as tomllib
-            except ModuleNotFoundError:
-                raise ImportError("Python 3.10 reads TOML with the package `tomli`, which is not installed") from None
-        return tomllib.loads(text, parse_float=Decimal)
+        return _toml.loads(text, parse_float=Decimal)
     except ValueError as e:
         raise ValueError(f"{name}: found a text that is no TOML ({e}); expected a scheme or a model") from None
 

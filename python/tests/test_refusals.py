@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -96,3 +97,13 @@ def test_what_is_no_scheme_is_not_loaded(tmp_path: Path, name: str, text: str, f
     (tmp_path / name).write_text(text, encoding="utf-8")
     with pytest.raises(importers.ImportProblem, match=found):
         obsdeg.load(tmp_path / name)
+
+
+def test_no_record_is_said() -> None:
+    """The engine itself, which the browser page and others call without the checks of `obsdeg.calibrate`."""
+    scheme = {"name": "s", "text": '[[position]]\nattitude = "NUE"\n[[position]]\nattitude = "NDW"\n'}
+    with pytest.raises(obsdeg.ProblemError, match="found no record; expected one of each run"):
+        obsdeg._obsdeg.calibrate(json.dumps({"sources": [scheme]}), [])
+    model = {"name": "m", "text": 'name = "m"\n[states]\nx = "-x"\n[outputs]\ny = "x"\n'}
+    with pytest.raises(obsdeg.ProblemError, match="found 0 records; expected one of a model"):
+        obsdeg._obsdeg.calibrate(json.dumps({"sources": [model]}), [])

@@ -9,11 +9,11 @@ from __future__ import annotations
 import importlib
 import json
 import re
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import _toml
 from .._files import TEXT, read_text
 from .problem import ImportProblem
 
@@ -95,14 +95,7 @@ def _own(text: str, path: Path) -> None:
     """Refuses what is no text of obsdeg's own; what it says is read when it is judged."""
     is_json = text.lstrip().startswith("{")
     try:
-        if is_json:
-            found: Any = json.loads(text)
-        elif sys.version_info >= (3, 11):
-            import tomllib
-
-            found = tomllib.loads(text)
-        else:
-            return
+        found: Any = json.loads(text) if is_json else _toml.loads(text)
     except ValueError as error:
         raise ImportProblem(f"a text that is no {'JSON' if is_json else 'TOML'} ({error})", "a model or scheme", file=str(path)) from None
     if not found:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import keyword
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 import sympy  # type: ignore[import-untyped]
 
+from .. import _toml
 from .._files import Text
 from .formula import TIME, Expr, exact, expand, parse, put, text_of
 from .problem import ImportProblem
@@ -30,8 +30,8 @@ def read_model(model: str | Text) -> System:
     if text.lstrip().startswith("{"):
         return _json(text)
     try:
-        file = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        file = _toml.loads(text)
+    except ValueError as error:
         raise ImportProblem(f"`{error}`", "a model file") from None
     for key, words in (("experiment", "experiments with values of their own"), ("segment", "segments"), ("constraints", "constraints")):
         if file.get(key):

@@ -170,6 +170,9 @@ pub enum CalibrationError {
     /// Nothing to estimate.
     #[error("nothing is determined by these records: no unknown and no combination")]
     Nothing,
+    /// No record at all.
+    #[error("found no record; expected one of each run of the scheme, at least one")]
+    NoRecord,
     /// A record that counts already.
     #[error(
         "{record} has the same numbers as {other}; expected records of different runs, since what is the same says nothing twice"
@@ -243,6 +246,14 @@ const ROUNDS: usize = 6;
 /// More than this part of all measurements are no outliers.
 const MOST_OUTLIERS: f64 = 0.02;
 
+/// Whether records of this scheme can be read: positions at rest, at least one record.
+fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> {
+    if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
+        return Err(CalibrationError::Rotates { position: p.name.clone() });
+    }
+    if records.is_empty() { Err(CalibrationError::NoRecord) } else { Ok(()) }
+}
+
 /// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and slews. `going` hears now and then how far it is; where
 /// it says no while a record is read there is none, later the estimate is where the iteration is then, and a finding.
 ///
@@ -255,9 +266,7 @@ pub fn calibrate(
     options: &Options,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Calibration, CalibrationError> {
-    if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
-        return Err(CalibrationError::Rotates { position: p.name.clone() });
-    }
+    concern(scheme, &records)?;
     let own = run::conditions(conditions);
     let planned = Plan::new(scheme, &own)?;
     let mut sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();

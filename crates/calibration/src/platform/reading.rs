@@ -110,9 +110,7 @@ pub fn read_records(
     options: &Options,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<RecordsRead, CalibrationError> {
-    if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
-        return Err(CalibrationError::Rotates { position: p.name.clone() });
-    }
+    super::concern(scheme, &records)?;
     let own = run::conditions(conditions);
     let plan = Plan::new(scheme, &own)?;
     let sigmas: Vec<f64> = plan.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();

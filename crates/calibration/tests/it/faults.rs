@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_calibration::answer::{Finding, ForceError};
-use obsdeg_calibration::platform::Mistaken;
+use obsdeg_calibration::platform::{Mistaken, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Before, Calibration, CalibrationError, Options, calibrate};
 use obsdeg_core::model::settings::Assignment;
@@ -402,6 +402,23 @@ fn with(
     };
     let options = Options { prior: prior.map(before), ..Options::default() };
     calibrate(&scheme(bench, "F,I,O,S"), &conditions(bench), records, &options, &|_| true)
+}
+
+/// Without a record there is nothing to estimate from, and nothing to read.
+#[test]
+fn no_record_is_refused() {
+    let bench = bench();
+    let read = read_records(
+        &scheme(&bench, "F,I,O,S"),
+        &conditions(&bench),
+        Vec::new(),
+        &Options::default(),
+        &|_| true,
+    );
+    let calibrated = with(&bench, &[], None);
+    for e in [calibrated.expect_err("no record"), read.expect_err("no record")] {
+        assert!(e.to_string().starts_with("found no record; expected one of each run"), "{e}");
+    }
 }
 
 /// No record counts twice: neither beside itself, nor behind a calibration that rests on it, however long ago.
