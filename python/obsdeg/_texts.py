@@ -6,6 +6,7 @@ import json
 import operator
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
+from itertools import islice
 from json.encoder import encode_basestring_ascii
 from numbers import Rational
 from typing import Any, NamedTuple, Union
@@ -16,6 +17,8 @@ Number = Union[int, float, str, Decimal, Rational]
 Attitude = Union[str, Sequence[Number]]
 #: Decimals of an angle in degrees: the engine takes at most nine.
 DIGITS = 9
+#: Most positions of a scheme.
+POSITIONS = 1000
 
 
 class Rounded(NamedTuple):
@@ -187,10 +190,15 @@ def attitudes(positions: Iterable[Attitude], digits: int | None = DIGITS, log: l
 
     Raises:
         TypeError: no list of positions.
+        ValueError: more positions than a scheme may have.
     """
     if isinstance(positions, (str, bytes, bytearray, set, frozenset, Mapping)) or not isinstance(positions, Iterable):
         raise TypeError(f"angles: found {positions!r}; expected a list of positions, as in [(0, 0, 0), (180, 0, 0)]")
-    return [attitude(a, digits, i, log) for i, a in enumerate(positions, 1)]
+    found = [attitude(a, digits, i, log) for i, a in enumerate(islice(positions, POSITIONS + 1), 1)]
+    if len(found) > POSITIONS:
+        # a generator may never end
+        raise ValueError(f"angles: found more than {POSITIONS} positions; expected at most {POSITIONS}")
+    return found
 
 
 def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:

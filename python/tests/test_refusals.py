@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -31,6 +32,16 @@ def test_positions(angles: Any, message: str) -> None:
         obsdeg.analyze(angles=angles)
     with pytest.raises((TypeError, ValueError), match=message):
         obsdeg.Scheme(angles)
+
+
+def test_positions_without_end() -> None:
+    for positions in (itertools.repeat((0, 0, 0)), ((i, 0, 0) for i in itertools.count())):
+        with pytest.raises(ValueError, match="found more than 1000 positions; expected at most 1000"):
+            obsdeg.analyze(angles=positions)
+        with pytest.raises(ValueError, match="found more than 1000 positions; expected at most 1000"):
+            obsdeg.Scheme(positions)
+    # the number that the engine allows
+    assert len(obsdeg.Scheme([(0, 0, 0)] * 1000)) == 1000
 
 
 def test_numbers_of_numpy() -> None:

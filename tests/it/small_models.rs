@@ -294,3 +294,27 @@ fn work_beside_the_rows_is_counted() {
     let answer = answered(high, &[]).expect("judged");
     assert_eq!(answer["rank_profile"], serde_json::json!([1, 2]));
 }
+
+/// Many names: each text ends within the limits. 100,000 outputs are judged, with solutions; values of 2,000 unknowns are not
+/// tried, and the sentence names the option; more unknowns than are allowed are refused.
+#[test]
+fn many_names_end_within_the_limits() {
+    let names = |letter: &str, n: usize, value: &str| {
+        (0..n).map(|i| format!("{letter}{i} = {value}\n")).collect::<String>()
+    };
+    let state = "name = \"m\"\n[states]\nx = \"-x\"\n";
+    let outputs = format!("{state}[outputs]\n{}", names("y", 100_000, "\"x\""));
+    let answer = answered(&outputs, &[]).expect("judged");
+    assert_eq!(answer["rank_profile"], serde_json::json!([1]));
+    let parameters = |n: usize| format!("{state}[parameters]\n{}[outputs]\ny = \"x\"\n", names("p", n, "{}"));
+    let answer = answered(&parameters(2_000), &[]).expect("judged");
+    assert_eq!((&answer["rank"], &answer["to_resolve"]["verdicts"]), (&1.into(), &0.into()));
+    assert_eq!(
+        answer["to_resolve"]["not_tried"],
+        serde_json::json!([
+            "2000 known values and outputs: none is tried; a larger --work-limit allows more"
+        ])
+    );
+    let error = answered(&parameters(100_000), &[]).expect_err("too many");
+    assert!(error.contains("100001 states and parameters; expected at most 4000 unknowns"), "{error}");
+}

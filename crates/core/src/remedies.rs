@@ -3,6 +3,7 @@
 //! remedy.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
 use obsdeg_exact::{RowSpace, Scalars};
 use schemars::JsonSchema;
@@ -11,7 +12,7 @@ use serde::Serialize;
 use crate::model::Carry;
 
 /// Most candidates of which pairs are formed.
-const MOST_PAIRED: usize = 48;
+pub(crate) const MOST_PAIRED: usize = 48;
 
 /// Remedies of the unknowns that are not observable.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, JsonSchema)]
@@ -106,26 +107,42 @@ impl Remedies {
 /// entries lie in their span.
 pub(crate) struct Directions<S: Scalars> {
     field: S,
-    /// Null vectors, one after the other.
-    basis: Vec<Vec<S::Element>>,
+    /// Entries of every unknown in the null vectors.
+    units: Vec<Vec<S::Element>>,
+    /// Number of null vectors.
+    count: usize,
 }
 
 impl<S: Scalars> Directions<S> {
     /// The directions that no row of a space sees.
     pub(crate) fn of(field: S, space: &S::Space) -> Self {
-        Self { field, basis: space.null_space() }
+        let basis = space.null_space();
+        let units = (0..space.columns()).map(|c| basis.iter().map(|v| v[c]).collect()).collect();
+        Self { field, units, count: basis.len() }
     }
 
-    /// Entries of the value of an unknown.
-    fn unit(&self, column: usize) -> Vec<S::Element> {
-        self.basis.iter().map(|v| v[column]).collect()
+    /// Products of numbers, at most, of [`known`](Self::known) for a number of unknowns and of
+    /// [`resolved`](Self::resolved) by these.
+    pub(crate) fn products(&self, known: usize, open: usize) -> u64 {
+        let [known, open, count] = [known, open, self.count].map(|n| n as u64);
+        // a row is reduced by those before it and these by it, an unknown by all
+        let rows = known.saturating_mul(known).saturating_add(open.saturating_mul(known + 1));
+        rows.saturating_mul(count)
+    }
+
+    /// Products of numbers, at most, of the search for [`pairs`](Self::pairs) of one list, of candidates that give at most
+    /// this number of unknowns each.
+    pub(crate) fn products_of_pairs(&self, candidates: usize, known: usize, open: usize) -> u64 {
+        let paired = candidates.min(MOST_PAIRED) as u64;
+        let pairs = paired * paired.saturating_sub(1) / 2;
+        pairs.saturating_mul(self.products(2 * known, open))
     }
 
     /// Information of known values of some unknowns on the unobservable directions.
     pub(crate) fn known(&self, columns: &[usize]) -> Told<S> {
-        let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.basis.len());
+        let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.count);
         for &c in columns {
-            space.insert(&self.unit(c));
+            space.insert(&self.units[c]);
         }
         Told { space, given: columns.to_vec() }
     }
@@ -138,8 +155,8 @@ impl<S: Scalars> Directions<S> {
         let mut told = self.known(&[]);
         let zero = self.field.zero();
         for row in rows {
-            let entries: Vec<_> =
-                self.basis.iter().map(|v| self.field.dot(&zero, row.iter().zip(v))).collect();
+            let entry = |k: usize| self.field.dot(&zero, row.iter().zip(self.units.iter().map(|u| &u[k])));
+            let entries: Vec<_> = (0..self.count).map(entry).collect();
             told.space.insert(&entries);
         }
         told
@@ -147,7 +164,7 @@ impl<S: Scalars> Directions<S> {
 
     /// Unknowns of `open` that become observable by that and are not given.
     pub(crate) fn resolved(&self, by: &Told<S>, open: &[usize]) -> Vec<usize> {
-        let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.unit(*c));
+        let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.units[*c]);
         open.iter().copied().filter(resolved).collect()
     }
 
@@ -159,7 +176,7 @@ impl<S: Scalars> Directions<S> {
         &self,
         left: &[Told<S>],
         right: Option<&[Told<S>]>,
-        mut open: Vec<usize>,
+        open: Vec<usize>,
         mut judge: impl FnMut(usize, usize) -> Option<Vec<usize>>,
     ) -> bool {
         let second = right.unwrap_or(left);
@@ -173,7 +190,8 @@ impl<S: Scalars> Directions<S> {
                 }
             }
         }
-        let count = |of: &[usize], open: &[usize]| of.iter().filter(|c| open.contains(c)).count();
+        let mut open: BTreeSet<usize> = open.into_iter().collect();
+        let count = |of: &[usize], open: &BTreeSet<usize>| of.iter().filter(|c| open.contains(c)).count();
         loop {
             found.retain(|pair| count(&pair.2, &open) > 0);
             // the first of those that resolve most

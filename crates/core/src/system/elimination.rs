@@ -6,7 +6,7 @@
 //! parameters stand alone.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use obsdeg_exact::divisor::Algebra;
 use obsdeg_exact::fraction::Fraction;
@@ -74,6 +74,9 @@ struct Elimination<'a> {
     solved: Vec<Option<Fraction>>,
     /// Every parameter that was found.
     found: Vec<Option<Fraction>>,
+    /// State of every variable that is one, and order of every derivative of an output.
+    states: BTreeMap<u32, usize>,
+    orders: BTreeMap<u32, usize>,
 }
 
 /// Expressions of the states, then of the parameters, and whether all were sought within the limit of work.
@@ -84,6 +87,8 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
         rates: system.rates.clone(),
         solved: vec![None; system.states.len()],
         found: vec![None; system.parameters.len()],
+        states: system.states.iter().enumerate().map(|(i, &v)| (v, i)).collect(),
+        orders: system.outputs.iter().flat_map(|(_, y)| y.iter().copied().zip(0..)).collect(),
     };
     let ended = work.run();
     let mut complete = ended.is_ok();
@@ -123,12 +128,12 @@ impl Elimination<'_> {
     }
 
     fn holds_state(&self, p: &Polynomial) -> bool {
-        self.system.states.iter().any(|&v| p.terms_with(v) > 0)
+        p.variables().iter().any(|v| self.states.contains_key(v))
     }
 
     /// What time makes of a variable.
     fn rate(&self, v: u32) -> Rate {
-        if let Some(i) = self.system.states.iter().position(|&x| x == v) {
+        if let Some(&i) = self.states.get(&v) {
             return Rate::Is(self.rates[i].clone());
         }
         let outputs = self.system.outputs.iter().map(|o| (&o.1, false));
@@ -164,9 +169,7 @@ impl Elimination<'_> {
 
     /// Order of the outputs' derivatives in a polynomial.
     fn order(&self, p: &Polynomial) -> usize {
-        let variables = p.variables();
-        let highest = |o: &(Fraction, Vec<u32>)| o.1.iter().rposition(|y| variables.contains(y)).unwrap_or(0);
-        self.system.outputs.iter().map(highest).max().unwrap_or(0)
+        p.variables().iter().filter_map(|v| self.orders.get(v)).copied().max().unwrap_or(0)
     }
 
     /// The equation that is linear in a state at the least cost: its number, the state, and what that is.
@@ -175,8 +178,10 @@ impl Elimination<'_> {
         // slope and rest together have its terms
         let short = |e: &(usize, &Equation)| e.1.zero.len() <= SUBSTITUTED;
         for (e, equation) in equations.iter().enumerate().filter(short) {
-            for (i, &v) in self.system.states.iter().enumerate() {
-                let Some([slope, rest]) = linear(&equation.zero, v) else { continue };
+            let occurring: BTreeSet<usize> =
+                equation.zero.variables().iter().filter_map(|v| self.states.get(v)).copied().collect();
+            for i in occurring {
+                let Some([slope, rest]) = linear(&equation.zero, self.system.states[i]) else { continue };
                 if self.holds_state(&slope) {
                     continue;
                 }

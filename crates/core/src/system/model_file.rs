@@ -1,6 +1,6 @@
 //! Model files: TOML, with errors that know their place.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use schemars::JsonSchema;
@@ -225,17 +225,9 @@ impl Reader<'_> {
                 }
             }
             Value::Table(table) => {
-                // the line that the key begins, or its place in an inline table
-                let begins = |line: &str, name: &str| {
-                    let rest = line.trim_start().trim_start_matches('"').strip_prefix(name);
-                    rest.is_some_and(|r| r.trim_start_matches('"').trim_start().starts_with(['=', '.']))
-                };
-                let place = |name: &str| {
-                    let lines = self.text[span.start..].lines().position(|line| begins(line, name));
-                    (lines, self.text[span.clone()].find(name))
-                };
+                let places = Places::of(&self.text[span.start..], span.len());
                 let mut names: Vec<&String> = table.keys().collect();
-                names.sort_by_key(|n| place(n));
+                names.sort_by_cached_key(|n| places.of_key(n));
                 for key in names {
                     let what = format!("the parameter {key}");
                     let Some(entry) = table.get(key).and_then(Value::as_table) else {
@@ -507,4 +499,82 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         return Err(r.at(0..text.chars().next().map_or(0, char::len_utf8), "the model file".into(), message));
     }
     Ok(model)
+}
+
+/// Where keys stand in a text: the line that a key begins, or its place in an inline table, of the first part of the text.
+struct Places<'t> {
+    lines: HashMap<&'t str, usize>,
+    inline: HashMap<&'t str, usize>,
+}
+
+impl<'t> Places<'t> {
+    /// Places in a text, whose first `inline` bytes may be an inline table.
+    fn of(text: &'t str, inline: usize) -> Self {
+        let (mut out, mut at) = (Self { lines: HashMap::new(), inline: HashMap::new() }, 0);
+        for (k, line) in text.lines().enumerate() {
+            if let Some((key, _)) = line.split_once(['=', '.']) {
+                let key = key.trim().trim_start_matches('"').trim_end_matches('"');
+                out.lines.entry(key).or_insert(k);
+            }
+        }
+        while let Some(begin) = text[at..inline].find(|c: char| !c.is_whitespace() && !"{}=,.".contains(c)) {
+            let word = &text[at + begin..inline];
+            let quote = word.chars().next().filter(|c| ['"', '\''].contains(c));
+            let word = &word[quote.map_or(0, char::len_utf8)..];
+            let end = word.find(|c: char| match quote {
+                Some(quote) => c == quote,
+                None => c.is_whitespace() || "{}=,.".contains(c),
+            });
+            let word = &word[..end.unwrap_or(word.len())];
+            out.inline.entry(word).or_insert(at + begin);
+            at += begin + word.len() + 2 * quote.map_or(0, char::len_utf8);
+            at = at.min(inline);
+        }
+        out
+    }
+
+    /// What keys are sorted by, those of an inline table first.
+    fn of_key(&self, name: &str) -> (Option<usize>, Option<usize>) {
+        (self.lines.get(name).copied(), self.inline.get(name).copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The order of parameters in a file is that of its lines or of its inline table, by keys of every kind; the time for many
+    /// does not grow with their square.
+    #[test]
+    fn parameters_keep_the_order_of_the_file() {
+        let order = |parameters: &str| {
+            let text = format!("name = \"m\"\n{parameters}\n[states]\nx = \"-x\"\n[outputs]\ny = \"x\"\n");
+            let model = read(&text).expect("a model");
+            model.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(" ")
+        };
+        let tables = [
+            ("[parameters]\nzeta = {}\nb = {}\n  a.unit = \"1/h\"\n\"c\" = {}\n'd' = {}", "d zeta b a c"),
+            ("parameters = { zeta = {}, b = { unit = \"a\" }, a2 = {}, a = {} }", "zeta b a a2"),
+            ("parameters = { \"v[2]\" = {}, 'b' = {}, a = {} }", "v[1] v[2] b a"),
+            ("[parameters]\nb = {}\n\"v[2]\" = {}\na = {}", "b v[1] v[2] a"),
+            ("parameters = [\"z\", \"a\"]", "z a"),
+        ];
+        for (text, expected) in tables {
+            assert_eq!(order(text), expected, "{text}");
+        }
+        let names: Vec<String> =
+            (0..20_000u32).map(|i| format!("p{}", i.wrapping_mul(7919) % 20_011)).collect();
+        let places = |text: &str| {
+            let places = Places::of(text, text.len());
+            let mut sorted: Vec<&String> = names.iter().collect();
+            sorted.sort_unstable();
+            sorted.sort_by_cached_key(|n| places.of_key(n));
+            sorted.into_iter().eq(&names)
+        };
+        assert!(places(&names.iter().map(|n| format!("{n} = {{}}\n")).collect::<String>()));
+        assert!(places(&format!(
+            "{{ {} }}",
+            names.iter().map(|n| format!("{n} = {{}}")).collect::<Vec<_>>().join(", ")
+        )));
+    }
 }

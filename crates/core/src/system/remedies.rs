@@ -9,9 +9,9 @@ use super::model::{
     Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
 };
 use super::values::Values;
-use super::work::Spent;
+use super::work::{Spent, product};
 use crate::language::{Expression, Node};
-use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
+use crate::remedies::{Change, Directions, MOST_PAIRED, Remedies, Remedy, Resolved, Told};
 
 /// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the
 /// number falls as the square of the unknowns, as the work of a verdict grows at least: 10 of a model of 90
@@ -93,6 +93,14 @@ pub(super) fn remedies(
 impl Search<'_> {
     /// Single changes, then pairs for what these do not resolve.
     fn all<S: Values>(&mut self, directions: &Directions<S>) {
+        let open = self.open.len();
+        let products = self.roles.iter().map(|(_, columns)| directions.products(columns.len(), open));
+        if !self.spend::<S>(products.fold(0, u64::saturating_add)) {
+            let text =
+                format!("{} known values and outputs: none is tried{}", self.roles.len(), self.option());
+            self.out.not_tried.push(text);
+            return;
+        }
         let singles = self.singles(directions);
         let (count, mut tried) = (singles.len(), 0);
         for change in singles.into_iter().take(self.budget) {
@@ -146,14 +154,22 @@ impl Search<'_> {
 
     /// Two values known, or two outputs more, for what no single change resolves.
     fn two<S: Values>(&mut self, directions: &Directions<S>, outputs: &[Role]) {
-        let values: Vec<Told<S>> = self.roles.iter().map(|(_, columns)| directions.known(columns)).collect();
         let most = self.budget.div_ceil(2);
         let mut work = most;
-        let mut complete = directions.pairs(&values, None, self.left(), |i, j| {
-            work = work.checked_sub(1)?;
-            let changes = [i, j].map(|k| self.known(self.roles[k].0));
-            self.judge(changes.into())
-        });
+        let left = self.left();
+        let widest = self.roles.iter().map(|r| r.1.len()).max().unwrap_or(0);
+        let mut complete =
+            self.spend::<S>(directions.products_of_pairs(self.roles.len(), widest, left.len()));
+        if complete {
+            // one more than are paired says that there are more
+            let paired = self.roles.iter().take(MOST_PAIRED + 1);
+            let values: Vec<Told<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
+            complete = directions.pairs(&values, None, left, |i, j| {
+                work = work.checked_sub(1)?;
+                let changes = [i, j].map(|k| self.known(self.roles[k].0));
+                self.judge(changes.into())
+            });
+        }
         // rows of an output more are those of another random point: only the engine can say what two of them
         // tell
         for (i, j) in (0..outputs.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
@@ -171,6 +187,17 @@ impl Search<'_> {
             let text = format!("some pairs of changes: at most {most} are judged{}", self.option());
             self.out.not_tried.push(text);
         }
+    }
+
+    /// Counts products of numbers before they are formed; false where they take more operations than are left.
+    fn spend<S: Values>(&mut self, products: u64) -> bool {
+        let operations = products.saturating_mul(product::<S::Element>());
+        let enough = operations <= self.left;
+        match enough {
+            true => self.left -= operations,
+            false => self.ended = true,
+        }
+        enough
     }
 
     /// Unknowns that no remedy resolves so far.
