@@ -178,6 +178,32 @@ def test_texts_of_sympy_are_read_and_never_run(tmp_path: Path) -> None:
     assert not mark.exists()
 
 
+def test_parts_in_common_are_counted_as_often_as_they_stand() -> None:
+    """40 times a sum with its own square: 2**40 operations of 40 objects."""
+    x = sympy.Symbol("x")
+    doubled, nested = x, x
+    for _ in range(40):
+        doubled = sympy.Add(doubled, sympy.Mul(doubled, doubled, evaluate=False), evaluate=False)
+    for _ in range(300):
+        nested = sympy.sin(nested)
+    for expression, message in ((doubled, "a formula of more than 100000 operations"), (nested, "a formula with 300 operations in each other")):
+        for states, outputs in (({"x": expression}, {"y": x}), ({"x": x}, {"y": expression})):
+            with pytest.raises(ImportProblem, match=message):
+                obsdeg.Model(states=states, outputs=outputs)
+
+
+def test_powers_that_are_not_evaluated_are_held() -> None:
+    x = sympy.Symbol("x")
+    # SymPy makes the number where it may: nothing here is evaluated
+    power = sympy.Pow(2, 10**9, evaluate=False)
+    nested = sympy.Pow(sympy.Pow(3, 10**5, evaluate=False), 10**5, evaluate=False)
+    for expression in (power, sympy.Mul(power, x, evaluate=False), sympy.Add(nested, x, evaluate=False)):
+        with pytest.raises(ImportProblem, match="a power that is a number of too many digits"):
+            obsdeg.Model(states={"x": expression}, outputs={"y": x})
+    small = obsdeg.Model(states={"x": sympy.Pow(2, 10, evaluate=False) * x}, outputs={"y": x})
+    assert "1024" in str(small.text)
+
+
 def test_a_bar_without_tqdm_says_what_to_install() -> None:
     script = (
         "import sys; sys.modules['tqdm'] = sys.modules['tqdm.auto'] = None\n"

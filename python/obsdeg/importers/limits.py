@@ -108,6 +108,9 @@ def measured(expression: Any, sizes: Callable[[Any], Size | None] = lambda leaf:
     Arguments:
         expression: What is measured.
         sizes: Those of what will stand for a symbol, or None where it stays.
+
+    Raises:
+        OverLimit: a power in it is a number of more than `DIGITS` digits, which SymPy makes when it puts something in.
     """
     known: dict[Any, Size] = {}
     stack = [(sympy.sympify(expression, strict=True), False)]
@@ -118,6 +121,8 @@ def measured(expression: Any, sizes: Callable[[Any], Size | None] = lambda leaf:
         if not part.args:
             known[part] = (sizes(part) if part.is_Symbol else None) or (1, 0)
         elif visited:
+            if part.is_Pow:
+                _hold_power(*part.args)
             parts = [known[a] for a in part.args]
             known[part] = (1 + sum(p[0] for p in parts), 1 + max(p[1] for p in parts))
         else:

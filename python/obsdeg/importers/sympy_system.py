@@ -13,7 +13,7 @@ from typing import Any
 import sympy  # type: ignore[import-untyped]
 
 from .formula import TIME, Expr, exactly, names_in, parse, shortened, symbol
-from .limits import hold_brackets, text_of_file
+from .limits import hold, hold_brackets, measured, text_of_file
 from .problem import ImportProblem
 from .system import State, System
 
@@ -56,6 +56,8 @@ def system(
 
     def plain(value: Any) -> Expr:
         expression = _expression(value)
+        # SymPy visits parts in common as often as they stand there
+        hold(measured(expression), "a formula")
         functions = {f: symbol(f.func.__name__) for f in expression.atoms(sympy.core.function.AppliedUndef)}
         if expression.has(sympy.Derivative):
             raise ImportProblem(f"`{expression}`", "an equation without derivatives on the right")

@@ -58,6 +58,16 @@ type Cost = (bool, bool, usize, usize);
 /// An equation as linear in products of parameters: their coefficients.
 type Row = BTreeMap<Monomial, Fraction>;
 
+/// A derivative of an output or of a known input.
+struct Signal {
+    /// Its order; 0 of known inputs, which need no derivative of an output.
+    order: usize,
+    /// Variable of the next derivative, if it has one.
+    next: Option<u32>,
+    /// True if derivatives without a variable vanish.
+    ends: bool,
+}
+
 /// What a symbol's derivative is: nothing, an expression, or one without a name.
 enum Rate {
     Zero,
@@ -74,9 +84,10 @@ struct Elimination<'a> {
     solved: Vec<Option<Fraction>>,
     /// Every parameter that was found.
     found: Vec<Option<Fraction>>,
-    /// State of every variable that is one, and order of every derivative of an output.
+    /// State of every variable that is one.
     states: BTreeMap<u32, usize>,
-    orders: BTreeMap<u32, usize>,
+    /// Of every output and known input and their derivatives.
+    signals: BTreeMap<u32, Signal>,
 }
 
 /// Expressions of the states, then of the parameters, and whether all were sought within the limit of work.
@@ -88,7 +99,7 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
         solved: vec![None; system.states.len()],
         found: vec![None; system.parameters.len()],
         states: system.states.iter().enumerate().map(|(i, &v)| (v, i)).collect(),
-        orders: system.outputs.iter().flat_map(|(_, y)| y.iter().copied().zip(0..)).collect(),
+        signals: signals(system),
     };
     let ended = work.run();
     let mut complete = ended.is_ok();
@@ -102,6 +113,20 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
         out.push(expression.and_then(Result::ok).filter(|e| work.is_solution(i, e)));
     }
     (out, complete)
+}
+
+/// Outputs and known inputs with their derivatives, by variable.
+fn signals(system: &System) -> BTreeMap<u32, Signal> {
+    let outputs = system.outputs.iter().map(|(_, chain)| (chain, false, true));
+    let inputs = system.inputs.iter().map(|(chain, ends)| (chain, *ends, false));
+    let mut out = BTreeMap::new();
+    for (chain, ends, counts) in outputs.chain(inputs) {
+        for (k, &v) in chain.iter().enumerate() {
+            let order = if counts { k } else { 0 };
+            out.entry(v).or_insert(Signal { order, next: chain.get(k + 1).copied(), ends });
+        }
+    }
+    out
 }
 
 impl Elimination<'_> {
@@ -136,12 +161,10 @@ impl Elimination<'_> {
         if let Some(&i) = self.states.get(&v) {
             return Rate::Is(self.rates[i].clone());
         }
-        let outputs = self.system.outputs.iter().map(|o| (&o.1, false));
-        for (chain, ends) in outputs.chain(self.system.inputs.iter().map(|u| (&u.0, u.1))) {
-            let Some(k) = chain.iter().position(|&x| x == v) else { continue };
-            return match chain.get(k + 1) {
-                Some(&next) => Rate::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
-                None if ends => Rate::Zero,
+        if let Some(signal) = self.signals.get(&v) {
+            return match signal.next {
+                Some(next) => Rate::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
+                None if signal.ends => Rate::Zero,
                 None => Rate::Nameless,
             };
         }
@@ -169,7 +192,7 @@ impl Elimination<'_> {
 
     /// Order of the outputs' derivatives in a polynomial.
     fn order(&self, p: &Polynomial) -> usize {
-        p.variables().iter().filter_map(|v| self.orders.get(v)).copied().max().unwrap_or(0)
+        p.variables().iter().filter_map(|v| self.signals.get(v)).map(|s| s.order).max().unwrap_or(0)
     }
 
     /// The equation that is linear in a state at the least cost: its number, the state, and what that is.
