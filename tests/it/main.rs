@@ -29,6 +29,7 @@ mod language;
 mod laws;
 mod licences;
 mod models;
+mod not_estimated;
 mod points;
 mod program;
 mod reference_verdicts;

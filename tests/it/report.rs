@@ -171,6 +171,7 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
             "Positions",
             "How each is solved",
             "Sensitivity",
+            "What is not estimated",
             "Fewest positions, and what each is for",
             "Evidence by a filter",
             "Validity of the small-angle model",

@@ -3,7 +3,7 @@
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_evidence::requirements::Requirements;
-use obsdeg_evidence::simulation::omitted::Suspicion;
+use obsdeg_evidence::simulation::omitted::{ChangePerUnit, Suspicion};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -222,8 +222,12 @@ pub struct Omitted {
 pub struct SilentError {
     /// Name of the error, such as `K0_X`.
     pub name: String,
+    /// Unit of its size: ug, ppm, arcsec, ...
+    pub unit: String,
     /// Names of the unknowns whose estimates it changes.
     pub changes: Vec<String>,
+    /// Changes of the coefficients per unit of the error: the same whatever the record says.
+    pub sensitivities: Vec<ChangePerUnit>,
 }
 
 /// Kind of cells that hold one value again and again.

@@ -5,7 +5,7 @@ use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Simulation, Traces};
 use obsdeg_evidence::system::{SystemRun, simulate_system};
 use obsdeg_report::{
-    Answer, Document, File, ReportError, Table, series_csv, series_parquet, simulation_figures,
+    Answer, Document, File, ReportError, Table, budget_csv, series_csv, series_parquet, simulation_figures,
 };
 use serde::{Deserialize, Serialize};
 
@@ -117,6 +117,12 @@ pub fn files(run: &Run, traces: &Traces) -> Result<Vec<File>, ReportError> {
         File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },
         File { name: "series.parquet".into(), bytes: series_parquet(traces, run)? },
     ];
+    if let Run::Scheme(run) = run
+        && !run.omitted.budgets.is_empty()
+    {
+        let bytes = budget_csv(&run.omitted.budgets)?.into_bytes();
+        files.push(File { name: "budget.csv".into(), bytes });
+    }
     files.extend(simulation_figures(traces)?);
     Ok(files)
 }

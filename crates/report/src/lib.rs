@@ -14,6 +14,7 @@
 
 mod analysis;
 mod audit;
+mod budget;
 mod calibration;
 mod compare;
 mod crosscheck;
@@ -48,6 +49,7 @@ mod visible;
 mod walks;
 mod words;
 
+pub use budget::budget_csv;
 pub use calibration::{calibration_figures, covariance_csv, residuals_csv};
 pub use document::Document;
 pub use excess::Excess;

@@ -2,15 +2,19 @@
 
 use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
-use obsdeg_evidence::simulation::omitted::{Budget, FamilyEffect, OmittedEffects};
+use obsdeg_evidence::simulation::omitted::{
+    Advice, AdviceKind, Budget, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
+};
 
 use crate::document::{Block, left, number, right};
 use crate::words;
 
 /// Most budgets that a document prints in full: those with the least margin, or the largest share of the bench.
 const BUDGETS: usize = 3;
-/// Lines of a printed budget; the rest is in the JSON.
+/// Lines of a budget, and silent errors, that an answer prints; a report and the JSON have all.
 const LINES: usize = 6;
+/// Percent of the squared total from which on a source has a line of its own in a printed budget.
+const LEAST: f64 = 0.05;
 
 /// A number with two significant digits: sizes need no more.
 fn short(x: f64) -> String {
@@ -64,35 +68,103 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
     let heading = format!("Not estimated{whose}: effect on the estimates");
     let mut out = vec![Block::table(heading, columns, of.families.iter().map(row)).without(left_out)];
     out.push(Block::list(format!("Not estimated{whose}: conditions"), conditions(of)));
-    for b in printed(&of.budgets) {
-        let columns = [
-            left("source"),
-            left("type"),
-            right("standard uncertainty"),
-            right("sensitivity"),
-            right("contribution"),
-            right("percent"),
-        ];
-        let rows = b.lines.iter().take(LINES).map(|l| {
-            vec![
-                l.source.clone(),
-                format!("{:?}", l.evaluation),
-                format!("{} {}", number(l.value), l.value_unit),
-                number(l.sensitivity),
-                number(l.contribution),
-                format!("{:.1}", l.percent),
-            ]
-        });
-        let required = b.requirement.map_or_else(String::new, |r| format!(", required {}", number(r)));
-        let heading = format!(
-            "Uncertainty budget of {}{whose}: total {} {}{required}",
-            b.unknown,
-            number(b.total),
-            b.unit
-        );
-        out.push(Block::table(heading, columns, rows));
-    }
+    out.extend(trade(of, whose));
+    out.extend(Block::list_if_any(
+        format!("Not estimated{whose}: what would help, each as it was tried"),
+        advice(of),
+    ));
+    out.extend(printed(&of.budgets).into_iter().map(|b| budget(b, whose, LINES)));
     out
+}
+
+/// The blocks of a report: the families, and the budgets of all unknowns but psi in full, the least margin first.
+pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
+    let alone = OmittedEffects { budgets: Vec::new(), ..of.clone() };
+    let budgets = of.budgets.iter().filter(|b| !b.unknown.starts_with("psi"));
+    (blocks(&alone, ""), budgets.map(|b| budget(b, "", usize::MAX)).collect())
+}
+
+/// Sigma, bias and total of the worst drift coefficient under every carry; nothing without a bench.
+fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
+    let columns = [left("carry"), left("worst"), right("sigma"), right("bias"), right("total"), left("unit")];
+    let row = |c: &CarryUncertainty| {
+        let at_once = if c.without_slews { " (repositioning at once)" } else { "" };
+        let mut cells = vec![format!("{}{at_once}", c.carry)];
+        match &c.worst {
+            Some(w) => cells.extend([
+                w.unknown.clone(),
+                number(w.sigma),
+                number(w.bias),
+                number(w.total),
+                w.unit.clone(),
+            ]),
+            None => cells.extend(std::iter::repeat_n("-".into(), 5)),
+        }
+        cells
+    };
+    let heading = format!(
+        "Carries{whose}: sigma, bias by the bench, and total of the coefficient with the largest total"
+    );
+    (!of.carries.is_empty()).then(|| Block::table(heading, columns, of.carries.iter().map(row)))
+}
+
+/// What would help, a line each: what it does to the largest total over its requirement, and what it costs in sigma.
+fn advice(of: &OmittedEffects) -> Vec<String> {
+    let line = |a: &Advice| {
+        let what = match a.kind {
+            AdviceKind::Estimate => format!("Estimate {} too (add to --terms)", a.what),
+            AdviceKind::Relevel => "Level the platform again before each position (--carry reset)".into(),
+            AdviceKind::AddPosition => format!("Add a position {}, as long as the last one", a.what),
+        };
+        format!(
+            "{what}: the largest total is {} times its requirement (now {}), sigmas at most {} times as large; {}",
+            short(a.total_over_required),
+            short(a.now),
+            number(a.sigma_factor),
+            if a.met { "every requirement is met" } else { "not enough by itself" }
+        )
+    };
+    of.advice.iter().map(line).collect()
+}
+
+/// Uncertainty budget of one unknown in the form of the GUM, with its total; lines beyond `most`, and those of less
+/// than [`LEAST`] percent, together in one line.
+fn budget(b: &Budget, whose: &str, most: usize) -> Block {
+    let columns = [
+        left("source"),
+        left("type"),
+        right("standard uncertainty"),
+        right("sensitivity"),
+        right("contribution"),
+        right("percent"),
+    ];
+    let row = |source: String, [kind, value, sensitivity]: [String; 3], contribution: f64, percent: f64| {
+        let percent = format!("{percent:.1}");
+        vec![source, kind, value, sensitivity, format!("{} {}", number(contribution), b.unit), percent]
+    };
+    let large = b.lines.iter().take_while(|l| l.percent >= LEAST).count().min(most);
+    // one small source alone stands by itself
+    let large = if b.lines.len() - large == 1 { b.lines.len() } else { large };
+    let (shown, rest) = b.lines.split_at(large);
+    let mut rows: Vec<Vec<String>> = shown
+        .iter()
+        .map(|l| {
+            let value = format!("{} {}", number(l.value), l.value_unit);
+            let texts = [format!("{:?}", l.evaluation), value, number(l.sensitivity)];
+            row(l.source.clone(), texts, l.contribution, l.percent)
+        })
+        .collect();
+    let none = || ["-", "-", "-"].map(String::from);
+    if !rest.is_empty() {
+        let contribution = rest.iter().map(|l| l.contribution * l.contribution).sum::<f64>().sqrt();
+        let percent = rest.iter().map(|l| l.percent).sum();
+        rows.push(row(format!("{} smaller sources", rest.len()), none(), contribution, percent));
+    }
+    rows.push(row("total".into(), none(), b.total, b.lines.iter().map(|l| l.percent).sum()));
+    let required = b.requirement.map_or_else(String::new, |r| format!(", required {}", number(r)));
+    let heading =
+        format!("Uncertainty budget of {}{whose}: total {} {}{required}", b.unknown, number(b.total), b.unit);
+    Block::table(heading, columns, rows)
 }
 
 /// Budgets that are printed: the largest totals over requirement first, then those in which the samples have the
@@ -125,6 +197,15 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
     if !of.torquers_in_turns {
         out.push("GS and GM act at the earth rate alone: the turns between positions are not stated".into());
     }
+    out.extend(of.correlated_noise.as_ref().map(|c| {
+        format!(
+            "the correlated noise of the accelerometers makes the sigmas of drift coefficients {} to {} times as large as the white noise \
+             alone ({}, the most); it is counted in them",
+            number(c.smallest),
+            number(c.largest),
+            c.unknown
+        )
+    }));
     out.extend(of.not_classified.as_ref().map(|why| format!("no exact classes: {why}")));
     let silent = of.terms.iter().filter(|t| t.class == Some(OmittedClass::Silent));
     for t in silent.filter(|t| !t.sensitivities.is_empty()).take(LINES) {
@@ -156,11 +237,17 @@ pub(crate) fn silent(of: &Omitted) -> String {
     if of.silent.is_empty() {
         return String::new();
     }
-    let one = |s: &SilentError| format!("{} ({})", s.name, s.changes.join(", "));
+    let change = |c: &ChangePerUnit, unit: &str| {
+        format!("changes {} by {} {} per {unit}", c.unknown, number(c.per_unit), c.unit)
+    };
+    let one = |s: &SilentError| {
+        let changes: Vec<String> = s.sensitivities.iter().map(|c| change(c, &s.unit)).collect();
+        format!("{} ({})", s.name, changes.join(", "))
+    };
     let more = of.silent.len().saturating_sub(LINES);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let listed: Vec<String> = of.silent.iter().take(LINES).map(one).collect();
-    format!("; it cannot show, with the unknowns that change: {}{more}", listed.join("; "))
+    format!("; silent here: {}{more}", listed.join("; "))
 }
 
 /// What a calibration says of errors that it does not estimate.

@@ -20,7 +20,7 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::excess::Excess;
-use crate::{Answer, Origin, compare, gimbals, latex, simulation, stated, words};
+use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
 /// What a calibration changes of the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
@@ -159,6 +159,8 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     solved(blocks, a);
     blocks.push(section(level, "Sensitivity"));
     sensitivity(blocks, s, review, id);
+    blocks.push(section(level, "What is not estimated"));
+    not_estimated(blocks, review, id);
     blocks.push(section(level, "Fewest positions, and what each is for"));
     fewest(blocks, s, review, id);
     blocks.push(section(level, "Evidence by a filter"));
@@ -189,6 +191,17 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
         (k, true) => format!("with derivatives up to order {k}"),
         (k, false) => format!("with derivatives up to order {k} ({})", names.join(", ")),
     }
+}
+
+/// Effects of errors that the scheme does not estimate, and the budgets with a bench.
+fn not_estimated(blocks: &mut Vec<Block>, review: &ComparedScheme, id: &str) {
+    let (effects, budgets) = omitted::in_full(&review.omitted);
+    blocks.extend(effects);
+    let caption =
+        "Uncertainty budgets: shares of samples and of the errors of the bench in the squared total";
+    let picture = budget::bars(&review.omitted);
+    blocks.extend(picture.map(|svg| pictures::still(&format!("{id}_budget"), caption, svg)));
+    blocks.extend(budgets);
 }
 
 fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {

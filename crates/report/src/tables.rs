@@ -113,7 +113,8 @@ fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Ta
         match item {
             Value::Object(fields) => {
                 let mut row = keys.to_vec();
-                let known = ["name", "label", "expression", "what"].iter().find_map(|k| fields.get(*k));
+                let known =
+                    ["name", "label", "expression", "what", "unknown"].iter().find_map(|k| fields.get(*k));
                 let key = (format!("{name}.name"), known.map_or_else(|| (i + 1).to_string(), text));
                 let keys: Vec<_> = keys.iter().cloned().chain([key]).collect();
                 let mut found = Vec::new();

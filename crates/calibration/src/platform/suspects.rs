@@ -10,7 +10,7 @@ use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::simulation::omitted::{
-    Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
+    ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
 use obsdeg_evidence::simulation::{SegmentKind, shown_unit, si_per_shown};
 
@@ -41,8 +41,13 @@ pub(super) fn omitted(
     let class = |j: usize| classes.as_ref().map(|v| v.terms[j].class);
     let shown = (0..model.terms().len()).map(|j| class(j).is_none_or(|c| c == OmittedClass::Visible));
     let tested = tested(problem, estimate, &model, shown.collect())?;
-    let silent = classes.iter().flat_map(|v| &v.terms).filter(|t| t.class == OmittedClass::Silent);
-    let silent = silent.map(|t| SilentError { name: t.name.clone(), changes: t.changes.clone() });
+    let silent = classes.iter().flat_map(|v| v.terms.iter().enumerate());
+    let silent = silent.filter(|(_, t)| t.class == OmittedClass::Silent).map(|(j, t)| SilentError {
+        name: t.name.clone(),
+        unit: model.terms()[j].unit.into(),
+        changes: t.changes.clone(),
+        sensitivities: tested.per_unit(j, model.terms()[j].unit, &t.changes),
+    });
     let suspicion = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
     Ok(Omitted {
         tried: tested.score.tried().len(),
@@ -56,6 +61,19 @@ struct Tested {
     score: Score,
     /// By name of the coefficient, with its unit.
     changes: Vec<(String, &'static str, Vec<f64>)>,
+}
+
+impl Tested {
+    /// Changes of the coefficients `of` per unit of error `j`.
+    fn per_unit(&self, j: usize, unit: &str, of: &[String]) -> Vec<ChangePerUnit> {
+        let own = self.changes.iter().filter(|(name, ..)| of.contains(name));
+        own.map(|(name, of, changes)| ChangePerUnit {
+            unknown: name.clone(),
+            unit: shown_unit(of).into(),
+            per_unit: changes[j] * si_per_shown(unit) / si_per_shown(of),
+        })
+        .collect()
+    }
 }
 
 fn tested(

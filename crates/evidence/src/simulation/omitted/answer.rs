@@ -1,19 +1,28 @@
 //! Sensitivities to what a scheme does not estimate, as plain data.
 
+use obsdeg_core::model::Carry;
 use obsdeg_core::omitted::{ExactChange, OmittedClass};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and the
-/// attitudes of the positions.
+/// Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and
+/// the attitudes of the positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OmittedEffects {
-    /// Effects family by family: all terms of a family have the same size, and their changes add up as squares.
+    /// Effects family by family: all terms of a family have the same size, and their changes add up as
+    /// squares.
     pub families: Vec<FamilyEffect>,
     /// Effects term by term, in the order of the error model.
     pub terms: Vec<OmittedEffect>,
     /// Uncertainty budgets of the unknowns that have a sigma; empty without a bench.
     pub budgets: Vec<Budget>,
+    /// Uncertainty of the scheme under every carry, its own first; empty without a bench.
+    pub carries: Vec<CarryUncertainty>,
+    /// Changes that lower the largest total over its requirement, the lowest first; empty unless sigma meets
+    /// every requirement and the total with the bench does not.
+    pub advice: Vec<Advice>,
+    /// Effect of correlated noise on the sigmas; null if no correlated noise is stated.
+    pub correlated_noise: Option<CorrelatedNoise>,
     /// True if torquer errors (GS, GM) act in the stated turns; otherwise they act at the earth rate alone.
     pub torquers_in_turns: bool,
     /// Bound on the probability that a class is wrong, dimensionless; null where no classes were computed.
@@ -35,14 +44,15 @@ pub struct OmittedEffect {
     pub class: Option<OmittedClass>,
     /// Exact changes by a silent error, in SI units; null if they have no exact form, or for other classes.
     pub exact: Option<Vec<ExactChange>>,
-    /// Size that a record of this scheme shows at three sigma, in the unit of `unit`; null unless the error is visible.
+    /// Size that a record of this scheme shows at three sigma, in the unit of `unit`; null unless the error
+    /// is visible.
     pub visible_from: Option<f64>,
     /// Size stated by the bench (one sigma), in the unit of `unit`; null where the bench states none.
     pub size: Option<f64>,
     /// Changes of the estimates per unit of the error; estimates that it does not change are left out.
     pub sensitivities: Vec<ChangePerUnit>,
-    /// Size at which the error uses up the margin of a requirement; null if there is no requirement, or none that
-    /// it affects.
+    /// Size at which the error uses up the margin of a requirement; null if there is no requirement, or none
+    /// that it affects.
     pub uses_up: Option<UsesUp>,
 }
 
@@ -62,8 +72,8 @@ pub struct ChangePerUnit {
 pub struct UsesUp {
     /// Name of the unknown with this requirement.
     pub unknown: String,
-    /// Size (one sigma) of the error at which the total uncertainty reaches the requirement, in the unit of the
-    /// error; a requirement that is missed without the error has no such size.
+    /// Size (one sigma) of the error at which the total uncertainty reaches the requirement, in the unit of
+    /// the error; a requirement that is missed without the error has no such size.
     pub size: f64,
 }
 
@@ -80,14 +90,14 @@ pub struct FamilyEffect {
     pub no_effect: Option<usize>,
     /// Number of terms that no record can show; null where no classes were computed.
     pub silent: Option<usize>,
-    /// Largest change of a drift coefficient per unit size of all terms (root of the sum of squares); null if no
-    /// drift coefficient changes.
+    /// Largest change of a drift coefficient per unit size of all terms (root of the sum of squares); null if
+    /// no drift coefficient changes.
     pub worst: Option<ChangePerUnit>,
-    /// Largest change of a drift coefficient per unit size in its own sigma (dimensionless per unit of the error);
-    /// null if no drift coefficient changes.
+    /// Largest change of a drift coefficient per unit size in its own sigma (dimensionless per unit of the
+    /// error); null if no drift coefficient changes.
     pub worst_in_sigmas: Option<f64>,
-    /// Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none is
-    /// visible.
+    /// Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none
+    /// is visible.
     pub visible_from: Option<f64>,
     /// Smallest size of a single term that uses up the margin of a requirement; null if none does.
     pub uses_up: Option<UsesUp>,
@@ -106,6 +116,72 @@ pub struct Budget {
     pub requirement: Option<f64>,
     /// Sources of uncertainty, the largest contribution first.
     pub lines: Vec<BudgetLine>,
+}
+
+/// Uncertainty of a scheme under one carry, with the bench.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CarryUncertainty {
+    /// Carry: quantity that continues from one position to the next.
+    pub carry: Carry,
+    /// True if the slews of the scheme are left out, since only inertial carry has slews.
+    pub without_slews: bool,
+    /// Drift coefficient with the largest total; null if one is not observable, or if nothing was judged.
+    pub worst: Option<Composition>,
+}
+
+/// Uncertainty of one unknown: by the samples, by the bench, and both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Composition {
+    /// Name of the unknown.
+    pub unknown: String,
+    /// Unit of the figures.
+    pub unit: String,
+    /// Sigma by the samples, in the unit of `unit`.
+    pub sigma: f64,
+    /// Contribution of the errors of the bench (root of the sum of squares), in the unit of `unit`.
+    pub bias: f64,
+    /// Total uncertainty: root of the sum of both squares, in the unit of `unit`.
+    pub total: f64,
+}
+
+/// Kind of a change that lowers a total uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AdviceKind {
+    /// Families of errors are estimated: terms among the unknowns.
+    Estimate,
+    /// The platform is levelled again before each position: reset carry.
+    Relevel,
+    /// One more position, as long as the last one.
+    AddPosition,
+}
+
+/// Change of a scheme that lowers the largest total uncertainty over its requirement, as it was tried.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Advice {
+    /// Kind of the change.
+    pub kind: AdviceKind,
+    /// Terms that become unknowns, the carry, or the attitude that is added.
+    pub what: String,
+    /// Largest total uncertainty over its requirement with the change, dimensionless.
+    pub total_over_required: f64,
+    /// The same without the change, dimensionless.
+    pub now: f64,
+    /// Largest factor on the sigma of a drift coefficient: what the change costs.
+    pub sigma_factor: f64,
+    /// True if every requirement is met with the change.
+    pub met: bool,
+}
+
+/// Effect of correlated noise: sigmas with it over sigmas of the white noise alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CorrelatedNoise {
+    /// Smallest factor on the sigma of a drift coefficient.
+    pub smallest: f64,
+    /// Largest factor on the sigma of a drift coefficient.
+    pub largest: f64,
+    /// Name of the drift coefficient with the largest factor.
+    pub unknown: String,
 }
 
 /// Evaluation of a standard uncertainty, by the GUM.
@@ -130,7 +206,8 @@ pub struct BudgetLine {
     pub value_unit: String,
     /// ChangePerUnit of the unknown to the source, in the unit of the unknown per `value_unit`.
     pub sensitivity: f64,
-    /// Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity, positive.
+    /// Contribution to the standard uncertainty of the unknown, in its unit: value times sensitivity,
+    /// positive.
     pub contribution: f64,
     /// Part of the squared total, in percent.
     pub percent: f64,

@@ -1,7 +1,7 @@
 //! The bench: sizes (one sigma) of errors that are not estimated, and the total uncertainty with them.
 
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{OmittedModel, may_be_omitted, omitted_meant};
+use obsdeg_core::model::{OmittedModel, OmittedTerm, may_be_omitted, omitted_meant};
 
 /// Name in a bench that nothing answers to.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -21,26 +21,24 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The sizes that `stated` gives the errors of `model`, families before single ones. What is among the unknowns
-    /// has no size: it is estimated.
+    /// The sizes that `stated` gives the errors of `model`, families before single ones. What is among the
+    /// unknowns has no size: it is estimated.
     ///
     /// # Errors
     /// [`BenchError`] for a name that no error has.
     pub fn of(stated: &[Assignment], model: &OmittedModel) -> Result<Self, BenchError> {
-        let mut sizes = vec![None; model.terms().len()];
-        for a in stated {
-            // of an error that is estimated, or of a position that another scheme has, nothing counts
-            let found = may_be_omitted(&a.name);
-            for (slot, term) in sizes.iter_mut().zip(model.terms()) {
-                if a.name == term.family || concerns(&a.name, &term.name) {
-                    *slot = Some(a.value);
-                }
-            }
-            if !found {
-                return Err(BenchError { found: a.name.clone(), known: omitted_meant(&a.name) });
-            }
+        // of an error that is estimated, or of a position that another scheme has, nothing counts
+        if let Some(a) = stated.iter().find(|a| !may_be_omitted(&a.name)) {
+            return Err(BenchError { found: a.name.clone(), known: omitted_meant(&a.name) });
         }
-        Ok(Self { sizes })
+        let size = |t: &OmittedTerm| Self::size_of(stated, t.family, &t.name);
+        Ok(Self { sizes: model.terms().iter().map(size).collect() })
+    }
+
+    /// Size that `stated` gives an error of a family, in its unit: the last one that names either.
+    pub fn size_of(stated: &[Assignment], family: &str, name: &str) -> Option<f64> {
+        let own = |a: &&Assignment| a.name == family || concerns(&a.name, name);
+        stated.iter().rfind(own).map(|a| a.value)
     }
 
     /// True if no error has a size.
@@ -48,8 +46,8 @@ impl Bench {
         self.sizes.iter().all(Option::is_none)
     }
 
-    /// Total uncertainty of every estimate: `sqrt(sigma^2 + sum (B s)^2)`, the covariance of Schmidt's consider
-    /// filter. `changes` is unknowns x errors, in the units of `sigmas` per unit of the sizes.
+    /// Total uncertainty of every estimate: `sqrt(sigma^2 + sum (B s)^2)`, the covariance of Schmidt's
+    /// consider filter. `changes` is unknowns x errors, in the units of `sigmas` per unit of the sizes.
     pub fn totals(&self, sigmas: &[Option<f64>], changes: &[Vec<f64>]) -> Vec<Option<f64>> {
         let of = |(sigma, row): (&Option<f64>, &Vec<f64>)| {
             let contribution = |(b, s): (&f64, &Option<f64>)| (b * s.unwrap_or(0.0)).powi(2);

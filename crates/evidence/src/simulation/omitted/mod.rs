@@ -1,9 +1,13 @@
 //! What is not in the model: how errors that a scheme does not estimate change its estimates.
 //!
-//! With x the unknowns and k the omitted errors, `Z = J x + O k + n`: estimates change by `B k`,
-//! `B = (J' R^-1 J + P^-1)^-1 J' R^-1 O`, with the noise and the priors that the sigmas rest on. The classes (no effect,
-//! silent, visible) are verdicts of the exact engine ([`obsdeg_core::omitted`]); sizes and sensitivities are figures.
+//! With x the unknowns and k the omitted errors, `Z = J x + O k + n`: estimates change by `B k`, `B = (J'
+//! R^-1 J + P^-1)^-1 J' R^-1 O`, with the noise and the priors that the sigmas rest on. The classes (no
+//! effect, silent, visible) are verdicts of the exact engine ([`obsdeg_core::omitted`]); sizes and
+//! sensitivities are figures.
 
+mod advice;
+#[cfg(test)]
+mod advice_tests;
 mod answer;
 pub(crate) mod bench;
 mod budget;
@@ -17,8 +21,8 @@ use obsdeg_core::model::{OmittedModel, OmittedTerm};
 use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 
 pub use answer::{
-    Budget, BudgetLine, ChangePerUnit, Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES,
-    UsesUp,
+    Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, Composition, CorrelatedNoise,
+    Evaluation, FamilyEffect, OmittedEffect, OmittedEffects, SAMPLES, UsesUp,
 };
 pub use bench::{Bench, BenchError};
 pub use columns::OmittedColumns;
@@ -30,13 +34,55 @@ use crate::simulation::{
 };
 
 /// Sigmas of a visible error that count as seen.
-const SEEN: f64 = 3.0;
+pub const SEEN: f64 = 3.0;
 
-/// Effects of everything that the scheme of `attained` does not estimate.
+/// Effects of everything that the scheme of `attained` does not estimate; with a bench the uncertainty under
+/// every carry, and what would help where the bench uses up a margin.
 ///
 /// # Errors
 /// [`SimulationError`].
 pub fn omitted_effects(
+    attained: &Attained,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<OmittedEffects, SimulationError> {
+    let mut out = term_effects(attained, conditions, seed)?;
+    out.correlated_noise = correlated_noise(attained, conditions, seed)?;
+    if !out.budgets.is_empty() {
+        out.carries = advice::carries(attained, conditions, seed)?;
+        out.advice = advice::advice(attained, conditions, &out, seed)?;
+    }
+    Ok(out)
+}
+
+/// Factors of the correlated noise of the accelerometers on the sigmas, if there is any.
+fn correlated_noise(
+    attained: &Attained,
+    conditions: &Conditions,
+    seed: u64,
+) -> Result<Option<CorrelatedNoise>, SimulationError> {
+    if conditions.accelerometer().states().is_empty() {
+        return Ok(None);
+    }
+    let white = Conditions { accelerometer_instability_ug: 0.0, bench: Vec::new(), ..conditions.clone() };
+    let white = Attained::new(attained.plan.platform.scheme(), &white, seed)?;
+    let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
+    let factor = |c: usize| Some((attained.sigmas[c]? / white.sigmas[c]?, c));
+    let factors: Vec<(f64, usize)> =
+        (0..names.len()).filter(|&c| is_rate(units[c])).filter_map(factor).collect();
+    let largest = factors.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(largest.map(|&(largest, c)| CorrelatedNoise {
+        smallest: factors.iter().fold(largest, |least, f| least.min(f.0)),
+        largest,
+        unknown: names[c].clone(),
+    }))
+}
+
+/// Effects of the errors alone: what [`omitted_effects`] adds with a bench is empty.
+///
+/// # Errors
+/// [`SimulationError`].
+pub fn term_effects(
     attained: &Attained,
     conditions: &Conditions,
     seed: u64,
@@ -94,6 +140,9 @@ pub fn omitted_effects(
         families,
         budgets,
         terms,
+        carries: Vec::new(),
+        advice: Vec::new(),
+        correlated_noise: None,
         torquers_in_turns: model.turning().is_some()
             || attained.plan.slews().next().is_some()
             || platform.scheme().rotates(),

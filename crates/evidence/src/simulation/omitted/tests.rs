@@ -14,7 +14,7 @@ use crate::simulation::{Attained, Conditions, Noise, Plan, no_prior, si_per_show
 const W_IE: f64 = 7.292115e-5;
 const LATITUDE: f64 = 28.2;
 
-fn letters(names: &[&str], carry: Carry) -> Scheme {
+pub(super) fn letters(names: &[&str], carry: Carry) -> Scheme {
     let angles = names.iter().map(|n| cardinal(n).expect("an attitude"));
     Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::of_angles(angles) }
 }
@@ -219,6 +219,11 @@ fn error(name: &str, g: [f64; 3], rate: [f64; 3]) -> ([f64; 3], [f64; 3], [f64; 
 
 /// Z1 and Z3 at the end of every step of 10 s, of one column.
 fn record(column: &Column, angles: &[[f64; 3]], carry: Carry, dwell_s: f64) -> Vec<f64> {
+    record_every(column, angles, carry, [dwell_s, 10.0])
+}
+
+/// The same at the end of every step of `step_s`, a multiple of 10 s.
+fn record_every(column: &Column, angles: &[[f64; 3]], carry: Carry, [dwell_s, step_s]: [f64; 2]) -> Vec<f64> {
     let (sin, cos) = LATITUDE.to_radians().sin_cos();
     let w = DVector::from_column_slice(&[W_IE * cos, W_IE * sin, 0.0]);
     let mut psi = DVector::zeros(3);
@@ -255,15 +260,17 @@ fn record(column: &Column, angles: &[[f64; 3]], carry: Carry, dwell_s: f64) -> V
             }
         }
         psi += &offset;
-        let steps = (dwell_s / 10.0).round() as usize;
+        let (steps, sampled) = ((dwell_s / 10.0).round() as usize, (step_s / 10.0).round() as usize);
         let derivative = |p: &DVector<f64>| p.cross(&w) + &rate;
-        for _ in 0..steps {
+        for k in 0..steps {
             let k1 = derivative(&psi);
             let k2 = derivative(&(&psi + 5.0 * &k1));
             let k3 = derivative(&(&psi + 5.0 * &k2));
             let k4 = derivative(&(&psi + 10.0 * &k3));
             psi += (k1 + 2.0 * (k2 + k3) + k4) * (10.0 / 6.0);
-            out.extend([psi[2] + force[0], -psi[0] + force[2]]);
+            if (k + 1) % sampled == 0 {
+                out.extend([psi[2] + force[0], -psi[0] + force[2]]);
+            }
         }
         psi -= &offset;
         before = Some(c);
@@ -338,13 +345,23 @@ fn random_scheme(rng: &mut SplitMix64, cardinal_angles: bool) -> (Scheme, Vec<[f
 
 /// The columns of the unknowns F, I, O, S by the model of this file.
 fn unknowns(platform: &Platform, angles: &[[f64; 3]], dwell_s: f64) -> Vec<DVector<f64>> {
+    columns_every(platform, angles, dwell_s, 10.0)
+}
+
+/// The same with samples every `step_s`, a multiple of 10 s.
+pub(super) fn columns_every(
+    platform: &Platform,
+    angles: &[[f64; 3]],
+    dwell_s: f64,
+    step_s: f64,
+) -> Vec<DVector<f64>> {
     let carry = platform.scheme().carry;
     let column = |(c, name): (usize, &String)| {
         let column = match name.starts_with("psi") {
             true => Column::Psi(c % 3, c / 3),
             false => Column::Name(name.clone()),
         };
-        DVector::from_vec(record(&column, angles, carry, dwell_s))
+        DVector::from_vec(record_every(&column, angles, carry, [dwell_s, step_s]))
     };
     platform.names().iter().enumerate().map(column).collect()
 }

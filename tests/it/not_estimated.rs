@@ -1,0 +1,167 @@
+//! What a scheme does not estimate: budgets in reports and files, against numbers computed by hand from their
+//! lines.
+
+use scraper::Html;
+
+use crate::program::{json, run, stderr};
+use crate::report::{report, table, texts};
+
+const BENCH: &str = "examples/bench-errors/scheme.toml";
+
+/// Numbers of a text with a unit behind them: `1.5 deg/h`.
+fn number(text: &str) -> f64 {
+    let first = text.split(' ').next().unwrap_or_default();
+    first.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
+}
+
+/// Every coefficient has a budget in the report: lines with the largest first, their squares add up to that
+/// of the total, and the total is the one of the JSON. The picture has a bar for each.
+#[test]
+fn the_report_has_a_budget_of_every_coefficient() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);
+    assert!(texts(&page, "h2").iter().any(|t| t == "What is not estimated"));
+    let answer = json(&["simulate", "--scheme", BENCH, "--format", "json", "-q"]);
+    let budgets = answer["omitted"]["budgets"].as_array().expect("budgets");
+    let coefficients = budgets.iter().filter(|b| !b["unknown"].as_str().expect("a name").starts_with("psi"));
+    let mut seen = 0;
+    for b in coefficients {
+        let name = b["unknown"].as_str().expect("a name");
+        let rows = table(&page, &format!("Uncertainty budget of {name}:"));
+        let (total, lines) = rows.split_last().expect("rows");
+        let contributions: Vec<f64> = lines.iter().map(|r| number(&r[4])).collect();
+        let squared: f64 = contributions.iter().map(|x| x * x).sum();
+        let expected = b["total"].as_f64().expect("a number");
+        assert!((squared.sqrt() / expected - 1.0).abs() < 2e-3, "{name}: {rows:?}");
+        assert!((number(&total[4]) / expected - 1.0).abs() < 1e-3, "{name}: {total:?}");
+        let percent: f64 = lines.iter().map(|r| number(&r[5])).sum();
+        assert!((percent - 100.0).abs() < 0.5, "{name}: {rows:?}");
+        let named = lines.iter().filter(|r| r[1] != "-").map(|r| number(&r[4]));
+        assert!(named.clone().zip(named.skip(1)).all(|(a, b)| a >= b), "{name}: {rows:?}");
+        for r in lines.iter().filter(|r| r[1] == "B") {
+            // the size that the file states, times the sensitivity
+            let stated = if r[0].starts_with("K0") {
+                20.0
+            } else if r[0].starts_with("M_") {
+                5.0
+            } else {
+                10.0
+            };
+            assert_eq!(number(&r[2]), stated, "{r:?}");
+            assert!((stated * number(&r[3]).abs() / number(&r[4]) - 1.0).abs() < 1e-3, "{r:?}");
+        }
+        seen += 1;
+    }
+    assert_eq!(seen, 12);
+    let picture = texts(&page, "figure svg text").concat();
+    for name in ["D_FX", "D_SZ", "samples", "K0", "latitude", "share of the squared total"] {
+        assert!(picture.contains(name), "{name}: {picture}");
+    }
+}
+
+/// `budget.csv` has a row per line of every budget, with the numbers of the JSON; so has the table of `--format csv`,
+/// under the name of the unknown.
+#[test]
+fn budgets_are_files_of_rows() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("run");
+    let output = run(&["simulate", "--scheme", BENCH, "-q", "-o", &out.display().to_string()]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let answer = json(&["simulate", "--scheme", BENCH, "--format", "json", "-q"]);
+    let mut expected = Vec::new();
+    for b in answer["omitted"]["budgets"].as_array().expect("budgets") {
+        for l in b["lines"].as_array().expect("lines") {
+            let text = |x: &serde_json::Value| x.as_str().expect("a text").to_string();
+            expected.push((text(&b["unknown"]), text(&l["source"]), l["contribution"].as_f64()));
+        }
+    }
+    assert!(expected.len() > 50);
+    let rows = |text: &[u8], columns: [&str; 3]| -> Vec<(String, String, Option<f64>)> {
+        let mut reader = csv::Reader::from_reader(text);
+        let header = reader.headers().expect("a header").clone();
+        let at =
+            columns.map(|c| header.iter().position(|h| h == c).unwrap_or_else(|| panic!("{c}: {header:?}")));
+        let row = |r: csv::StringRecord| (r[at[0]].into(), r[at[1]].into(), r[at[2]].parse().ok());
+        reader.records().map(|r| row(r.expect("a row"))).collect()
+    };
+    let written = std::fs::read(out.join("budget.csv")).expect("a file");
+    assert_eq!(rows(&written, ["unknown", "source", "contribution"]), expected);
+    let table = ["simulate", "--scheme", BENCH, "-q", "--format", "csv", "--table", "omitted.budgets.lines"];
+    let printed = run(&table);
+    assert!(printed.status.success(), "{}", stderr(&printed));
+    assert_eq!(rows(&printed.stdout, ["omitted.budgets.name", "source", "contribution"]), expected);
+}
+
+/// Z1 and Z3 of one position NUE at 28.2 deg N over 2000 s, by Runge and Kutta, with noise of 1e-6 g: D_F of
+/// the gyros in deg/h, D_IY in deg/h/g (g along Y is -1 there), a zero of accelerometer X in ug.
+fn record_of_one_position(d_f: [f64; 3], d_iy: f64, k0_x_ug: f64) -> String {
+    let (w_n, w_u) = {
+        let (sin, cos) = 28.2f64.to_radians().sin_cos();
+        (7.292115e-5 * cos, 7.292115e-5 * sin)
+    };
+    let dph = (1f64 / 3600.0).to_radians();
+    let eps = [d_f[0] * dph, (d_f[1] - d_iy) * dph, d_f[2] * dph];
+    let slope = |p: [f64; 3]| [eps[0] - p[2] * w_u, eps[1] + p[2] * w_n, eps[2] + p[0] * w_u - p[1] * w_n];
+    let along = |p: [f64; 3], k: [f64; 3], h: f64| std::array::from_fn(|i| p[i] + h * k[i]);
+    let mut state = 7u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    };
+    let mut normal = || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
+    let mut psi = [1e-4, -2e-4, 1.5e-4];
+    let mut text = String::from("t [s],position,Z1 [g],Z3 [g]\n");
+    for i in 1..=200 {
+        let k1 = slope(psi);
+        let k2 = slope(along(psi, k1, 5.0));
+        let k3 = slope(along(psi, k2, 5.0));
+        let k4 = slope(along(psi, k3, 10.0));
+        for (r, p) in psi.iter_mut().enumerate() {
+            *p += (k1[r] + 2.0 * (k2[r] + k3[r]) + k4[r]) * (10.0 / 6.0);
+        }
+        let z = [psi[2] + k0_x_ug * 1e-6 + 1e-6 * normal(), -psi[0] + 1e-6 * normal()];
+        text += &format!("{},p1,{},{}\n", 10 * i, z[0], z[1]);
+    }
+    text
+}
+
+/// A record with an error that it can not show is called consistent; the sentence names the error and what it
+/// does, and the estimate is off by just that.
+#[test]
+fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scheme = folder.path().join("scheme.toml");
+    let text = "name = 'one'\ncarry = 'inertial'\nlatitude_deg = 28.2\nterms = ['F']\n[simulation]\ndwell_s = 2000\n\
+                step_s = 10\naccelerometer_noise_g = 1e-6\ndrift_noise = '0'\n[[position]]\nname = 'p1'\nattitude = 'NUE'\n";
+    std::fs::write(&scheme, text).expect("written");
+    let calibrated = |d_iy: f64, k0_x_ug: f64| -> (String, f64) {
+        let record = folder.path().join("record.csv");
+        std::fs::write(&record, record_of_one_position([0.5, -0.3, 0.4], d_iy, k0_x_ug)).expect("written");
+        let [scheme, record] = [&scheme, &record].map(|p| p.display().to_string());
+        let arguments = ["calibrate", "--scheme", &scheme, &record, "-q"];
+        let table = run(&arguments);
+        assert!(table.status.success(), "{}", stderr(&table));
+        let table = crate::program::stdout(&table).split_whitespace().collect::<Vec<_>>().join(" ");
+        let answer = json(&[&arguments[..], &["--format", "json"]].concat());
+        let own = answer["quantities"].as_array().expect("a list").iter().find(|q| q["name"] == "D_FY");
+        (table, own.expect("D_FY")["estimate"].as_f64().expect("an estimate"))
+    };
+    let (_, without) = calibrated(0.0, 0.0);
+    for (name, unit, [d_iy, k0_x], size) in
+        [("D_IY", "deg/h/g", [0.5, 0.0], 0.5), ("K0_X", "ug", [0.0, 3000.0], 3000.0)]
+    {
+        let (table, estimate) = calibrated(d_iy, k0_x);
+        assert!(table.contains("consistent: the model and its sigmas explain the record, as far as it can tell; silent here: "), "{table}");
+        let said = format!("{name} (changes D_FY by ");
+        let behind = table.split(&said).nth(1).unwrap_or_else(|| panic!("no {said}: {table}"));
+        let (per_unit, rest) = behind.split_once(' ').expect("a number");
+        assert!(rest.starts_with(&format!("deg/h per {unit})")), "{rest}");
+        let expected = per_unit.parse::<f64>().expect("a number") * size;
+        // the number is printed with four digits; psi times drift adds 1e-4 of the drift
+        assert!(
+            (estimate - without - expected).abs() < 1e-3 * expected.abs(),
+            "{estimate} {without} {expected}"
+        );
+        assert!(expected.abs() > 0.03, "{expected}");
+    }
+}
