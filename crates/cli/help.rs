@@ -90,6 +90,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("correlation_time", GYROS, "Correlation time of the bias instability, in s (default: 3600)"),
     ("observable", WANTED, "Coefficients that must be observable: D_F,D_IX (default: all)"),
     ("max_degree", WANTED, "Largest degree, of all or of a coefficient or family: 1, D_F=1"),
+    ("immune", WANTED, "Errors without effect, or seen from a size on: K0, K0=20"),
     ("criterion", WANTED, "Criterion: worst, a, d, e or margin (default: worst)"),
     ("meet", WANTED, "Only schemes that meet every requirement; where none does, what would"),
     ("max_time", WANTED, "Largest total time with turns, in s"),

@@ -43,6 +43,11 @@ def _max_degree(value: Any) -> list[str]:
     return [str(value)] if isinstance(value, int) else assignments(value)
 
 
+def _immune(value: Any) -> list[str]:
+    names = isinstance(value, (str, list, tuple))
+    return _texts(value) if names else assignments(value)
+
+
 #: How options are read that are not as JSON has them.
 READ: dict[str, Callable[[Any], Any]] = {
     "angles": attitudes,
@@ -55,6 +60,7 @@ READ: dict[str, Callable[[Any], Any]] = {
     "prior": assignments,
     "estimate": assignments,
     "max_degree": _max_degree,
+    "immune": _immune,
     "terms": lambda value: ",".join(_texts(value)),
     "combination": _texts,
     "gimbal": _texts,

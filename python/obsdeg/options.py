@@ -210,6 +210,9 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     """Coefficients or families that must be observable and that the criterion is about [default: all]."""
     max_degree: int | ByName
     """Largest degree, of all required coefficients or by name: ``1``, ``{"D_F": 1}``."""
+    immune: Names | ByName
+    """Only schemes that are immune to errors that they do not estimate: without effect, ``"K0"``, or shown at 3 sigma
+    from a size on, ``{"K0": 20}``."""
     criterion: Literal["worst", "a", "d", "e", "margin"]
     """What makes one scheme better: the largest sigma, trace, determinant, largest eigenvalue, or the largest sigma over its requirement."""
     meet: bool

@@ -139,7 +139,7 @@ fn options_are_the_same() {
     ask("crosscheck", json!({ "filter_drop": "p9" }), &["--filter-drop", "p9"]);
     same(
         "design",
-        &json!({ "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "keep": 3, "restarts": 5 }),
+        &json!({ "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "immune": { "K0": 500 }, "keep": 3, "restarts": 5 }),
         &[
             "design",
             "--positions",
@@ -148,6 +148,8 @@ fn options_are_the_same() {
             "inertial",
             "--max-degree",
             "D_F=1",
+            "--immune",
+            "K0=500",
             "--keep",
             "3",
             "--restarts",

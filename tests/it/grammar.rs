@@ -119,6 +119,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         }
         "prior" => &["D=1", "psi=1e-12", "D=1e-300", "D=1e200", "psi=1e8", "D_F=0", "D_F=-1"],
         "bench" => &["K0=20", "K0_X=3,latitude=10", "azimuth=0", "K0=-1", "Q=1", "x"],
+        "immune" => &["K0", "K0=20", "M_XY=5,K0_X=3", "latitude", "K0=0", "Q=1", "psi"],
         "drift-scale" => &["1", "1e-6", "1e6", "1e-300", "0", "nan"],
         "runs" => &["3", "2", "1", "0", "-1", "1e3"],
         "filter-carry" => &["inertial", "reset", "x"],

@@ -10,8 +10,9 @@ use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Part, Progress, WalkOptions, Walks,
-    asked as asked_conditions, design_merged, design_part, is_walk, scheme_found, scheme_of_walk, walks,
+    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Immune, Part, Progress,
+    WalkOptions, Walks, asked as asked_conditions, design_merged, design_part, is_walk, scheme_found,
+    scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
@@ -157,6 +158,13 @@ pub struct WantedOptions {
     #[arg(long, value_name = "[NAME=]K")]
     #[serde(with = "text::list")]
     pub max_degree: Vec<DegreeCap>,
+
+    /// Only schemes that are immune to an error or a family that they do not estimate, each of its terms: it has no
+    /// effect (K0), or none but one that a record shows at 3 sigma from a size on (K0=20). Exact classes; the units are
+    /// those of --bench
+    #[arg(long, value_name = "NAME[=X]", value_delimiter = ',')]
+    #[serde(with = "text::list")]
+    pub immune: Vec<Immune>,
 
     /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and
     /// --meet only (default: worst)
@@ -405,6 +413,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         positions: a.positions,
         required: a.wanted.observable.clone(),
         degree_caps: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
+        immune: a.wanted.immune.clone(),
         meet: a.wanted.meet,
         total_s: a.wanted.max_time,
         slew_s: a.wanted.max_slew,
@@ -527,6 +536,7 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
             ("--front", !a.front.is_empty()),
             ("--round", a.round.is_some()),
             ("--max-degree", !w.max_degree.is_empty()),
+            ("--immune", !w.immune.is_empty()),
             ("--criterion", w.criterion.is_some()),
             ("--meet", w.meet),
             ("--max-time", w.max_time.is_some()),

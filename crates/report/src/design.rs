@@ -1,7 +1,7 @@
 //! Schemes that were found.
 
 use obsdeg_core::model::Carry;
-use obsdeg_design::design::{Certificate, Design, Found, PartsReport, SearchReport, Weight};
+use obsdeg_design::design::{BiasPoint, Certificate, Design, Found, PartsReport, SearchReport, Weight};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
@@ -79,8 +79,8 @@ fn lead(d: &Design) -> Vec<String> {
         out.extend(d.omitted.as_ref().and_then(|o| omitted::lead(o, first.requirements.with_bench, met)));
         out.extend(s.ranked.map(|n| {
             format!(
-                "With the bench, the {n} schemes of least sigma were ranked by their total uncertainty: no bound and no proof counts, and a \
-                 scheme with a larger sigma may have a smaller total."
+                "The search does not count what is not estimated under these conditions: the {n} schemes of least sigma were ranked by their total \
+                 uncertainty. No bound and no proof counts, and a scheme with a larger sigma may have a smaller total."
             )
         }));
         if first.requirements.any_missed() {
@@ -514,6 +514,19 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     ]
 }
 
+/// The front of sigma against bias; nothing where the search counts no bench.
+fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
+    let row = |p: &BiasPoint| vec![p.positions.join(" "), number(p.sigma), number(p.bias), number(p.total)];
+    let unit = s.unit.as_ref().map_or_else(|| "over what is required".into(), |u| format!("in {u}"));
+    let heading = format!(
+        "Front of sigma against bias by the bench: criterion {} of each and of the total, {unit} (by exchange with other sizes of the \
+         bench, not proven)",
+        s.criterion
+    );
+    let columns = [left("positions"), right("sigma"), right("bias"), right("total")];
+    (!d.bias_front.is_empty()).then(|| Block::table(heading, columns, d.bias_front.iter().map(row)))
+}
+
 impl Answer for Design {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -529,6 +542,7 @@ impl Answer for Design {
             blocks.extend(self.found.first().map(gimbal_angles));
             blocks.extend(gimbals::block(self.gimbals.as_ref()));
             blocks.extend(self.omitted.iter().flat_map(|o| omitted::blocks(o, " by the first scheme")));
+            blocks.extend(bias_front(self, s));
             blocks.push(Block::list("How", how(self, s)));
             blocks.push(Block::list("How good the best can be", bound(self, s)));
             blocks.push(

@@ -44,11 +44,16 @@ pub struct Design {
     pub found: Vec<Found>,
     /// Schemes that no scheme found beats in both total time and criterion, by total time.
     pub front: Vec<Found>,
+    /// Schemes that no scheme found beats in both sigma and bias by the bench, by sigma; left out where the
+    /// search counts no bench.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bias_front: Vec<BiasPoint>,
     /// Unknowns and families with a stated requirement that is not judged, since only some coefficients are
     /// asked for.
     #[serde(default)]
     pub not_judged: Vec<String>,
-    /// Effect of what the first scheme does not estimate, by the weights of its sigmas; null without a search.
+    /// Effect of what the first scheme does not estimate, by the weights of its sigmas; null without a
+    /// search.
     #[serde(default)]
     pub omitted: Option<OmittedEffects>,
     /// Outcome of the first scheme under the other carries; empty if no scheme was searched.
@@ -142,8 +147,9 @@ pub struct SearchReport {
     pub degree_floor: Option<usize>,
     /// Constraints of the search, in words.
     pub constraints: Vec<String>,
-    /// Number of schemes of least sigma that were ranked by total uncertainty with the bench; left out without a
-    /// bench.
+    /// Number of schemes of least sigma that were ranked by total uncertainty, and left out if not immune,
+    /// where the search does not count errors that are not estimated; left out where it counts them, and
+    /// where none is stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ranked: Option<usize>,
     /// Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial
@@ -274,6 +280,19 @@ pub struct TiesReport {
     pub within: f64,
 }
 
+/// Scheme on the front of sigma against bias: all figures in the unit of the criterion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BiasPoint {
+    /// Candidates of the scheme, in order of time.
+    pub positions: Vec<String>,
+    /// Criterion of the sigmas alone, in the unit of the criterion.
+    pub sigma: f64,
+    /// Criterion of what the errors of the bench add alone, in the unit of the criterion.
+    pub bias: f64,
+    /// Criterion of the total uncertainties, in the unit of the criterion.
+    pub total: f64,
+}
+
 /// Scheme that the search found, with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Found {
@@ -298,8 +317,8 @@ pub struct Found {
     pub dwells_s: Vec<f64>,
     /// Total time with turns, in s.
     pub total_s: f64,
-    /// Criterion of the scheme, in the unit of `unit`, with a bench of its total uncertainties; for margin the largest sigma over its requirement, psi
-    /// included where it counts.
+    /// Criterion of the scheme, in the unit of `unit`, with a bench of its total uncertainties; for margin
+    /// the largest sigma over its requirement, psi included where it counts.
     pub value: f64,
     /// Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if
     /// one is stated, no drift noise; null if none is required.

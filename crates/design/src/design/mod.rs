@@ -27,7 +27,7 @@ pub use observable::symmetry::Symmetry;
 pub use request::candidates::Candidates;
 pub use request::error::{DesignError, PartError};
 pub use request::limits::EXHAUSTIVE;
-pub use request::options::{CriterionName, DesignOptions};
+pub use request::options::{CriterionName, DesignOptions, Immune};
 pub use run::driver::design;
 pub use run::merged::design_merged;
 pub use run::part::{Block, Level, PART_SCHEMA, Part, design_part, design_starts};

@@ -116,10 +116,24 @@ impl Evaluator {
     }
 
     /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient
-    /// that counts is not determined. Sigmas are in deg/h (per g). `root` is working space.
+    /// that counts is not determined. Sigmas are in deg/h (per g); where errors that are not estimated count they are
+    /// total uncertainties. `root` is working space.
     pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        self.value_of(state, criterion, root, true)
+    }
+
+    /// The same of the sigmas alone, which no total is below.
+    pub(crate) fn sigma_value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+        self.value_of(state, criterion, root, false)
+    }
+
+    fn value_of(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>, total: bool) -> f64 {
         if !self.root(state, root) {
             return f64::INFINITY;
+        }
+        let total = total && state.beside.is_some();
+        if total && matches!(criterion, Criterion::D | Criterion::E) {
+            return self.of_total_covariance(state, criterion, root).unwrap_or(f64::INFINITY);
         }
         let (n, begin) = (self.n, 3 + self.nuisance);
         let d = n - begin;
@@ -135,7 +149,9 @@ impl Evaluator {
             let information = &block * block.transpose();
             return 1.0 / information.symmetric_eigenvalues().min().max(0.0).sqrt() / self.dph;
         }
-        let variances = (begin..n).map(|i| self.variance(l, i));
+        let added = if total { self.added_variances(state, l) } else { Vec::new() };
+        let added = added.into_iter().chain(std::iter::repeat(0.0));
+        let variances = (begin..n).map(|i| self.variance(l, i)).zip(added).map(|(own, added)| own + added);
         match criterion {
             Criterion::A => (variances.sum::<f64>() / d as f64).sqrt() / self.dph,
             Criterion::Margin(limits) => {

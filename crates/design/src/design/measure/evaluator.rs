@@ -1,7 +1,7 @@
 //! The evaluator of a search: its candidates, their dwells and what is known beforehand.
 
 use std::ops::Mul;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::Slew;
@@ -14,6 +14,7 @@ use obsdeg_evidence::simulation::{Conditions, Plan, steps};
 
 use crate::design::measure::elimination::eliminate;
 use crate::design::measure::noise_process::{Joint, OfDwell, Output, of_dwell};
+use crate::design::measure::omitted::{Beside, Omitted, OmittedAt, with_accelerometer};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
@@ -30,6 +31,8 @@ pub(crate) struct Candidate {
     pub(crate) own: Vec<f64>,
     /// Its own psi under reset carry, as soon as that was asked for.
     pub(crate) psi: OnceLock<OwnPsi>,
+    /// What errors that are not estimated do there.
+    pub(crate) omitted: OmittedAt,
     /// Which of the dwells of the evaluator it has.
     pub(crate) dwell: usize,
 }
@@ -50,6 +53,8 @@ pub(crate) struct Dwelling {
     pub(crate) seconds: f64,
     /// Information of the position on its local unknowns.
     pub(crate) local: [[f64; LOCAL]; LOCAL],
+    /// The same with the errors of the accelerometers, whether they are unknown or not.
+    pub(crate) full: [[f64; LOCAL]; LOCAL],
     /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
     pub(crate) phi: [[f64; PSI_EPS]; 3],
     /// What its samples say where the noise of Z is correlated.
@@ -90,6 +95,8 @@ pub struct Evaluator {
     pub(crate) prior: Prior,
     /// The process that each accelerometer has beside white noise.
     pub(crate) bias: Option<BiasState>,
+    /// Errors that are not estimated and count: they make totals of sigmas.
+    pub(crate) omitted: Option<Arc<Omitted>>,
     /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
     pub(crate) dph: f64,
 }
@@ -103,6 +110,8 @@ pub struct State {
     pub(crate) psi: [Vec<f64>; 3],
     /// Where the noise of Z is correlated: what is known of it by now.
     pub(crate) joint: Option<Joint>,
+    /// What errors that are not estimated do, where they count.
+    pub(crate) beside: Option<Box<Beside>>,
     /// The candidates in order.
     pub(crate) path: Vec<usize>,
     /// Dwells and turns, in s.
@@ -138,22 +147,24 @@ impl Evaluator {
             })
             .collect();
         let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
-        let mut local = [[0.0; LOCAL]; LOCAL];
+        let (mut local, mut full) = ([[0.0; LOCAL]; LOCAL], [[0.0; LOCAL]; LOCAL]);
+        let counted = if self.omitted.is_some() { &outputs[..] } else { &[] };
+        let with_errors: Vec<_> = counted.iter().map(|o| with_accelerometer(o.component, o.row)).collect();
         let of = |bias| Box::new(of_dwell(&outputs, bias, &step, steps, dwell_s / steps as f64));
         let correlated = self.bias.as_ref().map(of);
         for _ in 0..steps {
             now = &step * now;
             for Output { row: h, weight, .. } in &outputs {
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
-                for i in 0..LOCAL {
-                    for j in 0..LOCAL {
-                        local[i][j] += weight * row[i] * row[j];
-                    }
-                }
+                add_square(&mut local, &row, *weight);
+            }
+            for (Output { weight, .. }, h) in outputs.iter().zip(&with_errors) {
+                let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
+                add_square(&mut full, &row, *weight);
             }
         }
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| now[(i, j)]));
-        Ok(Dwelling { seconds: dwell_s, local, phi, correlated })
+        Ok(Dwelling { seconds: dwell_s, local, full, phi, correlated })
     }
 
     /// Every candidate with a dwell of its own, which [`Self::dwell_at`] changes.
@@ -168,7 +179,9 @@ impl Evaluator {
         let Candidate { c, effects, dwell, .. } = &self.candidates[candidate];
         self.dwells[*dwell].clone_from(dwelling);
         let own = self.information_alone(c, effects, dwelling);
-        (self.candidates[candidate].own, self.candidates[candidate].psi) = (own, OnceLock::new());
+        let omitted = self.omitted_at(c, effects, dwelling);
+        let changed = &mut self.candidates[candidate];
+        (changed.own, changed.omitted, changed.psi) = (own, omitted, OnceLock::new());
     }
 
     /// What the dwell of a candidate is.
@@ -203,6 +216,7 @@ impl Evaluator {
                 let effects = self.effects(c);
                 Candidate {
                     own: self.information_alone(c, &effects, &self.dwells[0]),
+                    omitted: self.omitted_at(c, &effects, &self.dwells[0]),
                     effects,
                     c: *c,
                     psi: OnceLock::new(),
@@ -324,6 +338,13 @@ impl Evaluator {
     /// Dwell of each position, in s; where they have dwells of their own, of the first.
     pub fn dwell_s(&self) -> f64 {
         self.dwells[0].seconds
+    }
+}
+
+/// Adds `weight row^T row`.
+fn add_square(sum: &mut [[f64; LOCAL]; LOCAL], row: &[f64; LOCAL], weight: f64) {
+    for (line, x) in sum.iter_mut().zip(row) {
+        line.iter_mut().zip(row).for_each(|(sum, y)| *sum += weight * x * y);
     }
 }
 

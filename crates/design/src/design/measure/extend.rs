@@ -23,6 +23,7 @@ impl Evaluator {
             information,
             psi: std::array::from_fn(unit),
             joint: self.bias.as_ref().map(|bias| Joint::start(bias, n)),
+            beside: self.beside_at_start(),
             path: Vec::new(),
             seconds: 0.0,
         }
@@ -54,6 +55,7 @@ impl Evaluator {
             for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
                 *sum = x + y;
             }
+            self.add_beside(state, stop.candidate, out);
             return;
         }
         let local = self.functionals::<L, N>(state, stop);
@@ -69,6 +71,7 @@ impl Evaluator {
                 }
             }
         }
+        self.extend_beside(state, (stop.candidate, turn), &local, out);
         self.go_on(dwelling, c, &local, out);
     }
 }

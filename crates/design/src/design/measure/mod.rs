@@ -7,6 +7,7 @@ pub(crate) mod elimination;
 pub(crate) mod evaluator;
 pub(crate) mod extend;
 pub(crate) mod noise_process;
+pub(crate) mod omitted;
 pub(crate) mod psi;
 pub(crate) mod setup;
 pub(crate) mod slew_path;

@@ -1,5 +1,7 @@
 //! The evaluator of a search, from a scheme, candidates and conditions.
 
+use std::sync::Arc;
+
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, Euler, Float, Gimbals, Matrix3, Platform, Scheme, c_n_f64, local_dynamics};
 use obsdeg_evidence::simulation::{
@@ -7,6 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::design::measure::evaluator::{Evaluator, Prior};
+use crate::design::measure::omitted::Omitted;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
@@ -22,15 +25,14 @@ impl Evaluator {
         required: &[usize],
         conditions: &Conditions,
     ) -> Result<Self, DesignError> {
-        Self::while_going(base, candidates, required, conditions, &|| true)
+        Self::while_going((base, candidates), required, (conditions, None), &|| true)
     }
 
-    /// The same, as long as `going` says so: the ways between many candidates take a while.
+    /// The same with errors that are not estimated and count, as long as `going` says so: the ways between many candidates take a while.
     pub(crate) fn while_going(
-        base: &Scheme,
-        candidates: &[Euler],
+        (base, candidates): (&Scheme, &[Euler]),
         required: &[usize],
-        conditions: &Conditions,
+        (conditions, omitted): (&Conditions, Option<Omitted>),
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         let scheme = Scheme {
@@ -61,6 +63,7 @@ impl Evaluator {
         let empty = Self {
             prior,
             bias: conditions.accelerometer().states().first().copied(),
+            omitted: omitted.map(Arc::new),
             platform,
             conditions: conditions.clone(),
             nuisance: d - required.len(),

@@ -14,6 +14,8 @@ pub(crate) struct SlewPath {
     pub(crate) phi: Matrix3<f64>,
     /// `psi^n` after the turn by the coefficients (3 x d).
     pub(crate) drift: [Vec<f64>; 3],
+    /// `psi^n` after the turn by the errors that are not estimated and count (3 x errors).
+    pub(crate) omitted: [Vec<f64>; 3],
     /// Axis and angle; `None` where both attitudes are the same.
     pub(crate) turn: Option<Turn>,
     /// The opposite path of a half turn.
@@ -25,12 +27,17 @@ impl SlewPath {
     pub(crate) fn none(d: usize) -> Self {
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
         let drift = std::array::from_fn(|_| vec![0.0; d]);
-        Self { seconds: 0.0, phi, drift, turn: None, other: None }
+        Self { seconds: 0.0, phi, drift, omitted: Default::default(), turn: None, other: None }
     }
 
     /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n after a turn by psi^n and the
-    /// coefficients; `drift_at` is `C E(g)` (3 x d) at a time in s.
-    pub(crate) fn along(slew: &Slew, w: &Matrix3<f64>, drift_at: impl Fn(f64) -> [Vec<f64>; 3]) -> Self {
+    /// coefficients; `drift_at` is `C E(g)` (3 x d) at a time in s, columns of errors that are not estimated behind it.
+    pub(crate) fn along(
+        slew: &Slew,
+        w: &Matrix3<f64>,
+        d: usize,
+        drift_at: impl Fn(f64) -> [Vec<f64>; 3],
+    ) -> Self {
         let steps = (slew.turned(slew.duration_s) / TURN_STEP).ceil().max(1.0);
         let dt = slew.duration_s / steps;
         let mut before = drift_at(0.0);
@@ -62,7 +69,8 @@ impl SlewPath {
             // times are compared: what rounding adds is no time
             seconds: (slew.duration_s * 1e9).round() / 1e9,
             phi: std::array::from_fn(|i| std::array::from_fn(|j| x[i][j])),
-            drift: x.map(|row| row[3..].to_vec()),
+            drift: std::array::from_fn(|i| x[i][3..3 + d].to_vec()),
+            omitted: std::array::from_fn(|i| x[i][3 + d..].to_vec()),
             turn: Some(slew.turn()),
             other: None,
         }

@@ -62,8 +62,8 @@ impl Evaluator {
     }
 
     fn turned(&self, slew: &Slew) -> SlewPath {
-        let drift_at = |t: f64| self.ordered_columns(self.drift_rows(&slew.at(t), Some(slew)));
-        SlewPath::along(slew, &self.w, drift_at)
+        let drift_at = |t: f64| self.drift_with_omitted(&slew.at(t), slew);
+        SlewPath::along(slew, &self.w, self.n - 3, drift_at)
     }
 
     /// How long it takes to get from one candidate to another, in s.

@@ -58,6 +58,14 @@ pub enum DesignError {
         /// The coefficients.
         known: String,
     },
+    /// A name that is no error of this scheme.
+    #[error(
+        "immune to `{found}`: no error that this scheme does not estimate has this name; expected some such as K0, M, latitude"
+    )]
+    Immune {
+        /// The name found.
+        found: String,
+    },
     /// Turns that take time are about one axis here.
     #[error(
         "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave one of them out"

@@ -1,5 +1,11 @@
 //! Options of a search.
 
+use std::fmt;
+use std::str::FromStr;
+
+use obsdeg_core::model::ranges::BENCH;
+use obsdeg_core::model::settings::concerns;
+use obsdeg_core::model::{may_be_omitted, omitted_meant};
 use serde::{Deserialize, Serialize};
 
 use crate::design::request::candidates::Candidates;
@@ -15,6 +21,8 @@ pub struct DesignOptions {
     pub required: Vec<String>,
     /// Largest degrees: of a coefficient or family, or of all that are required.
     pub degree_caps: Vec<(Option<String>, usize)>,
+    /// Errors that are not estimated and that schemes must be immune to.
+    pub immune: Vec<Immune>,
     /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is
     /// everything.
     pub meet: bool,
@@ -56,6 +64,7 @@ impl Default for DesignOptions {
             positions: None,
             required: Vec::new(),
             degree_caps: Vec::new(),
+            immune: Vec::new(),
             meet: false,
             total_s: None,
             slew_s: None,
@@ -70,6 +79,47 @@ impl Default for DesignOptions {
             free: None,
             seed: 1,
         }
+    }
+}
+
+/// An error that schemes are immune to: it has no effect, or a record shows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Immune {
+    /// Name of an error or a family, such as `K0` or `K0_X`.
+    pub name: String,
+    /// Size from which on a record must show the error at three sigma, in its unit; `None`: it has no effect.
+    pub size: Option<f64>,
+}
+
+impl fmt::Display for Immune {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.size {
+            Some(size) => write!(f, "{}={size}", self.name),
+            None => write!(f, "{}", self.name),
+        }
+    }
+}
+
+impl FromStr for Immune {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, size) = text.split_once('=').map_or((text, None), |(name, size)| (name, Some(size)));
+        let name = name.trim().to_string();
+        if !may_be_omitted(&name) {
+            return Err(format!("no error is `{name}`; {}", omitted_meant(&name)));
+        }
+        let read = |size: &str| size.trim().parse().ok().filter(|x: &f64| *x > 0.0 && *x <= BENCH.high);
+        let wrong = |size| format!("expected a size above 0 and up to {:e}, found `{size}`", BENCH.high);
+        let size = size.map(|size| read(size).ok_or_else(|| wrong(size))).transpose()?;
+        Ok(Self { name, size })
+    }
+}
+
+impl Immune {
+    /// True if this concerns an error of a family.
+    pub(crate) fn names(&self, family: &str, name: &str) -> bool {
+        self.name == family || concerns(&self.name, name)
     }
 }
 

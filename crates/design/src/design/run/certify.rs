@@ -1,5 +1,6 @@
 //! What is said of how good the best can be: bounds on the schemes of a task.
 
+use nalgebra::DMatrix;
 use obsdeg_core::model::{Euler, angles_text};
 use rayon::prelude::*;
 
@@ -48,14 +49,20 @@ impl Task<'_> {
 
     /// The criterion of a scheme, of the information of its positions as it is evaluated.
     pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> Value {
-        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, None))
+        Value::new(of.worth.value, self.at_most(evaluator, of, None))
     }
 
     /// The same, of the information of its positions as that of all attitudes is bounded: without psi.
     pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> Value {
         let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
         let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
-        Value::new(of.worth.value, evaluator.at_most(&of.sequence, &self.criterion, Some(&errors)))
+        Value::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
+    }
+
+    /// The criterion of a scheme is not above this; nothing is known of the rounding of total uncertainties.
+    fn at_most(&self, evaluator: &Evaluator, of: &Scored, errors: Option<&DMatrix<f64>>) -> Option<f64> {
+        let of_sigmas = || evaluator.at_most(&of.sequence, &self.criterion, errors);
+        if self.omitted.is_none() { of_sigmas() } else { None }
     }
 
     /// The bound in the light of the best scheme found, of this criterion.

@@ -74,6 +74,7 @@ pub(crate) fn answered(
             search: None,
             found: Vec::new(),
             front: Vec::new(),
+            bias_front: Vec::new(),
             omitted: None,
             other_carries: Vec::new(),
             not_judged: not_judged(stated, conditions),
@@ -103,7 +104,7 @@ pub(crate) fn answered(
         if task.is_noisy() {
             out.found.sort_by(|a, b| a.worst_degree.cmp(&b.worst_degree).then(a.value.total_cmp(&b.value)));
         }
-        if task.has_bench() {
+        if task.ranks() {
             out.found.truncate(options.keep.max(1));
         }
         task.mark_images(&mut out.found, evaluator.ordered());
@@ -111,7 +112,7 @@ pub(crate) fn answered(
             let (positions, wanted) = (k, task.wanted());
             let error = match (best.complete, exhaustive) {
                 (false, _) => return Err(DesignError::Interrupted),
-                (true, Some(_)) if !task.has_bench() => DesignError::Impossible {
+                (true, Some(_)) if !task.ranks() => DesignError::Impossible {
                     positions,
                     wanted,
                     why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
@@ -130,6 +131,7 @@ pub(crate) fn answered(
         let certified = bound.filter(|_| !task.is_noisy());
         let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
+            out.bias_front = task.bias_front(evaluator, &search, k, &best);
             let of = (k, conditions.dwell_s);
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
             let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
@@ -191,7 +193,7 @@ pub(crate) fn answered(
             interrupted: stopped.load(Ordering::Relaxed),
             degree_floor: (!task.walks).then_some(search.floor),
             constraints: task.constraints_in_words(),
-            ranked: task.has_bench().then_some(best.found.len()),
+            ranked: task.ranks().then_some(best.found.len()),
             certificate,
         });
         winner::within_gimbals(&mut out, base, conditions)?;
@@ -224,7 +226,7 @@ fn examined(lost: u64, slews: bool) -> String {
 
 /// True if a polished scheme may stand first: polishing knows of no bench, and may make the total larger.
 fn improves(task: &Task<'_>, polished: &Found, first: Option<&Found>) -> bool {
-    !task.has_bench() || first.is_none_or(|f| polished.value < f.value)
+    !task.ranks() || first.is_none_or(|f| polished.value < f.value)
 }
 
 /// Puts a scheme before others, if there is one.

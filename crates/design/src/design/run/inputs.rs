@@ -57,6 +57,7 @@ fn options_written(options: &DesignOptions) -> BTreeMap<String, String> {
         ("--positions", options.positions.map(|k| k.to_string())),
         ("--observable", joined(options.required.clone())),
         ("--max-degree", joined(caps.collect())),
+        ("--immune", joined(options.immune.iter().map(ToString::to_string).collect())),
         ("--meet", flag(options.meet)),
         ("--max-time", number(options.total_s)),
         ("--max-slew", number(options.slew_s)),
@@ -124,6 +125,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         positions,
         required,
         degree_caps,
+        immune,
         meet,
         total_s,
         slew_s,
@@ -159,7 +161,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         bench,
         stated,
     } = conditions;
-    let of: [(&str, &dyn std::fmt::Debug); 48] = [
+    let of: [(&str, &dyn std::fmt::Debug); 49] = [
         ("version", &env!("CARGO_PKG_VERSION")),
         ("carry", carry),
         ("latitude", latitude),
@@ -176,6 +178,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         ("positions", positions),
         ("observable", required),
         ("max-degree", degree_caps),
+        ("immune", immune),
         ("meet", meet),
         ("max-time", total_s),
         ("max-slew", slew_s),

@@ -18,7 +18,7 @@ use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 use crate::design::search::screen::Screen;
 
-/// Schemes of least sigma that a search with a bench keeps, to be ranked by their total uncertainty.
+/// Schemes of least sigma that are kept, to be ranked by their total uncertainty, where the search does not count it.
 const RANKED: usize = 100;
 
 /// A search that can begin: its task, and what evaluates sequences.
@@ -53,7 +53,8 @@ impl<'a> Prepared<'a> {
         // without a number of positions nothing is evaluated
         let evaluated = options.positions.map_or(1, |_| task.candidates.attitudes.len());
         let attitudes = &task.candidates.attitudes[..evaluated];
-        let evaluator = Evaluator::while_going(base, attitudes, &indices, conditions, going)?;
+        let omitted = task.omitted.clone();
+        let evaluator = Evaluator::while_going((base, attitudes), &indices, (conditions, omitted), going)?;
         Ok(Self { task, evaluator, conditions, degrees, beyond })
     }
 
@@ -64,7 +65,7 @@ impl<'a> Prepared<'a> {
             evaluator: &self.evaluator,
             criterion: &self.task.criterion,
             constraints: &self.task.constraints,
-            keep: match self.task.has_bench() {
+            keep: match self.task.ranks() {
                 true => self.task.options.keep.max(RANKED),
                 false => self.task.options.keep,
             },

@@ -6,13 +6,16 @@ use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, angles_text, c_n_f64};
+use obsdeg_core::omitted::OmittedClass;
 use obsdeg_evidence::requirements::Requirements;
+use obsdeg_evidence::simulation::omitted::{OmittedEffect, term_effects};
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use rayon::prelude::*;
 
 use crate::design::answer::{Found, HalfTurn, Minimum};
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::omitted::Omitted;
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::Rows;
 use crate::design::observable::slew_sequences::is_walk;
@@ -21,7 +24,7 @@ use crate::design::polish::{divide, refine};
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::{EXHAUSTIVE, MAX_CANDIDATES};
-use crate::design::request::options::{CriterionName, DesignOptions};
+use crate::design::request::options::{CriterionName, DesignOptions, Immune};
 use crate::design::run::winner;
 use crate::design::search::best::Best;
 use crate::design::search::constraints::Constraints;
@@ -68,6 +71,8 @@ pub(crate) struct Task<'a> {
     pub(crate) required: Vec<(String, usize)>,
     pub(crate) criterion: Criterion,
     pub(crate) constraints: Constraints,
+    /// Errors that are not estimated and that the search counts.
+    pub(crate) omitted: Option<Omitted>,
     conditions: &'a Conditions,
     pub(crate) rows: Rows,
     pub(crate) symmetry: Symmetry,
@@ -152,6 +157,10 @@ impl<'a> Task<'a> {
             let what = if options.meet { "--meet" } else { "--criterion margin" };
             return Err(DesignError::NoRequirement { what });
         }
+        // the total uncertainty of psi is that at the end, which is not built up position by position
+        let of_psi = uses_requirements && limits.psi.iter().any(|l| l.is_finite());
+        let omitted = Omitted::of(base, &platform, conditions, &options.immune)?;
+        let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
         let criterion = match options.criterion {
             CriterionName::Worst => Criterion::Worst,
             CriterionName::A => Criterion::A,
@@ -170,7 +179,8 @@ impl<'a> Task<'a> {
         let place = |c: usize| required.iter().position(|r| r.1 == c);
         // a turn of the platform axes renames psi as well
         let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
-            && priors[..3].iter().all(|p| *p == priors[0]);
+            && priors[..3].iter().all(|p| *p == priors[0])
+            && omitted.as_ref().is_none_or(|o| o.alike);
         let same = |i: usize, j: usize| match (place(i), place(j)) {
             _ if (!turned || priors[first + i] != priors[first + j]) && i != j => false,
             (None, None) => true,
@@ -202,6 +212,7 @@ impl<'a> Task<'a> {
             constraints,
             rows,
             symmetry,
+            omitted,
             slews: conditions.slew_rate_deg_s.is_some(),
             units: platform.units()[first..].to_vec(),
             walks,
@@ -419,6 +430,9 @@ impl<'a> Task<'a> {
         }
         let counts = |name: &String| self.required.iter().any(|r| r.0 == *name);
         let (worst, worst_sigma_dph) = attained.worst_of(&counts).map(|w| (w.name, w.sigma_dph)).unzip();
+        if !self.is_immune(&attained, &conditions)? {
+            return Ok(None);
+        }
         let value = match self.is_noisy() {
             false => found.value,
             true => self
@@ -429,17 +443,36 @@ impl<'a> Task<'a> {
         Ok(Some(Found { requirements, worst, worst_sigma_dph, value, ..found }))
     }
 
-    /// True if random drift or a bench is stated: the search leaves them out, and what it finds is evaluated with
-    /// them.
+    /// True if a scheme is immune to what it must be, by the exact classes of the errors.
+    fn is_immune(&self, attained: &Attained, conditions: &Conditions) -> Result<bool, DesignError> {
+        if self.options.immune.is_empty() {
+            return Ok(true);
+        }
+        let effects = term_effects(attained, conditions, self.options.seed)?;
+        let stands = |t: &OmittedEffect, size: Option<f64>| match t.class {
+            Some(OmittedClass::NoEffect) => true,
+            Some(OmittedClass::Visible) => t.visible_from.zip(size).is_some_and(|(from, size)| from <= size),
+            _ => false,
+        };
+        let kept = |i: &Immune| {
+            let own = effects.terms.iter().filter(|t| i.names(&t.family, &t.name));
+            own.fold(true, |all, t| all && stands(t, i.size))
+        };
+        Ok(self.options.immune.iter().all(kept))
+    }
+
+    /// True if random drift is stated, or a bench that the search does not count: the search leaves them out, and what
+    /// it finds is evaluated with them.
     pub(crate) fn is_noisy(&self) -> bool {
-        self.has_bench()
+        self.ranks()
             || !self.conditions.gyro_noise.is_none()
             || self.conditions.as_stated().drift_noise.amount() > 0.0
     }
 
-    /// True if a bench is stated.
-    pub(crate) fn has_bench(&self) -> bool {
-        !self.conditions.bench.is_empty()
+    /// True if a bench, or an error that schemes must be immune to, is stated that the search does not count: the
+    /// schemes of least sigma are ranked by their total uncertainty.
+    pub(crate) fn ranks(&self) -> bool {
+        self.omitted.is_none() && !(self.conditions.bench.is_empty() && self.options.immune.is_empty())
     }
 
     /// What is found at other dwells and numbers of positions.
@@ -545,6 +578,12 @@ impl<'a> Task<'a> {
                 false => "every stated requirement on what must be observable met as predicted".into(),
             });
         }
+        out.extend(self.options.immune.iter().map(|i| match i.size {
+            Some(size) => {
+                format!("no effect of {}, or one that a record shows at 3 sigma from {size} on", i.name)
+            }
+            None => format!("no effect of {}", i.name),
+        }));
         for (name, cap) in &self.options.degree_caps {
             let name = name.as_deref().unwrap_or("every required coefficient");
             out.push(format!("degree of {name} at most {cap}"));

@@ -40,7 +40,8 @@ impl Constraints {
             let over = evaluator.value(state, &Criterion::Margin(limits.clone()), root);
             if meets(over, 1.0) { 0.0 } else { over - 1.0 }
         };
-        slews + beyond(state.seconds, self.total_s) + self.sigmas.as_ref().map_or(0.0, margin)
+        let over = slews + beyond(state.seconds, self.total_s) + self.sigmas.as_ref().map_or(0.0, margin);
+        over + evaluator.not_immune(state, root)
     }
 
     /// Whether times and sigmas of a sequence are within the limits.

@@ -97,7 +97,7 @@ impl<'a> Walk<'a> {
     /// The sequence as it is; `images` of it are searched.
     fn score(&mut self, degree: usize, images: usize) {
         let (search, state) = (self.search, &self.states[self.sequence.len()]);
-        let value = search.evaluator.value(state, search.criterion, &mut self.root);
+        let mut value = search.evaluator.sigma_value(state, search.criterion, &mut self.root);
         self.best.examined += 1;
         if self.best.examined.is_multiple_of(PATIENCE) {
             self.stopped = !self.meter.report(0, PATIENCE, self.best.found.first());
@@ -107,8 +107,17 @@ impl<'a> Walk<'a> {
             self.best.lost += 1;
             return;
         }
-        let ties = self.best.ties.wants(&worth);
-        let kept = self.best.wants(search.keep, &worth, state.seconds);
+        let wanted = |best: &Best, worth: &Worth| {
+            [best.ties.wants(worth), best.wants(search.keep, worth, state.seconds)]
+        };
+        if wanted(&self.best, &worth) == [false; 2] {
+            return;
+        }
+        // a total, which is not below it
+        let counts = search.evaluator.omitted.is_some();
+        value = if counts { search.evaluator.value(state, search.criterion, &mut self.root) } else { value };
+        let worth = Worth { value, ..worth };
+        let [ties, kept] = wanted(&self.best, &worth);
         if !ties && !kept {
             return;
         }

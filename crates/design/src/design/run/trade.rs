@@ -1,0 +1,78 @@
+//! The front of sigma against what the bench adds: the schemes that are best with the bench scaled, from none
+//! of it to far more.
+
+use std::sync::Arc;
+
+use crate::design::answer::BiasPoint;
+use crate::design::measure::criterion::Criterion;
+use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::stop::Stop;
+use crate::design::run::task::Task;
+use crate::design::search::best::Best;
+use crate::design::search::score::Scored;
+use crate::design::search::scoring::Search;
+
+/// Factors on all sizes of the bench.
+const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
+/// Restarts of the exchange at each of them, besides those from the schemes found.
+const RESTARTS: u64 = 8;
+
+impl Task<'_> {
+    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma; empty where the
+    /// search does not count a bench, and for D and E, which are of no single coefficient.
+    pub(crate) fn bias_front(
+        &self,
+        evaluator: &Evaluator,
+        search: &Search<'_>,
+        k: usize,
+        main: &Best,
+    ) -> Vec<BiasPoint> {
+        let single = matches!(self.criterion, Criterion::Worst | Criterion::A | Criterion::Margin(_));
+        let sized = self.omitted.as_ref().filter(|o| o.has_sizes());
+        let (Some(omitted), true, Some(first)) = (sized, single, main.found.first()) else {
+            return Vec::new();
+        };
+        // none of a larger worst degree is listed
+        let same = |s: &&Scored| s.worth.degree == first.worth.degree;
+        let mut sequences: Vec<Vec<Stop>> =
+            main.found.iter().filter(same).map(|s| s.sequence.clone()).collect();
+        for factor in FACTORS {
+            let there = Evaluator { omitted: Some(Arc::new(omitted.scaled(factor))), ..evaluator.clone() };
+            let scaled = Search { evaluator: &there, keep: 1, ..*search };
+            let best = scaled.exchange(k, &sequences, RESTARTS, self.options.seed);
+            if !best.complete {
+                return Vec::new();
+            }
+            sequences.extend(best.found.iter().filter(same).map(|s| s.sequence.clone()));
+        }
+        let mut points: Vec<BiasPoint> = sequences.iter().filter_map(|s| self.point(evaluator, s)).collect();
+        points.sort_by(|a, b| a.sigma.total_cmp(&b.sigma).then(a.bias.total_cmp(&b.bias)));
+        let mut least = f64::INFINITY;
+        // what differs by rounding only is no other point
+        points.retain(|p| {
+            let better = p.bias < least * (1.0 - 1e-9);
+            least = least.min(p.bias);
+            better
+        });
+        points
+    }
+
+    /// Figures of a sequence; `None` where rounding hides them.
+    fn point(&self, evaluator: &Evaluator, sequence: &[Stop]) -> Option<BiasPoint> {
+        let (state, mut root) = (evaluator.state_of(sequence), Vec::new());
+        let sigma = evaluator.sigma_value(&state, &self.criterion, &mut root);
+        let total = evaluator.value(&state, &self.criterion, &mut root);
+        let added = evaluator.added_variances(&state, &root);
+        let unit = evaluator.dph;
+        let squared = added.iter().map(|a| a / (unit * unit));
+        let bias = match &self.criterion {
+            Criterion::A => squared.sum::<f64>() / added.len() as f64,
+            Criterion::Margin(limits) => {
+                squared.zip(&limits.coefficients).map(|(a, l)| a / (l * l)).fold(0.0, f64::max)
+            }
+            _ => squared.fold(0.0, f64::max),
+        };
+        let positions = sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
+        total.is_finite().then(|| BiasPoint { positions, sigma, bias: bias.sqrt(), total })
+    }
+}
