@@ -18,7 +18,7 @@ const BARS: usize = 40;
 /// Widths of names, bars and texts, and the height of a bar, in pixels.
 const NAMES: f64 = 70.0;
 const BAR: f64 = 280.0;
-const TEXTS: f64 = 210.0;
+const TEXTS: f64 = 250.0;
 const ROW: f64 = 19.0;
 
 /// All lines of all budgets as CSV, in the columns of the GUM.
@@ -115,8 +115,8 @@ pub(crate) fn bars(of: &OmittedEffects) -> Option<String> {
             x += wide;
         }
         let judged = match b.requirement {
-            Some(r) if b.total > r => format!(", missed: {}", number(r)),
-            Some(r) => format!(", met: {}", number(r)),
+            Some(r) if b.total > r => format!(", missed (required {})", number(r)),
+            Some(r) => format!(", met (required {})", number(r)),
             None => String::new(),
         };
         text(&mut out, NAMES + BAR + 8.0, y + 13.0, &format!("{} {}{judged}", number(b.total), b.unit));
@@ -194,7 +194,7 @@ mod tests {
             let wide = format!("width=\"{:.2}\" height=\"15.0\" fill=\"{color}\"", 280.0 * share / 169.0);
             assert!(svg.contains(&wide), "{wide} in {svg}");
         }
-        assert!(svg.contains("missed: 10"), "{svg}");
+        assert!(svg.contains("missed (required 10"), "{svg}");
         assert!(bars(&OmittedEffects { budgets: Vec::new(), ..of }).is_none());
     }
 

@@ -218,6 +218,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
             s.positions
         )
+    } else if s.ties.is_some() && s.ranked.is_some() {
+        format!(
+            "not proven: all sequences were searched by sigma alone ({evaluated}), without what is not estimated"
+        )
     } else if s.ties.is_some() {
         format!(
             "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of up to {}",

@@ -13,6 +13,8 @@ use crate::words;
 const BUDGETS: usize = 3;
 /// Lines of a budget, and silent errors, that an answer prints; a report and the JSON have all.
 const LINES: usize = 6;
+/// Silent errors that a calibration names in its first sentence.
+const SILENT: usize = 12;
 /// Percent of the squared total from which on a source has a line of its own in a printed budget.
 const LEAST: f64 = 0.05;
 
@@ -23,6 +25,17 @@ fn short(x: f64) -> String {
     }
     let decimals = (1 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{x:.decimals$}")
+}
+
+/// A number with three significant digits, rounded down: a size below which a requirement is met.
+fn below(x: f64) -> String {
+    let exponent = x.log10().floor() as i32;
+    let unit = 10f64.powi(exponent - 2);
+    let down = (x / unit).floor() * unit;
+    match exponent {
+        -3..5 => format!("{down:.*}", (2 - exponent).max(0) as usize),
+        _ => format!("{down:.2e}"),
+    }
 }
 
 /// Class of a family in words: the classes of its terms.
@@ -98,7 +111,10 @@ fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
                 number(w.total),
                 w.unit.clone(),
             ]),
-            None => cells.extend(std::iter::repeat_n("-".into(), 5)),
+            None => {
+                cells.push("not all determined, or not judged".into());
+                cells.extend(std::iter::repeat_n("-".into(), 4));
+            }
         }
         cells
     };
@@ -110,21 +126,23 @@ fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
 
 /// What would help, a line each: what it does to the largest total over its requirement, and what it costs in sigma.
 fn advice(of: &OmittedEffects) -> Vec<String> {
-    let line = |a: &Advice| {
-        let what = match a.kind {
-            AdviceKind::Estimate => format!("Estimate {} too (add to --terms)", a.what),
-            AdviceKind::Relevel => "Level the platform again before each position (--carry reset)".into(),
-            AdviceKind::AddPosition => format!("Add a position {}, as long as the last one", a.what),
-        };
-        format!(
-            "{what}: the largest total is {} times its requirement (now {}), sigmas at most {} times as large; {}",
-            short(a.total_over_required),
-            short(a.now),
-            number(a.sigma_factor),
-            if a.met { "every requirement is met" } else { "not enough by itself" }
-        )
+    of.advice.iter().map(advised).collect()
+}
+
+/// One change, as it was tried.
+pub(crate) fn advised(a: &Advice) -> String {
+    let what = match a.kind {
+        AdviceKind::Estimate => format!("Estimate {} too (add to --terms)", a.what),
+        AdviceKind::Relevel => "Level the platform again before each position (--carry reset)".into(),
+        AdviceKind::AddPosition => format!("Add a position {}, as long as the last one", a.what),
     };
-    of.advice.iter().map(line).collect()
+    format!(
+        "{what}: the largest total is {} times its requirement (now {}), sigmas at most {} times as large; {}",
+        short(a.total_over_required),
+        short(a.now),
+        number(a.sigma_factor),
+        if a.met { "every requirement is met" } else { "not enough by itself" }
+    )
 }
 
 /// Uncertainty budget of one unknown in the form of the GUM, with its total; lines beyond `most`, and those of less
@@ -224,12 +242,17 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
         return None;
     }
     let limit = |f: &FamilyEffect| {
-        let used = f.uses_up.as_ref()?;
-        Some(format!("|{}| < {} {}", f.family, short(used.size), f.unit))
+        let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| below(u.size));
+        let alone = if one == all { String::new() } else { format!(" (one term alone: {one})") };
+        Some(format!("{} < {all} {}{alone}", f.family, f.unit))
     };
     let listed: Vec<String> = of.families.iter().filter_map(limit).collect();
-    (!listed.is_empty())
-        .then(|| format!("No bench is stated (--bench). Met while, each by itself: {}.", listed.join(", ")))
+    (!listed.is_empty()).then(|| {
+        format!(
+            "No bench is stated (--bench). Met while, each family by itself, 1 sigma of each of its terms: {}.",
+            listed.join(", ")
+        )
+    })
 }
 
 /// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a coefficient.
@@ -244,9 +267,9 @@ pub(crate) fn silent(of: &Omitted) -> String {
         let changes: Vec<String> = s.sensitivities.iter().map(|c| change(c, &s.unit)).collect();
         format!("{} ({})", s.name, changes.join(", "))
     };
-    let more = of.silent.len().saturating_sub(LINES);
+    let more = of.silent.len().saturating_sub(SILENT);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    let listed: Vec<String> = of.silent.iter().take(LINES).map(one).collect();
+    let listed: Vec<String> = of.silent.iter().take(SILENT).map(one).collect();
     format!("; silent here: {}{more}", listed.join("; "))
 }
 
@@ -335,4 +358,24 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
         }
     ));
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::below;
+
+    /// Three digits, never above the number itself.
+    #[test]
+    fn limits_are_rounded_down() {
+        let shown = [3.0799, 3.36, 0.0999999, 0.00336, 12345.9, 99.99, 4.567e-7, 2e9].map(below);
+        assert_eq!(
+            shown,
+            ["3.07", "3.36", "0.0999", "0.00336", "12300", "99.9", "4.56e-7", "2.00e9"].map(String::from)
+        );
+        for k in 1..2000 {
+            let x = 1.0137f64.powi(k - 1000);
+            let said: f64 = below(x).parse().expect("a number");
+            assert!(said <= x * (1.0 + 1e-15) && said > 0.989 * x, "{x} {said}");
+        }
+    }
 }

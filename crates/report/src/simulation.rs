@@ -250,9 +250,14 @@ impl Answer for Simulation {
         } else {
             "exact verdict, - not observable"
         };
+        let bench = match self.requirements.with_bench {
+            true => ", where the total with the bench does; reached: the total",
+            false => "",
+        };
         let mut blocks = vec![table(
             &format!(
-                "Estimates at the end (degree: {degree}; predicted: sigma by what is stated; at: when sigma met the requirement)"
+                "Estimates at the end (degree: {degree}; predicted: sigma by what is stated; at: when sigma met the \
+                 requirement{bench})"
             ),
             &self.quantities,
         )];

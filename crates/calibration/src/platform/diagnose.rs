@@ -314,7 +314,8 @@ impl Parts<'_> {
         let repeatability = self.repeatability(&fit);
         let outliers = self.outliers();
         let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
-        let omitted = omitted(self.problem, self.estimate, &quantities, self.options.seed)?;
+        let asked = (&self.conditions.bench[..], self.options.seed);
+        let (omitted, bench) = omitted(self.problem, self.estimate, &quantities, asked)?;
         let mut out = Calibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -341,23 +342,30 @@ impl Parts<'_> {
         };
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
-        out.requirements = self.requirements(&out.quantities);
+        out.requirements = self.requirements(&out.quantities, &bench);
         Ok(out)
     }
 
-    /// Outcome of the requirements on coefficients; `None` where none is stated.
-    fn requirements(&self, quantities: &[Estimated]) -> Option<Requirements> {
+    /// Outcome of the requirements on coefficients, with what a bench adds to each; `None` where none is
+    /// stated.
+    fn requirements(&self, quantities: &[Estimated], bench: &[(String, f64)]) -> Option<Requirements> {
         let stated = |name: &str| {
             let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");
             self.conditions.requirements.iter().rfind(of).map(|a| a.value)
         };
-        let sigma = |e: &Estimated| e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
+        let added = |name: &str| bench.iter().find(|(of, _)| of == name).map_or(0.0, |(_, added)| *added);
+        let sigma = |e: &Estimated| {
+            let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
+            own.map(|s| s.hypot(added(&e.name)))
+        };
         let claims = quantities.iter().map(|e| Claim {
             name: &e.name,
             required: stated(&e.name),
             sigma: sigma(e).ok_or(Miss::NotObservable),
         });
-        Some(Requirements::of(Basis::Record, claims)).filter(|r| r.stated > 0)
+        let mut out = Requirements::of(Basis::Record, claims);
+        out.with_bench = !self.conditions.bench.is_empty();
+        Some(out).filter(|r| r.stated > 0)
     }
 
     /// Chi-square of everything: degrees of freedom are measurements minus what they determine.

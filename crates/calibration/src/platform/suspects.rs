@@ -5,12 +5,13 @@
 //! Columns are those of small angles at the attitudes of the scheme. Of several records each has unknowns of its own.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::OmittedModel;
+use obsdeg_core::model::settings::Assignment;
+use obsdeg_core::model::{OmittedModel, OmittedTerm};
 use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::simulation::omitted::{
-    ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
+    Bench, ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
 use obsdeg_evidence::simulation::{SegmentKind, shown_unit, si_per_shown};
 
@@ -24,7 +25,9 @@ const WIDE: f64 = 1e4;
 /// Most estimates whose change is listed.
 const CHANGES: usize = 3;
 
-/// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme shows.
+/// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme shows;
+/// beside them what a bench adds to the sigma of every coefficient, by name in its shown unit (root of the sum of
+/// squares), by the weights of the first record.
 ///
 /// # Errors
 /// [`CalibrationError`] for a number that is not finite.
@@ -32,9 +35,9 @@ pub(super) fn omitted(
     problem: &Problem<'_>,
     estimate: &Estimate,
     quantities: &[Estimated],
-    seed: u64,
-) -> Result<Omitted, CalibrationError> {
-    let Some(first) = problem.runs.first() else { return Ok(Omitted::default()) };
+    (bench, seed): (&[Assignment], u64),
+) -> Result<(Omitted, Vec<(String, f64)>), CalibrationError> {
+    let Some(first) = problem.runs.first() else { return Ok(Default::default()) };
     let platform = &first.plan.platform;
     let model = OmittedModel::new(platform);
     let classes = omitted_verdicts(platform, &model, seed).ok();
@@ -49,11 +52,18 @@ pub(super) fn omitted(
         sensitivities: tested.per_unit(j, model.terms()[j].unit, &t.changes),
     });
     let suspicion = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
-    Ok(Omitted {
+    let found = Omitted {
         tried: tested.score.tried().len(),
         suspicion,
         silent: silent.filter(|s| s.changes.iter().any(|c| !c.starts_with("psi"))).collect(),
-    })
+    };
+    let size =
+        |t: &OmittedTerm| Bench::size_of(bench, t.family, &t.name).unwrap_or(0.0) * si_per_shown(t.unit);
+    let sizes: Vec<f64> = model.terms().iter().map(size).collect();
+    let added =
+        |changes: &[f64]| changes.iter().zip(&sizes).map(|(b, s)| (b * s).powi(2)).sum::<f64>().sqrt();
+    let added = tested.changes.iter().map(|(name, unit, of)| (name.clone(), added(of) / si_per_shown(unit)));
+    Ok((found, added.collect()))
 }
 
 /// Sums of all runs, and the change of every coefficient of the platform per SI unit of every error.

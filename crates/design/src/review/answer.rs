@@ -52,9 +52,9 @@ pub struct SchemeReview {
     pub traces: Traces,
     /// Verdicts against the filter, or why they cannot be held against it.
     pub evidence: Result<CrossCheck, SimulationError>,
-    /// Predicted sigma against the latitude in degrees.
+    /// Predicted sigma, with a bench the total uncertainty, against the latitude in degrees.
     pub latitudes: Sweep,
-    /// Predicted sigma against the factor on all dwells.
+    /// Predicted sigma, with a bench the total uncertainty, against the factor on all dwells.
     pub dwells: Sweep,
     /// Smaller and other schemes.
     pub alternatives: Alternatives,
@@ -108,7 +108,7 @@ pub struct Attitude {
 /// A condition, and every unknown's sigma there.
 pub(super) type Point = (f64, Vec<(String, Option<f64>)>);
 
-/// Predicted sigmas over a condition.
+/// Predicted sigmas over a condition, with a bench total uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sweep {
     /// The unknowns.

@@ -89,7 +89,7 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
 }
 
 /// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions
-/// that are stated; `None` where neither samples nor stated priors bound it.
+/// that are stated, with a bench its total uncertainty; `None` where neither samples nor stated priors bound it.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -99,7 +99,7 @@ pub fn predicted(
     seed: u64,
 ) -> Result<Vec<(String, Option<f64>)>, SimulationError> {
     let judged = judged(scheme, conditions, seed)?;
-    Ok(judged.plan.platform.names().iter().cloned().zip(judged.sigmas.iter().copied()).collect())
+    Ok(judged.plan.platform.names().iter().cloned().zip(judged.totals.iter().copied()).collect())
 }
 
 /// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries

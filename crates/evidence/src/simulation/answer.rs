@@ -39,7 +39,8 @@ pub struct Simulation {
     /// Outcome of the requirements by prediction, as in every other command: the information of all samples
     /// with the noise, the random drift and the priors that are stated.
     pub requirements: Requirements,
-    /// Outcome of the requirements in this run, by the sigmas of its filter at the end.
+    /// Outcome of the requirements in this run, by the sigmas of its filter at the end; with a bench by their
+    /// totals with its errors, which the truth of the run does not have.
     pub run: RunRequirements,
     /// Outcome of the same scheme under the other carries.
     pub other_carries: Vec<OtherCarry>,
@@ -287,8 +288,8 @@ pub struct Estimate {
     pub prior_sigma: f64,
     /// Largest sigma allowed, in the unit of `unit`; null if none is required.
     pub required_sigma: Option<f64>,
-    /// Time, in s, from which sigma meets the requirement to the end; null if it does not, or if the samples
-    /// do not determine the unknown.
+    /// Time, in s, from which sigma meets the requirement to the end; null if it does not, if the total with
+    /// a bench does not, or if the samples do not determine the unknown.
     pub time_to_requirement_s: Option<f64>,
     /// Outcome of the run for this unknown or combination.
     pub outcome: Outcome,
@@ -340,9 +341,9 @@ pub enum FilterReason {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Reached: sigma is at or below the requirement.
+    /// Reached: sigma, with a bench the total uncertainty, is at or below the requirement.
     Reached,
-    /// Converging: sigma fell, but not to the requirement.
+    /// Converging: sigma fell, but it, or with a bench the total uncertainty, is above the requirement.
     Converging,
     /// Determined: sigma fell; nothing is required of it.
     Determined,
@@ -359,13 +360,14 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end.
+    /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end;
+    /// `required` with the uncertainty that it is about: sigma at the end, and what a bench adds.
     pub(crate) fn of(
         determined: bool,
         filter: FilterKind,
         error_over_sigma: f64,
         [prior, sigma]: [f64; 2],
-        required: Option<f64>,
+        required: Option<(f64, f64)>,
     ) -> Self {
         if !(error_over_sigma.is_finite() && sigma.is_finite()) {
             Self::NoNumber
@@ -377,7 +379,7 @@ impl Outcome {
             Self::LargeAnglesOnly
         } else if sigma > 0.9 * prior {
             Self::RestsOnPrior
-        } else if required.is_some_and(|r| meets(sigma, r)) {
+        } else if required.is_some_and(|(required, total)| meets(total, required)) {
             Self::Reached
         } else if required.is_some() {
             Self::Converging

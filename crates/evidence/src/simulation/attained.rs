@@ -157,6 +157,13 @@ impl Attained {
         Ok(self.known.variance(terms)?.max(0.0).sqrt())
     }
 
+    /// Root of the sum of squares of what the errors of a stated bench add to a combination of unknowns,
+    /// `(unknown, coefficient)`, in SI units; zero without a bench.
+    pub(crate) fn bench_of(&self, terms: &[(usize, f64)]) -> f64 {
+        let change = |e: usize| terms.iter().map(|(c, k)| k * self.contributions[(*c, e)]).sum::<f64>();
+        (0..self.contributions.ncols()).map(|e| change(e).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Covariance of some unknowns in SI units, in their order, with the errors of a stated bench.
     ///
     /// # Errors

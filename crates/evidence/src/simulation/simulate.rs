@@ -55,7 +55,8 @@ fn summary(
     let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
         let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
         let wanted = [required(c), attained.sigmas[c]];
-        estimate(&names[c], units[c], verdict, c, record, wanted)
+        let bench = attained.bench_of(&[(c, 1.0)]) / si_per_shown(units[c]);
+        estimate(&names[c], units[c], verdict, (c, record), wanted, bench)
     });
     let mut quantities: Vec<Estimate> = unknowns.collect();
     for (q, u) in
@@ -69,7 +70,8 @@ fn summary(
         let lead = c.terms[0].0;
         let predicted = attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
         let wanted = [required(lead), c.determined_at_end.then_some(predicted)];
-        Ok(estimate(&c.expression, units[lead], verdict, n + i, record, wanted))
+        let bench = attained.bench_of(&c.terms) / si_per_shown(units[lead]);
+        Ok(estimate(&c.expression, units[lead], verdict, (n + i, record), wanted, bench))
     };
     let combinations = prediction.combinations.iter().enumerate();
     let combinations: Vec<Estimate> = combinations.map(combination).collect::<Result<_, _>>()?;
@@ -90,7 +92,7 @@ fn summary(
         conditions: conditions_report(scheme, plan, conditions),
         timeline: timeline_report(plan),
         requirements: attained.requirements(conditions)?,
-        run: run_requirements(plan, conditions, &quantities, record)?,
+        run: run_requirements((plan, &attained), conditions, &quantities, record)?,
         other_carries: other_carries(scheme, conditions, seed)?,
         omitted: omitted_effects(&attained, conditions, seed)?,
         quantities,
@@ -106,21 +108,25 @@ fn summary(
 
 /// Outcome of the requirements in the run, and the reasons why its sigmas may differ from the predicted ones.
 fn run_requirements(
-    plan: &Plan,
+    (plan, attained): (&Plan, &Attained),
     conditions: &Conditions,
     quantities: &[Estimate],
     record: &Record,
 ) -> Result<RunRequirements, SimulationError> {
-    let claims = quantities.iter().map(|q| Claim {
-        name: &q.name,
-        required: q.required_sigma,
+    let units = plan.platform.units();
+    let claims = quantities.iter().enumerate().map(|(c, q)| {
+        // the truth of the run has none of the errors of the bench: they are added to its sigma
+        let total = q.sigma.hypot(attained.bench_of(&[(c, 1.0)]) / si_per_shown(units[c]));
         // what a stated prior bounds counts, as in the prediction
-        sigma: match q.outcome.miss() {
-            Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(q.sigma),
+        let sigma = match q.outcome.miss() {
+            Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(total),
             Some(why) => Err(why),
-            None => Ok(q.sigma),
-        },
+            None => Ok(total),
+        };
+        Claim { name: &q.name, required: q.required_sigma, sigma }
     });
+    let mut requirements = Requirements::of(Basis::Run, claims);
+    requirements.with_bench = !conditions.bench.is_empty();
     let ratio = |q: &Estimate| {
         let ratio = q.sigma / q.predicted_sigma?;
         ratio.is_finite().then(|| SigmaRatio { name: q.name.clone(), ratio })
@@ -133,7 +139,7 @@ fn run_requirements(
         (RunDiffers::FullAttitudes, record.filter.kind != FilterKind::Linear),
     ];
     Ok(RunRequirements {
-        requirements: Requirements::of(Basis::Run, claims),
+        requirements,
         largest_ratio: quantities.iter().filter_map(ratio).max_by(by_ratio),
         smallest_ratio: quantities.iter().filter_map(ratio).min_by(by_ratio),
         differs: differs.into_iter().filter_map(|(reason, here)| here.then_some(reason)).collect(),
@@ -141,14 +147,14 @@ fn run_requirements(
 }
 
 /// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the
-/// last are the required and the predicted sigma.
+/// last are the required and the predicted sigma, and what a bench adds to sigma.
 fn estimate(
     name: &str,
     unit: &str,
     verdict: (Status, Option<usize>, Option<usize>, bool),
-    i: usize,
-    record: &Record,
+    (i, record): (usize, &Record),
     [required_sigma, predicted_sigma]: [Option<f64>; 2],
+    bench: f64,
 ) -> Estimate {
     let (status, degree, accuracy_order, determined) = verdict;
     let (series, scale) = (&record.traces.series[i], si_per_shown(unit));
@@ -161,7 +167,8 @@ fn estimate(
     });
     let error = estimate - truth;
     let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
-    // from when on sigma meets it to the end
+    // from when on sigma meets it to the end; what the bench adds is known there alone
+    let total = sigma.hypot(bench);
     let reached = required_sigma.and_then(|r| {
         let missed = series.sigma.iter().rposition(|s| !meets(s / scale, r));
         missed.map_or(Some(0), |i| (i + 1 < series.sigma.len()).then_some(i + 1))
@@ -181,13 +188,15 @@ fn estimate(
         linear,
         prior_sigma,
         required_sigma,
-        time_to_requirement_s: reached.filter(|_| determined).map(|i| record.traces.time[i]),
+        time_to_requirement_s: reached
+            .filter(|_| determined && required_sigma.is_some_and(|r| meets(total, r)))
+            .map(|i| record.traces.time[i]),
         outcome: Outcome::of(
             determined,
             record.filter.kind,
             error_over_sigma,
             [prior_sigma, sigma],
-            required_sigma,
+            required_sigma.map(|r| (r, total)),
         ),
         prior_of: Vec::new(),
     }

@@ -12,7 +12,7 @@ use super::fewest_of_all;
 use crate::calibration::is_clock;
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
-use crate::{resolve, stated, words};
+use crate::{omitted, resolve, stated, words};
 
 /// Advice where a run is not consistent.
 const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsistent with the truth.";
@@ -36,7 +36,9 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     }
     let large = missed(Miss::TooLarge);
     if !large.is_empty() {
-        out.push(longer(s, review, &large));
+        let advised =
+            review.omitted.advice.iter().find(|a| a.met).map(|a| format!("{}.", omitted::advised(a)));
+        out.push(advised.unwrap_or_else(|| longer(s, review, &large)));
     }
     let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
     let in_run = s.simulation.run.requirements.missed.iter().map(|m| m.name.as_str());
@@ -94,8 +96,9 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
         }
         None => {
             let most = s.dwells.x.last().copied().unwrap_or(1.0);
+            let or_bench = if review.requirements.with_bench { ", the bench" } else { "" };
             format!(
-                "Change the positions, the noise of Z or the requirements: dwells up to {} times as long do not meet those of {names}.",
+                "Change the positions, the noise of Z{or_bench} or the requirements: dwells up to {} times as long do not meet those of {names}.",
                 number(most)
             )
         }

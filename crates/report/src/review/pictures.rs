@@ -154,10 +154,16 @@ fn drifts(s: &Sweep) -> Vec<String> {
     s.names.iter().filter(|n| n.starts_with("D_")).cloned().collect()
 }
 
+/// What sweeps are of.
+fn predicted(s: &SchemeReview) -> &'static str {
+    if s.simulation.requirements.with_bench { "total uncertainty with the bench" } else { "sigma" }
+}
+
 pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
     let lines = sweep(&s.latitudes, &drifts(&s.latitudes), |x| x);
+    let what = predicted(s);
     let figure = Figure {
-        title: "Predicted sigma against latitude".into(),
+        title: format!("Predicted {what} against latitude"),
         x_label: "latitude [deg]".into(),
         y_label: "1 sigma [deg/h, deg/h/g]".into(),
         x_range: Some((0.0, 90.0)),
@@ -166,12 +172,14 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
         lines,
         ..Figure::default()
     };
-    let caption = "Predicted sigma of the coefficients against the latitude; a curve ends where its coefficient is not observable";
+    let caption = format!(
+        "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is not observable"
+    );
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
 pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> Option<Block> {
-    let total = review.total_s;
+    let (total, what) = (review.total_s, predicted(s));
     let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
     let mut lines = sweep(&s.dwells, &drifts(&s.dwells), |factor| (total - slews) * factor + slews);
     let (first, last) = (lines.first()?.points.first()?.0, lines.first()?.points.last()?.0);
@@ -185,7 +193,7 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
         lines.push(line(&format!("required {r}"), BLACK, Stroke::Dotted, vec![(first, *r), (last, *r)]));
     }
     let figure = Figure {
-        title: "Predicted sigma against time".into(),
+        title: format!("Predicted {what} against time"),
         x_label: "total time, all dwells scaled alike [s]".into(),
         y_label: "1 sigma [deg/h, deg/h/g]".into(),
         lines,
@@ -194,7 +202,7 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
     };
     Some(curves(
         name,
-        "What longer dwells buy: predicted sigma against the total time, with the required sigma",
+        format!("What longer dwells buy: predicted {what} against the total time, with the required sigma"),
         figure,
     ))
 }

@@ -96,6 +96,13 @@ impl Omitted {
         Ok(counts.then(|| Self::among(&all, bench, immune)))
     }
 
+    /// Units of the sizes of errors.
+    pub(crate) fn units(platform: &Platform, immune: &[Immune]) -> Vec<&'static str> {
+        let all = OmittedModel::new(platform);
+        let own = |i: &Immune| all.terms().iter().find(|t| i.names(t.family, &t.name));
+        immune.iter().filter_map(own).map(|t| t.unit).collect()
+    }
+
     fn among(all: &OmittedModel, bench: &[Assignment], immune: &[Immune]) -> Self {
         let size = |family: &str, name: &str, unit: &str| {
             Bench::size_of(bench, family, name).unwrap_or(0.0) * si_per_shown(unit)
@@ -200,6 +207,55 @@ impl Evaluator {
             rows.iter_mut().zip(more).for_each(|(row, more)| row.extend(more));
         }
         rows
+    }
+
+    /// Sizes of immunity are those that [`Self::not_immune`] decides: what it takes for silent in `most`
+    /// positions has less than [`SILENT`] of the information of its samples, so a record does not show it
+    /// from a size on that this bounds.
+    ///
+    /// # Errors
+    /// [`DesignError::ImmuneSize`].
+    pub(crate) fn check_immune(
+        &self,
+        immune: &[Immune],
+        most: usize,
+        conditions: &Conditions,
+    ) -> Result<(), DesignError> {
+        let Some(of) = &self.omitted else { return Ok(()) };
+        let terms = of.model.terms().iter().map(|t| (t.family, t.name.as_str(), t.unit));
+        let attitudes = ["attitude_x@1", "attitude_y@1", "attitude_z@1"].map(|n| ("attitude", n, "arcsec"));
+        for (kind, (family, name, unit)) in terms.chain(attitudes).enumerate() {
+            let Some(size) = of.immune[kind].filter(|size| *size > 0.0) else { continue };
+            let largest = SEEN / (SILENT * self.samples_at_most(of, kind, most, conditions)).sqrt();
+            if size > largest {
+                let own = immune.iter().find(|i| i.names(family, name));
+                let found = own.map_or_else(String::new, ToString::to_string);
+                return Err(DesignError::ImmuneSize { found, most: largest / si_per_shown(unit), unit });
+            }
+        }
+        Ok(())
+    }
+
+    /// `O^T R^-1 O` of an error in `most` positions is not above this, by the triangle inequality: psi is at
+    /// most the drift times the time, and what the turns add.
+    fn samples_at_most(&self, of: &Omitted, kind: usize, most: usize, conditions: &Conditions) -> f64 {
+        let dwell = self.dwells.iter().map(|d| d.seconds).fold(0.0, f64::max);
+        let turn_s = conditions.slew_rate_deg_s.map_or(0.0, |rate| 360.0 / rate);
+        let positions = most as f64;
+        let seconds = if self.carry() == Carry::Reset { dwell } else { positions * (dwell + turn_s) };
+        let mut o = [0.0f64; LOCAL];
+        for at in &self.candidates {
+            if let Some(effect) = at.omitted.effects.get(kind) {
+                o[3..].iter_mut().zip(effect).for_each(|(o, e)| *o = o.max(e.abs()));
+            }
+        }
+        let attitude = if kind >= of.fixed() { 1.0 } else { 0.0 };
+        let torquer = of.model.terms().get(kind).is_some_and(|t| matches!(t.family, "GS" | "GM"));
+        let turns = if torquer && turn_s > 0.0 { positions * std::f64::consts::TAU } else { 0.0 };
+        let drift = o[3..PSI_EPS].iter().map(|x| x * x).sum::<f64>().sqrt();
+        o[..3].fill(attitude + drift * seconds + turns);
+        let norm = |d: &Dwelling| (0..LOCAL).map(|i| o[i] * d.full[i][i].max(0.0).sqrt()).sum::<f64>();
+        positions * self.dwells.iter().map(norm).fold(0.0, f64::max).powi(2)
     }
 
     /// What the errors do at an attitude.

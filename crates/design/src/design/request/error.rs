@@ -66,6 +66,19 @@ pub enum DesignError {
         /// The name found.
         found: String,
     },
+    /// A size from which on double precision does not tell whether a record shows an error.
+    #[error(
+        "immune to `{found}`: beyond {most:.3e} {unit} a search does not tell an error that a record hardly shows from one that none shows; \
+         expected a smaller size"
+    )]
+    ImmuneSize {
+        /// The error with its size.
+        found: String,
+        /// Largest size, in `unit`.
+        most: f64,
+        /// Unit of the size.
+        unit: &'static str,
+    },
     /// Turns that take time are about one axis here.
     #[error(
         "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave one of them out"

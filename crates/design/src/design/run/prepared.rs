@@ -55,6 +55,9 @@ impl<'a> Prepared<'a> {
         let attitudes = &task.candidates.attitudes[..evaluated];
         let omitted = task.omitted.clone();
         let evaluator = Evaluator::while_going((base, attitudes), &indices, (conditions, omitted), going)?;
+        if let Some(most) = options.positions.iter().chain(&options.front).max() {
+            evaluator.check_immune(&options.immune, *most, conditions)?;
+        }
         Ok(Self { task, evaluator, conditions, degrees, beyond })
     }
 

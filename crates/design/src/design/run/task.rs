@@ -73,6 +73,8 @@ pub(crate) struct Task<'a> {
     pub(crate) constraints: Constraints,
     /// Errors that are not estimated and that the search counts.
     pub(crate) omitted: Option<Omitted>,
+    /// Units of the errors that schemes are immune to.
+    immune_units: Vec<&'static str>,
     conditions: &'a Conditions,
     pub(crate) rows: Rows,
     pub(crate) symmetry: Symmetry,
@@ -213,6 +215,7 @@ impl<'a> Task<'a> {
             rows,
             symmetry,
             omitted,
+            immune_units: Omitted::units(&platform, &options.immune),
             slews: conditions.slew_rate_deg_s.is_some(),
             units: platform.units()[first..].to_vec(),
             walks,
@@ -578,9 +581,12 @@ impl<'a> Task<'a> {
                 false => "every stated requirement on what must be observable met as predicted".into(),
             });
         }
-        out.extend(self.options.immune.iter().map(|i| match i.size {
+        out.extend(self.options.immune.iter().zip(&self.immune_units).map(|(i, unit)| match i.size {
             Some(size) => {
-                format!("no effect of {}, or one that a record shows at 3 sigma from {size} on", i.name)
+                format!(
+                    "no effect of {}, or one that a record shows at 3 sigma from {size} {unit} on",
+                    i.name
+                )
             }
             None => format!("no effect of {}", i.name),
         }));

@@ -99,8 +99,12 @@ pub struct FamilyEffect {
     /// Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none
     /// is visible.
     pub visible_from: Option<f64>,
-    /// Smallest size of a single term that uses up the margin of a requirement; null if none does.
+    /// Smallest size of all terms of the family together that uses up the margin of a requirement; null if
+    /// none does.
     pub uses_up: Option<UsesUp>,
+    /// Smallest size of a single term, the others being zero, that uses up the margin of a requirement; null
+    /// if none does.
+    pub one_uses_up: Option<UsesUp>,
 }
 
 /// Uncertainty budget of one unknown.

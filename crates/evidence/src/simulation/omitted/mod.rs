@@ -100,6 +100,7 @@ pub fn term_effects(
     let required = required_sigmas(platform, conditions)?;
     let totals = bench.totals(&attained.sigmas, &changes);
     let names = platform.names();
+    let margins = Margins { names, required: &required, totals: &totals };
     let terms = model.terms().iter().enumerate().map(|(j, t)| {
         let verdict = verdicts.as_ref().map(|v| &v.terms[j]);
         let class = verdict.map(|v| v.class);
@@ -108,14 +109,6 @@ pub fn term_effects(
             unknown: names[c].clone(),
             unit: shown_unit(platform.units()[c]).into(),
             per_unit: changes[c][j],
-        });
-        let used = (0..names.len()).filter_map(|c| {
-            let (change, own) = (changes[c][j], changes[c][j] * size.unwrap_or(0.0));
-            let rest = (totals[c]? * totals[c]? - own * own).max(0.0);
-            let left = required[c]? * required[c]? - rest;
-            // no margin is left without this error: nothing for it to use up
-            (change != 0.0 && left > 0.0)
-                .then(|| UsesUp { unknown: names[c].clone(), size: left.sqrt() / change.abs() })
         });
         OmittedEffect {
             name: t.name.clone(),
@@ -126,11 +119,11 @@ pub fn term_effects(
             visible_from: visible_from(t, class, influence.information[j]),
             size,
             sensitivities: sensitivities.collect(),
-            uses_up: used.min_by(|a, b| a.size.total_cmp(&b.size)),
+            uses_up: margins.used_up(|c| changes[c][j], |c| changes[c][j] * size.unwrap_or(0.0)),
         }
     });
     let terms: Vec<OmittedEffect> = terms.collect();
-    let families = families(attained, &model, &changes, &terms);
+    let families = families(attained, (&model, &terms), &changes, &margins);
     let budget = |c: usize| {
         let (name, unit) = (names[c].as_str(), shown_unit(platform.units()[c]));
         Some(budget::budget((name, unit), attained.sigmas[c]?, required[c], &terms))
@@ -151,6 +144,29 @@ pub fn term_effects(
     })
 }
 
+/// What is required of every unknown, and its total uncertainty.
+struct Margins<'a> {
+    names: &'a [String],
+    required: &'a [Option<f64>],
+    totals: &'a [Option<f64>],
+}
+
+impl Margins<'_> {
+    /// The smallest size at which an error makes a total as large as its requirement: `change` is that of an
+    /// unknown per unit, `benched` what the bench makes of it, which the size replaces.
+    fn used_up(&self, change: impl Fn(usize) -> f64, benched: impl Fn(usize) -> f64) -> Option<UsesUp> {
+        let used = (0..self.names.len()).filter_map(|c| {
+            let (change, own) = (change(c), benched(c));
+            let rest = (self.totals[c]? * self.totals[c]? - own * own).max(0.0);
+            let left = self.required[c]? * self.required[c]? - rest;
+            // no margin is left without this error: nothing for it to use up
+            (change != 0.0 && left > 0.0)
+                .then(|| UsesUp { unknown: self.names[c].clone(), size: left.sqrt() / change.abs() })
+        });
+        used.min_by(|a, b| a.size.total_cmp(&b.size))
+    }
+}
+
 /// Size at which a record shows a visible error at three sigma, in its unit.
 fn visible_from(term: &OmittedTerm, class: Option<OmittedClass>, information: f64) -> Option<f64> {
     let visible = class.is_none_or(|c| c == OmittedClass::Visible);
@@ -160,9 +176,9 @@ fn visible_from(term: &OmittedTerm, class: Option<OmittedClass>, information: f6
 /// Family by family, in the order of the terms.
 fn families(
     attained: &Attained,
-    model: &OmittedModel,
+    (model, terms): (&OmittedModel, &[OmittedEffect]),
     changes: &[Vec<f64>],
-    terms: &[OmittedEffect],
+    margins: &Margins<'_>,
 ) -> Vec<FamilyEffect> {
     let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
     let mut known: Vec<&str> = Vec::new();
@@ -173,7 +189,8 @@ fn families(
     }
     let family = |family: &str| {
         let own: Vec<usize> = (0..terms.len()).filter(|&j| terms[j].family == family).collect();
-        let rss = |c: usize| own.iter().map(|&j| changes[c][j] * changes[c][j]).sum::<f64>().sqrt();
+        let rss = |c: usize| own.iter().map(|&j| changes[c][j].powi(2)).sum::<f64>().sqrt();
+        let benched = |j: usize, c: usize| changes[c][j] * terms[j].size.unwrap_or(0.0);
         let rates = (0..names.len()).filter(|&c| is_rate(units[c]) && rss(c) > 0.0);
         let worst = rates.clone().max_by(|&a, &b| rss(a).total_cmp(&rss(b)));
         let count = |class: OmittedClass| {
@@ -194,7 +211,8 @@ fn families(
             }),
             worst_in_sigmas: rates.filter_map(|c| Some(rss(c) / attained.sigmas[c]?)).reduce(f64::max),
             visible_from: own.iter().filter_map(|&j| terms[j].visible_from).reduce(f64::min),
-            uses_up: used.min_by(|a, b| a.size.total_cmp(&b.size)),
+            uses_up: margins.used_up(rss, |c| own.iter().map(|&j| benched(j, c).powi(2)).sum::<f64>().sqrt()),
+            one_uses_up: used.min_by(|a, b| a.size.total_cmp(&b.size)),
         }
     };
     known.into_iter().map(family).collect()

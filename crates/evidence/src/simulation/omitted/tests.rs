@@ -8,7 +8,7 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form, Gains};
 use obsdeg_exact::SplitMix64;
 
-use super::{LEVEL, OmittedColumns, OmittedEffects, Score, omitted_effects};
+use super::{FamilyEffect, LEVEL, OmittedColumns, OmittedEffects, Score, omitted_effects};
 use crate::simulation::{Attained, Conditions, Noise, Plan, no_prior, si_per_shown};
 
 const W_IE: f64 = 7.292115e-5;
@@ -43,7 +43,7 @@ fn is_printed(x: f64, like: &str) -> bool {
 
 /// The 24 cardinal attitudes by their letters, in the order N, U, E, S, D, W. Under inertial carry the figures depend
 /// on the order of the positions; with this one they are those of the table.
-fn by_letters() -> Vec<String> {
+pub(super) fn by_letters() -> Vec<String> {
     let mut all = cardinal_names();
     all.sort_by_key(|n| n.chars().map(|c| "NUESDW".find(c)).collect::<Vec<_>>());
     all
@@ -150,6 +150,46 @@ fn what_uses_up_a_margin() {
         assert!((budget.lines.iter().map(|l| l.percent).sum::<f64>() - 100.0).abs() < 1e-9);
         assert!(budget.lines.windows(2).all(|l| l[0].contribution >= l[1].contribution));
     }
+}
+
+/// The size of a family at which a margin is used up is that of the bench that states it: just below it the
+/// requirement is met, just above it is missed. For the family whole, and for one term alone; with another
+/// family in the bench too.
+#[test]
+fn sizes_that_use_up_a_margin_are_those_of_a_bench() {
+    let mut counts = [0; 2];
+    for other in [&[][..], &[("M".to_string(), 0.5)]] {
+        let mut scheme = letters(&["NUE", "USE", "ENU", "EUS", "DSW"], Carry::Inertial);
+        scheme.requirements = [("D".to_string(), 0.1)].into();
+        scheme.bench = other.iter().cloned().collect();
+        let (_, of) = effects(&scheme);
+        let stated: Vec<(String, f64)> = of
+            .families
+            .iter()
+            .filter_map(|f| Some((f.family.clone(), f.uses_up.as_ref()?.size)))
+            .chain(of.terms.iter().filter_map(|t| Some((t.name.clone(), t.uses_up.as_ref()?.size))))
+            .filter(|(name, _)| other.is_empty() || !name.starts_with('M'))
+            .collect();
+        let least = |f: &FamilyEffect| {
+            let own = of.terms.iter().filter(|t| t.family == f.family);
+            own.filter_map(|t| Some(t.uses_up.as_ref()?.size)).reduce(f64::min)
+        };
+        for f in &of.families {
+            assert_eq!(f.one_uses_up.as_ref().map(|u| u.size), least(f), "{}", f.family);
+        }
+        for (name, size) in stated {
+            let met = [0.9999, 1.0001].map(|factor| {
+                let mut benched = scheme.clone();
+                benched.bench.insert(name.clone(), size * factor);
+                let conditions = Conditions::of(&benched);
+                let attained = Attained::new(&benched, &conditions, 1).expect("sigmas");
+                attained.requirements(&conditions).expect("judged").all_met()
+            });
+            assert_eq!(met, [true, false], "{name} {size} {other:?}");
+            counts[usize::from(name.contains('_'))] += 1;
+        }
+    }
+    assert!(counts[0] > 10 && counts[1] > 40, "{counts:?}");
 }
 
 /// What one column does to the platform, written anew.
