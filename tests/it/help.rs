@@ -9,7 +9,7 @@ const COMMANDS: [(&str, usize); 12] = [
     ("crosscheck", 70),
     ("calibrate", 48),
     ("compare", 46),
-    ("design", 69),
+    ("design", 70),
     ("report", 60),
     ("paper", 18),
     ("licences", 12),

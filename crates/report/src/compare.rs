@@ -186,7 +186,7 @@ fn lead(c: &Comparison) -> Vec<String> {
     for r in &c.schemes {
         let sigma = r.worst.as_ref().map_or_else(
             || "not every coefficient is determined".into(),
-            |w| format!("worst sigma {}", stated::worst_sigma(w)),
+            |w| format!("{} {}", stated::worst(&r.requirements), stated::worst_sigma(w)),
         );
         out.push(of(format!("{}; {sigma}.", stated::requirements(&r.requirements)), r));
         let lead = omitted::lead(&r.omitted, r.requirements.with_bench, r.requirements.all_met());

@@ -69,7 +69,7 @@ fn lead(d: &Design) -> Vec<String> {
         };
         let sigma = first.worst_sigma_dph.zip(first.worst.as_ref());
         let sigma = sigma.map_or_else(String::new, |(sigma, name)| {
-            format!(": worst sigma {}", stated::sigma_of(name, sigma))
+            format!(": {} {}", stated::worst(&first.requirements), stated::sigma_of(name, sigma))
         });
         // a scheme with a smaller criterion and a larger worst degree comes later
         let first_by = if s.degree_floor.is_some() { "worst degree, then " } else { "" };

@@ -149,6 +149,11 @@ pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
     format!("{} {unit} ({name})", number(sigma_dph))
 }
 
+/// What the largest figure of drift coefficients is: a total with a bench.
+pub(crate) fn worst(r: &Requirements) -> &'static str {
+    if r.with_bench { "worst total" } else { "worst sigma" }
+}
+
 /// The same scheme under the other carries, in one line; empty where nothing was judged.
 pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
     let of = |o: &OtherCarry| {
@@ -158,7 +163,7 @@ pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
         let at_once = if o.without_slews { " (repositioning at once)" } else { "" };
         let sigma = o.worst.as_ref().map_or_else(
             || "not every coefficient is determined".into(),
-            |w| format!("worst sigma {}", worst_sigma(w)),
+            |w| format!("{} {}", worst(r), worst_sigma(w)),
         );
         let met = match (r.stated, r.all_met()) {
             (0, _) => String::new(),

@@ -136,9 +136,9 @@ pub struct CarryUncertainty {
 /// Uncertainty of one unknown: by the samples, by the bench, and both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Composition {
-    /// Name of the unknown.
+    /// Name of the unknown with these figures.
     pub unknown: String,
-    /// Unit of the figures.
+    /// Unit of sigma, bias and total.
     pub unit: String,
     /// Sigma by the samples, in the unit of `unit`.
     pub sigma: f64,
@@ -163,7 +163,7 @@ pub enum AdviceKind {
 /// Change of a scheme that lowers the largest total uncertainty over its requirement, as it was tried.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Advice {
-    /// Kind of the change.
+    /// Kind of the change: errors estimated too, the platform levelled again, or a position added.
     pub kind: AdviceKind,
     /// Terms that become unknowns, the carry, or the attitude that is added.
     pub what: String,
@@ -171,7 +171,7 @@ pub struct Advice {
     pub total_over_required: f64,
     /// The same without the change, dimensionless.
     pub now: f64,
-    /// Largest factor on the sigma of a drift coefficient: what the change costs.
+    /// Largest factor on the sigma of a drift coefficient, dimensionless: what the change costs.
     pub sigma_factor: f64,
     /// True if every requirement is met with the change.
     pub met: bool,
@@ -180,9 +180,9 @@ pub struct Advice {
 /// Effect of correlated noise: sigmas with it over sigmas of the white noise alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CorrelatedNoise {
-    /// Smallest factor on the sigma of a drift coefficient.
+    /// Smallest factor on the sigma of a drift coefficient, dimensionless.
     pub smallest: f64,
-    /// Largest factor on the sigma of a drift coefficient.
+    /// Largest factor on the sigma of a drift coefficient, dimensionless.
     pub largest: f64,
     /// Name of the drift coefficient with the largest factor.
     pub unknown: String,
