@@ -1032,7 +1032,9 @@ class FamilyEffect(Record):
     visible_from: float | None
     """Smallest size of a single term that a record shows at three sigma, in the unit of `unit`; null if none is visible."""
     uses_up: UsesUp | None
-    """Smallest size of a single term that uses up the margin of a requirement; null if none does."""
+    """Smallest size of all terms of the family together that uses up the margin of a requirement; null if none does."""
+    one_uses_up: UsesUp | None
+    """Smallest size of a single term, the others being zero, that uses up the margin of a requirement; null if none does."""
 
 
 class OmittedEffect(Record):
@@ -1103,6 +1105,73 @@ class Budget(Record):
     """Sources of uncertainty, the largest contribution first."""
 
 
+class Composition(Record):
+    """Uncertainty of one unknown: by the samples, by the bench, and both."""
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the unknown with these figures."""
+    unit: str
+    """Unit of sigma, bias and total."""
+    sigma: float
+    """Sigma by the samples, in the unit of `unit`."""
+    bias: float
+    """Contribution of the errors of the bench (root of the sum of squares), in the unit of `unit`."""
+    total: float
+    """Total uncertainty: root of the sum of both squares, in the unit of `unit`."""
+
+
+class CarryUncertainty(Record):
+    """Uncertainty of a scheme under one carry, with the bench."""
+
+    __slots__ = ()
+
+    carry: Carry
+    """Carry: quantity that continues from one position to the next."""
+    without_slews: bool
+    """True if the slews of the scheme are left out, since only inertial carry has slews."""
+    worst: Composition | None
+    """Drift coefficient with the largest total; null if one is not observable, or if nothing was judged."""
+
+AdviceKind = Literal["estimate", "relevel", "add_position"]
+"""Kind of a change that lowers a total uncertainty. estimate: Families of errors are estimated: terms among the unknowns. relevel: The
+platform is levelled again before each position: reset carry. add_position: One more position, as long as the last one.
+"""
+
+
+class Advice(Record):
+    """Change of a scheme that lowers the largest total uncertainty over its requirement, as it was tried."""
+
+    __slots__ = ()
+
+    kind: AdviceKind
+    """Kind of the change: errors estimated too, the platform levelled again, or a position added."""
+    what: str
+    """Terms that become unknowns, the carry, or the attitude that is added."""
+    total_over_required: float
+    """Largest total uncertainty over its requirement with the change, dimensionless."""
+    now: float
+    """The same without the change, dimensionless."""
+    sigma_factor: float
+    """Largest factor on the sigma of a drift coefficient, dimensionless: what the change costs."""
+    met: bool
+    """True if every requirement is met with the change."""
+
+
+class CorrelatedNoise(Record):
+    """Effect of correlated noise: sigmas with it over sigmas of the white noise alone."""
+
+    __slots__ = ()
+
+    smallest: float
+    """Smallest factor on the sigma of a drift coefficient, dimensionless."""
+    largest: float
+    """Largest factor on the sigma of a drift coefficient, dimensionless."""
+    unknown: str
+    """Name of the drift coefficient with the largest factor."""
+
+
 class OmittedEffects(Record):
     """Effect of everything that a scheme does not estimate: the other terms of the error model, the site, and the attitudes of the
     positions.
@@ -1116,6 +1185,14 @@ class OmittedEffects(Record):
     """Effects term by term, in the order of the error model."""
     budgets: list[Budget]
     """Uncertainty budgets of the unknowns that have a sigma; empty without a bench."""
+    carries: list[CarryUncertainty]
+    """Uncertainty of the scheme under every carry, its own first; empty without a bench."""
+    advice: list[Advice]
+    """Changes that lower the largest total over its requirement, the lowest first; empty unless sigma meets every requirement and the
+    total with the bench does not.
+    """
+    correlated_noise: CorrelatedNoise | None
+    """Effect of correlated noise on the sigmas; null if no correlated noise is stated."""
     torquers_in_turns: bool
     """True if torquer errors (GS, GM) act in the stated turns; otherwise they act at the earth rate alone."""
     error_bound: float | None
@@ -1486,7 +1563,9 @@ class SearchReport(Record):
     constraints: list[str]
     """Constraints of the search, in words."""
     ranked: int | None
-    """Number of schemes of least sigma that were ranked by total uncertainty with the bench; left out without a bench."""
+    """Number of schemes of least sigma that were ranked by total uncertainty, and left out if not immune, where the search does not
+    count errors that are not estimated; left out where it counts them, and where none is stated.
+    """
     certificate: Certificate | None
     """Bound on the criterion of the best scheme; null if no such bound is known: under platform and inertial carry, and where the noise
     of Z is correlated, information is no sum over positions.
@@ -1553,6 +1632,21 @@ class Found(Record):
     """Rank by derivatives, exact, then the number of unknowns."""
 
 
+class BiasPoint(Record):
+    """Scheme on the front of sigma against bias: all figures in the unit of the criterion."""
+
+    __slots__ = ()
+
+    positions: list[str]
+    """Candidates of the scheme, in order of time."""
+    sigma: float
+    """Criterion of the sigmas alone, in the unit of the criterion."""
+    bias: float
+    """Criterion of what the errors of the bench add alone, in the unit of the criterion."""
+    total: float
+    """Criterion of the total uncertainties, in the unit of the criterion."""
+
+
 class Design(Shape):
     """Search for the best schemes of candidate attitudes."""
 
@@ -1586,6 +1680,8 @@ class Design(Shape):
     """Best schemes that were found, best first."""
     front: list[Found]
     """Schemes that no scheme found beats in both total time and criterion, by total time."""
+    bias_front: list[BiasPoint]
+    """Schemes that no scheme found beats in both sigma and bias by the bench, by sigma; left out where the search counts no bench."""
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
     omitted: OmittedEffects | None
@@ -1868,11 +1964,12 @@ Outcome = Literal[
     "inconsistent",
     "no_number",
 ]
-"""Outcome of a run for one unknown or combination. reached: Reached: sigma is at or below the requirement. converging: Converging: sigma
-fell, but not to the requirement. determined: Determined: sigma fell; nothing is required of it. rests_on_prior: Determined by the
-samples, but sigma is (nearly) that of the prior. prior_only: Not determined by the samples: sigma comes from the prior alone.
-large_angles_only: Not determined for small angles; a filter with full attitudes learns of it through large ones. inconsistent:
-Inconsistent: the error is beyond four sigma, so the filter is wrong. no_number: Error or sigma that is not a finite number.
+"""Outcome of a run for one unknown or combination. reached: Reached: sigma, with a bench the total uncertainty, is at or below the
+requirement. converging: Converging: sigma fell, but it, or with a bench the total uncertainty, is above the requirement. determined:
+Determined: sigma fell; nothing is required of it. rests_on_prior: Determined by the samples, but sigma is (nearly) that of the prior.
+prior_only: Not determined by the samples: sigma comes from the prior alone. large_angles_only: Not determined for small angles; a
+filter with full attitudes learns of it through large ones. inconsistent: Inconsistent: the error is beyond four sigma, so the filter
+is wrong. no_number: Error or sigma that is not a finite number.
 """
 
 
@@ -1910,8 +2007,8 @@ class Estimate(Record):
     required_sigma: float | None
     """Largest sigma allowed, in the unit of `unit`; null if none is required."""
     time_to_requirement_s: float | None
-    """Time, in s, from which sigma meets the requirement to the end; null if it does not, or if the samples do not determine the
-    unknown.
+    """Time, in s, from which sigma meets the requirement to the end; null if it does not, if the total with a bench does not, or if the
+    samples do not determine the unknown.
     """
     outcome: Outcome
     """Outcome of the run for this unknown or combination."""
@@ -2044,7 +2141,9 @@ class Simulation(Shape):
     drift and the priors that are stated.
     """
     run: RunRequirements
-    """Outcome of the requirements in this run, by the sigmas of its filter at the end."""
+    """Outcome of the requirements in this run, by the sigmas of its filter at the end; with a bench by their totals with its errors,
+    which the truth of the run does not have.
+    """
     other_carries: list[OtherCarry]
     """Outcome of the same scheme under the other carries."""
     omitted: OmittedEffects
@@ -3163,8 +3262,12 @@ class SilentError(Record):
 
     name: str
     """Name of the error, such as `K0_X`."""
+    unit: str
+    """Unit of its size: ug, ppm, arcsec, ..."""
     changes: list[str]
     """Names of the unknowns whose estimates it changes."""
+    sensitivities: list[ChangePerUnit]
+    """Changes of the coefficients per unit of the error: the same whatever the record says."""
 
 
 class Omitted(Record):

@@ -88,11 +88,10 @@ impl Omitted {
                 return Err(DesignError::Immune { found: i.name.clone() });
             }
         }
-        let single = |name: &str| name.contains('@');
-        let counts = !(bench.is_empty() && immune.is_empty())
-            && !bench.iter().any(|a| single(&a.name))
-            && !immune.iter().any(|i| single(&i.name))
-            && are_counted(base, conditions);
+        let mut names = bench.iter().map(|a| &a.name).chain(immune.iter().map(|i| &i.name)).peekable();
+        let stated = names.peek().is_some();
+        // the attitude of a single position
+        let counts = stated && names.all(|name| !name.contains('@')) && are_counted(base, conditions);
         Ok(counts.then(|| Self::among(&all, bench, immune)))
     }
 

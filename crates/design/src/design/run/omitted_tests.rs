@@ -123,7 +123,7 @@ fn bench(rng: &mut SplitMix64) -> Vec<Assignment> {
         ("attitude", 5.0),
         ("K0_Y", 300.0),
         ("earth_rate", 200.0),
-        ("II", 0.05),
+        ("D_II", 0.05),
     ];
     let drawn = (0..1 + rng.below(3)).map(|_| {
         let (name, most) = all[rng.below(all.len() as u64) as usize];

@@ -458,8 +458,8 @@ impl<'a> Task<'a> {
             _ => false,
         };
         let kept = |i: &Immune| {
-            let own = effects.terms.iter().filter(|t| i.names(&t.family, &t.name));
-            own.fold(true, |all, t| all && stands(t, i.size))
+            let mut own = effects.terms.iter().filter(|t| i.names(&t.family, &t.name));
+            own.all(|t| stands(t, i.size))
         };
         Ok(self.options.immune.iter().all(kept))
     }
