@@ -299,7 +299,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
                 .into(),
         );
     }
-    let by = criterion(&s.criterion);
+    let by = match s.conditions.bench {
+        Some(_) => format!("{}; with the bench a sigma is a total uncertainty", criterion(&s.criterion)),
+        None => criterion(&s.criterion).into(),
+    };
     out.push(match s.degree_floor {
         Some(floor) => format!(
             "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the criterion, {by}"
@@ -624,9 +627,13 @@ pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
     // lines per number of positions, and the front itself as steps
     let steps = d.front.windows(2).flat_map(|w| [(w[0].total_s, w[0].value), (w[1].total_s, w[0].value)]);
     let last = d.front.last().map(|f| (f.total_s, f.value));
+    let quantity = match search.conditions.bench {
+        Some(_) => "largest total uncertainty",
+        None => "largest sigma",
+    };
     let label = match search.criterion.as_str() {
-        "margin" => "largest sigma over requirement".into(),
-        "worst" => format!("largest sigma{}", unit(search)),
+        "margin" => format!("{quantity} over requirement"),
+        "worst" => format!("{quantity}{}", unit(search)),
         other => format!("{other}-criterion{}", unit(search)),
     };
     let slews =

@@ -12,6 +12,8 @@ const STEPS: usize = 80;
 /// Steps in a row that gain less than two bits each, near a point: at one whose gradients are independent
 /// none does. So many that what is left of the constraints falls far below what it is where they hold nowhere.
 const SLOW: usize = 40;
+/// Bits by which the residual after them is below one over the fourth power of the size of the point.
+const DEEP: f64 = 24.0;
 /// Length, as a power of two, of the first of them at most.
 const SHORT: f64 = -8.0;
 /// Bits by which the step from a point at which constraints hold is shorter than the point is far from zero.
@@ -298,6 +300,8 @@ pub(super) fn hold_by_newton<const N: usize>(
         }
         // towards a point residuals fall by more than a bit a step; away from all points they stay, or the point does not
         let settles = from.0 - linear.residual >= SLOW as f64 && far < from.1 + 1.0;
+        // and fall below what far values leave of a sum that is nowhere zero
+        let settles = settles && linear.residual < -4.0 * far - DEEP;
         if slow >= SLOW && settles {
             return Err(NotHeld::Dependent(linear.worst));
         }

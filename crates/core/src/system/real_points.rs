@@ -142,7 +142,7 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
                 ));
             }
             return refuse(format!(
-                "its left side minus its right side is never {sign}: where it holds, its gradient vanishes and says nothing; expected the \
+                "its left side minus its right side is never {sign}: where it holds, if anywhere, its gradient vanishes and says nothing; expected the \
                  conditions themselves as constraints (x = 0 and y = 0 in place of x^2 + y^2 = 0)"
             ));
         }

@@ -10,7 +10,7 @@ use super::columns::OmittedColumns;
 use crate::simulation::{Plan, SimulationError, each_row, si_per_shown};
 
 /// Changes below this part of what the samples of an error are, both in sigmas, are rounding.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING: f64 = 1e-12;
 /// Rows that are reduced at a time.
 const ROWS: usize = 1024;
 
