@@ -251,7 +251,7 @@ fn a_verdict_leads_with_what_limits_it() {
         "{grade} {text}"
     );
     assert!(text.contains("; in this run requirements are NOT met, "), "{text}");
-    assert!(text.contains("since the run has a random drift of 0.01 deg/h, which nothing states"), "{text}");
+    assert!(text.contains("since the run has a random drift of 0.01 deg/h (not stated)"), "{text}");
     // a random drift that is stated counts in the prediction
     let noisy = [&twelve[..], &["--drift-noise", "0.05 deg/h"]].concat();
     let (page, verdict) = page_of("noise.html", &noisy);

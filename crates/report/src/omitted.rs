@@ -225,15 +225,28 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         )
     }));
     out.extend(of.not_classified.as_ref().map(|why| format!("no exact classes: {why}")));
-    let silent = of.terms.iter().filter(|t| t.class == Some(OmittedClass::Silent));
-    for t in silent.filter(|t| !t.sensitivities.is_empty()).take(LINES) {
-        if let Some(exact) = t.exact.as_ref().filter(|e| !e.is_empty()) {
-            let changes: Vec<String> =
-                exact.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect();
-            out.push(format!("{} is silent and changes {} (rad, rad/s, g)", t.name, changes.join(", ")));
-        }
-    }
+    let silent =
+        of.terms.iter().filter(|t| t.class == Some(OmittedClass::Silent) && !t.sensitivities.is_empty());
+    let silent = silent.filter_map(|t| {
+        let exact = t.exact.as_ref().filter(|e| !e.is_empty())?;
+        let changes: Vec<String> = exact.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect();
+        Some((
+            t.name.as_str(),
+            format!("{} is silent and changes {} (rad, rad/s, g)", t.name, changes.join(", ")),
+        ))
+    });
+    out.extend(first_lines(silent.collect()));
     out
+}
+
+/// The first lines of what silent errors change, and the names of those that are left out.
+fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
+    let shown = if all.len() == LINES + 1 { all.len() } else { LINES };
+    let left: Vec<&str> = all.iter().skip(shown).map(|(name, _)| *name).collect();
+    let more = (!left.is_empty()).then(|| {
+        format!("silent and with changes of their own too (--format json has them): {}", left.join(", "))
+    });
+    all.into_iter().take(shown).map(|(_, line)| line).chain(more).collect()
 }
 
 /// The sentence of the first lines: what would use up the margin without a bench, or that the bench counts.
@@ -342,13 +355,14 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
         }
     }
     let silent = of.terms.iter().filter(|t| t.changes.iter().any(|c| !c.starts_with("psi")));
-    for t in silent.take(LINES) {
+    let silent = silent.map(|t| {
         let exact = t.exact.as_ref().map(|e| {
             e.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect::<Vec<_>>().join(", ")
         });
         let exact = exact.unwrap_or_else(|| t.changes.join(", "));
-        out.push(format!("{} changes {exact} (rad, rad/s, g)", t.name));
-    }
+        (t.name.as_str(), format!("{} changes {exact} (rad, rad/s, g)", t.name))
+    });
+    out.extend(first_lines(silent.collect()));
     out.push(format!(
         "classes: exact ranks modulo two random primes, wrong with probability below {}; {}",
         words::at_most(of.error_bound),

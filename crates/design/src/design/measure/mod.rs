@@ -1,5 +1,6 @@
 //! What the samples of a sequence say: information, criteria, psi.
 
+pub(crate) mod beside;
 pub(crate) mod carry;
 pub(crate) mod correlated;
 pub(crate) mod criterion;

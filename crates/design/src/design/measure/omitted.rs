@@ -8,41 +8,29 @@
 //! one on totals.
 
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::slew::{Slew, W_IE};
-use obsdeg_core::model::{
-    AZIMUTH, Carry, Float, LOCAL, Matrix3, OmittedEffect, OmittedModel, PSI_EPS, Platform, Scheme,
-    earth_rate_in,
-};
-use obsdeg_evidence::simulation::omitted::{Bench, SEEN};
+use obsdeg_core::model::slew::W_IE;
+use obsdeg_core::model::{AZIMUTH, Carry, LOCAL, OmittedEffect, OmittedModel, PSI_EPS, Platform, Scheme};
+use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, si_per_shown};
 
-use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Dwelling, Evaluator, State};
-use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::Immune;
-
-/// Part of the samples of a unit error below which they are rounding, squared: sines of right angles are
-/// below 1e-16.
-const NO_EFFECT: f64 = 1e-24;
-/// Part of the samples of an error below which what the unknowns leave of them is rounding, squared.
-const SILENT: f64 = 1e-9;
 
 /// Errors that count in a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Omitted {
     /// The errors but those of attitudes, which are three more at every position.
-    model: OmittedModel,
+    pub(super) model: OmittedModel,
     /// One sigma of every error in SI units, those about x, y and z of the attitude of a position last; zero
     /// where none is stated.
-    sizes: Vec<f64>,
+    pub(super) sizes: Vec<f64>,
     /// Largest size in SI units from which on a record may show the error, zero where it must have no effect,
     /// in the order of `sizes`; `None` for what no scheme has to be immune to.
-    immune: Vec<Option<f64>>,
+    pub(super) immune: Vec<Option<f64>>,
     /// Most that one SI unit makes of drift (rad/s) or of the output (g), in the order of `sizes`.
-    largest: Vec<f64>,
+    pub(super) largest: Vec<f64>,
     /// True if attitudes count.
-    attitudes: bool,
+    pub(super) attitudes: bool,
     /// True if a turn of the platform axes changes no criterion.
     pub(crate) alike: bool,
 }
@@ -51,20 +39,20 @@ pub(crate) struct Omitted {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OmittedAt {
     /// Drift, then the output, of every error at that attitude (errors x 6).
-    effects: Vec<[f64; LOCAL - 3]>,
+    pub(super) effects: Vec<[f64; LOCAL - 3]>,
     /// Under reset carry what the position adds, psi eliminated.
-    own: Beside,
+    pub(super) own: Beside,
 }
 
 /// What is known of the errors beside the information of a sequence.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Beside {
     /// `J^T R^-1 O`, error by error (errors x n).
-    cross: Vec<f64>,
+    pub(super) cross: Vec<f64>,
     /// `O^T R^-1 O` of every error.
-    squares: Vec<f64>,
+    pub(super) squares: Vec<f64>,
     /// psi in the carried axes by every error.
-    psi: Vec<[f64; 3]>,
+    pub(super) psi: Vec<[f64; 3]>,
 }
 
 impl Omitted {
@@ -153,12 +141,12 @@ impl Omitted {
     }
 
     /// Number of errors but those of attitudes.
-    fn fixed(&self) -> usize {
+    pub(super) fn fixed(&self) -> usize {
         self.model.terms().len()
     }
 
     /// Index in `sizes` of the error `j` of a sequence.
-    fn kind(&self, j: usize) -> usize {
+    pub(super) fn kind(&self, j: usize) -> usize {
         let fixed = self.fixed();
         if j < fixed { j } else { fixed + (j - fixed) % 3 }
     }
@@ -174,320 +162,10 @@ fn are_counted(base: &Scheme, conditions: &Conditions) -> bool {
         && !(at_once && base.carry == Carry::Inertial && base.path.is_some())
 }
 
-impl Dwelling {
-    /// `G v`, G the information on all local unknowns, errors of the accelerometers among them.
-    fn information_of(&self, v: &[f64; LOCAL]) -> [f64; LOCAL] {
-        std::array::from_fn(|i| self.full[i].iter().zip(v).map(|(g, x)| g * x).sum())
-    }
-}
-
 /// The row of an output on all local unknowns: the error of its accelerometer too, which may be no unknown.
 pub(crate) fn with_accelerometer(component: usize, mut row: [f64; LOCAL]) -> [f64; LOCAL] {
     if component != AZIMUTH {
         row[PSI_EPS + component - 1] = 1.0;
     }
     row
-}
-
-impl Evaluator {
-    /// Drift by the errors at an attitude while the platform turns as `slew` says (3 x errors).
-    fn omitted_drift(&self, of: &Omitted, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
-        let (w_n, w_u) = (self.w[1][2], -self.w[0][2]);
-        let earth = earth_rate_in(&Float, c, &w_n, &w_u);
-        let rate = std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]));
-        of.model.drift_rows(&Float, c, rate, [&w_n, &w_u])
-    }
-
-    /// The rows of [`Self::drift_rows`] with those of the errors behind them.
-    pub(crate) fn drift_with_omitted(&self, c: &Matrix3<f64>, slew: &Slew) -> [Vec<f64>; 3] {
-        let mut rows = self.ordered_columns(self.drift_rows(c, Some(slew)));
-        if let Some(of) = &self.omitted {
-            let more = self.omitted_drift(of, c, Some(slew));
-            rows.iter_mut().zip(more).for_each(|(row, more)| row.extend(more));
-        }
-        rows
-    }
-
-    /// Sizes of immunity are those that [`Self::not_immune`] decides: what it takes for silent in `most`
-    /// positions has less than [`SILENT`] of the information of its samples, so a record does not show it
-    /// from a size on that this bounds.
-    ///
-    /// # Errors
-    /// [`DesignError::ImmuneSize`].
-    pub(crate) fn check_immune(
-        &self,
-        immune: &[Immune],
-        most: usize,
-        conditions: &Conditions,
-    ) -> Result<(), DesignError> {
-        let Some(of) = &self.omitted else { return Ok(()) };
-        let terms = of.model.terms().iter().map(|t| (t.family, t.name.as_str(), t.unit));
-        let attitudes = ["attitude_x@1", "attitude_y@1", "attitude_z@1"].map(|n| ("attitude", n, "arcsec"));
-        for (kind, (family, name, unit)) in terms.chain(attitudes).enumerate() {
-            let Some(size) = of.immune[kind].filter(|size| *size > 0.0) else { continue };
-            let largest = SEEN / (SILENT * self.samples_at_most(of, kind, most, conditions)).sqrt();
-            if size > largest {
-                let own = immune.iter().find(|i| i.names(family, name));
-                let found = own.map_or_else(String::new, ToString::to_string);
-                return Err(DesignError::ImmuneSize { found, most: largest / si_per_shown(unit), unit });
-            }
-        }
-        Ok(())
-    }
-
-    /// `O^T R^-1 O` of an error in `most` positions is not above this, by the triangle inequality: psi is at
-    /// most the drift times the time, and what the turns add.
-    fn samples_at_most(&self, of: &Omitted, kind: usize, most: usize, conditions: &Conditions) -> f64 {
-        let dwell = self.dwells.iter().map(|d| d.seconds).fold(0.0, f64::max);
-        let turn_s = conditions.slew_rate_deg_s.map_or(0.0, |rate| 360.0 / rate);
-        let positions = most as f64;
-        let seconds = if self.carry() == Carry::Reset { dwell } else { positions * (dwell + turn_s) };
-        let mut o = [0.0f64; LOCAL];
-        for at in &self.candidates {
-            if let Some(effect) = at.omitted.effects.get(kind) {
-                o[3..].iter_mut().zip(effect).for_each(|(o, e)| *o = o.max(e.abs()));
-            }
-        }
-        let attitude = if kind >= of.fixed() { 1.0 } else { 0.0 };
-        let torquer = of.model.terms().get(kind).is_some_and(|t| matches!(t.family, "GS" | "GM"));
-        let turns = if torquer && turn_s > 0.0 { positions * std::f64::consts::TAU } else { 0.0 };
-        let drift = o[3..PSI_EPS].iter().map(|x| x * x).sum::<f64>().sqrt();
-        o[..3].fill(attitude + drift * seconds + turns);
-        let norm = |d: &Dwelling| (0..LOCAL).map(|i| o[i] * d.full[i][i].max(0.0).sqrt()).sum::<f64>();
-        positions * self.dwells.iter().map(norm).fold(0.0, f64::max).powi(2)
-    }
-
-    /// What the errors do at an attitude.
-    pub(crate) fn omitted_at(
-        &self,
-        c: &Matrix3<f64>,
-        unknowns: &[Vec<f64>; LOCAL - 3],
-        dwelling: &Dwelling,
-    ) -> OmittedAt {
-        let Some(of) = &self.omitted else { return OmittedAt::default() };
-        let (drift, output) = (self.omitted_drift(of, c, None), of.model.output_rows(&Float, c));
-        let one = |j: usize| std::array::from_fn(|r| if r < 3 { drift[r][j] } else { output[r - 3][j] });
-        let mut out = OmittedAt { effects: (0..of.fixed()).map(one).collect(), own: Beside::default() };
-        if self.carry() == Carry::Reset {
-            out.own = self.omitted_alone(of, c, unknowns, dwelling, &out.effects);
-        }
-        out
-    }
-
-    /// What one position adds where its psi is its own, which is eliminated.
-    fn omitted_alone(
-        &self,
-        of: &Omitted,
-        c: &Matrix3<f64>,
-        unknowns: &[Vec<f64>; LOCAL - 3],
-        dwelling: &Dwelling,
-        effects: &[[f64; LOCAL - 3]],
-    ) -> Beside {
-        let n = self.n;
-        let m = effects.len() + if of.attitudes { 3 } else { 0 };
-        // columns: psi, coefficients, errors
-        let column = |k: usize| -> [f64; LOCAL] {
-            std::array::from_fn(|r| match (r, k) {
-                (0..3, 0..3) => c[r][k],
-                (3.., 3..) if k < n => unknowns[r - 3].get(k - 3).copied().unwrap_or(0.0),
-                (3.., _) if k >= n && k < n + effects.len() => effects[k - n][r - 3],
-                (0..3, _) if k >= n + effects.len() => c[r][k - n - effects.len()],
-                _ => 0.0,
-            })
-        };
-        let columns: Vec<[f64; LOCAL]> = (0..n + m).map(column).collect();
-        let weighted = |v: &[f64; LOCAL]| dwelling.information_of(v);
-        let product = |a: &[f64; LOCAL], b: &[f64; LOCAL]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let all: Vec<[f64; LOCAL]> = columns.iter().map(weighted).collect();
-        let mut g: Vec<Vec<f64>> =
-            all.iter().map(|w| columns.iter().map(|v| product(w, v)).collect()).collect();
-        self.prior.psi.iter().enumerate().for_each(|(k, p)| g[k][k] += p);
-        for p in 0..3 {
-            let pivot = g[p][p];
-            if pivot <= 0.0 {
-                continue;
-            }
-            let row = g[p].clone();
-            for other in g.iter_mut().skip(p + 1) {
-                let part = other[p] / pivot;
-                other.iter_mut().zip(&row).for_each(|(x, y)| *x -= part * y);
-            }
-        }
-        let cross = (n..n + m).flat_map(|j| (0..n).map(move |i| (i, j)));
-        Beside {
-            cross: cross.map(|(i, j)| if i < 3 { 0.0 } else { g[i][j] }).collect(),
-            squares: (n..n + m).map(|j| g[j][j]).collect(),
-            psi: vec![[0.0; 3]; m],
-        }
-    }
-
-    /// Nothing of the errors yet.
-    pub(crate) fn beside_at_start(&self) -> Option<Box<Beside>> {
-        let of = self.omitted.as_ref()?;
-        let fixed = of.fixed();
-        let (cross, squares) = (vec![0.0; fixed * self.n], vec![0.0; fixed]);
-        Some(Box::new(Beside { cross, squares, psi: vec![[0.0; 3]; fixed] }))
-    }
-
-    /// Adds a position under reset carry.
-    pub(crate) fn add_beside(&self, state: &State, candidate: usize, out: &mut State) {
-        let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
-            return;
-        };
-        let own = &self.candidates[candidate].omitted.own;
-        let (fixed, n) = (of.fixed(), self.n);
-        out.clone_from(before);
-        out.cross.iter_mut().zip(&own.cross[..fixed * n]).for_each(|(x, y)| *x += y);
-        out.squares.iter_mut().zip(&own.squares[..fixed]).for_each(|(x, y)| *x += y);
-        // the attitude of every position is an error of its own
-        out.cross.extend_from_slice(&own.cross[fixed * n..]);
-        out.squares.extend_from_slice(&own.squares[fixed..]);
-        out.psi.extend_from_slice(&own.psi[fixed..]);
-    }
-
-    /// Adds a position whose local unknowns are these functionals of the unknowns.
-    pub(crate) fn extend_beside<const L: usize, const N: usize>(
-        &self,
-        state: &State,
-        (candidate, turn): (usize, Option<&SlewPath>),
-        local: &[[f64; N]; L],
-        out: &mut State,
-    ) {
-        let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
-            return;
-        };
-        let at = &self.candidates[candidate];
-        let (c, dwelling, n, fixed) = (&at.c, &self.dwells[at.dwell], self.n, of.fixed());
-        out.clone_from(before);
-        if of.attitudes {
-            out.cross.resize(out.cross.len() + 3 * n, 0.0);
-            out.squares.resize(out.squares.len() + 3, 0.0);
-            out.psi.resize(out.psi.len() + 3, [0.0; 3]);
-        }
-        let platform = self.carry() == Carry::Platform;
-        for (j, psi) in out.psi.iter_mut().enumerate() {
-            let mut o = [0.0; LOCAL];
-            for r in 0..3 {
-                o[r] = match turn {
-                    _ if platform => (0..3).map(|k| c[r][k] * psi[k]).sum(),
-                    None => psi[r],
-                    Some(turn) => {
-                        let gone_on: f64 = (0..3).map(|k| turn.phi[r][k] * psi[k]).sum();
-                        gone_on + turn.omitted[r].get(j).copied().unwrap_or(0.0)
-                    }
-                };
-            }
-            if let Some(effects) = at.omitted.effects.get(j) {
-                o[3..].copy_from_slice(effects);
-            }
-            // while a position lasts, its attitude is off
-            let own = (j >= before.psi.len()).then(|| (j - fixed) % 3);
-            let offset: [f64; 3] = std::array::from_fn(|r| own.map_or(0.0, |axis| c[r][axis]));
-            o.iter_mut().zip(&offset).for_each(|(x, y)| *x += y);
-            let weighted = dwelling.information_of(&o);
-            out.squares[j] += o.iter().zip(&weighted).map(|(x, y)| x * y).sum::<f64>();
-            for (l, w) in local.iter().zip(&weighted).filter(|(_, w)| **w != 0.0) {
-                for (x, y) in out.cross[j * n..][..n].iter_mut().zip(&l[..n]) {
-                    *x += w * y;
-                }
-            }
-            let after: [f64; 3] = std::array::from_fn(|r| {
-                o[..PSI_EPS].iter().zip(&dwelling.phi[r]).map(|(x, p)| x * p).sum::<f64>() - offset[r]
-            });
-            *psi = match platform {
-                true => std::array::from_fn(|k| (0..3).map(|r| c[r][k] * after[r]).sum()),
-                false => after,
-            };
-        }
-    }
-
-    /// `L^-1 N_j` of an error, L the root of the information; zero where nothing is determined.
-    fn forward(&self, cross: &[f64], l: &[f64], first: usize, y: &mut [f64]) {
-        let n = self.n;
-        for i in first..n {
-            let row = &l[i * n..=i * n + i];
-            let sum: f64 = row[first..i].iter().zip(&y[first..i]).map(|(a, b)| a * b).sum();
-            y[i] = if row[i] > 0.0 { (cross[i] - sum) / row[i] } else { 0.0 };
-        }
-    }
-
-    /// Changes of the coefficients that count by one sigma of every error with a size (errors x d), in units
-    /// of the evaluator; `l` is the root of the information.
-    fn contributions(&self, of: &Omitted, beside: &Beside, l: &[f64]) -> Vec<Vec<f64>> {
-        let (n, begin) = (self.n, 3 + self.nuisance);
-        let first = if self.carry() == Carry::Reset { 3 } else { 0 };
-        let mut y = vec![0.0; n];
-        let sized = (0..beside.squares.len()).filter(|&j| of.sizes[of.kind(j)] > 0.0);
-        let change = |j: usize| {
-            self.forward(&beside.cross[j * n..][..n], l, first, &mut y);
-            // of what counts alone, which comes last
-            for i in (begin..n).rev() {
-                let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * y[k]).sum();
-                y[i] = (y[i] - sum) / l[i * n + i];
-            }
-            let size = of.sizes[of.kind(j)];
-            y[begin..].iter().map(|b| b * size).collect()
-        };
-        sized.map(change).collect()
-    }
-
-    /// The same as variances that the errors add to each coefficient that counts; empty without errors.
-    pub(crate) fn added_variances(&self, state: &State, l: &[f64]) -> Vec<f64> {
-        let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return Vec::new() };
-        let mut out = vec![0.0; self.n - 3 - self.nuisance];
-        for change in self.contributions(of, beside, l) {
-            out.iter_mut().zip(change).for_each(|(sum, b)| *sum += b * b);
-        }
-        out
-    }
-
-    /// The criteria D and E of the covariance of what counts, with the errors: in deg/h (per g).
-    pub(crate) fn of_total_covariance(&self, state: &State, criterion: &Criterion, l: &[f64]) -> Option<f64> {
-        let (of, beside) = (self.omitted.as_ref()?, state.beside.as_ref()?);
-        let (n, begin) = (self.n, 3 + self.nuisance);
-        let d = n - begin;
-        let block = |i: usize, j: usize| if j <= i { l[(i + begin) * n + j + begin] } else { 0.0 };
-        let root = nalgebra::DMatrix::from_fn(d, d, block);
-        let inverse = root.solve_lower_triangular(&nalgebra::DMatrix::identity(d, d))?;
-        let mut covariance = inverse.transpose() * inverse;
-        for change in self.contributions(of, beside, l) {
-            let b = nalgebra::DVector::from_vec(change);
-            covariance += &b * b.transpose();
-        }
-        let unit = self.dph * self.dph;
-        let values = (covariance / unit).symmetric_eigenvalues();
-        Some(match criterion {
-            Criterion::D => (values.iter().map(|x| x.ln()).sum::<f64>() / (2.0 * d as f64)).exp(),
-            _ => values.max().sqrt(),
-        })
-    }
-
-    /// How far a sequence is from being immune, 0 where it is: 1 for an error that must have no effect and
-    /// has one, at most 1 for one that a record shows later than it must. `root` is working space.
-    pub(crate) fn not_immune(&self, state: &State, root: &mut Vec<f64>) -> f64 {
-        let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return 0.0 };
-        if of.immune.iter().all(Option::is_none) {
-            return 0.0;
-        }
-        self.root(state, root);
-        let (n, first) = (self.n, if self.carry() == Carry::Reset { 3 } else { 0 });
-        let mut y = vec![0.0; n];
-        let unit = self.dwells.iter().flat_map(|d| (0..LOCAL).map(|i| d.full[i][i])).fold(0.0, f64::max);
-        let of_one = |j: usize| -> f64 {
-            let kind = of.kind(j);
-            let Some(size) = of.immune[kind] else { return 0.0 };
-            let samples = beside.squares[j];
-            if samples <= NO_EFFECT * unit * of.largest[kind].powi(2) {
-                return 0.0;
-            }
-            self.forward(&beside.cross[j * n..][..n], root, first, &mut y);
-            let information = samples - y[first..].iter().map(|x| x * x).sum::<f64>();
-            if information <= SILENT * samples {
-                return 1.0;
-            }
-            let from = SEEN / information.sqrt();
-            if from <= size { 0.0 } else { 1.0 - size / from }
-        };
-        (0..beside.squares.len()).map(of_one).sum()
-    }
 }
