@@ -583,6 +583,10 @@ class Analysis(Shape):
     """Changes that make the unobservable unknowns observable."""
     degenerate_loci: list[Locus] | None
     """Conditions on generic angles under which a verdict changes; null if they were not computed."""
+    degenerate_loci_incomplete: str | None
+    """Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if it has all that one equation
+    describes.
+    """
     formulas: list[Formula] | None
     """Formulas of Z and its derivatives, position by position; null if not asked for."""
     frame: Frame
@@ -2072,6 +2076,10 @@ class Consistency(Record):
     unresolved_directions: int
     """Number of directions that the NEES leaves out: a filter linearised at its estimates claims to know them more than a million times
     better than the unknowns themselves. 0 for a linear model.
+    """
+    held_directions: int
+    """Number of directions that the NEES leaves out because constraints of the model hold them: nothing is estimated there. 0 for a
+    platform.
     """
     nees_band: tuple[float, float]
     """Band of 95 % of the NEES, dimensionless."""
