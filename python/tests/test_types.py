@@ -111,7 +111,7 @@ def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Itera
 #: What the answers above leave out, of the classes that they have.
 RARE = {
     "ConditionsReport.accelerometer_bias", "Design.gimbals", "Geometry.accelerometers", "MeasurementReport.accelerometer_bias", "MeasurementReport.gyro_noise",
-    "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor",
+    "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor", "SearchReport.ranked",
 }
 
 

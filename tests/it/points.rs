@@ -205,6 +205,43 @@ fn one_of_several_ways_is_named() {
     }
 }
 
+/// Symmetries, combinations and remedies are those of the way in which the constraint holds where the verdicts
+/// are judged. By hand: x^2 = y^2 z^2 with s = x - y z moves nothing along x = y z, by two scalings, and x/(y z) is 1
+/// there; (x - y)(x + y - z) = 0 with s = (x - y)(1 + z) leaves z alone free along x = y.
+#[test]
+fn all_that_is_said_is_of_one_way() {
+    let answer = |constraint: &str, outputs: &str, seed: u64| {
+        let text = format!(
+            "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\n{outputs}"
+        );
+        let model = model_file::read(&text).expect("a model");
+        let options = SystemOptions { seed, solutions: false, ..SystemOptions::default() };
+        analyze_system(&model, options).unwrap_or_else(|e| panic!("{constraint} {seed}: {e}"))
+    };
+    let mut seen = [0; 2];
+    for seed in 1..=8 {
+        let a = answer("x^2 = y^2*z^2", "s='x - y*z'", seed);
+        let combinations: Vec<&str> = a.invariants.iter().map(|i| i.expression.as_str()).collect();
+        assert!(a.other_directions.is_empty(), "{seed}: {:?}", a.other_directions);
+        assert_eq!(a.symmetries.len(), a.unobservable_directions, "{seed}");
+        match a.rank {
+            1 => assert_eq!(combinations, ["x/(y*z)"], "{seed}"),
+            rank => assert_eq!(rank, 2, "{seed}"),
+        }
+        seen[0] += usize::from(a.rank == 1);
+        let a = answer("(x - y)*(x + y - z) = 0", "s='x - y + z*(x - y)'", seed);
+        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
+        if a.rank == 1 {
+            for wrong in ["z: know x", "z: know y", "z: know one of"] {
+                assert!(!text.contains(wrong), "{seed}: {text}");
+            }
+        }
+        seen[1] += usize::from(a.rank == 1);
+    }
+    assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+}
+
 /// Constraints whose gradients depend on each other where they hold say less than they seem to: the points
 /// are these alone, so that a verdict from gradients would be wrong.
 #[test]

@@ -39,6 +39,8 @@ struct Search<'a> {
     left: u64,
     /// True once it was these that ended the search.
     ended: bool,
+    /// True once a changed model was judged where constraints hold in another way.
+    elsewhere: bool,
     out: Remedies,
 }
 
@@ -71,7 +73,8 @@ pub(super) fn remedies(
     let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
     let out = Remedies::default();
-    let mut search = Search { model, judged, order, open, roles, budget, left, ended: false, out };
+    let mut search =
+        Search { model, judged, order, open, roles, budget, left, ended: false, elsewhere: false, out };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -84,6 +87,11 @@ pub(super) fn remedies(
                 search.all(&Directions::of(field, &at.span));
             }
         }
+    }
+    if search.elsewhere {
+        let text = "known values and outputs: the constraints hold in several ways, and with a change verdicts are those of another one".into();
+        let verdicts = search.out.verdicts;
+        search.out = Remedies { not_tried: vec![text], verdicts, ..Remedies::default() };
     }
     let open = search.open.iter().map(|&c| unknowns[c].name.clone());
     search.out.close(open);
@@ -231,6 +239,18 @@ impl Search<'_> {
         if self.ended { "; a larger --work-limit allows more" } else { "" }
     }
 
+    /// True if a changed model may have been judged where the model was: constraints that hold in several ways
+    /// are judged in one. k columns that are left out lower a rank by less than k, since none is observable;
+    /// an output adds to it.
+    fn is_of_same_part(&self, judged: &Judgement, changes: &[Change]) -> bool {
+        let rank = |judged: &Judgement| judged.findings.degrees.rank();
+        let (before, after) = (rank(self.judged), rank(judged));
+        let left_out = self.judged.layout.unknowns.len().saturating_sub(judged.layout.unknowns.len());
+        let outputs = changes.iter().any(|c| c.known().is_none());
+        self.model.constraints.is_empty()
+            || after + left_out.saturating_sub(1) >= before && (outputs || after <= before)
+    }
+
     /// Judges the model with some changes, and enters what they resolve; `None` where that takes more operations than are
     /// left.
     fn judge(&mut self, changes: Vec<Change>) -> Option<Vec<usize>> {
@@ -255,6 +275,10 @@ impl Search<'_> {
         }
         self.out.verdicts += 1;
         let Ok(judged) = judged else { return Some(Vec::new()) };
+        if !self.is_of_same_part(&judged, &changes) {
+            self.elsewhere = true;
+            return None;
+        }
         let unknowns = &self.judged.layout.unknowns;
         let found: Vec<(usize, usize)> = (self.open.iter())
             .filter_map(|&c| Some((c, judged.verdict(&model, &unknowns[c].name)?.degree?)))

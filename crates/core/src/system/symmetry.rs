@@ -13,6 +13,8 @@ use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, 
 
 /// Points at which a direction must vanish, at most.
 const POINTS: usize = 8;
+/// Points with other verdicts, where constraints hold in several ways, before no more are drawn.
+const ELSEWHERE: usize = 24;
 /// Most unknowns among which directions that are polynomials in them are sought.
 const MOVED: usize = 16;
 /// Verdicts on changes for which work is left, where they take no more than a tenth of it.
@@ -207,12 +209,19 @@ fn symmetries_in<S: Values>(
     let mut budget = Budget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false };
     // a verdict rests on two points
     let mut verdict = judged.work / 2;
-    for point in 0..POINTS {
+    // constraints that hold in several ways have points with other verdicts
+    let alike = |at: &At<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
+    let (mut point, mut elsewhere) = (0, 0);
+    while point < POINTS && elsewhere < ELSEWHERE {
         if !budget.spend(cost_of_point::<S>(verdict, rank, 2 * n)) {
             break;
         }
         let mut spent = Spent::default();
         let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent)?;
+        if !alike(&here) {
+            elsewhere += 1;
+            continue;
+        }
         for i in 0..here.span.rank() {
             let row = here.span.row(i);
             let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
@@ -227,6 +236,7 @@ fn symmetries_in<S: Values>(
             break;
         }
         last = basis.rank();
+        point += 1;
     }
     let Some(at) = at else {
         return Ok(Symmetries { stopped: budget.stopped(), work: budget.spent, ..Symmetries::default() });
@@ -249,11 +259,17 @@ fn symmetries_in<S: Values>(
         let moved: Vec<usize> =
             (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
         let mut draw = |budget: &mut Budget, columns: usize| {
-            if !budget.spend(cost_of_point::<S>(verdict, rank, columns)) {
-                return Ok(None);
+            for _ in 0..=ELSEWHERE {
+                if !budget.spend(cost_of_point::<S>(verdict, rank, columns)) {
+                    break;
+                }
+                let mut spent = Spent::default();
+                let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent)?;
+                if alike(&here) {
+                    return Ok(Some(here));
+                }
             }
-            let mut spent = Spent::default();
-            climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent).map(Some)
+            Ok(None)
         };
         // constants that every segment and experiment shares may be factors too
         let changed =
