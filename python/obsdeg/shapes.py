@@ -3631,7 +3631,7 @@ class NoiseSetting(Record):
     key: str
     """Key of the table, with its unit, such as `angle_random_walk_deg_sqrt_h`."""
     values: list[float]
-    """Values in the unit that `key` names: one, or those of the gyros X, Y, Z."""
+    """Values in the unit of the name of `key`: one, or three for the gyros X, Y, Z."""
 
 
 class SensorNoiseReport(Shape):

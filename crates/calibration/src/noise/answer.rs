@@ -140,6 +140,6 @@ pub struct AllanDeviation {
 pub struct NoiseSetting {
     /// Key of the table, with its unit, such as `angle_random_walk_deg_sqrt_h`.
     pub key: String,
-    /// Values in the unit that `key` names: one, or those of the gyros X, Y, Z.
+    /// Values in the unit of the name of `key`: one, or three for the gyros X, Y, Z.
     pub values: Vec<f64>,
 }
