@@ -382,7 +382,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
         ),
         match a.noise_estimated {
             true => format!(
-                "noise of a sample estimated from what is left of it (first taken as {:e} g)",
+                "noise of a sample estimated from the residuals (first taken as {:e} g)",
                 a.accelerometer_noise_g
             ),
             false => format!(

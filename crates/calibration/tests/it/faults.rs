@@ -511,7 +511,7 @@ fn what_is_held_is_said() {
     for (u, v) in c.quantities.iter().zip(&known.quantities).filter(|(u, _)| u.determined) {
         let (s, t, factor) =
             (u.sigma.expect("there"), v.sigma.expect("there"), u.held_factor.expect("there"));
-        // attitudes of the two differ by what is left of the box
+        // attitudes of the two differ by what the box lets them
         assert!((0.9..1.1).contains(&(s / t / factor)), "{}: {s} {t} {factor}", u.name);
         assert!((v.held_factor.expect("there") - 1.0).abs() < 1e-3, "{}: {:?}", v.name, v.held_factor);
         largest = largest.max(factor);
