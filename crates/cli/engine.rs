@@ -69,7 +69,7 @@ impl EngineArguments {
     }
 }
 
-/// What is missing without the engine, and how to get it; quiet or not.
+/// Names on stderr the parts of the answer that are missing without the engine, and how to get them; quiet or not.
 pub(crate) fn say_busy(worker: &Worker) {
     let why = match worker.failure() {
         Some(WorkerError::Busy { seconds: 0 }) => {
@@ -86,7 +86,7 @@ pub(crate) fn say_busy(worker: &Worker) {
     ));
 }
 
-/// What is known without the engine, line by line: asked for once, when the wait for it has lasted a second.
+/// Verdicts that need no engine, line by line: asked for once, when the wait for it has lasted a second.
 pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 
 /// Says that the engine is waited for, at most how many seconds, and the verdicts, which need none.

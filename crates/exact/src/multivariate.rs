@@ -279,7 +279,7 @@ mod tests {
         (value, p)
     }
 
-    /// What is counted beforehand is what is done, for sums of different variables: one power among many low ones too.
+    /// Operations counted beforehand are those done, for sums of different variables: one power among many low ones too.
     #[test]
     fn products_of_what_is_put_in() {
         let exponents: [&[u32]; 9] =

@@ -124,7 +124,7 @@ fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
     (!of.carries.is_empty()).then(|| Block::table(heading, columns, of.carries.iter().map(row)))
 }
 
-/// What would help, a line each: what it does to the largest total over its requirement, and what it costs in sigma.
+/// Remedies, a line each: the largest total over its requirement with it, and its cost in sigma.
 fn advice(of: &OmittedEffects) -> Vec<String> {
     of.advice.iter().map(advised).collect()
 }

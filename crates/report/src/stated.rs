@@ -149,7 +149,7 @@ pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
     format!("{} {unit} ({name})", number(sigma_dph))
 }
 
-/// What the largest figure of drift coefficients is: a total with a bench.
+/// Name of the largest figure of drift coefficients: a total with a bench.
 pub(crate) fn worst(r: &Requirements) -> &'static str {
     if r.with_bench { "worst total" } else { "worst sigma" }
 }

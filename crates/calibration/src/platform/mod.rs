@@ -246,7 +246,7 @@ const ROUNDS: usize = 6;
 /// More than this part of all measurements are no outliers.
 const MOST_OUTLIERS: f64 = 0.02;
 
-/// Whether records of this scheme can be read: positions at rest, at least one record.
+/// Checks that records of this scheme can be read: positions at rest, at least one record.
 fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> {
     if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
         return Err(CalibrationError::Rotates { position: p.name.clone() });

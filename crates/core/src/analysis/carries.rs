@@ -24,7 +24,7 @@ impl Named {
     }
 }
 
-/// What is found under the other carries, and what is not said of them and why.
+/// Verdicts under the other carries, and reasons for those that are left out.
 pub(super) fn carry_reports(
     platform: &Platform,
     judged: &Verdicts,

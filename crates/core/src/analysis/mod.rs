@@ -254,12 +254,12 @@ fn null_report(platform: &Platform, v: &NullVector) -> Vec<Component> {
     pairs.map(|((c, _), k)| Component { name: name(*c), coefficient: Some(k.to_string()) }).collect()
 }
 
-/// What an answer lacks that the symbolic engine gives.
+/// Parts of an answer that are missing without the symbolic engine.
 #[derive(Debug, Default)]
 struct Wanting {
-    /// What is observable and has a solution in decimals.
+    /// Names of observable unknowns with a solution in decimals.
     decimals: Vec<String>,
-    /// What is observable and has no solution.
+    /// Names of observable unknowns without a solution.
     unsolved: Vec<String>,
     /// Number of combinations that are left out, since nobody gave their coefficients.
     left_out: usize,

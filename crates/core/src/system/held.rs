@@ -61,7 +61,7 @@ impl<S: Values> Maker<'_, '_, S> {
         Ok(())
     }
 
-    /// What constraints can move: states, parameters and generic constants.
+    /// Slots that constraints can move: states, parameters and generic constants.
     pub(super) fn free(&self, experiment: usize) -> Vec<bool> {
         let free = |role: &Role| match *role {
             Role::State(i) => !matches!(self.model.states[i].start, StateStart::Value(_)),

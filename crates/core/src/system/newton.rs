@@ -24,7 +24,7 @@ const TERMS: usize = 64;
 const NEAR: f64 = -16.0;
 /// Logarithm of the ratio of sides from which on a point is far from holding a constraint.
 const FAR: f64 = 0.5;
-/// What a step from far away must gain of that logarithm, or half of it.
+/// Least gain of that logarithm by a step from far away, or half of it.
 const GAIN: f64 = 0.2;
 /// Bits by which a step may be longer than the point is far from zero.
 const LONGEST: f64 = 6.0;
@@ -78,7 +78,7 @@ struct Row<const N: usize> {
     ratio: Option<(Vec<Ball<N>>, Ball<N>)>,
 }
 
-/// What a step is taken in.
+/// Constraints and free slots of Newton's steps.
 struct Newton<'a> {
     dag: &'a Dag,
     sums: Vec<Sum>,
@@ -245,7 +245,7 @@ fn size<const N: usize>(list: &[Ball<N>]) -> f64 {
 }
 
 /// A point near the values at which the constraints hold: Newton's steps of least length in the `free` ones.
-/// What is left of the constraints is in the error of the values.
+/// The residual of the constraints is in the error of the values.
 ///
 /// # Errors
 /// [`NotHeld`], with the constraint that is farthest off.

@@ -23,7 +23,7 @@ const NEARBY: usize = 3;
 /// Relative residual, as a power of two, below which a constraint holds at such a point.
 const HOLDS: f64 = -128.0;
 
-/// What was found at one start.
+/// Outcome of one start.
 enum Found {
     /// A point, and the number of constraints that follow from the others there.
     Point(usize),

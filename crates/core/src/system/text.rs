@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::language::{Names, evaluate_f64, parse_with};
 
-    /// What is written, read again, has the values of what it was made of.
+    /// Texts of nodes, read again, have the values of the nodes.
     #[test]
     fn written_and_read_again() {
         let names = ["x", "y", "t"].map(String::from);

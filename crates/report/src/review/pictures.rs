@@ -154,7 +154,7 @@ fn drifts(s: &Sweep) -> Vec<String> {
     s.names.iter().filter(|n| n.starts_with("D_")).cloned().collect()
 }
 
-/// What sweeps are of.
+/// Quantity of the sweeps.
 fn predicted(s: &SchemeReview) -> &'static str {
     if s.simulation.requirements.with_bench { "total uncertainty with the bench" } else { "sigma" }
 }

@@ -1,4 +1,4 @@
-//! What the errors that a scheme does not estimate change in a sequence, beside its information.
+//! Changes of the estimates of a sequence by errors that the scheme does not estimate, beside its information.
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Carry, Float, LOCAL, Matrix3, PSI_EPS, earth_rate_in};
@@ -93,7 +93,7 @@ impl Evaluator {
         positions * self.dwells.iter().map(norm).fold(0.0, f64::max).powi(2)
     }
 
-    /// What the errors do at an attitude.
+    /// Effects of the errors at an attitude.
     pub(crate) fn omitted_at(
         &self,
         c: &Matrix3<f64>,
@@ -110,7 +110,7 @@ impl Evaluator {
         out
     }
 
-    /// What one position adds where its psi is its own, which is eliminated.
+    /// Sums of one position whose psi is its own and is eliminated.
     fn omitted_alone(
         &self,
         of: &Omitted,

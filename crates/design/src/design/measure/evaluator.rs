@@ -31,7 +31,7 @@ pub(crate) struct Candidate {
     pub(crate) own: Vec<f64>,
     /// Its own psi under reset carry, as soon as that was asked for.
     pub(crate) psi: OnceLock<OwnPsi>,
-    /// What errors that are not estimated do there.
+    /// Effects there of errors that are not estimated.
     pub(crate) omitted: OmittedAt,
     /// Which of the dwells of the evaluator it has.
     pub(crate) dwell: usize,
@@ -110,7 +110,7 @@ pub struct State {
     pub(crate) psi: [Vec<f64>; 3],
     /// Where the noise of Z is correlated: what is known of it by now.
     pub(crate) joint: Option<Joint>,
-    /// What errors that are not estimated do, where they count.
+    /// Effects of errors that are not estimated, where they count.
     pub(crate) beside: Option<Box<Beside>>,
     /// The candidates in order.
     pub(crate) path: Vec<usize>,

@@ -35,7 +35,7 @@ pub(crate) struct Omitted {
     pub(crate) alike: bool,
 }
 
-/// What the errors do at one candidate.
+/// Effects of the errors at one candidate.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OmittedAt {
     /// Drift, then the output, of every error at that attitude (errors x 6).
@@ -44,7 +44,7 @@ pub(crate) struct OmittedAt {
     pub(super) own: Beside,
 }
 
-/// What is known of the errors beside the information of a sequence.
+/// Sums over a sequence that concern the errors, beside its information.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Beside {
     /// `J^T R^-1 O`, error by error (errors x n).

@@ -277,7 +277,7 @@ fn record(column: Column, positions: &[&str], carry: Carry) -> DVector<f64> {
     DVector::from_vec(out)
 }
 
-/// What a vector has outside the span of others, twice orthogonalised.
+/// Part of a vector outside the span of others, twice orthogonalised.
 fn outside(basis: &[DVector<f64>], v: &DVector<f64>) -> DVector<f64> {
     let mut rest = v.clone();
     for _ in 0..2 {

@@ -1,4 +1,4 @@
-//! What would help where a bench uses up the margin of a requirement, each by trying it: the error among the
+//! Remedies where a bench uses up the margin of a requirement, each by trying it: the error among the
 //! unknowns, re-levelling, another position. And the same scheme under every carry: sigma against what the
 //! bench adds.
 
