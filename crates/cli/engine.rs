@@ -82,7 +82,7 @@ pub(crate) fn say_busy(worker: &Worker) {
         _ => return,
     };
     say(&format!(
-        "what needs the symbolic engine is missing or in decimals (the notes of the answer say what): {why}"
+        "what needs the symbolic engine is missing or in decimals (the notes of a table and the JSON answer say what): {why}"
     ));
 }
 

@@ -251,3 +251,33 @@ fn powers_are_refused_as_powers() {
         assert_eq!(judged(&text).quantities.iter().filter(|q| q.degree == Some(0)).count(), 2, "{exponent}");
     }
 }
+
+/// The side that known starts decide is not that of "unknowns near one".
+#[test]
+fn known_starts_decide_sides() {
+    for (start, side, said) in [
+        (
+            "x={equation='-a*x', initial=-3}",
+            "x < 0",
+            "where x < 0 (known starts and `time` in the file choose another)",
+        ),
+        (
+            "x={equation='-a*x', initial=3}",
+            "x > 0",
+            "where x > 0 (known starts and `time` in the file choose another)",
+        ),
+        ("x='-a*x'", "x > 0", "where x > 0 (chosen by unknowns near one"),
+    ] {
+        let a = judged(&format!("name='m'\nparameters=['a']\n[states]\n{start}\n[outputs]\ny='a*abs(x)'"));
+        assert_eq!(a.branch_sides[0].condition, side);
+        assert!(printed(&a).contains(said), "{}", printed(&a));
+    }
+    let a = judged(
+        "name='m'\nparameters=['a']\n[states]\nx={equation='-a*x', initial=-3}\n[outputs]\ny='abs(x)+abs(a)'",
+    );
+    assert!(
+        printed(&a).contains("by known starts where these decide, else by unknowns near one"),
+        "{}",
+        printed(&a)
+    );
+}

@@ -166,3 +166,12 @@ fn the_command_for_five_of_24() -> Design {
     let options = DesignOptions { positions: Some(5), ..DesignOptions::default() };
     design(&base(Carry::Inertial), &Conditions::default(), &options, &|_| true).expect("designed")
 }
+
+/// The same by total uncertainty, with a bench.
+#[divan::bench(sample_count = 3)]
+fn the_command_for_five_of_24_with_a_bench() -> Design {
+    let options = DesignOptions { positions: Some(5), ..DesignOptions::default() };
+    let bench = ["K0=20", "latitude=10"].map(|text| text.parse().expect("a size")).to_vec();
+    let conditions = Conditions { bench, ..Conditions::default() };
+    design(&base(Carry::Inertial), &conditions, &options, &|_| true).expect("designed")
+}

@@ -209,10 +209,21 @@ fn lead(c: &CrossCheck) -> Vec<String> {
         );
     }
     if !c.passed && !c.validity.holds && c.conditions.truth == Truth::Exact {
+        let why = match c.monte_carlo.filter {
+            FilterKind::Linear => {
+                let ratio = c.validity.neglected_g / c.validity.accelerometer_noise_g;
+                format!(", so (6) leaves out {} times the noise of Z", optional(Some(ratio)))
+            }
+            FilterKind::Extended => {
+                "; the extended filter is linearised before the drifts are known, the iterated one (--filter \
+                                     iterated) along the whole run"
+                    .into()
+            }
+            FilterKind::Iterated => "; the iterated filter has full attitudes".into(),
+        };
         out.push(format!(
-            "the truth is exact and the drifts are too large for the linear model: |psi| reaches {} deg, so (6) leaves out {} times the noise of Z",
+            "the truth is exact and the drifts are too large for the linear model: |psi| reaches {} deg{why}",
             number(c.validity.largest_psi_deg),
-            optional(Some(c.validity.neglected_g / c.validity.accelerometer_noise_g))
         ));
     }
     out

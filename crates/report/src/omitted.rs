@@ -232,7 +232,7 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         let changes: Vec<String> = exact.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect();
         Some((
             t.name.as_str(),
-            format!("{} is silent and changes {} (rad, rad/s, g)", t.name, changes.join(", ")),
+            format!("{} is silent and changes {}, in rad, rad/s and g", t.name, changes.join(", ")),
         ))
     });
     out.extend(first_lines(silent.collect()));
@@ -360,7 +360,7 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
             e.iter().map(|e| format!("{} by {}", e.unknown, e.change)).collect::<Vec<_>>().join(", ")
         });
         let exact = exact.unwrap_or_else(|| t.changes.join(", "));
-        (t.name.as_str(), format!("{} changes {exact} (rad, rad/s, g)", t.name))
+        (t.name.as_str(), format!("{} changes {exact}, in rad, rad/s and g", t.name))
     });
     out.extend(first_lines(silent.collect()));
     out.push(format!(

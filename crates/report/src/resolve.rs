@@ -324,14 +324,16 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Changes that are made together, in the imperative: `add p3 = NWU and p4 = USE`.
+/// Changes that are made together, in the imperative: `add a position NWU and one USE`. Lines are alternatives,
+/// so that none numbers the positions it adds.
 fn changes(list: &[Change]) -> String {
     let mut before = "";
     let mut one = |c: &Change| {
         let (verb, what) = match c {
             Change::Known { name } => ("know ", name.clone()),
             Change::Output { state } => ("measure ", state.clone()),
-            Change::Attitude { position, attitude } => ("add ", format!("{position} = {attitude}")),
+            Change::Attitude { attitude, .. } if before == "add " => ("add ", format!("one {attitude}")),
+            Change::Attitude { attitude, .. } => ("add ", format!("a position {attitude}")),
             Change::Carry { carry } => ("take ", format!("{carry} carry")),
         };
         let said = if verb == before { "" } else { verb };

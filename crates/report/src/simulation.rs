@@ -186,7 +186,7 @@ fn requirements(quantities: &[Estimate]) -> Vec<String> {
 }
 
 /// On whose prior rests what the samples do not determine, a line for all that rest on each other.
-fn priors(quantities: &[Estimate]) -> Vec<String> {
+fn priors(quantities: &[Estimate], filter: FilterKind) -> Vec<String> {
     let mut groups: BTreeMap<Vec<usize>, Vec<&str>> = BTreeMap::new();
     for (i, q) in quantities.iter().enumerate().filter(|(_, q)| !q.prior_of.is_empty()) {
         let of = |(k, o): (usize, &Estimate)| (k == i || q.prior_of.contains(&o.name)).then_some(k);
@@ -196,7 +196,12 @@ fn priors(quantities: &[Estimate]) -> Vec<String> {
         let of = words::names(of.iter().map(|&k| quantities[k].name.as_str()));
         format!("{}: on the priors of {of} together, which the outputs do not tell apart", words::names(who))
     };
-    groups.into_iter().map(line).collect()
+    let mut out: Vec<String> = groups.into_iter().map(line).collect();
+    if filter != FilterKind::Linear && !out.is_empty() {
+        let text = "this is said of small angles: with the full attitudes of this filter other priors may bear on these estimates too";
+        out.push(text.into());
+    }
+    out
 }
 
 /// Advice where one run is consistent and says little.
@@ -266,7 +271,7 @@ impl Answer for Simulation {
         }
         blocks.extend(Block::list_if_any(
             "Known from the prior only: on which priors",
-            priors(&self.quantities),
+            priors(&self.quantities, self.filter.kind),
         ));
         blocks.extend(omitted::blocks(&self.omitted, ""));
         blocks.push(Block::list("Filter", filter(&self.filter)));

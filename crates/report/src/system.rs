@@ -117,6 +117,12 @@ fn branch(a: &SystemAnalysis) -> String {
     let chosen = match (sides.is_empty(), a.branch_sides.iter().all(|s| s.of_time)) {
         (true, _) => format!("that of {point}"),
         (_, true) => format!("where {sides} (`time` in the file chooses another)"),
+        _ if a.branch_sides.iter().all(|s| s.given || s.of_time) => {
+            format!("where {sides} (known starts and `time` in the file choose another)")
+        }
+        _ if a.branch_sides.iter().any(|s| s.given) => {
+            format!("where {sides} (by known starts where these decide, else by {point})")
+        }
         (..) => format!("where {sides} (chosen by {point})"),
     };
     format!("{functions}: the verdicts are those of one branch, {chosen}; others may have other verdicts")
@@ -208,16 +214,31 @@ impl Answer for SystemAnalysis {
             )
         }));
         if !self.constraints.is_empty() {
-            // linear ones hold in one way
-            let several = self.constraints.iter().any(|c| c.contains(['*', '^']));
+            // linear ones hold in one way, products in that of the factor taken
+            let taken = |c: &String| self.constraint_factors.iter().any(|w| w.constraint == *c);
+            let several = self.constraints.iter().any(|c| c.contains(['*', '^']) && !taken(c));
             assumed.push(format!(
                 "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
                 self.constraints.join(", "),
                 match several {
-                    true => "; where it can hold in several ways (x*y = 0 by x = 0 or by y = 0), they are those of one: state that one to choose",
+                    true => "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are those of one: state that one to choose",
                     false => "",
                 }
             ));
+            assumed.extend(self.constraint_factors.iter().map(|w| {
+                let others: Vec<String> = w.others.iter().map(|o| format!("{o} = 0")).collect();
+                format!(
+                    "{} holds where {} = 0 or where {}: all that is said is of {} = 0, {}; state another one in its place to choose it",
+                    w.constraint,
+                    w.factor,
+                    others.join(" or where "),
+                    w.factor,
+                    match w.given {
+                        true => "which the values under [simulation.values] hold",
+                        false => "the first of them with a real point",
+                    }
+                )
+            }));
         }
         assumed.push(if self.closed {
         format!(

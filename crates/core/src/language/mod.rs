@@ -11,4 +11,5 @@ pub use expression::{
 };
 pub(crate) use expression::{among, nearest};
 pub use parser::{Components, Shapes, parse, parse_components, parse_equation, parse_with};
+pub(crate) use vectors::component;
 pub use vectors::{MAX_ENTRIES, Shape};

@@ -392,7 +392,7 @@ pub(super) fn entry(of: &Value, index: &[usize]) -> Result<usize, Mismatch> {
 }
 
 /// What `root` is made of, alone.
-pub(super) fn component(e: &Expression, root: usize) -> Expression {
+pub(crate) fn component(e: &Expression, root: usize) -> Expression {
     let mut used = vec![root];
     let mut seen = std::collections::HashSet::from([root]);
     let mut next = 0;

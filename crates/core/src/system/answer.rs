@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::branches::{BranchSide, branches};
+use super::constraints::ConstraintFactor;
 use super::error::ModelError;
 use super::fibre::{Count, values_taken};
 use super::functions::gcd;
@@ -51,6 +52,8 @@ pub struct SystemAnalysis {
     pub time: Option<String>,
     /// Equations that hold at the start; their differentials count as rows of order 0.
     pub constraints: Vec<String>,
+    /// Factors that stand for those of these equations that are products: verdicts are those where they are zero.
+    pub constraint_factors: Vec<ConstraintFactor>,
     /// Combinations of unknowns that the model asks for.
     pub combinations: Vec<SystemCombination>,
     /// Number of independent directions that change no output.
@@ -335,6 +338,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             .collect(),
         time: None,
         constraints: model.constraint_texts(),
+        constraint_factors: model.factors.clone(),
         combinations: asked
             .map(|(c, verdict)| SystemCombination { expression: c.text.clone(), degree: verdict.degree })
             .collect(),

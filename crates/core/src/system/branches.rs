@@ -19,6 +19,9 @@ pub struct BranchSide {
     pub condition: String,
     /// True if the argument depends on the time.
     pub of_time: bool,
+    /// True if the file gives the value of the argument at the start: known starts and constants, and no second
+    /// segment.
+    pub given: bool,
 }
 
 /// True if the values that a slot takes are not all given.
@@ -27,6 +30,15 @@ fn varies(compiled: &Compiled, slot: usize) -> bool {
         Role::Constant(c) => (0..compiled.experiments.len()).any(|e| compiled.constants(e)[c].is_none()),
         _ => true,
     }
+}
+
+/// True if the value of a node at the start of the first segment is given: it depends on states with given starts
+/// and on given constants alone.
+fn is_given(compiled: &Compiled, node: usize) -> bool {
+    slots_of(&compiled.dag, node).into_iter().all(|s| match compiled.roles[s] {
+        Role::State(i) => compiled.starts[i].is_some_and(|start| !open(compiled, start)),
+        _ => !varies(compiled, s),
+    })
 }
 
 /// True if a node depends on something that is not given.
@@ -96,7 +108,8 @@ pub(super) fn sides(model: &SystemModel, compiled: &Compiled, points: &[Signs; 2
             }
         };
         let of_time = slots_of(&compiled.dag, node).into_iter().any(|s| compiled.roles[s] == Role::Time);
-        out.push(BranchSide { condition, of_time });
+        let given = segments == 1 && is_given(compiled, node);
+        out.push(BranchSide { condition, of_time, given });
     }
     out
 }

@@ -80,6 +80,7 @@ impl SystemModel {
         if !self.constraints.is_empty() {
             out.push("constraints".into());
             out.extend(self.constraints.iter().map(text));
+            out.extend(self.factors.iter().flat_map(|w| [w.constraint.clone(), w.factor.clone()]));
         }
         out
     }

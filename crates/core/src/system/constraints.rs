@@ -6,6 +6,9 @@
 
 use std::collections::BTreeSet;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use obsdeg_exact::polynomial::{interpolate, root};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
@@ -23,6 +26,20 @@ const MAX_DEGREE: usize = 400;
 /// polynomial up to the prime, 61 squares of it and as many products by halves, each with its remainder, and a division of
 /// two numbers for every pair of points.
 const PER_SQUARE: u64 = 512;
+
+/// A constraint that is a product, and the factor that was taken for it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ConstraintFactor {
+    /// Constraint that is a product, as written.
+    pub constraint: String,
+    /// Factor that is zero where the verdicts are judged.
+    pub factor: String,
+    /// Other factors of the constraint, by which it could hold as well.
+    pub others: Vec<String>,
+    /// True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the
+    /// first with a real point.
+    pub given: bool,
+}
 
 /// The slots that a node depends on.
 pub(crate) fn slots_of(dag: &Dag, node: usize) -> BTreeSet<usize> {

@@ -43,13 +43,14 @@ impl<S: Values> Maker<'_, '_, S> {
             let bits = CLOSE[attempt / 2 % CLOSE.len()];
             self.near_given(point.experiment, &free, &mut values, bits, &mut own);
         }
-        self.field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, &mut own, self.work)?;
-        let distinct = distinct(&compiled.constraints);
+        let distinct = turned(distinct(&compiled.constraints), attempt);
+        let place = |c: usize| compiled.constraints.iter().position(|node| *node == distinct[c]).unwrap_or(0);
+        let held = self.field.hold(&compiled.dag, &distinct, &mut values, &free, &mut own, self.work);
+        held.map_err(|reason| reason.of(place))?;
         let independent = self.independent(&distinct, &values, &all)?;
         if independent.len() + self.layout.dependent < distinct.len() {
             let dependent = (0..distinct.len()).find(|c| !independent.contains(c)).unwrap_or(0);
-            let place = compiled.constraints.iter().position(|node| *node == distinct[dependent]);
-            return Err(Singular::Dependent(place.unwrap_or(0)));
+            return Err(Singular::Dependent(place(dependent)));
         }
         for (slot, x) in values.into_iter().enumerate() {
             match (&mut point.signals[slot], &mut point.initial[slot]) {
@@ -159,4 +160,12 @@ impl<S: Values> Maker<'_, '_, S> {
 pub(super) fn distinct(nodes: &[usize]) -> Vec<usize> {
     let first = |(i, node): (usize, &usize)| (!nodes[..i].contains(node)).then_some(*node);
     nodes.iter().enumerate().filter_map(first).collect()
+}
+
+/// A list that begins with another of its entries at each attempt. Newton's steps follow the first constraints with
+/// independent gradients; where only others are independent at the point, these must come first.
+pub(super) fn turned(mut nodes: Vec<usize>, attempt: usize) -> Vec<usize> {
+    let turn = attempt % nodes.len().max(1);
+    nodes.rotate_left(turn);
+    nodes
 }

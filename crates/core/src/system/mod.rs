@@ -14,6 +14,7 @@ pub(crate) mod dag;
 mod elimination;
 mod error;
 mod evaluation;
+mod factors;
 mod fibre;
 mod formula;
 mod functions;
@@ -39,6 +40,7 @@ pub(crate) mod work;
 
 pub use answer::*;
 pub use branches::BranchSide;
+pub use constraints::ConstraintFactor;
 pub use dag::{Dag, DagError, Op};
 pub use error::ModelError;
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
-use super::constraints::{below, slots_of};
+use super::constraints::{ConstraintFactor, below, slots_of};
 use super::dag::{Dag, DagError, Op};
 use super::error::ModelError;
 use super::work::WorkLimit;
@@ -176,6 +176,8 @@ pub struct SystemModel {
     pub segments: Vec<Segment>,
     /// What is zero at the start of every experiment: expressions of states, parameters and constants, with the equation as their text.
     pub constraints: Vec<PlacedExpression>,
+    /// Factors that stand for constraints that are products.
+    pub factors: Vec<ConstraintFactor>,
     /// What is not negative where the constraints hold: the other sides of those with a root alone on the
     /// left, which is taken squared.
     pub not_negative: Vec<PlacedExpression>,

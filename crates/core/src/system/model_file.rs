@@ -498,7 +498,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let message = "the key `name` is missing; expected it at the top of the file".into();
         return Err(r.at(0..text.chars().next().map_or(0, char::len_utf8), "the model file".into(), message));
     }
-    Ok(model)
+    Ok(model.by_one_factor())
 }
 
 /// Where keys stand in a text: the line that a key begins, or its place in an inline table, of the first part of the text.

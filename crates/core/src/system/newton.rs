@@ -26,6 +26,11 @@ const NEAR: f64 = -16.0;
 const FAR: f64 = 0.5;
 /// Least gain of that logarithm by a step from far away, or half of it.
 const GAIN: f64 = 0.2;
+/// Relative residual, as a power of two, below which a constraint holds at values of double precision.
+const HELD: f64 = -40.0;
+/// Change of a constraint where its point changes by its size, relative to its terms and as a power of two, below
+/// which its gradient vanishes there.
+const VANISHES: f64 = -16.0;
 /// Bits by which a step may be longer than the point is far from zero.
 const LONGEST: f64 = 6.0;
 
@@ -312,6 +317,22 @@ pub(super) fn hold_by_newton<const N: usize>(
         linear = newton.linear(values).ok_or_else(|| failed(nowhere))?;
     }
     Err(failed(NotHeld::Constraint(linear.worst)))
+}
+
+/// The first constraint that holds at a point where its gradient vanishes.
+pub(super) fn vanishing<const N: usize>(
+    dag: &Dag,
+    constraints: &[usize],
+    values: &[Ball<N>],
+    free: &[bool],
+    work: &Work,
+) -> Option<usize> {
+    let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
+    (0..constraints.len()).find(|&c| {
+        let sums = vec![Sum::new(dag, constraints[c])];
+        let linear = Newton { dag, sums, places: places.clone(), work }.linear(values);
+        linear.is_some_and(|at| at.off < HELD && at.off - at.shift < VANISHES)
+    })
 }
 
 /// Residual of the constraint that is farthest off, relative to its terms, as a power of two; `None` where

@@ -202,16 +202,15 @@ impl Reader<'_> {
         &self,
         equation: &Spanned<String>,
     ) -> Result<(Vec<PlacedExpression>, Option<PlacedExpression>), ModelError> {
-        let (text, span) = (equation.get_ref(), equation.span());
-        let offset = self.text[span.clone()].find(text.as_str()).map(|o| span.start + o);
+        let (text, span) = (equation.get_ref().trim(), equation.span());
+        let offset = self.text[span.clone()].find(text).map(|o| span.start + o);
         let place = Place { what: format!("the constraint {}", excerpt(text)), offset };
         let (read, size) = parse_equation(text, &self.shapes).map_err(|e| {
             let mut error = place.error(e.to_string(), e.span());
             error.span.get_or_insert(span);
             error
         })?;
-        let part =
-            |expression| PlacedExpression { text: text.trim().into(), expression, place: place.clone() };
+        let part = |expression| PlacedExpression { text: text.into(), expression, place: place.clone() };
         Ok((read.entries.into_iter().map(part).collect(), size.map(part)))
     }
 

@@ -3,10 +3,10 @@
 use obsdeg_exact::{Ball, Reals, SplitMix64};
 
 use super::error::ModelError;
-use super::held::{CLOSE, distinct};
+use super::held::{CLOSE, distinct, turned};
 use super::intervals::range;
 use super::model::{Compiled, SystemModel};
-use super::newton::{hold_by_newton, off};
+use super::newton::{hold_by_newton, off, vanishing};
 use super::rows::{Layout, Maker};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::{NotHeld, Values};
@@ -22,6 +22,9 @@ const DEPENDENT: usize = 20;
 const NEARBY: usize = 3;
 /// Relative residual, as a power of two, below which a constraint holds at such a point.
 const HOLDS: f64 = -128.0;
+
+/// Bits of the values of a file.
+const DOUBLE: i64 = 52;
 
 /// Outcome of one start.
 enum Found {
@@ -67,12 +70,20 @@ fn sought(
     let mut rng = model.random(seed, "real points");
     let free = maker.free(0);
     let mut dependent: Vec<usize> = Vec::new();
+    if maker.gives_start()
+        && let Some(mut values) = maker.values(&mut rng.clone(), 0)
+    {
+        maker.near_given(0, &free, &mut values, DOUBLE, &mut rng.clone());
+        if let Some(c) = vanishing(&compiled.dag, &compiled.constraints, &values, &free, work) {
+            return Err(dependent_at_points(model, c));
+        }
+    }
     for attempt in 0..TRIES {
         let Some(mut values) = maker.values(&mut rng, attempt * FARTHER) else { continue };
         if let Some(&bits) = CLOSE.get(attempt) {
             maker.near_given(0, &free, &mut values, bits, &mut rng);
         }
-        match from_start(&maker, values, &free, &mut rng) {
+        match from_start(&maker, values, &free, attempt, &mut rng) {
             Ok(Found::Point(following)) => return Ok(following),
             Ok(Found::Dependent(c)) => dependent.push(c),
             Ok(Found::Nothing) => {}
@@ -155,10 +166,11 @@ fn from_start(
     maker: &Maker<'_, '_, Reals<4>>,
     mut values: Vec<Ball<4>>,
     free: &[bool],
+    attempt: usize,
     rng: &mut SplitMix64,
 ) -> Result<Found, Refused> {
     let compiled = maker.compiled;
-    let (dag, all) = (&compiled.dag, distinct(&compiled.constraints));
+    let (dag, all) = (&compiled.dag, turned(distinct(&compiled.constraints), attempt));
     let place = |c: usize| compiled.constraints.iter().position(|node| *node == all[c]).unwrap_or(0);
     match hold_by_newton(dag, &all, &mut values, free, maker.work) {
         Ok(()) => {}

@@ -17,6 +17,17 @@ pub(crate) enum NotHeld {
     Refused,
 }
 
+impl NotHeld {
+    /// The same, with the constraint that `place` names for its own.
+    pub(super) fn of(self, place: impl FnOnce(usize) -> usize) -> Self {
+        match self {
+            Self::Constraint(c) => Self::Constraint(place(c)),
+            Self::Dependent(c) => Self::Dependent(place(c)),
+            Self::Refused => Self::Refused,
+        }
+    }
+}
+
 impl From<Refused> for NotHeld {
     fn from(_: Refused) -> Self {
         Self::Refused
