@@ -244,3 +244,82 @@ fn nothing_is_met_that_the_bench_uses_up() {
         }
     }
 }
+
+const FIVE: [&str; 14] = [
+    "--angles",
+    "NUE",
+    "--angles",
+    "USE",
+    "--angles",
+    "ENU",
+    "--angles",
+    "EUS",
+    "--angles",
+    "DSW",
+    "--carry",
+    "inertial",
+    "--latitude",
+    "28.2",
+];
+
+/// The bench of a run counts by the weights of the run. By hand (dense least squares with the noise and the priors of
+/// the run, in numpy): sigma of D_FY 8.298e-4 deg/h, total 0.004360, where the predicted weights give 0.00582.
+#[test]
+fn the_bench_of_a_run_counts_by_its_own_weights() {
+    let arguments =
+        ["--bench", "K0=20,M=5,latitude=10", "--requirement", "D_FY=0.005", "--format", "json", "-q"];
+    let answer = json(&[&["simulate"], &FIVE[..], &arguments[..]].concat());
+    let margin = answer["run"]["requirements"]["worst"]["margin"].as_f64().expect("a margin");
+    assert!((margin - 0.005 / 0.004360).abs() < 2e-3, "{margin}");
+    // what is stated of the run is what the prediction counts with
+    let mut stated = vec!["--drift-noise".to_string(), "0.01 deg/h".into()];
+    for q in answer["quantities"].as_array().expect("a list") {
+        let [name, prior] = [&q["name"], &q["prior_sigma"]];
+        stated.extend(["--prior".into(), format!("{}={prior}", name.as_str().expect("a name"))]);
+    }
+    let stated: Vec<&str> = stated.iter().map(String::as_str).collect();
+    let answer = json(&[&["simulate"], &FIVE[..], &arguments[..], &stated[..]].concat());
+    let of = |r: &serde_json::Value| r["worst"]["margin"].as_f64().expect("a margin");
+    let [run, predicted] = [of(&answer["run"]["requirements"]), of(&answer["requirements"])];
+    assert!((run / predicted - 1.0).abs() < 1e-6, "{run} {predicted}");
+}
+
+/// A size that has no computed effect is refused, one of an unknown is said to count nothing, and a cross-check says
+/// that it has no bench.
+#[test]
+fn sizes_that_count_nothing_are_said() {
+    let said = |arguments: &[&str]| -> String {
+        let output = run(arguments);
+        let text = format!("{}{}", crate::program::stdout(&output), stderr(&output));
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let five = |command: &str, rest: &[&str]| said(&[&[command], &FIVE[..], rest, &["-q"][..]].concat());
+    let required = ["--requirement", "D=0.1", "--bench"];
+    for command in ["simulate", "compare"] {
+        let of = match command {
+            "compare" => {
+                said(&["compare", BENCH, "--requirement", "D=0.1", "--bench", "attitude_x@6=100", "-q"])
+            }
+            _ => five(command, &[&required[..], &["attitude_x@6=100"]].concat()),
+        };
+        assert!(of.contains("no error is `attitude_x@6`; the scheme has 5 positions"), "{of}");
+    }
+    let turning: Vec<&str> = FIVE.iter().map(|a| if *a == "NUE" { "NUE@X_p:360" } else { *a }).collect();
+    let of = said(&[&["simulate"], &turning[..], &required[..], &["attitude=100", "-q"][..]].concat());
+    assert!(of.contains("not computed where a position rotates"), "{of}");
+    let of = said(&[&["simulate"], &turning[..], &["--requirement", "D=0.1", "-q"][..]].concat());
+    assert!(of.contains("attitudes are not computed here"), "{of}");
+    let of = five("simulate", &[&required[..], &["D_FX=100"]].concat());
+    assert!(of.contains("No size of the bench counts: D_FX is estimated. Met while"), "{of}");
+    assert!(!of.contains("With the bench every"), "{of}");
+    let of = five("simulate", &[&required[..], &["D_FX=100,K1=1"]].concat());
+    assert!(of.contains("Of the bench, D_FX is estimated: its size does not count."), "{of}");
+    let of = said(&["crosscheck", BENCH, "-q"]);
+    assert!(of.contains("the bench is no part of a cross-check"), "{of}");
+    let of = said(&["design", "--positions", "4", "--bench", "attitude_x@7=50", "-q"]);
+    assert!(of.contains("the scheme has 4 positions"), "{of}");
+    for wrong in ["K0=x", "K0=20ug", "K0"] {
+        let of = five("simulate", &["--bench", wrong]);
+        assert!(of.contains("as in K0=20 or latitude=10"), "{of}");
+    }
+}

@@ -291,9 +291,10 @@ fn products_are_judged_by_the_factor_that_is_named() {
         (&["x*y = 0"], point(2.0, 0.0), &["y = 0"], "y", &["x"]),
         (&["x*y = 0"], point(2.0, 3.0), &["x = 0"], "x", &["y"]),
         (&["0 = (x - y)*(x + y - a)"], String::new(), &["x - y = 0"], "x - y", &["x + y - a"]),
-        (&["(x^2 + 1)*(y - 2)^2/a = 0"], String::new(), &["y - 2 = 0"], "y - 2", &["x^2 + 1"]),
+        (&["(x^2 + 1)*(y - 2)^2/3 = 0"], String::new(), &["y - 2 = 0"], "y - 2", &["x^2 + 1"]),
         (&["x = 1", "-(x*y) = 0"], String::new(), &["x = 1", "y = 0"], "y", &["x"]),
         (&["x*y*(x + y + a) = 0"], point(1.0, 1.0), &["x = 0"], "x", &["y", "x + y + a"]),
+        (&["y = 0", "x*y = 0"], String::new(), &["y = 0"], "y", &["x"]),
     ] {
         for seed in 1..=6 {
             let a =
@@ -338,5 +339,70 @@ fn a_vanishing_gradient_at_given_values_is_said() {
     ] {
         let said = refusal(&[constraint], &format!("[simulation]\nvalues={{x={x:?}, y={y:?}}}"));
         assert!(said.contains("gradient vanishes"), "{constraint}: {said}");
+    }
+}
+
+/// The factor that is taken leaves most free, is one at which the outputs are defined, and is one alone for all
+/// experiments; a quotient of unknowns, and a product that a zero makes of everything, is none.
+#[test]
+fn factors_are_taken_that_can_be() {
+    let answer = |text: &str| {
+        let model = model_file::read(&format!("name='m'\n{text}")).unwrap_or_else(|e| panic!("{text}: {e}"));
+        let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+        analyze_system(&model, options).unwrap_or_else(|e| panic!("{text}: {e}"))
+    };
+    let taken = |a: &SystemAnalysis| -> Vec<String> {
+        a.constraint_factors.iter().map(|f| f.factor.clone()).collect()
+    };
+    let three = "parameters=['x', 'y', 'z']\n[outputs]\n";
+    // the set of both is y = 0, or that of the shorter product: rank of the one constraint and of the output
+    for (constraints, output, factors, rank) in [
+        ("'x*y = 0', 'y*(x - 1) = 0'", "s='z'", &["y", "y"][..], 2),
+        ("'x*y = 0', 'y*x*z = 0'", "s='z'", &["y", "y"], 2),
+        ("'x*y = 0', 'y*(z - 1) = 0'", "s='z + x'", &["y", "y"], 2),
+        ("'x*y = 0'", "s='y/x + z'", &["y"], 2),
+        ("'(x + 1)*(y - x) = 0'", "s='log(x) + z'", &["y - x"], 2),
+        ("'x*y/x^2 = 0'", "s='z'", &[], 2),
+    ] {
+        let a = answer(&format!("constraints=[{constraints}]\n{three}{output}"));
+        assert_eq!(
+            (taken(&a).as_slice(), a.rank),
+            (&factors.iter().map(|f| f.to_string()).collect::<Vec<_>>()[..], rank),
+            "{constraints}"
+        );
+    }
+    let runs = "constraints=['x*(y - 1) = 0']\nexperiments=2\n[states]\nx='0'\ny='0'\n[outputs]\ns='x + y'\n[simulation.values]\n";
+    for (values, factors) in
+        [("'x@1'=0\n'y@1'=2\n'x@2'=3\n'y@2'=1", &[][..]), ("'x@1'=0\n'y@1'=2\n'x@2'=0\n'y@2'=5", &["x"])]
+    {
+        assert_eq!(taken(&answer(&format!("{runs}{values}"))), factors, "{values}");
+    }
+}
+
+/// Where sums hold in several ways, the way is that of given values. By hand: x*y = x*z at x = 0 leaves y free and
+/// unseen by z, at y = z it leaves x; x^2 = y^2 with x + y seen is of rank 1 at x = -y.
+#[test]
+fn given_values_choose_the_way() {
+    for (constraint, output, values, rank, observable) in [
+        ("x*y = x*z", "z", "x=0, y=2, z=1", 2, &["x", "z"][..]),
+        ("x*y = x*z", "z", "x=3, y=1, z=1", 2, &["y", "z"]),
+        ("x^2 = y^2", "x + y", "x=1, y=-1, z=1", 1, &[]),
+        ("x^2 = y^2", "x + y", "x=1, y=1, z=1", 2, &["x", "y"]),
+        ("x^2 = x", "x*y", "x=1, y=5, z=1", 2, &["x", "y"]),
+        ("x^2 = x", "x*y", "x=0, y=5, z=1", 1, &["x"]),
+    ] {
+        for seed in 1..=6 {
+            let text = format!(
+                "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\ns='{output}'\n[simulation]\nvalues={{{values}}}"
+            );
+            let model = model_file::read(&text).expect("a model");
+            let options = SystemOptions { seed, solutions: false, ..SystemOptions::default() };
+            let a = analyze_system(&model, options)
+                .unwrap_or_else(|e| panic!("{constraint} {values} {seed}: {e}"));
+            let seen = a.quantities.iter().filter(|q| q.degree.is_some()).map(|q| q.name.as_str());
+            let mut seen: Vec<&str> = seen.collect();
+            seen.sort_unstable();
+            assert_eq!((a.rank, &seen[..]), (rank, observable), "{constraint} {values} {seed}");
+        }
     }
 }

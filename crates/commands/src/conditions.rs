@@ -94,6 +94,9 @@ pub struct MeasurementOptions {
 
 /// Reads a size of a bench: `K0=20`.
 fn benched(text: &str) -> Result<Assignment, String> {
+    if text.parse::<Assignment>().is_err() {
+        return Err("expected NAME=NUMBER in the unit of the error, as in K0=20 or latitude=10".into());
+    }
     let a = assigned(ranges::BENCH)(text)?;
     if may_be_omitted(&a.name) {
         return Ok(a);

@@ -183,6 +183,8 @@ mod tests {
             torquers_in_turns: false,
             error_bound: None,
             not_classified: None,
+            estimated: Vec::new(),
+            attitudes: true,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_evidence::crosscheck::{
-    Agreement, Check, Control, Counts, CrossCheck, NullEvidence, QuantityEvidence, Statistic,
+    Agreement, Check, Control, Counts, CrossCheck, MonteCarlo, NullEvidence, QuantityEvidence, Statistic,
 };
 
 use crate::Answer;
@@ -193,6 +193,11 @@ fn whole(c: &CrossCheck) -> Block {
     Block::table("The filter as a whole", columns, rows)
 }
 
+/// True if the statistics of the Monte Carlo runs are within their bands.
+fn fits(d: &MonteCarlo) -> bool {
+    d.white && d.statistics.iter().all(|s| s.pass)
+}
+
 /// What a reader must know before the rows.
 fn lead(c: &CrossCheck) -> Vec<String> {
     let mut out: Vec<String> = warning(&c.conditions).into_iter().collect();
@@ -205,6 +210,12 @@ fn lead(c: &CrossCheck) -> Vec<String> {
         out.push(
             "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \
              drifts of its own; d knows of the slews"
+                .into(),
+        );
+    }
+    if c.bench.is_some() {
+        out.push(
+            "the bench is no part of a cross-check: it changes no verdict, and no record here has its errors"
                 .into(),
         );
     }
@@ -265,6 +276,9 @@ impl Answer for CrossCheck {
                 "filter and exact verdicts agree as far as resolvable"
             }
             (true, _) => "filter and exact verdicts agree",
+            (false, true) if self.monte_carlo.unsettled > 0 && fits(&self.monte_carlo) => {
+                "filter and exact verdicts agree, but some Monte Carlo runs (d) did NOT settle"
+            }
             (false, true) => {
                 "filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter"
             }

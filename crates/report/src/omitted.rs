@@ -4,6 +4,7 @@ use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_evidence::simulation::omitted::{
     Advice, AdviceKind, Budget, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
+    SuspectedChange,
 };
 
 use crate::document::{Block, left, number, right};
@@ -15,6 +16,8 @@ const BUDGETS: usize = 3;
 const LINES: usize = 6;
 /// Silent errors that a calibration names in its first sentence.
 const SILENT: usize = 12;
+/// Smallest bound on a probability that is printed.
+const SMALLEST: f64 = 1e-300;
 /// Percent of the squared total from which on a source has a line of its own in a printed budget.
 const LEAST: f64 = 0.05;
 
@@ -208,9 +211,17 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         "no effect: enters no sample; silent: no record of this scheme shows it; visible: a record shows it from the \
          size given (exact classes, by ranks)"
             .into(),
-        "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each position by itself, \
-         about each platform axis"
-            .into(),
+        match of.attitudes {
+            true => {
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each position by itself, \
+                 about each platform axis"
+            }
+            false => {
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitudes are not computed for rotating \
+                 positions, nor for more than 64"
+            }
+        }
+        .into(),
     ];
     if !of.torquers_in_turns {
         out.push("GS and GM act at the earth rate alone: the turns between positions are not stated".into());
@@ -251,9 +262,15 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
 
 /// The sentence of the first lines: what would use up the margin without a bench, or that the bench counts.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
+    let estimated = of.estimated.join(", ");
     if bench || !all_met {
-        return None;
+        let said = || format!("Of the bench, {estimated} is estimated: its size does not count.");
+        return (!of.estimated.is_empty()).then(said);
     }
+    let stated = match of.estimated.is_empty() {
+        true => "No bench is stated (--bench).".to_string(),
+        false => format!("No size of the bench counts: {estimated} is estimated."),
+    };
     let limit = |f: &FamilyEffect| {
         let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| below(u.size));
         let alone = if one == all { String::new() } else { format!(" (one term alone: {one})") };
@@ -262,8 +279,9 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
     let listed: Vec<String> = of.families.iter().filter_map(limit).collect();
     (!listed.is_empty()).then(|| {
         format!(
-            "No bench is stated (--bench). Met while, each family by itself, 1 sigma of each of its terms: {}.",
-            listed.join(", ")
+            "{stated} Met while, each family by itself, 1 sigma of each of its terms: {}{}.",
+            listed.join(", "),
+            if of.attitudes { "" } else { "; attitudes are not computed here" }
         )
     })
 }
@@ -304,24 +322,35 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
         .collect();
     let verb = if errors.len() > 1 { "explain" } else { "explains" };
     out.push(format!(
-        "{} {verb} the residuals: chi-square falls by {} (probability by chance at most {:.1e})",
+        "{} {verb} the residuals: chi-square falls by {} (probability by chance {})",
         errors.join(" and "),
         number(s.chi_square_fall),
-        s.probability
+        match s.probability > SMALLEST {
+            true => format!("at most {:.1e}", s.probability),
+            false => format!("below {SMALLEST:e}"),
+        }
     ));
     if !s.indistinguishable.is_empty() {
         out.push(format!("this record does not distinguish it from {}", s.indistinguishable.join(", ")));
     }
-    for c in &s.changes {
-        out.push(format!(
-            "with it, {} is {} {}, not {}",
-            c.unknown,
-            number(c.with),
-            c.unit,
-            number(c.estimate)
-        ));
-    }
+    let with = if errors.len() > 1 { "them" } else { "it" };
+    out.extend(s.changes.iter().map(|c| change(c, s.indistinguishable.len(), with)));
     out
+}
+
+/// Estimate with suspected errors among the unknowns; a range where others of the same residuals change it otherwise.
+fn change(c: &SuspectedChange, others: usize, with: &str) -> String {
+    let (unknown, unit, estimate) = (&c.unknown, &c.unit, number(c.estimate));
+    let [lowest, highest] = [c.lowest, c.highest].map(number);
+    match others {
+        0 => format!("with {with}, {unknown} is {} {unit}, not {estimate}", number(c.with)),
+        _ if lowest == highest => {
+            format!("with any of these, {unknown} is {lowest} {unit}, not {estimate}")
+        }
+        _ => format!(
+            "with one of these, {unknown} is between {lowest} and {highest} {unit}, by which of them it is, not {estimate}"
+        ),
+    }
 }
 
 /// The exact classes of an analysis, a line per class; silent errors with the unknowns that they change.

@@ -144,7 +144,7 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
             _ => "it is linearised before the drifts are known",
         };
         out.push(format!(
-            "do not trust the sigmas of this filter where the small-angle model does not hold: {why}; \
+            "do not trust the sigmas of this filter where the small-angle model does not hold, at the truth or within the prior of psi: {why}; \
              one run that is consistent does not show that they are right; the iterated filter (--filter iterated) is linearised along the \
              whole run"
         ));
@@ -205,7 +205,7 @@ fn priors(quantities: &[Estimate], filter: FilterKind) -> Vec<String> {
 }
 
 /// Advice where one run is consistent and says little.
-pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the small-angle model does not hold, and the \
+pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the small-angle model does not hold, at the truth or within the prior of psi, and the \
      filter is not linearised along the whole run. Use the iterated filter (--filter iterated)";
 
 /// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody

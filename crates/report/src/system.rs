@@ -215,8 +215,20 @@ impl Answer for SystemAnalysis {
         }));
         if !self.constraints.is_empty() {
             // linear ones hold in one way, products in that of the factor taken
-            let taken = |c: &String| self.constraint_factors.iter().any(|w| w.constraint == *c);
-            let several = self.constraints.iter().any(|c| c.contains(['*', '^']) && !taken(c));
+            let left = |c: &String| {
+                let factor = self.constraint_factors.iter().find(|w| w.constraint == *c);
+                factor.map_or(c.clone(), |w| w.factor.clone())
+            };
+            // a name may stand for a product
+            let defined = |c: &String| {
+                self.equations.iter().any(|e| {
+                    let (name, _) = e.split_once(" = ").unwrap_or_default();
+                    !name.is_empty()
+                        && c.split(|x: char| !x.is_alphanumeric() && x != '_').any(|word| word == name)
+                })
+            };
+            let several =
+                self.constraints.iter().map(left).any(|c| c.contains(['*', '^', '/']) || defined(&c));
             assumed.push(format!(
                 "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
                 self.constraints.join(", "),
@@ -235,7 +247,7 @@ impl Answer for SystemAnalysis {
                     w.factor,
                     match w.given {
                         true => "which the values under [simulation.values] hold",
-                        false => "the first of them with a real point",
+                        false => "the first of them that leaves most free",
                     }
                 )
             }));

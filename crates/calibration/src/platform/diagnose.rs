@@ -4,12 +4,13 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{AZIMUTH, Scheme};
+use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
+use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
 use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
@@ -364,7 +365,10 @@ impl Parts<'_> {
             sigma: sigma(e).ok_or(Miss::NotObservable),
         });
         let mut out = Requirements::of(Basis::Record, claims);
-        out.with_bench = !self.conditions.bench.is_empty();
+        let stated = &self.conditions.bench;
+        let estimated = |p: &Platform| Bench::estimated(stated, p).len();
+        out.with_bench =
+            self.problem.runs.first().is_some_and(|run| estimated(&run.plan.platform) < stated.len());
         Some(out).filter(|r| r.stated > 0)
     }
 

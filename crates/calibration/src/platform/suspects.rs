@@ -6,14 +6,16 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{OmittedModel, OmittedTerm};
-use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
+use obsdeg_core::model::{OmittedModel, OmittedTerm, Platform};
+use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::simulation::omitted::{
     Bench, ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
-use obsdeg_evidence::simulation::{SegmentKind, shown_unit, si_per_shown};
+use obsdeg_evidence::simulation::{
+    Attained, Conditions, SegmentKind, SimulationError, is_rate, shown_unit, si_per_shown,
+};
 
 use super::CalibrationError;
 use super::estimate::{Estimate, Problem};
@@ -44,12 +46,16 @@ pub(super) fn omitted(
     let class = |j: usize| classes.as_ref().map(|v| v.terms[j].class);
     let shown = (0..model.terms().len()).map(|j| class(j).is_none_or(|c| c == OmittedClass::Visible));
     let tested = tested(problem, estimate, &model, shown.collect())?;
+    let exact = Silent::of(&first.plan.platform, &model, classes.as_ref(), seed).ok();
     let silent = classes.iter().flat_map(|v| v.terms.iter().enumerate());
     let silent = silent.filter(|(_, t)| t.class == OmittedClass::Silent).map(|(j, t)| SilentError {
         name: t.name.clone(),
         unit: model.terms()[j].unit.into(),
         changes: t.changes.clone(),
-        sensitivities: tested.per_unit(j, model.terms()[j].unit, &t.changes),
+        sensitivities: exact.as_ref().map_or_else(
+            || tested.per_unit(j, model.terms()[j].unit, &t.changes),
+            |of| of.per_unit(j, &t.changes),
+        ),
     });
     let suspicion = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
     let found = Omitted {
@@ -57,6 +63,8 @@ pub(super) fn omitted(
         suspicion,
         silent: silent.filter(|s| s.changes.iter().any(|c| !c.starts_with("psi"))).collect(),
     };
+    let scheme = platform.scheme();
+    Bench::check(bench, scheme.positions.len(), scheme.rotates()).map_err(SimulationError::from)?;
     let size =
         |t: &OmittedTerm| Bench::size_of(bench, t.family, &t.name).unwrap_or(0.0) * si_per_shown(t.unit);
     let sizes: Vec<f64> = model.terms().iter().map(size).collect();
@@ -64,6 +72,39 @@ pub(super) fn omitted(
         |changes: &[f64]| changes.iter().zip(&sizes).map(|(b, s)| (b * s).powi(2)).sum::<f64>().sqrt();
     let added = tested.changes.iter().map(|(name, unit, of)| (name.clone(), added(of) / si_per_shown(unit)));
     Ok((found, added.collect()))
+}
+
+/// Changes by errors that no record shows: they do not depend on the weights, so that no prior takes part.
+struct Silent<'a> {
+    platform: &'a Platform,
+    /// Change of every unknown per unit of every error, in shown units.
+    changes: Vec<Vec<f64>>,
+}
+
+impl<'a> Silent<'a> {
+    fn of(
+        platform: &'a Platform,
+        model: &OmittedModel,
+        classes: Option<&OmittedVerdicts>,
+        seed: u64,
+    ) -> Result<Self, SimulationError> {
+        let attained = Attained::new(platform.scheme(), &Conditions::default(), seed)?;
+        let changes = attained.influence(model)?.shown(platform.units(), &attained.sigmas, model, classes);
+        Ok(Self { platform, changes })
+    }
+
+    /// Changes of the unknowns `of` per unit of error `j`.
+    fn per_unit(&self, j: usize, of: &[String]) -> Vec<ChangePerUnit> {
+        let own = self.platform.names().iter().enumerate().filter(|(c, name)| {
+            of.contains(name) && is_rate(self.platform.units()[*c]) && self.changes[*c][j] != 0.0
+        });
+        own.map(|(c, name)| ChangePerUnit {
+            unknown: name.clone(),
+            unit: shown_unit(self.platform.units()[c]).into(),
+            per_unit: self.changes[c][j],
+        })
+        .collect()
+    }
 }
 
 /// Sums of all runs, and the change of every coefficient of the platform per SI unit of every error.
@@ -185,15 +226,31 @@ fn suspicion(
             sigma: sigma / scale,
         }
     });
+    // each of a group explains the residuals as well, and may change the estimates in another way
+    let alone = |&j: &usize| vec![(j, tested.score.against[j] / tested.score.products[(j, j)])];
+    let best: Vec<(usize, f64)> =
+        found.errors.iter().zip(&found.estimates).map(|(&j, e)| (j, e[0])).collect();
+    let members: Vec<Vec<(usize, f64)>> =
+        std::iter::once(best).chain(found.group.iter().map(alone)).collect();
     let mut changes: Vec<(f64, SuspectedChange)> = Vec::new();
     for (name, unit, per_unit) in &tested.changes {
         let Some(q) = quantities.iter().find(|q| q.name == *name) else { continue };
         let (Some(estimate), Some(sigma)) = (q.estimate, q.sigma) else { continue };
-        let moved = found.errors.iter().zip(&found.estimates).map(|(&j, [size, _])| per_unit[j] * size);
-        let moved = moved.sum::<f64>() / si_per_shown(unit);
+        let moved = |of: &Vec<(usize, f64)>| of.iter().map(|(j, size)| per_unit[*j] * size).sum::<f64>();
+        let moved: Vec<f64> = members.iter().map(|of| moved(of) / si_per_shown(unit)).collect();
         let unit = shown_unit(unit).to_string();
-        let change = SuspectedChange { unknown: name.clone(), unit, estimate, with: estimate - moved };
-        changes.push(((moved / sigma).abs(), change));
+        let lowest = moved.iter().map(|m| estimate - m).fold(f64::INFINITY, f64::min);
+        let highest = moved.iter().map(|m| estimate - m).fold(f64::NEG_INFINITY, f64::max);
+        let change = SuspectedChange {
+            unknown: name.clone(),
+            unit,
+            estimate,
+            with: estimate - moved[0],
+            lowest,
+            highest,
+        };
+        let most = moved.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
+        changes.push((most / sigma, change));
     }
     changes.sort_by(|a, b| b.0.total_cmp(&a.0));
     Suspicion {

@@ -62,6 +62,36 @@ fn an_accelerometer_zero_is_named() {
     assert!(!c.consistent);
 }
 
+/// Members of a group explain the residuals equally and change the estimates in other ways: a range holds what the
+/// estimate is with the true one, which is not the one named first.
+#[test]
+fn a_group_changes_estimates_by_a_range() {
+    let (mut ranges, mut others) = (0, 0);
+    for seed in 0..10 {
+        let bench = five(8.0, seed);
+        let c = calibrated(&bench);
+        let Some(found) = c.omitted.suspicion.as_ref() else { continue };
+        for s in &found.changes {
+            assert!(s.lowest <= s.with && s.with <= s.highest, "{s:?}");
+            ranges += usize::from(s.lowest < s.highest);
+            let alone = found.indistinguishable.is_empty();
+            assert!(!alone || s.lowest == s.highest, "{s:?}");
+            others += usize::from(!alone);
+        }
+        let d_iz = found.changes.iter().find(|s| s.unknown == "D_IZ");
+        let sigma = c.quantities.iter().find(|q| q.name == "D_IZ").and_then(|q| q.sigma).expect("a sigma");
+        let near = |s: &obsdeg_evidence::simulation::omitted::SuspectedChange| {
+            s.lowest - 4.0 * sigma < -0.028 && -0.028 < s.highest + 4.0 * sigma
+        };
+        println!("{seed}: {found:?}");
+        let named = found.errors.iter().map(|e| &e.name).chain(&found.indistinguishable);
+        if named.clone().any(|n| n == "K0_Y") {
+            assert!(d_iz.is_some_and(near), "{seed}: {found:?}");
+        }
+    }
+    assert!(ranges > 0 && others > 0, "{ranges} {others}");
+}
+
 /// Without an error nothing is suspected, in these ten records.
 #[test]
 fn nothing_is_suspected_without_an_error() {

@@ -41,7 +41,7 @@ pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GimbalError, Gimbals};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
-pub use omitted::{OmittedEffect, OmittedModel, OmittedTerm};
+pub use omitted::{MAX_ATTITUDES, OmittedEffect, OmittedModel, OmittedTerm};
 pub use omitted_names::{SITE_FAMILIES, may_be_omitted, omitted_meant};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};

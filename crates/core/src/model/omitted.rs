@@ -21,7 +21,7 @@ use super::scheme::Scheme;
 use super::terms::{Source, Term, Unknowns};
 
 /// Most positions whose attitudes count one by one.
-const MAX_ATTITUDES: usize = 64;
+pub const MAX_ATTITUDES: usize = 64;
 
 /// Effect of an error that is not estimated.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,17 +1,20 @@
 //! Constraints that are products: one of their factors is zero, and verdicts are those where the same one always is.
 
-use crate::language::{Expression, Node, component, evaluate_f64};
+use obsdeg_exact::Reals;
 
 use super::constraints::ConstraintFactor;
+use super::held::distinct;
+use super::judge::climb_at;
 use super::model::{PlacedExpression, SystemModel};
 use super::real_points::real_point;
 use super::rows::Layout;
 use super::work::Spent;
+use crate::language::{Expression, Node, component, evaluate_f64};
 
 /// Choices of one factor in each product that are tried at most.
 const CHOICES: usize = 64;
 /// Operations of the search for a point of each.
-const OPERATIONS: u64 = 20_000_000;
+const OPERATIONS: u64 = 200_000_000;
 /// Size, relative to the largest of a product, up to which a factor is zero at the given values.
 const ZERO: f64 = 1e-9;
 
@@ -21,64 +24,92 @@ struct Factor {
     expression: Expression,
 }
 
+/// A constraint that is a product.
+struct Product {
+    constraint: usize,
+    factors: Vec<Factor>,
+    /// The factor that is zero at the values of the file.
+    given: Option<usize>,
+}
+
 impl SystemModel {
-    /// The same with the first factor that has a real point, together with all other constraints, in the place of
-    /// each constraint that is a product; factors that are zero at the values of the file before all others. Unchanged
-    /// where there is no product, or no such point was found.
+    /// The same with one factor in the place of each constraint that is a product. Of the choices whose factors have
+    /// a real point together with all other constraints, at which the model is defined: factors that are zero at the
+    /// values of the file before all others, then the choice with the fewest independent constraints, then the first as
+    /// written. Unchanged where there is no product, or no such point was found.
     pub(super) fn by_one_factor(self) -> Self {
-        let mut products: Vec<(usize, Vec<Factor>, Option<usize>)> = Vec::new();
-        for (c, own) in self.constraints.iter().enumerate() {
-            let factors = factors(own);
-            if factors.len() > 1 {
-                let given = self.zero_at_given(&factors);
-                products.push((c, factors, given));
-            }
-        }
-        let total = products.iter().map(|p| p.1.len()).fold(1, usize::saturating_mul);
+        let all = self.constraints.iter().enumerate();
+        let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
         if products.is_empty() {
             return self;
         }
+        let total = products.iter().map(|p| p.factors.len()).fold(1, usize::saturating_mul);
+        let mut best: Option<([usize; 2], Self)> = None;
         for choice in 0..total.min(CHOICES) {
-            let (mut out, mut left) = (self.clone(), choice);
-            for (c, factors, given) in &products {
-                // the given one, then the others as written
-                let rank = left % factors.len();
-                left /= factors.len();
-                let order = (given.iter().copied()).chain((0..factors.len()).filter(|k| Some(*k) != *given));
-                let Some(taken) = order.into_iter().nth(rank) else { continue };
-                out.constraints[*c].expression = factors[taken].expression.clone();
-                let others = (0..factors.len()).filter(|k| *k != taken).map(|k| factors[k].text.clone());
-                out.factors.push(ConstraintFactor {
-                    constraint: self.constraints[*c].text.clone(),
-                    factor: factors[taken].text.clone(),
-                    others: others.collect(),
-                    given: *given == Some(taken),
-                });
+            let (mut out, mut left, mut others) = (self.clone(), choice, 0);
+            for p in &products {
+                let taken = left % p.factors.len();
+                left /= p.factors.len();
+                others += usize::from(p.given.is_some_and(|given| given != taken));
+                out.take(p, taken);
             }
-            if out.has_point() {
-                return out;
+            if best.as_ref().is_some_and(|(rank, _)| rank[0] < others) {
+                continue;
+            }
+            if let Some(independent) = out.independent_at_point()
+                && best.as_ref().is_none_or(|(rank, _)| [others, independent] < *rank)
+            {
+                best = Some(([others, independent], out));
             }
         }
-        self
+        best.map_or(self, |(_, out)| out)
     }
 
-    fn has_point(&self) -> bool {
+    fn product(&self, constraint: usize, own: &PlacedExpression) -> Option<Product> {
+        let factors = factors(own);
+        let given = self.zero_at_given(&factors)?;
+        (factors.len() > 1).then_some(Product { constraint, factors, given })
+    }
+
+    /// Puts a factor in the place of its product.
+    fn take(&mut self, of: &Product, taken: usize) {
+        let own = &mut self.constraints[of.constraint];
+        own.expression = of.factors[taken].expression.clone();
+        let others = of.factors.iter().enumerate().filter(|(k, _)| *k != taken);
+        self.factors.push(ConstraintFactor {
+            constraint: own.text.clone(),
+            factor: of.factors[taken].text.clone(),
+            others: others.map(|(_, f)| f.text.clone()).collect(),
+            given: of.given == Some(taken),
+        });
+    }
+
+    /// Number of independent constraints at a real point at which the model is defined; `None` where none was found.
+    fn independent_at_point(&self) -> Option<usize> {
         let mut model = self.clone();
         model.work_limit = model.work_limit.within(OPERATIONS);
-        let Ok(compiled) = model.compile() else { return false };
-        let layout = Layout::new(&model, &compiled, None);
-        real_point(&model, &compiled, &layout, 1, &mut Spent::default()).is_ok()
+        let compiled = model.compile().ok()?;
+        let mut layout = Layout::new(&model, &compiled, Some(0));
+        let mut spent = Spent::default();
+        layout.dependent = real_point(&model, &compiled, &layout, 1, &mut spent).ok()?;
+        let mut rng = model.random(1, "factors");
+        let at = climb_at(&model, &compiled, &layout, Reals::<4>, &mut rng, &mut spent);
+        at.is_ok().then(|| distinct(&compiled.constraints).len() - layout.dependent)
     }
 
-    /// The only factor that is zero at the values under `[simulation.values]` of the first experiment, where these
-    /// are complete.
-    fn zero_at_given(&self, factors: &[Factor]) -> Option<usize> {
-        let value = |name: &str| self.simulation.value(name, 0).unwrap_or(f64::NAN);
-        let sizes: Vec<f64> = factors.iter().map(|f| evaluate_f64(&f.expression, &value).abs()).collect();
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let mut zero = (0..factors.len()).filter(|&k| sizes[k] <= ZERO * largest);
-        let first = zero.next()?;
-        (zero.next().is_none() && sizes.iter().all(|s| s.is_finite())).then_some(first)
+    /// The only factor that is zero at the values under `[simulation.values]`, where these are complete, in all
+    /// experiments; `None` of a product whose factors are zero in different experiments.
+    fn zero_at_given(&self, factors: &[Factor]) -> Option<Option<usize>> {
+        let zero = |experiment: usize| {
+            let value = |name: &str| self.simulation.value(name, experiment).unwrap_or(f64::NAN);
+            let sizes: Vec<f64> = factors.iter().map(|f| evaluate_f64(&f.expression, &value).abs()).collect();
+            let largest = sizes.iter().copied().fold(0.0, f64::max);
+            let mut zero = (0..factors.len()).filter(|&k| sizes[k] <= ZERO * largest);
+            let first = zero.next()?;
+            (zero.next().is_none() && sizes.iter().all(|s| s.is_finite())).then_some(first)
+        };
+        let first = zero(0);
+        (1..self.experiments).all(|e| zero(e) == first).then_some(first)
     }
 }
 
@@ -96,7 +127,10 @@ fn factors(own: &PlacedExpression) -> Vec<Factor> {
     while let Some(i) = open.pop() {
         match e.nodes[i] {
             Node::Multiply(a, b) => open.extend([b, a]),
-            Node::Divide(a, _) | Node::Negate(a) => open.push(a),
+            Node::Negate(a) => open.push(a),
+            Node::Divide(a, b) if matches!(e.nodes[b], Node::Number { .. }) => open.push(a),
+            // it holds everywhere, or where the denominator is not zero
+            Node::Number { mantissa: 0, .. } | Node::Divide(..) => return Vec::new(),
             Node::Power(a, b) if matches!(e.nodes[b], Node::Number { mantissa: 1.., decimals: ..=0 }) => {
                 open.push(a)
             }

@@ -149,7 +149,8 @@ impl Newton<'_> {
             // how much it changes where what it holds changes by its size
             let change = row.iter().zip(&here).map(|(slope, x)| slope.size_log2() + x.size_log2().max(0.0));
             let change = change.fold(f64::NEG_INFINITY, f64::max);
-            let scale = if ratio.is_some() { size(&sides) } else { change };
+            // both sides of x*y = x*z shrink on the way to x = 0
+            let scale = if ratio.is_some() { size(&sides).max(change) } else { change };
             let value = at.start(sum.node);
             let left = value.midpoint();
             out.shift = out.shift.max(left.size_log2() - change);

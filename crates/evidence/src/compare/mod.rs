@@ -19,7 +19,7 @@ use crate::simulation::carries::under;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
 use crate::simulation::iterated::at_own_drifts;
 use crate::simulation::limits::MAX_UNKNOWNS;
-use crate::simulation::omitted::omitted_effects;
+use crate::simulation::omitted::{Bench, omitted_effects};
 use crate::simulation::{Attained, SimulationError, noise_floor, other_carries};
 
 /// Latitudes of the sweep, in degrees.
@@ -105,6 +105,7 @@ pub fn predicted(
 /// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries
 /// and fewer positions have others.
 fn judged(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Attained, SimulationError> {
+    Bench::check(&conditions.bench, scheme.positions.len(), scheme.rotates())?;
     Attained::new(scheme, &conditions.within(&Platform::new(scheme.clone())?), seed)
 }
 
@@ -192,7 +193,7 @@ fn quantities(
             by_prior: judged.by_prior[c],
             sigma_extended: None,
             requirement,
-            total: judged.totals[c].filter(|_| !conditions.bench.is_empty()),
+            total: judged.totals[c].filter(|_| judged.has_bench()),
             margin: Claim { name, required: requirement, sigma: judged.totals[c].ok_or(Miss::NotObservable) }
                 .margin(),
             excitation: excitation(c),
@@ -265,7 +266,8 @@ fn drop_one(
     let parts = interrupt::parts();
     let without = |i: usize| {
         let position = scheme.positions[i].name.clone();
-        let judged = judged(&scheme.without_position(i), conditions, seed)?;
+        let own = Conditions { bench: Bench::without(&conditions.bench, i), ..conditions.clone() };
+        let judged = judged(&scheme.without_position(i), &own, seed)?;
         let names = whole.plan.platform.names().iter();
         // under reset carry every position has a psi of its own
         let names = names.filter(|n| !n.contains('@'));

@@ -24,6 +24,8 @@ pub struct CrossCheck {
     pub filter: Option<String>,
     /// Conditions of the runs, with their units.
     pub conditions: ConditionsReport,
+    /// Bench that is stated, in words; no part of a cross-check. Null where none is stated.
+    pub bench: Option<String>,
     /// Positions and slews of the run, in order of time.
     pub timeline: Vec<TimelineReport>,
     /// True if no check disagrees, evidence a to f.

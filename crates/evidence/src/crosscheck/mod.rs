@@ -233,6 +233,7 @@ fn against(
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         carry: scheme.carry,
+        bench: conditions.bench_in_words(),
         filter: (!options.filter.is_none()).then(|| options.filter.words(scheme)),
         conditions: conditions_report(scheme, truth, conditions),
         timeline: timeline_report(truth),

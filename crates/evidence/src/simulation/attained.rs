@@ -157,11 +157,9 @@ impl Attained {
         Ok(self.known.variance(terms)?.max(0.0).sqrt())
     }
 
-    /// Root of the sum of squares of what the errors of a stated bench add to a combination of unknowns,
-    /// `(unknown, coefficient)`, in SI units; zero without a bench.
-    pub(crate) fn bench_of(&self, terms: &[(usize, f64)]) -> f64 {
-        let change = |e: usize| terms.iter().map(|(c, k)| k * self.contributions[(*c, e)]).sum::<f64>();
-        (0..self.contributions.ncols()).map(|e| change(e).powi(2)).sum::<f64>().sqrt()
+    /// True if an error that is not estimated has a size in the stated bench.
+    pub fn has_bench(&self) -> bool {
+        self.contributions.ncols() > 0
     }
 
     /// Covariance of some unknowns in SI units, in their order, with the errors of a stated bench.
@@ -196,7 +194,7 @@ impl Attained {
             sigma: self.totals[c].ok_or(Miss::NotObservable),
         });
         let mut out = Requirements::of(conditions.basis(), claims);
-        out.with_bench = !conditions.bench.is_empty();
+        out.with_bench = self.has_bench();
         let rests = |c: &usize| self.by_prior[*c] && !required[*c].is_nan();
         out.on_prior = (0..names.len()).filter(rests).map(|c| names[c].clone()).collect();
         Ok(out)
@@ -215,6 +213,33 @@ impl Attained {
         }
         worst
     }
+}
+
+/// Root of the sum of squares of what every column of `contributions` (unknowns x errors) adds to a combination of
+/// unknowns, `(unknown, coefficient)`.
+pub(crate) fn added_to(contributions: &DMatrix<f64>, terms: &[(usize, f64)]) -> f64 {
+    let change = |e: usize| terms.iter().map(|(c, k)| k * contributions[(*c, e)]).sum::<f64>();
+    (0..contributions.ncols()).map(|e| change(e).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Changes of the estimates of the filter of a run by one sigma of every error of the bench (unknowns x errors, SI
+/// units), by its own gains at small angles; no columns without a bench.
+pub(crate) fn run_contributions(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &RunStart,
+) -> Result<DMatrix<f64>, SimulationError> {
+    let model = OmittedModel::new(&plan.platform);
+    let sizes = Bench::of(&conditions.bench, &model)?.sizes;
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&j| sizes[j].is_some_and(|s| s > 0.0)).collect();
+    let n = plan.platform.names().len();
+    if kept.is_empty() {
+        return Ok(DMatrix::zeros(n, 0));
+    }
+    let own = model.only(&kept);
+    let changes = weights::by_filter(plan, &own, start.covariance(Form::Ud)?)?.changes;
+    let size = |e: usize| sizes[kept[e]].unwrap_or(0.0) * si_per_shown(own.terms()[e].unit);
+    Ok(DMatrix::from_fn(n, kept.len(), |c, e| changes[(c, e)] * size(e)))
 }
 
 /// Standard deviations of the stated priors in SI units (shape n); `None` where none is stated.

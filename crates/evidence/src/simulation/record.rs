@@ -338,7 +338,7 @@ pub fn run(
             reason,
             passes,
             converged,
-            trusted: trusted(kind, conditions, &validity),
+            trusted: trusted(kind, conditions, &validity, psi_prior(plan, start)),
         },
         validity,
         traces: Traces { series: series(filtered), ..traces },
@@ -367,10 +367,21 @@ pub(crate) fn choose(
 }
 
 /// Whether sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose model
-/// is that of the truth.
-fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity) -> bool {
-    let own_model = kind == FilterKind::Linear && conditions.truth == Truth::Linear;
-    validity.holds || own_model || kind == FilterKind::Iterated
+/// is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
+fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity, psi_prior: f64) -> bool {
+    match kind {
+        FilterKind::Linear => validity.holds || conditions.truth == Truth::Linear,
+        FilterKind::Extended => {
+            validity.holds && psi_prior * psi_prior / 2.0 <= validity.accelerometer_noise_g
+        }
+        FilterKind::Iterated => true,
+    }
+}
+
+/// Largest standard deviation of psi at the start, in rad.
+fn psi_prior(plan: &Plan, start: &RunStart) -> f64 {
+    let psi = plan.platform.units().iter().zip(&start.sigma).filter(|(unit, _)| **unit == "rad");
+    psi.map(|(_, sigma)| *sigma).fold(0.0, f64::max)
 }
 
 /// The number of the first step of every segment.

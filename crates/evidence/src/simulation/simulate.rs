@@ -1,5 +1,6 @@
 //! A scheme simulated once: the run, and its summary.
 
+use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::settings::FilterKind;
@@ -7,7 +8,7 @@ use obsdeg_core::model::settings::FilterKind;
 use super::answer::{
     Estimate, LinearEstimate, Outcome, RunDiffers, RunRequirements, SCHEMA, SigmaRatio, Simulation,
 };
-use super::attained::Attained;
+use super::attained::{Attained, added_to, run_contributions};
 use super::carries::other_carries;
 use super::conditions::{Conditions, PRIOR, REQUIRED, resolve, shown_unit, si_per_shown};
 use super::consistency::{Consistency, Outcomes};
@@ -35,16 +36,16 @@ pub fn simulate(
     let start = RunStart::new(&plan, conditions)?;
     let prediction = predict_run(&plan, &start.sigma[..plan.unknowns()], seed)?;
     let record = run(&plan, conditions, &start, &prediction, seed)?;
-    let summary = summary(scheme, &plan, conditions, &prediction, &record, seed)?;
+    let bench = run_contributions(&plan, conditions, &start)?;
+    let summary = summary((scheme, &plan, conditions), &prediction, &record, &bench, seed)?;
     Ok((summary, record))
 }
 
 fn summary(
-    scheme: &Scheme,
-    plan: &Plan,
-    conditions: &Conditions,
+    (scheme, plan, conditions): (&Scheme, &Plan, &Conditions),
     prediction: &Prediction,
     record: &Record,
+    bench: &DMatrix<f64>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
     let n = plan.unknowns();
@@ -55,7 +56,7 @@ fn summary(
     let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
         let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
         let wanted = [required(c), attained.sigmas[c]];
-        let bench = attained.bench_of(&[(c, 1.0)]) / si_per_shown(units[c]);
+        let bench = added_to(bench, &[(c, 1.0)]) / si_per_shown(units[c]);
         estimate(&names[c], units[c], verdict, (c, record), wanted, bench)
     });
     let mut quantities: Vec<Estimate> = unknowns.collect();
@@ -70,7 +71,7 @@ fn summary(
         let lead = c.terms[0].0;
         let predicted = attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
         let wanted = [required(lead), c.determined_at_end.then_some(predicted)];
-        let bench = attained.bench_of(&c.terms) / si_per_shown(units[lead]);
+        let bench = added_to(bench, &c.terms) / si_per_shown(units[lead]);
         Ok(estimate(&c.expression, units[lead], verdict, (n + i, record), wanted, bench))
     };
     let combinations = prediction.combinations.iter().enumerate();
@@ -92,7 +93,7 @@ fn summary(
         conditions: conditions_report(scheme, plan, conditions),
         timeline: timeline_report(plan),
         requirements: attained.requirements(conditions)?,
-        run: run_requirements((plan, &attained), conditions, &quantities, record)?,
+        run: run_requirements((plan, bench), conditions, &quantities, record)?,
         other_carries: other_carries(scheme, conditions, seed)?,
         omitted: omitted_effects(&attained, conditions, seed)?,
         quantities,
@@ -108,7 +109,7 @@ fn summary(
 
 /// Outcome of the requirements in the run, and the reasons why its sigmas may differ from the predicted ones.
 fn run_requirements(
-    (plan, attained): (&Plan, &Attained),
+    (plan, bench): (&Plan, &DMatrix<f64>),
     conditions: &Conditions,
     quantities: &[Estimate],
     record: &Record,
@@ -116,7 +117,7 @@ fn run_requirements(
     let units = plan.platform.units();
     let claims = quantities.iter().enumerate().map(|(c, q)| {
         // the truth of the run has none of the errors of the bench: they are added to its sigma
-        let total = q.sigma.hypot(attained.bench_of(&[(c, 1.0)]) / si_per_shown(units[c]));
+        let total = q.sigma.hypot(added_to(bench, &[(c, 1.0)]) / si_per_shown(units[c]));
         // what a stated prior bounds counts, as in the prediction
         let sigma = match q.outcome.miss() {
             Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(total),
@@ -126,7 +127,7 @@ fn run_requirements(
         Claim { name: &q.name, required: q.required_sigma, sigma }
     });
     let mut requirements = Requirements::of(Basis::Run, claims);
-    requirements.with_bench = !conditions.bench.is_empty();
+    requirements.with_bench = bench.ncols() > 0;
     let ratio = |q: &Estimate| {
         let ratio = q.sigma / q.predicted_sigma?;
         ratio.is_finite().then(|| SigmaRatio { name: q.name.clone(), ratio })
@@ -195,7 +196,8 @@ fn estimate(
             determined,
             record.filter.kind,
             error_over_sigma,
-            [prior_sigma, sigma],
+            // what the linear filter knows of it without samples is no gain of large angles
+            [linear.filter(|_| !determined).map_or(prior_sigma, |l| l.sigma.min(prior_sigma)), sigma],
             required_sigma.map(|r| (r, total)),
         ),
         prior_of: Vec::new(),

@@ -278,6 +278,12 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     {
         defect.outcome = Agreement::NotResolvable;
     }
+    // at values at which an observable unknown is not seen, a direction more vanishes
+    let blurred =
+        quantities.iter().any(|q| q.degree.is_some() && q.inflation.outcome == Agreement::NotResolvable);
+    if defect.measured > defect.predicted && blurred {
+        defect.outcome = Agreement::NotResolvable;
+    }
     if open && defect.measured < defect.predicted {
         defect.outcome = Agreement::NotResolvable;
     }

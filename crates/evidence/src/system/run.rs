@@ -156,6 +156,12 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
             );
             return Err(missing(&format!("the constraint {text}"), &message));
         }
+        if rows.row(k).iter().all(|g| *g == 0.0) {
+            let text = &model.constraints[k % model.constraints.len()].text;
+            let message = "its gradient vanishes at the values under [simulation.values], so that a filter cannot hold it; \
+                           expected values at which it does not";
+            return Err(missing(&format!("the constraint {text}"), message));
+        }
     }
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
         let size = if truth[c] == 0.0 { 1.0 } else { truth[c].abs() };
@@ -428,6 +434,7 @@ fn estimates(
         let prior_sigma = series.sigma.first().copied().unwrap_or(f64::NAN);
         let error = estimate - truth;
         let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
+        let size = series.truth.first().map_or(1.0, |x| if *x == 0.0 { 1.0 } else { x.abs() });
         let status = verdict.map(|v| v.status);
         // what no derivative up to the bound shows a run may show
         let determined = is_determined(status) || status == Some(Status::NotSeen);
@@ -446,7 +453,8 @@ fn estimates(
                 determined,
                 FilterKind::Linear,
                 error_over_sigma,
-                [prior_sigma, sigma],
+                // a start that is known, or that constraints hold, is no prior of the end
+                [if prior_sigma <= 100.0 * KNOWN * size { f64::INFINITY } else { prior_sigma }, sigma],
                 None,
             ),
         }

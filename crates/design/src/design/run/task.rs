@@ -8,7 +8,7 @@ use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Carry, Euler, Path, Platform, Scheme, Unknowns, angles_text, c_n_f64};
 use obsdeg_core::omitted::OmittedClass;
 use obsdeg_evidence::requirements::Requirements;
-use obsdeg_evidence::simulation::omitted::{OmittedEffect, term_effects};
+use obsdeg_evidence::simulation::omitted::{Bench, OmittedEffect, term_effects};
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use rayon::prelude::*;
 
@@ -161,6 +161,9 @@ impl<'a> Task<'a> {
         }
         // the total uncertainty of psi is that at the end, which is not built up position by position
         let of_psi = uses_requirements && limits.psi.iter().any(|l| l.is_finite());
+        // where the number of positions is sought, none has a number
+        Bench::check(&conditions.bench, options.positions.unwrap_or(0), false)
+            .map_err(SimulationError::from)?;
         let omitted = Omitted::of(base, &platform, conditions, &options.immune)?;
         let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
         let criterion = match options.criterion {

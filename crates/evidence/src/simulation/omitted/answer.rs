@@ -29,6 +29,18 @@ pub struct OmittedEffects {
     pub error_bound: Option<f64>,
     /// Reason why there are no exact classes; null if there are.
     pub not_classified: Option<String>,
+    /// Names in the bench that are among the unknowns: estimated, so that their sizes do not count.
+    #[serde(default)]
+    pub estimated: Vec<String>,
+    /// True if attitudes of the positions are among the terms: those of rotating positions, and of more than 64, are
+    /// not computed.
+    #[serde(default = "yes")]
+    pub attitudes: bool,
+}
+
+/// Value of `attitudes` in answers that do not have it.
+fn yes() -> bool {
+    true
 }
 
 /// Effect of one error that is not estimated.

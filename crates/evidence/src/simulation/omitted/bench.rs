@@ -1,7 +1,7 @@
 //! The bench: sizes (one sigma) of errors that are not estimated, and the total uncertainty with them.
 
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{OmittedModel, OmittedTerm, may_be_omitted, omitted_meant};
+use obsdeg_core::model::{MAX_ATTITUDES, OmittedModel, OmittedTerm, Platform, may_be_omitted, omitted_meant};
 
 /// Name in a bench that nothing answers to.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -11,6 +11,11 @@ pub struct BenchError {
     pub found: String,
     /// Names that could be meant.
     pub known: String,
+}
+
+/// Number of the position in the name of an attitude: 2 in `attitude_x@2`.
+fn attitude_position(name: &str) -> Option<usize> {
+    name.strip_prefix("attitude_")?.split_once('@')?.1.parse().ok()
 }
 
 /// Sizes of the errors that a scheme does not estimate.
@@ -33,6 +38,59 @@ impl Bench {
         }
         let size = |t: &OmittedTerm| Self::size_of(stated, t.family, &t.name);
         Ok(Self { sizes: model.terms().iter().map(size).collect() })
+    }
+
+    /// Refuses sizes of attitudes whose effect is not computed for a scheme of so many positions, or of one whose
+    /// positions rotate.
+    ///
+    /// # Errors
+    /// [`BenchError`].
+    pub fn check(stated: &[Assignment], positions: usize, rotates: bool) -> Result<(), BenchError> {
+        let Some(first) = stated.iter().find(|a| a.name.starts_with("attitude") && a.value != 0.0) else {
+            return Ok(());
+        };
+        let refuse = |a: &Assignment, known: String| Err(BenchError { found: a.name.clone(), known });
+        if rotates {
+            let known = "the effect of an attitude is not computed where a position rotates; leave it out of the bench";
+            return refuse(first, known.into());
+        }
+        if positions > MAX_ATTITUDES {
+            let known =
+                format!("attitudes are computed for at most {MAX_ATTITUDES} positions, found {positions}");
+            return refuse(first, known);
+        }
+        let beyond = |a: &&Assignment| attitude_position(&a.name).is_some_and(|i| i > positions);
+        match stated.iter().find(beyond) {
+            Some(a) if positions == 0 => {
+                refuse(a, "the number of positions is not known beforehand; state it (--positions)".into())
+            }
+            Some(a) => refuse(a, format!("the scheme has {positions} positions")),
+            None => Ok(()),
+        }
+    }
+
+    /// The names of a bench that are among the unknowns of `platform`: estimated, so that their sizes do not count.
+    pub fn estimated(stated: &[Assignment], platform: &Platform) -> Vec<String> {
+        let model = OmittedModel::new(platform);
+        let is_omitted =
+            |a: &Assignment| model.terms().iter().any(|t| a.name == t.family || concerns(&a.name, &t.name));
+        let is_unknown = |a: &Assignment| platform.names().iter().any(|name| concerns(&a.name, name));
+        let own = stated.iter().filter(|a| is_unknown(a) && !is_omitted(a));
+        own.map(|a| a.name.clone()).collect()
+    }
+
+    /// The sizes of a bench for the same scheme without a position (counted from 0): attitudes of later ones move
+    /// up.
+    pub fn without(stated: &[Assignment], position: usize) -> Vec<Assignment> {
+        let moved = |a: &Assignment| match attitude_position(&a.name) {
+            Some(i) if i == position + 1 => None,
+            Some(i) if i > position + 1 => {
+                let own = a.name.split('@').next().unwrap_or(&a.name);
+                Some(Assignment { name: format!("{own}@{}", i - 1), value: a.value })
+            }
+            _ => Some(a.clone()),
+        };
+        stated.iter().filter_map(moved).collect()
     }
 
     /// Size that `stated` gives an error of a family, in its unit: the last one that names either.

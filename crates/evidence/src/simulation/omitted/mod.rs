@@ -33,6 +33,8 @@ use crate::simulation::{
     Attained, Conditions, SimulationError, is_rate, required_sigmas, shown_unit, si_per_shown,
 };
 
+/// Part of the information of all samples of an error that rounding leaves of it.
+const ROUNDING: f64 = 1e-18;
 /// Sigmas of a visible error that count as seen.
 pub const SEEN: f64 = 3.0;
 
@@ -88,6 +90,8 @@ pub fn term_effects(
     seed: u64,
 ) -> Result<OmittedEffects, SimulationError> {
     let platform = &attained.plan.platform;
+    let scheme = platform.scheme();
+    Bench::check(&conditions.bench, scheme.positions.len(), scheme.rotates())?;
     let model = OmittedModel::new(platform);
     let classified = omitted_verdicts(platform, &model, seed);
     let (verdicts, not_classified) = match classified {
@@ -116,7 +120,7 @@ pub fn term_effects(
             unit: t.unit.into(),
             class,
             exact: verdict.and_then(|v| v.exact.clone()),
-            visible_from: visible_from(t, class, influence.information[j]),
+            visible_from: visible_from(t, class, influence.information[j], influence.squares[j]),
             size,
             sensitivities: sensitivities.collect(),
             uses_up: margins.used_up(|c| changes[c][j], |c| changes[c][j] * size.unwrap_or(0.0)),
@@ -141,6 +145,8 @@ pub fn term_effects(
             || platform.scheme().rotates(),
         error_bound: verdicts.map(|v| v.error_bound),
         not_classified,
+        estimated: Bench::estimated(&conditions.bench, platform),
+        attitudes: model.terms().iter().any(|t| t.family == "attitude"),
     })
 }
 
@@ -168,8 +174,14 @@ impl Margins<'_> {
 }
 
 /// Size at which a record shows a visible error at three sigma, in its unit.
-fn visible_from(term: &OmittedTerm, class: Option<OmittedClass>, information: f64) -> Option<f64> {
-    let visible = class.is_none_or(|c| c == OmittedClass::Visible);
+fn visible_from(
+    term: &OmittedTerm,
+    class: Option<OmittedClass>,
+    information: f64,
+    squares: f64,
+) -> Option<f64> {
+    // without a class, what is left of the samples by rounding shows nothing
+    let visible = class.map_or(information > ROUNDING * squares, |c| c == OmittedClass::Visible);
     (visible && information > 0.0).then(|| SEEN / information.sqrt() / si_per_shown(term.unit))
 }
 

@@ -63,7 +63,7 @@ pub struct Suspicion {
     pub chi_square_fall: f64,
     /// Bound on the probability that chance gives such a fall to any of the errors that were tried.
     pub probability: f64,
-    /// Estimates that the errors change most in their own sigma, the largest change first.
+    /// Estimates that the errors, or an indistinguishable one, change most in their own sigma, the largest change first.
     pub changes: Vec<SuspectedChange>,
 }
 
@@ -91,6 +91,12 @@ pub struct SuspectedChange {
     pub estimate: f64,
     /// Estimate with the suspected errors among the unknowns, in the unit of `unit`.
     pub with: f64,
+    /// Lowest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of
+    /// `unit`.
+    pub lowest: f64,
+    /// Highest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of
+    /// `unit`.
+    pub highest: f64,
 }
 
 impl Score {

@@ -29,7 +29,7 @@ impl Influence {
     /// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x errors); zero
     /// where the exact class says so, and where nothing but rounding is left. `units` and `sigmas` (shown) are those of
     /// the unknowns.
-    pub(crate) fn shown(
+    pub fn shown(
         &self,
         units: &[&'static str],
         sigmas: &[Option<f64>],
