@@ -36,6 +36,9 @@ pub struct Calibration {
     pub covariance: CovarianceTable,
     /// Quality of the whole fit: chi-square, its band and its factor.
     pub fit: Fit,
+    /// Curvature of the estimates over what the records and priors leave open.
+    #[serde(default)]
+    pub curvature: Curvature,
     /// Quality of the fit by record and position.
     pub positions: Vec<PositionFit>,
     /// Quality of the fit by component of Z.
@@ -86,6 +89,16 @@ pub enum Finding {
     Interrupted,
     /// Iteration that did not converge.
     NotSettled,
+    /// Estimates that bend over what the records leave open, so that no covariance describes their errors.
+    Bends {
+        /// Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if
+        /// another minimum fits nearly as well.
+        kappa: Option<f64>,
+        /// Number of repeated estimates from data with errors drawn anew.
+        refits: usize,
+        /// Number of repeated estimates that did not converge.
+        failed: usize,
+    },
     /// Specific force that is not one g long, with no unknown that explains it.
     Force {
         /// Name of the record with this finding.
@@ -299,13 +312,24 @@ pub struct Estimated {
     /// Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with
     /// the times and the noise of the records (and prior knowledge); null if not determined.
     pub predicted_sigma: Option<f64>,
+    /// Largest sigma that the scheme requires, in the unit of `unit`; null if none is stated.
+    #[serde(default)]
+    pub required_sigma: Option<f64>,
     /// Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model
-    /// couples an unknown constrained by its prior to the estimate. Null if not determined.
+    /// couples an unknown that stays open within its box to the estimate. Null if not determined.
     pub held_factor: Option<f64>,
-    /// Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined.
+    /// Part of sigma, in the unit of `unit`, by what the records leave open within its box (see
+    /// `assumed.held`): zero if nothing of it bends into the estimate. Null if not determined.
+    #[serde(default)]
+    pub open_sigma: Option<f64>,
+    /// True if the estimate rests on a stated prior: scheme and records alone do not determine it.
+    #[serde(default)]
+    pub from_prior: bool,
+    /// Shift that the program's prior would make to the estimate, in sigma (dimensionless); null if not
+    /// determined, and if priors are stated: these are in the estimate.
     pub prior_shift: Option<f64>,
-    /// Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not
-    /// determined.
+    /// Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null
+    /// as `prior_shift`.
     pub prior_factor: Option<f64>,
 }
 
@@ -349,6 +373,21 @@ pub struct Fit {
     pub factor: f64,
     /// Number of linearisations until convergence.
     pub passes: usize,
+}
+
+/// Curvature of the estimates over what the records and priors leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Curvature {
+    /// Largest difference of the run and its linear model along the longest axes of the estimates' errors, in
+    /// sigma (dimensionless): below 1 the linear covariance holds. Null if the run cannot be followed there,
+    /// or if another minimum fits nearly as well.
+    pub kappa: Option<f64>,
+    /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1).
+    pub refits: usize,
+    /// Number of repeated estimates that did not converge.
+    pub failed: usize,
+    /// True if estimates and sigmas are mean and covariance of the repeated estimates.
+    pub from_refits: bool,
 }
 
 /// Quality of the fit at one position of a record.
@@ -584,7 +623,12 @@ pub struct Assumed {
     pub known: Vec<String>,
     /// Differences of the scheme of that calibration.
     pub known_differs: Vec<String>,
-    /// Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit.
+    /// Priors that the estimates hold as stated: name of the unknown, standard deviation in its unit, and
+    /// that unit. Empty: estimates by the data alone.
+    #[serde(default)]
+    pub priors: Vec<(String, f64, String)>,
+    /// Box of what the records leave open: name of the unknown, one standard deviation in its unit, and that
+    /// unit.
     pub held: Vec<(String, f64, String)>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.

@@ -204,7 +204,7 @@ impl Answer for SystemCalibration {
     }
 }
 
-/// Every measurement and what is left of it, as CSV.
+/// The residuals of all measurements, as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].
@@ -218,7 +218,7 @@ pub fn system_residuals_csv(c: &SystemCalibration) -> Result<String, ReportError
     crate::csv_text::write(std::iter::once(head.map(String::from).to_vec()).chain(rows))
 }
 
-/// What is left of every output over time, with three sigma.
+/// The residuals of every output over time, with bands of three sigma.
 ///
 /// # Errors
 /// [`FigureError`].
@@ -248,6 +248,6 @@ pub fn system_calibration_figures(c: &SystemCalibration) -> Result<Vec<File>, Fi
         }
     };
     let figures: Vec<_> = c.outputs.iter().enumerate().map(figure).collect();
-    let title = format!("What the estimate leaves of {}", c.name);
+    let title = format!("Residuals, {}", c.name);
     Ok(picture("residuals", grid(&figures, figures.len().min(2), &title))?.into())
 }

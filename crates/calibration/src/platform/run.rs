@@ -1,9 +1,9 @@
 //! The record of one run on its own timeline: the scheme with the times of the record, linearised along a trajectory.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
-use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage, Update};
+use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
 use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind};
 
 use super::CalibrationError;
@@ -140,7 +140,8 @@ impl Run {
         })
     }
 
-    /// Linearised along the trajectory from `x0`, with all that counts of its first `most` bins; `sigmas` are those of a sample, by channel.
+    /// Linearised along the trajectory from `x0`, with all of its bins that count; `sigmas` are those of a
+    /// sample, by channel.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
@@ -149,17 +150,34 @@ impl Run {
         conditions: &Conditions,
         sigmas: &[f64],
         x0: &PlatformState,
-        most: usize,
+    ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
+        self.along_parts(conditions, sigmas, x0, &[])
+    }
+
+    /// The same along a trajectory in parts: each node says at which segment its part begins, and with which
+    /// attitude (the constants are those of the trajectory).
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn along_parts(
+        &self,
+        conditions: &Conditions,
+        sigmas: &[f64],
+        x0: &PlatformState,
+        nodes: &[(usize, PlatformState)],
     ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
         let filter = Extended::new(&self.plan, conditions, Update::default())?;
         let (plan, n) = (&self.plan, self.plan.states());
         let (mut out, mut keys) = (Linearised::default(), Vec::new());
         let (mut x, mut bin) = (x0.clone(), 0);
+        let mut nodes = nodes.iter().peekable();
         for (segment, s) in plan.segments.iter().enumerate() {
-            if bin >= most {
-                break;
-            }
             let motion = filter.motion(segment);
+            if let Some((_, node)) = nodes.next_if(|(at, _)| *at == segment) {
+                let begins = x.clone().with_attitude_of(motion.block(), node);
+                out.gaps.push((segment.saturating_sub(1), DVector::from_vec(x.local(&begins))));
+                x = begins;
+            }
             let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
             let mut outputs = Vec::new();
             if let Some((position, i)) = self.bins[segment] {

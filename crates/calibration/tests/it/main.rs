@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod campaign;
 mod cells;
 mod constraints;
 mod faults;
