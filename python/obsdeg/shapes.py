@@ -2962,6 +2962,35 @@ class Estimated(Record):
     """Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null as `prior_shift`."""
 
 
+class NextRun(Record):
+    """A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with this answer as prior
+    (`--prior`).
+    """
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the coefficient whose requirement is missed."""
+    unit: str
+    """Unit of its sigmas."""
+    sigma: float | None
+    """Sigma by this answer, rescaled, in the unit of `unit`; null if not determined."""
+    required_sigma: float
+    """Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds to it."""
+    attitude: str | None
+    """Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude makes sigma smaller by 1
+    %.
+    """
+    dwell_s: float | None
+    """Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell of the scheme. Null as
+    `attitude`.
+    """
+    sigma_then: float | None
+    """Sigma after this run, in the unit of `unit`, by the linear model. Null as `attitude`."""
+    met: bool
+    """True if that meets the requirement."""
+
+
 class CovarianceTable(Record):
     """Estimates with the covariance of their errors."""
 
@@ -3407,6 +3436,8 @@ class Calibration(Shape):
     """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null if none is
     stated. Requirements on psi are not judged: a calibration estimates psi of the start of a record.
     """
+    next_runs: list[NextRun]
+    """Further runs that bring coefficients to requirements they miss; empty if none is missed."""
     combinations: list[Estimated]
     """Estimates of combinations of unknowns that are not determined alone, and of those asked for."""
     covariance: CovarianceTable
@@ -3571,6 +3602,25 @@ class OtherSolution(Record):
     """Values of the unknowns, in their order and units."""
 
 
+class OtherStarts(Record):
+    """What became of starts that did not lead to the solution. The numbers and that of the starts that led there add up to the number of
+    starts.
+    """
+
+    __slots__ = ()
+
+    near: int
+    """Number of starts that led to other solutions that fit nearly as well."""
+    higher: int
+    """Number of starts that ended at a minimum with a larger chi-square."""
+    least_higher_chi_square: float | None
+    """Least chi-square of those minima, dimensionless; null if there are none."""
+    unsettled: int
+    """Number of starts whose iteration did not settle."""
+    failed: int
+    """Number of starts from which the model gives no numbers."""
+
+
 class Profile(Record):
     """Profile of one unknown: the fit as a function of its value when all others follow."""
 
@@ -3630,6 +3680,8 @@ class SystemCalibration(Shape):
     """Other solutions that fit nearly as well, the best first: the values of the unknowns."""
     starts: tuple[int, int]
     """Number of starts that were tried, then the number that led to the solution."""
+    other_starts: OtherStarts
+    """What became of the starts that did not lead to the solution."""
     starts_at_most: int
     """Largest number of starts; fewer are enough when no other solution is to be expected."""
     profiles: list[Profile]

@@ -130,8 +130,6 @@ impl Desk {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         symlink(root().join("examples"), folder.path().join("examples")).expect("a link");
-        std::fs::create_dir(folder.path().join("tests")).expect("a folder");
-        symlink(root().join("tests/data"), folder.path().join("tests/data")).expect("a link");
         Self { folder }
     }
 

@@ -30,6 +30,9 @@ pub struct Calibration {
     /// the start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
+    /// Further runs that bring coefficients to requirements they miss; empty if none is missed.
+    #[serde(default)]
+    pub next_runs: Vec<NextRun>,
     /// Estimates of combinations of unknowns that are not determined alone, and of those asked for.
     pub combinations: Vec<Estimated>,
     /// Covariance of all estimates that do not follow from others.
@@ -349,9 +352,36 @@ pub struct CovarianceTable {
     pub rescaled: Vec<Vec<f64>>,
 }
 
+/// A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with
+/// this answer as prior (`--prior`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NextRun {
+    /// Name of the coefficient whose requirement is missed.
+    pub unknown: String,
+    /// Unit of its sigmas.
+    pub unit: String,
+    /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
+    pub sigma: Option<f64>,
+    /// Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds
+    /// to it.
+    pub required_sigma: f64,
+    /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude
+    /// makes sigma smaller by 1 %.
+    pub attitude: Option<String>,
+    /// Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell of the
+    /// scheme. Null as `attitude`.
+    pub dwell_s: Option<f64>,
+    /// Sigma after this run, in the unit of `unit`, by the linear model. Null as `attitude`.
+    pub sigma_then: Option<f64>,
+    /// True if that meets the requirement.
+    pub met: bool,
+}
+
 /// A calibration before, of what `S` says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before<S> {
+    /// Names of the unknowns with a stated prior that is in the estimates already: it counts once.
+    pub priors: Vec<String>,
     /// Its estimates; the covariance is the one that counts.
     pub estimates: CovarianceTable,
     /// The records that it rests on, those of its own prior too.

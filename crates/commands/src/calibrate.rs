@@ -360,5 +360,9 @@ fn prior<S: serde::de::DeserializeOwned>(
     }
     let rests_on = serde_json::from_value(key("rests_on")).map_err(older)?;
     let of = serde_json::from_value(key(if of == "scheme" { "setup" } else { of })).map_err(older)?;
-    Ok(Before { estimates, rests_on, of })
+    // unknown, standard deviation, unit; none of a model
+    let named = |prior: &serde_json::Value| prior[0].as_str().map(String::from);
+    let priors = value["assumed"]["priors"].as_array().map_or(&[][..], Vec::as_slice);
+    let priors = priors.iter().filter_map(named).collect();
+    Ok(Before { priors, estimates, rests_on, of })
 }

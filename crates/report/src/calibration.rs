@@ -3,7 +3,7 @@
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
     Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
-    PositionFit, PositionsBy, RecordReport,
+    NextRun, PositionFit, PositionsBy, RecordReport,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -419,6 +419,30 @@ fn moment(records: &[RecordReport]) -> String {
     }
 }
 
+/// A further run for a requirement that is missed.
+fn next_run(n: &NextRun) -> String {
+    let now = n.sigma.map_or_else(
+        || format!("{} is not determined", n.unknown),
+        |s| format!("sigma of {} is {} {}", n.unknown, number(s), n.unit),
+    );
+    let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
+    let (Some(attitude), Some(dwell), Some(then)) = (&n.attitude, n.dwell_s, n.sigma_then) else {
+        return format!(
+            "{required}: no run at one attitude makes it smaller by 1 %. Add positions or reduce the noise."
+        );
+    };
+    let then = format!("{} {}", number(then), n.unit);
+    if n.met {
+        format!(
+            "{required}: a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then}."
+        )
+    } else {
+        format!(
+            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then} only."
+        )
+    }
+}
+
 /// The mode of the estimates: data alone or priors as stated, the box of what is left open and its effect,
 /// the curvature.
 fn mode(c: &Calibration) -> Vec<String> {
@@ -579,6 +603,7 @@ impl Answer for Calibration {
         }
         blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));
+        blocks.extend(Block::list_if_any("Next runs", self.next_runs.iter().map(next_run).collect()));
         blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
         let each = self.positions.len() / self.records.len().max(1);
         let force = self.positions.iter().any(|p| p.force_g.is_some());

@@ -32,7 +32,10 @@ pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
         draw("whiteness", "Autocorrelation of the residuals", &whiteness_figure)?;
     }
     let figures = estimate_figures(c);
-    files.extend(picture("estimates", grid(&figures, figures.len().min(3), "Estimates, with three sigma"))?);
+    files.extend(picture(
+        "estimates",
+        grid(&figures, figures.len().min(3), "Three sigma about the estimates"),
+    )?);
     Ok(files)
 }
 
@@ -112,7 +115,8 @@ pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
     }
 }
 
-/// Estimates by family, with bars of three sigma: as the fit has it, as predicted, and as required.
+/// Bars of three sigma about the estimates by family: as the fit has it, as predicted, and as required. Estimates are
+/// in the names along x, since sigmas are small beside them.
 pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
     for e in c.quantities.iter().filter(|e| e.determined) {
@@ -137,31 +141,36 @@ fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [
     line(label, color, stroke, points.to_vec())
 }
 
+/// Name and estimate, with the decimals that sigma leaves.
+fn named(e: &Estimated) -> String {
+    let Some((x, sigma)) = e.estimate.zip(e.sigma) else { return e.name.clone() };
+    // two digits of sigma
+    let decimals = (1.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{} = {x:.decimals$}", e.name)
+}
+
 fn family_figure(family: &str, own: &[&Estimated]) -> Figure {
     let last = own.len() as f64 + 0.5;
     let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.5, 0.0), (last, 0.0)])];
     let kinds: [(&str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>); 3] = [
-        ("estimate +-3 sigma (rescaled)", BLUE, Stroke::Solid, 0.0, |e| e.sigma_rescaled),
+        ("+-3 sigma of the estimate (rescaled)", BLUE, Stroke::Solid, 0.0, |e| e.sigma_rescaled),
         ("+-3 predicted sigma", ORANGE, Stroke::Dashed, 0.2, |e| e.predicted_sigma),
         ("+-3 required sigma", GREEN, Stroke::DashDot, -0.2, |e| e.required_sigma),
     ];
     for (label, color, stroke, aside, sigma) in kinds {
         let mut label = label;
         for (i, e) in own.iter().enumerate() {
-            let (Some(x), Some(sigma)) = (e.estimate, sigma(e)) else { continue };
+            let Some(sigma) = sigma(e).filter(|_| e.determined) else { continue };
             let (at, half) = (i as f64 + 1.0 + aside, 3.0 * sigma);
-            lines.push(bar(std::mem::take(&mut label), color, stroke, at, [x - half, x + half]));
-            if aside == 0.0 {
-                lines.push(line("", color, stroke, vec![(at - 0.15, x), (at + 0.15, x)]));
-            }
+            lines.push(bar(std::mem::take(&mut label), color, stroke, at, [-half, half]));
         }
     }
     Figure {
         title: family.into(),
-        y_label: format!("estimate [{}]", own[0].unit),
+        y_label: format!("about the estimate [{}]", own[0].unit),
         lines,
         x_range: Some((0.5, last)),
-        x_names: own.iter().map(|e| e.name.clone()).collect(),
+        x_names: own.iter().map(|e| named(e)).collect(),
         ..Figure::default()
     }
 }
@@ -169,6 +178,22 @@ fn family_figure(family: &str, own: &[&Estimated]) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An estimate has two digits of its sigma.
+    #[test]
+    fn estimates_have_the_decimals_of_their_sigmas() {
+        let e = |estimate: Option<f64>, sigma: Option<f64>| {
+            let value = serde_json::json!({
+                "name": "D_FX", "unit": "deg/h", "status": "observable", "degree": 1, "determined": true,
+                "estimate": estimate, "sigma": sigma, "sigma_rescaled": sigma, "predicted_sigma": sigma,
+                "held_factor": 1.0, "prior_shift": null, "prior_factor": null,
+            });
+            named(&serde_json::from_value(value).expect("an estimate"))
+        };
+        assert_eq!(e(Some(1.300_123), Some(0.002_78)), "D_FX = 1.3001");
+        assert_eq!(e(Some(-5.0), Some(31.0)), "D_FX = -5");
+        assert_eq!(e(None, None), "D_FX");
+    }
 
     #[test]
     fn a_record_is_named_by_its_file() {

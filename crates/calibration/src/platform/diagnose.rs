@@ -347,6 +347,7 @@ impl Parts<'_> {
             quantities,
             omitted,
             requirements: None,
+            next_runs: Vec::new(),
             combinations: combinations.iter().map(estimated).collect(),
             covariance,
             fit,
@@ -372,6 +373,7 @@ impl Parts<'_> {
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
         out.requirements = self.requirements(&out.quantities, &bench);
+        out.next_runs = self.next_runs(&out, &bench)?;
         Ok(out)
     }
 

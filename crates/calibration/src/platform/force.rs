@@ -14,9 +14,8 @@ use super::mistaken::Mistaken;
 const TILT_DEG: f64 = 20.0;
 /// Where psi does not go on in n and the vertical moves by more, it may be further off: so many times its
 /// moves from half to half of all positions until then (twice that is the move of a whole position; azimuth,
-/// too, may become tilt), and never further than this.
+/// too, may become tilt), whichever position is nearer.
 const REACH: f64 = 4.0;
-const FURTHEST_DEG: f64 = 60.0;
 /// From one position to the next drift moves the vertical by less than this, in deg, beside so many times
 /// what it moves it from half to half of the positions about the slew.
 const JUMP_DEG: f64 = 3.0;
@@ -292,9 +291,11 @@ impl Forces {
             // beside positions: twice that is the furthest
             let about = before.map(|(_, by)| by + moved);
             let held = about.map_or(f64::INFINITY, |by| JUMP_DEG + MOVES * by);
-            let reach = about.map_or(FURTHEST_DEG.min(JUMP_DEG + REACH * moves), |by| JUMP_DEG + by);
-            let elsewhere = own > NEARER * nearest;
-            let wrong = own > TILT_DEG.max(reach) || (own > TILT_DEG.min(held) && elsewhere);
+            let reach = about.map_or(JUMP_DEG + REACH * moves, |by| JUMP_DEG + by);
+            let furthest = TILT_DEG.max(reach);
+            // where psi does not go on in n, another position may be nearer by drift alone
+            let least = if before.is_some() || reach < TILT_DEG { TILT_DEG.min(held) } else { furthest };
+            let wrong = own > furthest || (own > least && own > NEARER * nearest);
             if !wrong {
                 before = inertial.then(|| (apply(&attitudes[p], &last), moved));
                 continue;

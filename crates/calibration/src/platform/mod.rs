@@ -11,6 +11,7 @@ mod gross;
 mod length;
 mod minimum;
 mod mistaken;
+mod next;
 mod observe;
 mod offset;
 mod reading;
@@ -308,13 +309,12 @@ pub fn calibrate(
     let start = RunStart::new(&planned, &own)?;
     let (n, coefficients, biases) =
         (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
-    let stated: Vec<bool> = planned
-        .platform
-        .names()
-        .iter()
-        .map(|name| own.stated_priors().iter().any(|a| concerns(&a.name, name)))
-        .chain(std::iter::repeat_n(false, biases))
-        .collect();
+    // what a calibration before holds already does not count again
+    let held =
+        |name: &String| before.is_some_and(|b| b.priors.contains(name) && b.estimates.names.contains(name));
+    let counts = |name: &String| own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
+    let stated: Vec<bool> =
+        planned.platform.names().iter().map(counts).chain(std::iter::repeat_n(false, biases)).collect();
     let mut unknowns = Unknowns::new(
         runs.len(),
         [n - coefficients, coefficients, biases],

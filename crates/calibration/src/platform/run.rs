@@ -193,7 +193,7 @@ impl Run {
                 }
                 bin += 1;
             }
-            out.roots.push(self.root(segment, n));
+            out.roots.push(noise_root(plan, segment, n));
             out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
         }
         if let Some(k) = out.residuals.iter().position(|x| !x.is_finite()) {
@@ -202,19 +202,18 @@ impl Run {
         }
         Ok((out, keys))
     }
+}
 
-    /// The root of the noise of a segment on all states, without directions of none.
-    fn root(&self, segment: usize, n: usize) -> DMatrix<f64> {
-        let root = &self.plan.noise_roots[segment];
-        let moved: Vec<usize> =
-            self.plan.psi_columns(segment).iter().copied().chain(self.plan.unknowns()..n).collect();
-        let there: Vec<usize> = (0..root.ncols()).filter(|&j| root.column(j).amax() > 0.0).collect();
-        let mut out = DMatrix::zeros(n, there.len());
-        for (k, &j) in there.iter().enumerate() {
-            for (i, &row) in moved.iter().enumerate() {
-                out[(row, k)] = root[(i, j)];
-            }
+/// The root of the noise of a segment of a plan on all `n` states, without directions of none.
+pub(super) fn noise_root(plan: &Plan, segment: usize, n: usize) -> DMatrix<f64> {
+    let root = &plan.noise_roots[segment];
+    let moved: Vec<usize> = plan.psi_columns(segment).iter().copied().chain(plan.unknowns()..n).collect();
+    let there: Vec<usize> = (0..root.ncols()).filter(|&j| root.column(j).amax() > 0.0).collect();
+    let mut out = DMatrix::zeros(n, there.len());
+    for (k, &j) in there.iter().enumerate() {
+        for (i, &row) in moved.iter().enumerate() {
+            out[(row, k)] = root[(i, j)];
         }
-        out
     }
+    out
 }

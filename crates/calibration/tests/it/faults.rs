@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use obsdeg_calibration::answer::{Finding, ForceError};
 use obsdeg_calibration::platform::{Mistaken, read_records};
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{Before, Calibration, CalibrationError, Options, calibrate};
+use obsdeg_calibration::{Before, Calibration, CalibrationError, Options, Setup, calibrate};
 use obsdeg_core::model::settings::Assignment;
 
 use crate::round_trip::{conditions, of_csv, scheme, six};
@@ -387,6 +387,16 @@ fn shifted_labels_are_found() {
     assert!(c.consistent && c.outliers.iter().any(|o| o.lines == (end, end)), "{:?}", c.outliers);
 }
 
+/// A calibration as what is known before another.
+pub(crate) fn before(c: &Calibration) -> Before<Setup> {
+    Before {
+        priors: c.assumed.priors.iter().map(|p| p.0.clone()).collect(),
+        estimates: c.covariance.clone(),
+        rests_on: c.rests_on.clone(),
+        of: c.setup.clone(),
+    }
+}
+
 fn with(
     bench: &Bench,
     records: &[(&str, &str)],
@@ -395,11 +405,6 @@ fn with(
     let read =
         |(name, text): &(&str, &str)| Record::csv(name, Box::new(std::io::Cursor::new(text.to_string())));
     let records = records.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    let before = |c: &Calibration| Before {
-        estimates: c.covariance.clone(),
-        rests_on: c.rests_on.clone(),
-        of: c.setup.clone(),
-    };
     let options = Options { prior: prior.map(before), ..Options::default() };
     calibrate(&scheme(bench, "F,I,O,S"), &conditions(bench), records, &options, &|_| true)
 }

@@ -9,6 +9,7 @@ mod faults;
 mod formats;
 mod handheld;
 mod models;
+mod next;
 mod omitted;
 mod round_trip;
 mod simulator;

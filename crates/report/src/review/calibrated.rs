@@ -21,7 +21,7 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
         Block::Picture(Picture {
             name: format!("{id}_estimates_{}", i + 1),
-            caption: format!("Estimates of {}, with three sigma: rescaled by the fit, predicted, and required where a requirement is stated", figure.title),
+            caption: format!("Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a requirement is stated", figure.title),
             drawing: Drawing::Still(figure.svg()),
         })
     }));
