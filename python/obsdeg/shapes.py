@@ -2972,7 +2972,7 @@ class NextRun(Record):
     unknown: str
     """Name of the coefficient whose requirement is missed."""
     unit: str
-    """Unit of its sigmas."""
+    """Unit of the sigmas of the coefficient, such as deg/h."""
     sigma: float | None
     """Sigma by this answer, rescaled, in the unit of `unit`; null if not determined."""
     required_sigma: float
@@ -3603,7 +3603,7 @@ class OtherSolution(Record):
 
 
 class OtherStarts(Record):
-    """What became of starts that did not lead to the solution. The numbers and that of the starts that led there add up to the number of
+    """Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there add up to the number of
     starts.
     """
 
@@ -3681,7 +3681,7 @@ class SystemCalibration(Shape):
     starts: tuple[int, int]
     """Number of starts that were tried, then the number that led to the solution."""
     other_starts: OtherStarts
-    """What became of the starts that did not lead to the solution."""
+    """Ends of the starts that did not lead to the solution."""
     starts_at_most: int
     """Largest number of starts; fewer are enough when no other solution is to be expected."""
     profiles: list[Profile]

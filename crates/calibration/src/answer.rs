@@ -358,7 +358,7 @@ pub struct CovarianceTable {
 pub struct NextRun {
     /// Name of the coefficient whose requirement is missed.
     pub unknown: String,
-    /// Unit of its sigmas.
+    /// Unit of the sigmas of the coefficient, such as deg/h.
     pub unit: String,
     /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
     pub sigma: Option<f64>,

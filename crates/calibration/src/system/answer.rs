@@ -45,7 +45,7 @@ pub struct SystemCalibration {
     pub others: Vec<OtherSolution>,
     /// Number of starts that were tried, then the number that led to the solution.
     pub starts: (usize, usize),
-    /// What became of the starts that did not lead to the solution.
+    /// Ends of the starts that did not lead to the solution.
     pub other_starts: OtherStarts,
     /// Largest number of starts; fewer are enough when no other solution is to be expected.
     pub starts_at_most: usize,
@@ -161,8 +161,8 @@ pub struct OutputFit {
     pub whiteness_probability: Option<f64>,
 }
 
-/// What became of starts that did not lead to the solution. The numbers and that of the starts that led there add up
-/// to the number of starts.
+/// Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there add up to
+/// the number of starts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct OtherStarts {
     /// Number of starts that led to other solutions that fit nearly as well.
