@@ -1,15 +1,14 @@
 //! `obsdeg calibrate`: what a scheme determines, from the record of its run.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
 
 use crate::arguments::RequireMet;
 use crate::failure::Failure;
-use crate::input::{Kind, is_stdin, open, read, read_as};
+use crate::input::{Kind, is_stdin, open_record, read, read_as};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
@@ -85,7 +84,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     };
     let (source, records) = a.read()?;
     let named = source.read()?;
-    let records = records.iter().map(|path| record(path)).collect::<Result<Vec<_>, _>>()?;
+    let records = records.iter().map(|path| open_record(path)).collect::<Result<Vec<_>, _>>()?;
     let before = a.before.as_deref().map(|path| read(path, "calibration")).transpose()?;
     let host = Host { worker: None, going: &going };
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
@@ -172,15 +171,4 @@ impl Arguments {
             }
         }
     }
-}
-
-/// A record that is a file, or stdin.
-fn record(path: &Path) -> Result<Record, Failure> {
-    let wrong = |e: &dyn std::fmt::Display| Failure::input(e.to_string());
-    if path == Path::new("-") {
-        return Record::stream("stdin", Box::new(std::io::stdin())).map_err(|e| wrong(&e));
-    }
-    let name = path.display().to_string();
-    let file = open(path).map_err(|e| Failure::input(format!("cannot read the record {name}: {e}")))?;
-    Record::file(&name, file).map_err(|e| wrong(&e))
 }

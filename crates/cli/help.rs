@@ -23,6 +23,8 @@ const OUTPUT: Section = Some("Output");
 /// says of one of its own comes first, as `calibrate.step`.
 const LINES: &[(&str, Section, &str)] = &[
     ("calibrate.files", None, "Scheme or model file, then records of its runs; - is stdin"),
+    ("allan.record", None, "Record of sensors at rest (CSV or Parquet); - is stdin"),
+    ("column", None, "Column to use, by its name; may be given several times"),
     ("compare.files", None, "Scheme files (TOML); - is stdin"),
     ("simulate.files", None, "Scheme file (TOML) or model file (TOML, JSON); - is stdin"),
     ("crosscheck.files", None, "Scheme file (TOML) or model file (TOML, JSON); - is stdin"),
@@ -61,6 +63,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("dry_run", OUTPUT, "Show how the records are read, and estimate nothing"),
     ("estimate_noise", ASSUMED, "Estimate the noise of every component of Z from the residuals"),
     ("gravity", ASSUMED, "One g in m/s^2"),
+    ("confidence", ASSUMED, "Probability that a confidence band holds a deviation"),
     ("gate", ASSUMED, "Probability that no good sample is taken as outlier"),
     ("runs", ASSUMED, "Number of Monte Carlo runs"),
     ("monte_carlo", ASSUMED, "Number of Monte Carlo runs of the evidence"),
@@ -127,6 +130,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("design.output", OUTPUT, "Folder for summary, scheme and figures; with --part a file"),
     ("simulate.output", OUTPUT, "Folder for summary, series and figures; or a .json, .md, .csv, .tex file"),
     ("crosscheck.output", OUTPUT, "Folder for evidence and figures; or a .json, .md, .csv, .tex file"),
+    ("allan.output", OUTPUT, "Folder for coefficients, deviations, settings and figures"),
     ("calibrate.output", OUTPUT, "Folder for calibration, coefficients, residuals and figures"),
     ("man.output", None, "Folder for all pages: obsdeg.1, obsdeg-analyze.1 and so on"),
     ("output", OUTPUT, "File to write to instead of stdout (-)"),

@@ -3,6 +3,7 @@
 use std::io::{Error, ErrorKind, Read, Result as Io};
 use std::path::{Path, PathBuf};
 
+use obsdeg_calibration::record::Record;
 use obsdeg_commands::{Expected, Source};
 use obsdeg_core::model::scheme_file;
 use obsdeg_core::system::model_file;
@@ -134,4 +135,15 @@ pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
 #[cfg(not(unix))]
 pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
     std::fs::File::open(path)
+}
+
+/// A record that is a file, or stdin.
+pub(crate) fn open_record(path: &Path) -> Result<Record, Failure> {
+    let wrong = |e: &dyn std::fmt::Display| Failure::input(e.to_string());
+    if path == Path::new("-") {
+        return Record::stream("stdin", Box::new(std::io::stdin())).map_err(|e| wrong(&e));
+    }
+    let name = path.display().to_string();
+    let file = open(path).map_err(|e| Failure::input(format!("cannot read the record {name}: {e}")))?;
+    Record::file(&name, file).map_err(|e| wrong(&e))
 }

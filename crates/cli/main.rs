@@ -1,6 +1,7 @@
 //! The command line of obsdeg: arguments in, text out, exit codes. One file per command.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is the command line")]
 
+mod allan;
 mod analyze;
 mod arguments;
 mod calibrate;
@@ -46,6 +47,7 @@ Examples:
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
   obsdeg calibrate scheme.toml record.csv
+  obsdeg allan night.csv
   obsdeg compare a.toml b.toml
   obsdeg design --positions 5 --carry inertial
   obsdeg report scheme.toml model.toml -o review.html
@@ -71,6 +73,8 @@ enum Command {
     Crosscheck(crosscheck::Arguments),
     /// Estimate what a scheme or model determines from records of its runs
     Calibrate(calibrate::Arguments),
+    /// Noise of gyros and accelerometers from a record at rest: Allan deviation and coefficients
+    Allan(allan::Arguments),
     /// Judge schemes side by side: verdicts, predicted accuracy, what each position is for
     Compare(compare::Arguments),
     /// Find schemes: the fewest positions, or the best of a number of them
@@ -178,6 +182,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Simulate(a) => simulate::run(a, given),
         Command::Crosscheck(a) => crosscheck::run(a, given),
         Command::Calibrate(a) => calibrate::run(a, given),
+        Command::Allan(a) => allan::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Design(a) => design::run(&a),
         Command::Report(a) => report::run(a, given),

@@ -1,6 +1,7 @@
 //! `obsdeg schema`: JSON Schemas, generated from the types.
 
 use clap::{Args, ValueEnum};
+use obsdeg_calibration::noise::SensorNoiseReport;
 use obsdeg_calibration::{Calibration, SystemCalibration};
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::scheme_file::SchemeFile;
@@ -20,6 +21,8 @@ use crate::output;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Kind {
+    /// The JSON of `obsdeg allan`
+    Allan,
     /// The JSON of `obsdeg analyze`
     Analysis,
     /// The JSON of `obsdeg paper`
@@ -62,6 +65,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut schema = match a.kind {
+        Kind::Allan => written::<SensorNoiseReport>(),
         Kind::Analysis => written::<Analysis>(),
         Kind::Audit => written::<Audit>(),
         Kind::Simulation => written::<Simulation>(),

@@ -6,7 +6,7 @@
 1
 
 Ask with :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`, :func:`calibrate` and :func:`report`,
-of a :class:`Scheme` or a :class:`Model`; :func:`load` reads models of other tools, :mod:`obsdeg.campaign` asks many times.
+of a :class:`Scheme` or a :class:`Model`; :func:`allan` gives the noise of sensors at rest; :func:`load` reads models of other tools, :mod:`obsdeg.campaign` asks many times.
 
 Options are those of the command line in snake case; answers are the JSON of a command line without the symbolic engine, byte for byte,
 with attributes. Angles and latitudes are exact: an ``int`` and a ``str`` as they are, a ``float`` by its shortest text. What is computed
@@ -21,7 +21,7 @@ from typing import Any
 
 from . import options as options
 from . import shapes as shapes
-from ._calibrate import calibrate
+from ._calibrate import allan, calibrate
 from ._commands import analyze, compare, crosscheck, design, load, paper, report, simulate
 from ._files import Text
 from ._model import Model
@@ -39,6 +39,7 @@ from ._results import (
     Judgements,
     Part,
     Report,
+    SensorNoise,
     Simulation,
     SystemAnalysis,
     SystemCalibration,
@@ -66,6 +67,7 @@ __all__ = [
     "Report",
     "Rounded",
     "Scheme",
+    "SensorNoise",
     "Simulation",
     "SystemAnalysis",
     "SystemCalibration",
@@ -74,6 +76,7 @@ __all__ = [
     "Text",
     "Walks",
     "__version__",
+    "allan",
     "analyze",
     "calibrate",
     "compare",

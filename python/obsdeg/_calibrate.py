@@ -12,7 +12,7 @@ from ._files import Texted, read_text
 from ._model import Model
 from ._progress import heard
 from ._request import Judged, are_positions, request, source
-from ._results import Answer, Calibration, Progress, SystemCalibration
+from ._results import Answer, Calibration, Progress, SensorNoise, SystemCalibration
 from ._scheme import Scheme
 from ._signatures import named
 from ._texts import DIGITS, Attitude, Rounded
@@ -140,6 +140,53 @@ def calibrate(
     show, bar = heard(progress)
     try:
         return answered(kinds, _obsdeg.calibrate(asked, given, show), ("calibrate", asked, given), log)
+    finally:
+        if bar is not None:
+            bar.close()
+
+
+@named(options.Allan)
+def allan(
+    record: Record, *, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any
+) -> SensorNoise:
+    """Noise of gyros and accelerometers at rest: Allan deviation, coefficients with sigma, and settings for simulations.
+
+    Parameters
+    ----------
+    record : path, text stream, frame or mapping
+        A record as of :func:`calibrate`: its columns are named as in files (``t [s]``, ``wx [deg/h]``, ``fx [g]``).
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Hears how far it is, and ends it where it returns False; True for a bar of tqdm.
+    **options
+        Those of ``obsdeg allan``, in :class:`obsdeg.options.Allan`: ``column``, ``confidence``, ``gravity`` [m/s^2].
+
+    Returns
+    -------
+    SensorNoise
+        ``passed`` is False where noise of these kinds does not explain the deviations.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong with the record, with its line.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> noise = obsdeg.allan("tests/data/static/imu.csv")
+    >>> len(noise.columns) > 0
+    True
+    """
+    from ._frames import record as read
+
+    log: list[Rounded] = []
+    asked, given = request(options, digits, log), [read(record, 1)]
+    show, bar = heard(progress)
+    try:
+        answer: SensorNoise = answered((SensorNoise,), _obsdeg.allan(asked, given, show), ("allan", asked, given), log)
+        return answer
     finally:
         if bar is not None:
             bar.close()

@@ -62,6 +62,7 @@ READ: dict[str, Callable[[Any], Any]] = {
     "max_degree": _max_degree,
     "immune": _immune,
     "terms": lambda value: ",".join(_texts(value)),
+    "column": _texts,
     "combination": _texts,
     "gimbal": _texts,
     "observable": _texts,

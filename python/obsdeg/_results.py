@@ -87,7 +87,7 @@ class Answer:
             if self._asked is None:
                 raise ValueError("found an answer that was read from JSON; expected one of the engine, which alone writes this: ask again")
             command, request, records = self._asked
-            self._rust = _obsdeg.answer(command, request) if records is None else _obsdeg.calibrate(request, records)
+            self._rust = _obsdeg.answer(command, request) if records is None else getattr(_obsdeg, command)(request, records)
         return self._rust
 
     @property
@@ -562,6 +562,10 @@ class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
         return 7.0, 2.5 + _plots.height_of(len(self))
 
 
+class SensorNoise(Answer, shapes.SensorNoiseReport):
+    """Noise of sensors at rest, by the Allan deviation of a record."""
+
+
 class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalibration):
     """What a model determines, estimated from records."""
 
@@ -594,6 +598,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.system-evidence/1": SystemEvidence,
     "obsdeg.calibration/1": Calibration,
     "obsdeg.system-calibration/1": SystemCalibration,
+    "obsdeg.allan/1": SensorNoise,
     "obsdeg.audit/1": Audit,
 }
 

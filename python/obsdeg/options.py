@@ -183,6 +183,17 @@ class Calibrate(Seeded, Assumed, GyroNoise, total=False):
     """Probability that no measurement of a right record is left out as an outlier [default: 0.999]."""
 
 
+class Allan(TypedDict, total=False):
+    """The options of :func:`obsdeg.allan`."""
+
+    column: Names
+    """Columns to use, by their names [default: all with a unit of a rate or a specific force]."""
+    confidence: Real
+    """Probability that a confidence band holds a deviation [default: 0.95]."""
+    gravity: Real
+    """What one g is, in m/s^2 [default: 9.80665]."""
+
+
 class Design(Seeded, Assumed, Terms, Measured, total=False):
     """The options of :func:`obsdeg.design` beside those that it names itself."""
 

@@ -2701,6 +2701,20 @@ class FindingNotSettled(Record):
     kind: Literal["not_settled"]
 
 
+class FindingBends(Record):
+    """Estimates that bend over what the records leave open, so that no covariance describes their errors."""
+
+    __slots__ = ()
+
+    kind: Literal["bends"]
+    kappa: float | None
+    """Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if another minimum fits nearly as well."""
+    refits: int
+    """Number of repeated estimates from data with errors drawn anew."""
+    failed: int
+    """Number of repeated estimates that did not converge."""
+
+
 class FindingForce(Record):
     """Specific force that is not one g long, with no unknown that explains it."""
 
@@ -2883,6 +2897,7 @@ class FindingKnown(Record):
 Finding = Union[
     FindingInterrupted,
     FindingNotSettled,
+    FindingBends,
     FindingForce,
     FindingCells,
     FindingClock,
@@ -2927,14 +2942,53 @@ class Estimated(Record):
     """Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with the times and the noise of the
     records (and prior knowledge); null if not determined.
     """
+    required_sigma: float | None
+    """Largest sigma that the scheme requires, in the unit of `unit`; null if none is stated."""
     held_factor: float | None
-    """Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model couples an unknown
-    constrained by its prior to the estimate. Null if not determined.
+    """Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model couples an unknown that
+    stays open within its box to the estimate. Null if not determined.
     """
+    open_sigma: float | None
+    """Part of sigma, in the unit of `unit`, by what the records leave open within its box (see `assumed.held`): zero if nothing of it
+    bends into the estimate. Null if not determined.
+    """
+    from_prior: bool
+    """True if the estimate rests on a stated prior: scheme and records alone do not determine it."""
     prior_shift: float | None
-    """Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined."""
+    """Shift that the program's prior would make to the estimate, in sigma (dimensionless); null if not determined, and if priors are
+    stated: these are in the estimate.
+    """
     prior_factor: float | None
-    """Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not determined."""
+    """Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null as `prior_shift`."""
+
+
+class NextRun(Record):
+    """A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with this answer as prior
+    (`--prior`).
+    """
+
+    __slots__ = ()
+
+    unknown: str
+    """Name of the coefficient whose requirement is missed."""
+    unit: str
+    """Unit of the sigmas of the coefficient, such as deg/h."""
+    sigma: float | None
+    """Sigma by this answer, rescaled, in the unit of `unit`; null if not determined."""
+    required_sigma: float
+    """Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds to it."""
+    attitude: str | None
+    """Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude makes sigma smaller by 1
+    %.
+    """
+    dwell_s: float | None
+    """Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell of the scheme. Null as
+    `attitude`.
+    """
+    sigma_then: float | None
+    """Sigma after this run, in the unit of `unit`, by the linear model. Null as `attitude`."""
+    met: bool
+    """True if that meets the requirement."""
 
 
 class CovarianceTable(Record):
@@ -2971,6 +3025,23 @@ class Fit(Record):
     """Factor to multiply sigmas by: the root of chi-square per degree of freedom, dimensionless."""
     passes: int
     """Number of linearisations until convergence."""
+
+
+class Curvature(Record):
+    """Curvature of the estimates over what the records and priors leave open."""
+
+    __slots__ = ()
+
+    kappa: float | None
+    """Largest difference of the run and its linear model along the longest axes of the estimates' errors, in sigma (dimensionless):
+    below 1 the linear covariance holds. Null if the run cannot be followed there, or if another minimum fits nearly as well.
+    """
+    refits: int
+    """Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1)."""
+    failed: int
+    """Number of repeated estimates that did not converge."""
+    from_refits: bool
+    """True if estimates and sigmas are mean and covariance of the repeated estimates."""
 
 
 class Moved(Record):
@@ -3208,8 +3279,12 @@ class Assumed(Record):
     """Names of the unknowns and combinations taken from a calibration before."""
     known_differs: list[str]
     """Differences of the scheme of that calibration."""
+    priors: list[tuple[str, float, str]]
+    """Priors that the estimates hold as stated: name of the unknown, standard deviation in its unit, and that unit. Empty: estimates by
+    the data alone.
+    """
     held: list[tuple[str, float, str]]
-    """Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit."""
+    """Box of what the records leave open: name of the unknown, one standard deviation in its unit, and that unit."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, drift_noise."""
     seed: int
@@ -3361,12 +3436,16 @@ class Calibration(Shape):
     """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null if none is
     stated. Requirements on psi are not judged: a calibration estimates psi of the start of a record.
     """
+    next_runs: list[NextRun]
+    """Further runs that bring coefficients to requirements they miss; empty if none is missed."""
     combinations: list[Estimated]
     """Estimates of combinations of unknowns that are not determined alone, and of those asked for."""
     covariance: CovarianceTable
     """Covariance of all estimates that do not follow from others."""
     fit: Fit
     """Quality of the whole fit: chi-square, its band and its factor."""
+    curvature: Curvature
+    """Curvature of the estimates over what the records and priors leave open."""
     positions: list[PositionFit]
     """Quality of the fit by record and position."""
     channels: list[ChannelFit]
@@ -3523,6 +3602,25 @@ class OtherSolution(Record):
     """Values of the unknowns, in their order and units."""
 
 
+class OtherStarts(Record):
+    """Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there add up to the number of
+    starts.
+    """
+
+    __slots__ = ()
+
+    near: int
+    """Number of starts that led to other solutions that fit nearly as well."""
+    higher: int
+    """Number of starts that ended at a minimum with a larger chi-square."""
+    least_higher_chi_square: float | None
+    """Least chi-square of those minima, dimensionless; null if there are none."""
+    unsettled: int
+    """Number of starts whose iteration did not settle."""
+    failed: int
+    """Number of starts from which the model gives no numbers."""
+
+
 class Profile(Record):
     """Profile of one unknown: the fit as a function of its value when all others follow."""
 
@@ -3582,6 +3680,8 @@ class SystemCalibration(Shape):
     """Other solutions that fit nearly as well, the best first: the values of the unknowns."""
     starts: tuple[int, int]
     """Number of starts that were tried, then the number that led to the solution."""
+    other_starts: OtherStarts
+    """Ends of the starts that did not lead to the solution."""
     starts_at_most: int
     """Largest number of starts; fewer are enough when no other solution is to be expected."""
     profiles: list[Profile]
@@ -3608,6 +3708,139 @@ class SystemCalibration(Shape):
     """Largest number of integration steps between two rows."""
     seed: int
     """Seed of starts and verdicts."""
+
+SensorKind = Literal["gyro", "accelerometer"]
+"""Kind of a sensor, by the unit of its column. gyro: Gyro: the column is a rate of rotation. accelerometer: Accelerometer: the column is
+a specific force.
+"""
+
+NoiseKind = Literal["random_walk", "bias_instability", "rate_random_walk"]
+"""Kind of noise of a sensor (IEEE Std 952-1997, Annex C). random_walk: White noise of a rate: angle random walk of a gyro, velocity
+random walk of an accelerometer; the deviation falls with the root of the cluster time. bias_instability: Flicker noise: bias
+instability; the deviation does not change with the cluster time. rate_random_walk: Random walk of a rate: rate random walk of a gyro,
+acceleration random walk of an accelerometer; the deviation grows with the root of the cluster time.
+"""
+
+
+class NoiseCoefficient(Record):
+    """Noise coefficient of a sensor."""
+
+    __slots__ = ()
+
+    noise: NoiseKind
+    """Kind of the noise that the coefficient is of."""
+    name: str
+    """Name of the coefficient in words."""
+    unit: str
+    """Unit of the coefficient, such as deg/sqrt(h)."""
+    resolved: bool
+    """True if the record resolves the coefficient: its square is more than three standard deviations."""
+    value: float | None
+    """Estimate in the unit of `unit`; null if not resolved."""
+    sigma: float | None
+    """Standard deviation of the estimate in the unit of `unit`; null if not resolved."""
+    limit: float
+    """Upper limit in the unit of `unit`: the coefficient lies below it with probability 0.95."""
+    least_resolved: float
+    """Least coefficient that this record resolves beside its other noise, in the unit of `unit`."""
+
+
+class AllanDeviation(Record):
+    """Overlapping Allan deviation at one cluster time."""
+
+    __slots__ = ()
+
+    tau_s: float
+    """Cluster time of the deviation, in s."""
+    samples: int
+    """Number of samples of a cluster."""
+    deviation: float
+    """Deviation, in the unit of the column's `unit`."""
+    low: float
+    """Lower end of the confidence band, in the unit of the column's `unit`."""
+    high: float
+    """Upper end of the confidence band, in the unit of the column's `unit`."""
+    degrees_of_freedom: float
+    """Degrees of freedom of the variance, by the fitted noise (dimensionless)."""
+    fitted: float
+    """Deviation of the fitted noise, in the unit of the column's `unit`."""
+
+
+class ColumnNoise(Record):
+    """Noise of one column of a record."""
+
+    __slots__ = ()
+
+    column: str
+    """Column, as in the header of the record."""
+    sensor: SensorKind
+    """Kind of the sensor, by the unit of the column."""
+    unit: str
+    """Unit of the deviations: deg/h (gyro) or ug (accelerometer)."""
+    samples: int
+    """Number of samples that count."""
+    empty_cells: int
+    """Number of cells that are empty or NaN."""
+    left_out: int
+    """Number of cells far from both neighbours, which were left out."""
+    left_out_lines: list[int]
+    """Numbers of the first lines with cells that were left out (dimensionless); at most 20."""
+    mean: float
+    """Mean of the samples, in the unit of `unit`."""
+    coefficients: list[NoiseCoefficient]
+    """Noise coefficients by a fit to the Allan variances."""
+    chi_square: float
+    """Sum of squared residuals of the fit by the covariance of the Allan variances, dimensionless."""
+    degrees_of_freedom: int
+    """Number of degrees of freedom of the fit."""
+    probability: float
+    """Probability that noise of these kinds leaves a larger sum."""
+    explained: bool
+    """True if noise of these kinds explains the deviations (probability above 0.001)."""
+    deviations: list[AllanDeviation]
+    """Overlapping Allan deviation by cluster time."""
+
+
+class NoiseSetting(Record):
+    """Key of a `[simulation]` table."""
+
+    __slots__ = ()
+
+    key: str
+    """Key of the table, with its unit, such as `angle_random_walk_deg_sqrt_h`."""
+    values: list[float]
+    """Values in the unit of the name of `key`: one, or three for the gyros X, Y, Z."""
+
+
+class SensorNoiseReport(Shape):
+    """Noise of the sensors of a static record, by its overlapping Allan deviation."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.allan/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    record: str
+    """Name of the record, as it was given."""
+    samples: int
+    """Number of rows of the record."""
+    span_s: tuple[float, float]
+    """First and last time of the record, in s."""
+    interval_s: float
+    """Usual interval between rows, in s."""
+    gaps: int
+    """Number of gaps: intervals between rows of more than one and a half usual ones, or less than half of one."""
+    jitter: float
+    """Largest deviation of another interval from the usual one, as a fraction of it (dimensionless)."""
+    ignored: list[str]
+    """Columns that are not used, as in the header of the record."""
+    columns: list[ColumnNoise]
+    """Noise by column of the record."""
+    settings: list[NoiseSetting]
+    """Keys of a `[simulation]` table for the noise that is resolved."""
+    simulation_table: str
+    """Text of the `[simulation]` table of a scheme file with the keys of `settings`, in TOML."""
+    notes: list[str]
+    """Statements on the record and on how noise maps to settings."""
 
 AuditFinding = Literal["agree", "conditional", "disagree", "not_covered"]
 """Outcome of checking an equation or claim of the paper. agree: True as printed in the paper. conditional: True under a condition that

@@ -28,6 +28,7 @@ SCHEMAS = [
     "system-evidence",
     "calibration",
     "system-calibration",
+    "allan",
     "audit",
 ]
 HEAD = '''"""What answers hold: a class for each type of their JSON. Written by `python/tools/write_shapes.py` from `obsdeg schema`; not by hand."""

@@ -557,7 +557,7 @@ fn how_a_record_is_read() {
     );
 }
 
-/// Every codec but one is read, and that one is named; of a pipe of Parquet only so much is taken.
+/// Every codec is read.
 #[test]
 fn codecs_of_parquet() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -579,18 +579,12 @@ fn codecs_of_parquet() {
         assert!(bytes.len() != parquet(&text).len(), "{codec:?}");
         assert_eq!(stdout(&of(&bytes)), right, "{codec:?}");
     }
-    // the codec of a column follows its name in the footer: field 4, an integer, gzip 2 and zstd 6 (zigzag)
-    let mut bytes = compressed(&text, Compression::GZIP(Default::default()));
-    let mark = [b"fx [g]".as_slice(), &[0x15, 0x04]].concat();
-    let at = bytes.windows(mark.len()).rposition(|w| w == mark).expect("a column") + mark.len() - 1;
-    bytes[at] = 0x0c;
-    let output = of(&bytes);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        stderr(&output).contains("it is compressed by zstd, which is not read; expected gzip"),
-        "{}",
-        stderr(&output)
-    );
+    // zstd, which the crate that wrote these has no pure codec for: by pyarrow
+    for version in ["1", "2"] {
+        let name = format!("tests/data/parquet/bench-day-{version}.parquet");
+        let bytes = fs::read(crate_root(&name)).expect("the record");
+        assert_eq!(stdout(&of(&bytes)), right, "{name}");
+    }
 }
 
 /// Files in the place of others are told by name, with the command in the right order.

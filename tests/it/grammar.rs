@@ -146,6 +146,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "profile" => &["x", "D_FX", ""],
         "calibration" => &["c.json", "none.json", "s.toml", "out", ""],
         "gravity" => &["9.81744", "9.80665", "9", "10.5", "1", "nan"],
+        "column" => &["wx", "fx", "t", ""],
+        "confidence" => &["0.95", "0.683", "0.5", "0", "1", "nan"],
         "gate" => &["0.999", "1", "0.5", "0", "2", "nan"],
         "within" => &["0.01", "0", "x"],
         "front" => &["1", "3", "0", "2:4", "1,2", "x"],
@@ -166,7 +168,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "figures" => &["pictures", ".", "s.toml"],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "require-met"
-        | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" => {
+        | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
             return None;
         }
         _ => number,
@@ -179,6 +181,7 @@ fn operands(command: &str) -> &'static [&'static str] {
         "analyze" | "simulate" | "crosscheck" => &["s.toml", "m.toml", "none.toml"],
         "compare" | "report" => &["s.toml", "t.toml", "m.toml", "none.toml"],
         "calibrate" => &["s.toml"],
+        "allan" => &["n.csv", "n.csv", "r.csv", "none.csv"],
         "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
         "completions" => &["bash", "zsh", "nothing"],
         "licences" => &["uPlot", "nalgebra", "nothing"],
@@ -224,6 +227,7 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         "completions",
         "licences",
         "man",
+        "allan",
     ];
     let codes = std::thread::scope(|scope| {
         let draw = |(i, command)| scope.spawn(move || draws(i as u64, command));
@@ -238,10 +242,22 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
 /// A folder with the files of the command lines.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, text) in [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL), ("r.csv", &record())] {
+    let record = record();
+    for (name, text) in
+        [("s.toml", SCHEME), ("t.toml", TURNING), ("m.toml", MODEL), ("r.csv", &record), ("n.csv", &noise())]
+    {
         fs::write(folder.path().join(name), text).expect("written");
     }
     folder
+}
+
+/// A record of a gyro and an accelerometer at rest: noise of uniform numbers.
+fn noise() -> String {
+    let mut rng = SplitMix64::new(3);
+    let mut next = || (rng.below(1 << 20) as f64) / f64::from(1 << 20) - 0.5;
+    let line = |k: u32| format!("{k},{},{}\n", next(), 1.0 + 1e-4 * next());
+    let lines: String = (0..2000).map(line).collect();
+    format!("t [s],wx [deg/h],fx [g]\n{lines}")
 }
 
 /// A record of s.toml, of no errors but noise.
@@ -303,7 +319,7 @@ fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
     let options = options(command);
     let fair = ["man", "schema", "completions", "licences"].contains(&command);
-    assert!(fair || options.len() > 4, "{command}: {options:?}");
+    assert!(fair || options.len() > 3, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
     for _ in 0..if fair { 4 } else { DRAWN } {
         let folder = folder();

@@ -3,11 +3,12 @@
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
-const COMMANDS: [(&str, usize); 12] = [
+const COMMANDS: [(&str, usize); 13] = [
     ("analyze", 46),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 48),
+    ("allan", 24),
     ("compare", 46),
     ("design", 70),
     ("report", 60),

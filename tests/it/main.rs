@@ -1,6 +1,7 @@
 //! Everything that is tested from outside, in one binary: compiled once, linked once, its tests side by side. The tests of the
 //! symbolic worker are apart: they hold the lock for which others would wait.
 
+mod allan;
 #[cfg(unix)]
 mod book;
 mod branches;

@@ -8,7 +8,8 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// The kinds of `obsdeg schema`.
-const KINDS: [&str; 15] = [
+const KINDS: [&str; 16] = [
+    "allan",
     "analysis",
     "audit",
     "calibration",
@@ -119,6 +120,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["analyze", "--angles", "0,0,0", "--angles", "180,0,0", "--formulas"][..],
         &["analyze", "--angles", "NUE@X_p:360", "--angles", "alpha,0,0", "--latitude", "90"],
         &["paper"],
+        &["allan", "tests/data/static/imu.csv"],
         &["compare", five, six],
         &["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0", "--runs", "20"],
         &["crosscheck", "examples/lotka-volterra/model.toml"],

@@ -30,12 +30,18 @@ pub struct Calibration {
     /// the start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
+    /// Further runs that bring coefficients to requirements they miss; empty if none is missed.
+    #[serde(default)]
+    pub next_runs: Vec<NextRun>,
     /// Estimates of combinations of unknowns that are not determined alone, and of those asked for.
     pub combinations: Vec<Estimated>,
     /// Covariance of all estimates that do not follow from others.
     pub covariance: CovarianceTable,
     /// Quality of the whole fit: chi-square, its band and its factor.
     pub fit: Fit,
+    /// Curvature of the estimates over what the records and priors leave open.
+    #[serde(default)]
+    pub curvature: Curvature,
     /// Quality of the fit by record and position.
     pub positions: Vec<PositionFit>,
     /// Quality of the fit by component of Z.
@@ -86,6 +92,16 @@ pub enum Finding {
     Interrupted,
     /// Iteration that did not converge.
     NotSettled,
+    /// Estimates that bend over what the records leave open, so that no covariance describes their errors.
+    Bends {
+        /// Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if
+        /// another minimum fits nearly as well.
+        kappa: Option<f64>,
+        /// Number of repeated estimates from data with errors drawn anew.
+        refits: usize,
+        /// Number of repeated estimates that did not converge.
+        failed: usize,
+    },
     /// Specific force that is not one g long, with no unknown that explains it.
     Force {
         /// Name of the record with this finding.
@@ -299,13 +315,24 @@ pub struct Estimated {
     /// Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with
     /// the times and the noise of the records (and prior knowledge); null if not determined.
     pub predicted_sigma: Option<f64>,
+    /// Largest sigma that the scheme requires, in the unit of `unit`; null if none is stated.
+    #[serde(default)]
+    pub required_sigma: Option<f64>,
     /// Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model
-    /// couples an unknown constrained by its prior to the estimate. Null if not determined.
+    /// couples an unknown that stays open within its box to the estimate. Null if not determined.
     pub held_factor: Option<f64>,
-    /// Shift of the estimate by the prior of the scheme, in sigma (dimensionless); null if not determined.
+    /// Part of sigma, in the unit of `unit`, by what the records leave open within its box (see
+    /// `assumed.held`): zero if nothing of it bends into the estimate. Null if not determined.
+    #[serde(default)]
+    pub open_sigma: Option<f64>,
+    /// True if the estimate rests on a stated prior: scheme and records alone do not determine it.
+    #[serde(default)]
+    pub from_prior: bool,
+    /// Shift that the program's prior would make to the estimate, in sigma (dimensionless); null if not
+    /// determined, and if priors are stated: these are in the estimate.
     pub prior_shift: Option<f64>,
-    /// Factor on sigma by the prior of the scheme, dimensionless: 1 where it does not matter; null if not
-    /// determined.
+    /// Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null
+    /// as `prior_shift`.
     pub prior_factor: Option<f64>,
 }
 
@@ -325,9 +352,36 @@ pub struct CovarianceTable {
     pub rescaled: Vec<Vec<f64>>,
 }
 
+/// A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with
+/// this answer as prior (`--prior`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NextRun {
+    /// Name of the coefficient whose requirement is missed.
+    pub unknown: String,
+    /// Unit of the sigmas of the coefficient, such as deg/h.
+    pub unit: String,
+    /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
+    pub sigma: Option<f64>,
+    /// Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds
+    /// to it.
+    pub required_sigma: f64,
+    /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude
+    /// makes sigma smaller by 1 %.
+    pub attitude: Option<String>,
+    /// Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell of the
+    /// scheme. Null as `attitude`.
+    pub dwell_s: Option<f64>,
+    /// Sigma after this run, in the unit of `unit`, by the linear model. Null as `attitude`.
+    pub sigma_then: Option<f64>,
+    /// True if that meets the requirement.
+    pub met: bool,
+}
+
 /// A calibration before, of what `S` says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before<S> {
+    /// Names of the unknowns with a stated prior that is in the estimates already: it counts once.
+    pub priors: Vec<String>,
     /// Its estimates; the covariance is the one that counts.
     pub estimates: CovarianceTable,
     /// The records that it rests on, those of its own prior too.
@@ -349,6 +403,21 @@ pub struct Fit {
     pub factor: f64,
     /// Number of linearisations until convergence.
     pub passes: usize,
+}
+
+/// Curvature of the estimates over what the records and priors leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Curvature {
+    /// Largest difference of the run and its linear model along the longest axes of the estimates' errors, in
+    /// sigma (dimensionless): below 1 the linear covariance holds. Null if the run cannot be followed there,
+    /// or if another minimum fits nearly as well.
+    pub kappa: Option<f64>,
+    /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1).
+    pub refits: usize,
+    /// Number of repeated estimates that did not converge.
+    pub failed: usize,
+    /// True if estimates and sigmas are mean and covariance of the repeated estimates.
+    pub from_refits: bool,
 }
 
 /// Quality of the fit at one position of a record.
@@ -584,7 +653,12 @@ pub struct Assumed {
     pub known: Vec<String>,
     /// Differences of the scheme of that calibration.
     pub known_differs: Vec<String>,
-    /// Undetermined unknowns: name, standard deviation of the constraining prior in its unit, and that unit.
+    /// Priors that the estimates hold as stated: name of the unknown, standard deviation in its unit, and
+    /// that unit. Empty: estimates by the data alone.
+    #[serde(default)]
+    pub priors: Vec<(String, f64, String)>,
+    /// Box of what the records leave open: name of the unknown, one standard deviation in its unit, and that
+    /// unit.
     pub held: Vec<(String, f64, String)>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.

@@ -17,12 +17,31 @@ pub struct Linearised {
     pub roots: Vec<DMatrix<f64>>,
     /// Measurement minus output, in the order of the rows.
     pub residuals: Vec<f64>,
+    /// Gaps of a trajectory in parts: after which step the next part begins, and the local coordinates there
+    /// of the end of the step before (shape n), in order. The states behind a gap are corrections of the next
+    /// part. Empty where the trajectory is one.
+    pub gaps: Vec<(usize, DVector<f64>)>,
 }
 
 impl Linearised {
     /// The number of states.
     pub fn states(&self) -> usize {
         self.stages.first().map_or(0, |s| s.transition.states())
+    }
+
+    /// Corrections of all states after the steps for a start corrected by `start`, without noise:
+    /// `d_k = Phi d_(k-1)`, and the gap where one is. `on_step` hears the step and the correction behind its
+    /// gap.
+    pub(crate) fn carried(&self, start: &[f64], mut on_step: impl FnMut(usize, &[f64])) {
+        let (mut d, mut scratch) = (start.to_vec(), Vec::new());
+        let mut gaps = self.gaps.iter().peekable();
+        for (step, stage) in self.stages.iter().enumerate() {
+            stage.transition.apply(&mut d, &mut scratch);
+            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+                d.iter_mut().zip(gap).for_each(|(d, e)| *d += e);
+            }
+            on_step(step, &d);
+        }
     }
 
     /// The same without the measurements for which `keep` is false.
@@ -93,9 +112,16 @@ impl Information {
         let mut rows: DMatrix<f64> = DMatrix::zeros(n + 1, n + 1);
         let mut noise = Vec::with_capacity(run.stages.len());
         let mut next = run.residuals.len();
-        for (stage, g) in run.stages.iter().zip(&run.roots).rev() {
+        let mut gaps = run.gaps.iter().rev().peekable();
+        for (step, (stage, g)) in run.stages.iter().zip(&run.roots).enumerate().rev() {
             let (m, q) = (stage.outputs.len(), g.ncols());
             next -= m;
+            // A (d + e) = b behind a gap e
+            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+                let shift = rows.columns(0, n) * gap;
+                let mut right = rows.column_mut(n);
+                right -= shift;
+            }
             // what this step measured
             let mut with = rows.clone().resize(n + 1 + m, n + 1, 0.0);
             for (i, output) in stage.outputs.iter().enumerate() {
@@ -147,13 +173,14 @@ impl Information {
     /// [`EkfError::Singular`].
     pub fn states(&self, run: &Linearised, start: State) -> Result<Vec<State>, EkfError> {
         let mut out = vec![start];
-        for ((stage, g), of) in run.stages.iter().zip(&run.roots).zip(&self.noise) {
+        let mut gaps = run.gaps.iter().peekable();
+        for (step, ((stage, g), of)) in run.stages.iter().zip(&run.roots).zip(&self.noise).enumerate() {
             let Some(State { correction: d, root: p }) = out.last() else { break };
             let phi = stage.transition.matrix();
             let solve = |b: &DMatrix<f64>| {
                 of.own.solve_upper_triangular(b).ok_or(EkfError::Singular { column: of.own.ncols() })
             };
-            let next = if g.ncols() == 0 {
+            let mut next = if g.ncols() == 0 {
                 State { correction: &phi * d, root: &phi * p }
             } else {
                 let right = &of.right - &of.before * d;
@@ -167,6 +194,9 @@ impl Information {
                 let root = if both.ncols() > n { both.transpose().qr().r().transpose() } else { both };
                 State { correction: &phi * d + g * xi.column(0), root }
             };
+            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+                next.correction += gap;
+            }
             out.push(next);
         }
         Ok(out)
@@ -299,7 +329,12 @@ mod tests {
             steps: 1,
         };
         let residuals: Vec<f64> = (0..8).filter(|k| *k != 3).map(|k| z[k]).collect();
-        let run = Linearised { stages: (0..8).map(stage).collect(), roots: vec![g.clone(); 8], residuals };
+        let run = Linearised {
+            stages: (0..8).map(stage).collect(),
+            roots: vec![g.clone(); 8],
+            residuals,
+            gaps: vec![],
+        };
         // unknowns: the start (3), then xi of every step (2 each)
         let n = 3 + 16;
         let (mut information, mut right, mut squares) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
@@ -324,6 +359,18 @@ mod tests {
         let covariance = information.try_inverse().expect("definite");
         let x = &covariance * &right;
         let found = Information::of(&run).expect("finite");
+        // the same run about a trajectory in two parts: the second begins elsewhere after step 4
+        let c = DVector::from_column_slice(&[0.6, -1.1, 0.4]);
+        let mut parted = Linearised { gaps: vec![(4, -&c)], ..run.clone() };
+        let mut at = c;
+        // step 3 has no measurement
+        for row in 4..7 {
+            at = &phi * at;
+            parted.residuals[row] -= at[0] + 0.5 * at[1];
+        }
+        let again = Information::of(&parted).expect("finite");
+        assert!((again.at_zero() - found.at_zero()).abs() < 1e-9);
+        assert!((again.left - found.left).abs() < 1e-9 && (&again.right - &found.right).amax() < 1e-9);
         let mut rows = Rows::new(3);
         rows.add(&found.root, &found.right);
         let solution = rows.solve().expect("determined");

@@ -25,11 +25,14 @@
 pub mod answer;
 pub mod bins;
 pub mod least_squares;
+pub mod noise;
 pub mod platform;
 pub mod record;
 mod setup;
 pub mod still;
 pub mod system;
+#[cfg(feature = "parquet")]
+mod zstd_pages;
 
 /// How far a calibration is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

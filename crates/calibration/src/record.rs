@@ -11,12 +11,15 @@ use std::io::{BufRead, BufReader, Read};
 
 use obsdeg_core::model::Recording;
 #[cfg(feature = "parquet")]
-use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit};
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 #[cfg(feature = "parquet")]
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::FileReader;
 #[cfg(feature = "parquet")]
 use parquet::record::Field;
 use sha2::{Digest, Sha256};
+
+#[cfg(feature = "parquet")]
+use crate::zstd_pages::ParquetFile;
 
 /// The standard acceleration of gravity, in m/s^2.
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -354,7 +357,7 @@ impl Record {
         if !parquet {
             return Self::stream(name, Box::new(file));
         }
-        Self::parquet(name, Box::new(SerializedFileReader::new(file).map_err(|e| wrong(&e))?))
+        Self::parquet(name, Box::new(ParquetFile::new(file).map_err(|e| wrong(&e))?))
     }
 
     /// A record from a pipe, with the feature `parquet`: Parquet, which ends with its header and so is read whole, if it begins so, else CSV.
@@ -377,19 +380,12 @@ impl Record {
                 "more than {most} MiB of Parquet from a pipe; expected a file, of which only what is needed is read"
             )));
         }
-        let reader = SerializedFileReader::new(bytes::Bytes::from(begin)).map_err(|e| wrong(&e))?;
+        let reader = ParquetFile::new(bytes::Bytes::from(begin)).map_err(|e| wrong(&e))?;
         Self::parquet(name, Box::new(reader))
     }
 
     #[cfg(feature = "parquet")]
     fn parquet(name: &str, reader: Box<dyn FileReader>) -> Result<Self, RecordError> {
-        let groups = reader.metadata().row_groups().iter();
-        if groups.flat_map(|g| g.columns()).any(|c| matches!(c.compression(), Compression::ZSTD(_))) {
-            return Err(RecordError::Read {
-                record: name.into(),
-                reason: "it is compressed by zstd, which is not read; expected gzip, brotli, lz4, snappy or none, as `pyarrow.parquet.write_table(table, name, compression=\"gzip\")` writes it".into(),
-            });
-        }
         let fields = reader.metadata().file_metadata().schema().get_fields();
         let headers: Vec<String> = fields.iter().map(|f| f.name().to_string()).collect();
         let mut columns = columns(name, headers, 0)?;

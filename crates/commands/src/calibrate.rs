@@ -35,7 +35,7 @@ const SOME_STARTS: RangeInclusive<u64> = 1..=10_000;
 /// The gate where nothing is said.
 const GATE: f64 = 0.999;
 /// What one g may be, in m/s^2.
-const GRAVITY: [f64; 2] = [9.0, 10.5];
+pub(crate) const GRAVITY: [f64; 2] = [9.0, 10.5];
 /// What the gate may be.
 const PROBABILITY: [f64; 2] = [0.5, 1.0];
 
@@ -132,7 +132,7 @@ impl Default for Calibrate {
 }
 
 /// Reads a number from `low` to `high`.
-fn number_within(
+pub(crate) fn number_within(
     [low, high]: [f64; 2],
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| {
@@ -360,5 +360,9 @@ fn prior<S: serde::de::DeserializeOwned>(
     }
     let rests_on = serde_json::from_value(key("rests_on")).map_err(older)?;
     let of = serde_json::from_value(key(if of == "scheme" { "setup" } else { of })).map_err(older)?;
-    Ok(Before { estimates, rests_on, of })
+    // unknown, standard deviation, unit; none of a model
+    let named = |prior: &serde_json::Value| prior[0].as_str().map(String::from);
+    let priors = value["assumed"]["priors"].as_array().map_or(&[][..], Vec::as_slice);
+    let priors = priors.iter().filter_map(named).collect();
+    Ok(Before { priors, estimates, rests_on, of })
 }

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use crate::allan::{Allan, allan, files as allan_files};
 use crate::analyze::{Analyze, analyze};
 use crate::arguments::Given;
 use crate::calibrate::{Calibrate, calibrate};
@@ -22,8 +23,8 @@ use crate::simulate::{Simulate, files as simulation_files, simulate};
 use crate::source::{Input, Named, Source, title};
 
 /// The commands.
-pub const COMMANDS: [&str; 8] =
-    ["analyze", "simulate", "crosscheck", "calibrate", "compare", "design", "report", "paper"];
+pub const COMMANDS: [&str; 9] =
+    ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report", "paper"];
 
 /// An answer, whatever it is of.
 pub trait Rendered: Send + Sync {
@@ -248,12 +249,13 @@ fn answered<W: Wanted>(
             asked.options.given = asked.given;
             let Records { sources, records, before } = asked.files;
             let source = one(sources)?;
-            let record = |r: Source| {
-                let bytes = std::io::Cursor::new(r.text.into_bytes());
-                Record::csv(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
-            };
-            let records = records.into_iter().map(record).collect::<Result<_, _>>()?;
+            let records = records.into_iter().map(of_text).collect::<Result<_, _>>()?;
             calibrated::<W>(&asked.options, source, records, before.as_ref(), host)
+        }
+        "allan" => {
+            let asked: Request<Allan, StaticRecords> = Request::read(request)?;
+            let records = asked.files.records.into_iter().map(of_text).collect::<Result<_, _>>()?;
+            noise_of::<W>(&asked.options, records, host)
         }
         "compare" => {
             let asked: Request<Compare, Sources> = Request::read(request)?;
@@ -304,6 +306,19 @@ struct Records {
     sources: Vec<Source>,
     records: Vec<Source>,
     before: Option<Source>,
+}
+
+/// What the noise of sensors is found in.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default)]
+struct StaticRecords {
+    records: Vec<Source>,
+}
+
+/// A record that is a text.
+fn of_text(r: Source) -> Result<Record, Problem> {
+    let bytes = std::io::Cursor::new(r.text.into_bytes());
+    Record::csv(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
 }
 
 /// What a review reads, and the command that it names.
@@ -410,6 +425,28 @@ pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) 
         calibrated::<All>(&asked.options, source, records, asked.files.before.as_ref(), host)
     };
     answer().map_err(in_snake_case)
+}
+
+/// The noise of sensors in a record that is no text, as [`call`] gives it of texts: `request` has all but
+/// `records`.
+///
+/// # Errors
+/// What is wrong with the request or the record.
+pub fn call_allan(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
+    let answer = || {
+        let asked: Request<Allan, StaticRecords> = Request::read(object(request)?)?;
+        noise_of::<All>(&asked.options, records, host)
+    };
+    answer().map_err(in_snake_case)
+}
+
+fn noise_of<W: Wanted>(options: &Allan, records: Vec<Record>, host: &Host<'_>) -> Result<W::Out, Problem> {
+    let found = records.len();
+    let [record] = <[Record; 1]>::try_from(records)
+        .map_err(|_| Problem::input(format!("found {found} records; expected one of sensors at rest")))?;
+    let found = allan(options, record, host)?;
+    let passed = found.columns.iter().all(|c| c.explained);
+    W::whole(found, passed, |found| Ok(allan_files(found)?))
 }
 
 fn calibrated<W: Wanted>(

@@ -13,6 +13,7 @@
 //! # Ok::<(), obsdeg_commands::Problem>(())
 //! ```
 
+mod allan;
 mod analyze;
 mod arguments;
 mod calibrate;
@@ -29,10 +30,11 @@ mod simulate;
 mod source;
 mod text;
 
+pub use allan::{Allan, allan, files as allan_files};
 pub use analyze::{Analyze, Judged, Judgements, analyze};
 pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
 pub use calibrate::{Calibrate, Calibrated, calibrate};
-pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_calibrate, call_json};
+pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_calibrate, call_json};
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};

@@ -6,10 +6,11 @@
 //!   an interval says of every moment in it; [`covariance`]: Joseph's and the UD form;
 //! - [`linear`]: linear models in stages, whose covariance is computed once for many runs;
 //! - [`information`]: the square root of the information matrix of a batch;
-//! - [`noise`]: random walks and bias instability of sensors; [`allan`]: the Allan deviation;
+//! - [`noise`]: random walks and bias instability of sensors; [`allan`]: the Allan deviation; [`allan_fit`]: noise coefficients from it;
 //! - [`consistency`]: NEES, NIS, whiteness and their bands; [`decomposition`]: singular values.
 
 pub mod allan;
+pub mod allan_fit;
 pub mod consistency;
 pub mod covariance;
 pub mod decomposition;

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use obsdeg_calibration::record::Record;
-use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_calibrate};
+use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_allan, call_calibrate};
 use obsdeg_exact::interrupt;
 use obsdeg_report::Format;
 use pyo3::create_exception;
@@ -90,17 +90,34 @@ fn calibrate(
     records: Vec<(String, Option<Vec<u8>>)>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
-    let record = |(name, bytes): (String, Option<Vec<u8>>)| {
-        let unreadable = |e| Problem::input(format!("cannot read the record {name}: {e}"));
-        let record = match bytes {
-            Some(bytes) => Record::stream(&name, Box::new(Cursor::new(bytes))),
-            None => Record::file(&name, File::open(&name).map_err(unreadable)?),
-        };
-        record.map_err(|e| Problem::input(e.to_string()))
-    };
     heard(py, "calibrate", progress, move |host| {
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_calibrate(request, records, host)
+    })
+}
+
+/// A record of a name: the file of that path (CSV or Parquet), or its bytes.
+fn record((name, bytes): (String, Option<Vec<u8>>)) -> Result<Record, Problem> {
+    let unreadable = |e| Problem::input(format!("cannot read the record {name}: {e}"));
+    let record = match bytes {
+        Some(bytes) => Record::stream(&name, Box::new(Cursor::new(bytes))),
+        None => Record::file(&name, File::open(&name).map_err(unreadable)?),
+    };
+    record.map_err(|e| Problem::input(e.to_string()))
+}
+
+/// The noise of sensors at rest, from one record as `calibrate` has them.
+#[pyfunction]
+#[pyo3(signature = (request, records, progress=None))]
+fn allan(
+    py: Python<'_>,
+    request: &str,
+    records: Vec<(String, Option<Vec<u8>>)>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Answer> {
+    heard(py, "allan", progress, move |host| {
+        let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
+        call_allan(request, records, host)
     })
 }
 
@@ -330,6 +347,7 @@ fn _obsdeg(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("COMMANDS", obsdeg_commands::COMMANDS.to_vec())?;
     m.add_class::<Answer>()?;
     m.add_function(wrap_pyfunction!(answer, m)?)?;
+    m.add_function(wrap_pyfunction!(allan, m)?)?;
     m.add_function(wrap_pyfunction!(calibrate, m)?)?;
     m.add_function(wrap_pyfunction!(seconds, m)?)
 }

@@ -3,12 +3,10 @@
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
     Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
-    PositionFit, PositionsBy, RecordReport, ResidualSeries,
+    NextRun, PositionFit, PositionsBy, RecordReport,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
-use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, SKY, Stroke, grid};
-use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, Table, omitted, stated, words};
 
 /// How many outliers are listed.
@@ -100,7 +98,8 @@ fn rates(c: &Clock) -> String {
 pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up".into(),
+        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up. Check the times and attitudes of the scheme against the run (--dry-run shows how the record is read); state priors of the drifts under [simulation]; add positions".into(),
+        Finding::Bends { kappa, refits, failed } => bends(*kappa, *refits, *failed),
         Finding::Force { record, length_g, alike, least, most, causes } => {
             let of = of(record, records);
             if *alike {
@@ -210,15 +209,40 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// From this factor of sigma on, what is held shows.
+/// What is wrong with estimates that bend.
+fn bends(kappa: Option<f64>, refits: usize, failed: usize) -> String {
+    let size = kappa.map_or_else(
+        || {
+            "other values fit nearly as well, or the run cannot be followed over what the records leave open"
+                .to_string()
+        },
+        |k| {
+            format!(
+                "over what the records leave open the run differs from its linear model by {} sigma",
+                number(k)
+            )
+        },
+    );
+    let failed = if failed > 0 {
+        format!(", and {failed} of {refits} repeated estimates did not settle")
+    } else {
+        String::new()
+    };
+    format!(
+        "the records and priors do NOT determine the estimates: {size}{failed}. Do not use estimates and sigmas; state smaller priors under [simulation] or add positions"
+    )
+}
+
+/// From this factor of sigma on, what is left open shows.
 const HELD: f64 = 1.05;
 
 /// Why there is no estimate, or what is to be said of it.
 fn verdict(e: &Estimated) -> String {
-    let held = e.held_factor.filter(|f| e.determined && *f > HELD);
+    let bent = e.open_sigma.filter(|_| e.determined && e.held_factor.is_some_and(|f| f > HELD));
     match (e.determined, e.degree) {
-        (true, _) if held.is_some() => {
-            format!("estimated; sigma x{} by what is HELD (see there)", number(held.unwrap_or(1.0)))
+        (true, _) if e.from_prior => "estimated from a stated prior and the record".into(),
+        (true, _) if bent.is_some() => {
+            format!("estimated; +-{} {} by what is left open", number(bent.unwrap_or(0.0)), e.unit)
         }
         (true, Some(_)) => "estimated".into(),
         (true, None) => "estimated; not by derivatives alone".into(),
@@ -358,7 +382,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
         ),
         match a.noise_estimated {
             true => format!(
-                "noise of a sample estimated from what is left of it (first taken as {:e} g)",
+                "noise of a sample estimated from the residuals (first taken as {:e} g)",
                 a.accelerometer_noise_g
             ),
             false => format!(
@@ -395,34 +419,77 @@ fn moment(records: &[RecordReport]) -> String {
     }
 }
 
-/// What nothing determines, and which sigmas that is in.
-fn held(c: &Calibration) -> Vec<String> {
-    let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
-    let all: Vec<&Estimated> = c.quantities.iter().chain(&c.combinations).filter(shows).collect();
-    if c.assumed.held.is_empty() {
-        return Vec::new();
-    }
-    let widths: Vec<String> = c
-        .assumed
-        .held
-        .iter()
-        .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
-        .collect();
-    let mut out = vec![format!(
-        "what nothing determines is held within ten times its prior about its first estimate: {}",
-        widths.join(", ")
-    )];
-    out.push(if all.is_empty() {
-        format!("were it known, no sigma would be smaller by more than {:.0} %", 100.0 * (HELD - 1.0))
-    } else {
-        let each: Vec<String> = all
-            .iter()
-            .map(|e| format!("{} {} times", e.name, number(e.held_factor.unwrap_or(1.0))))
-            .collect();
+/// A further run for a requirement that is missed.
+fn next_run(n: &NextRun) -> String {
+    let now = n.sigma.map_or_else(
+        || format!("{} is not determined", n.unknown),
+        |s| format!("sigma of {} is {} {}", n.unknown, number(s), n.unit),
+    );
+    let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
+    let (Some(attitude), Some(dwell), Some(then)) = (&n.attitude, n.dwell_s, n.sigma_then) else {
+        return format!(
+            "{required}: no run at one attitude makes it smaller by 1 %. Add positions or reduce the noise."
+        );
+    };
+    let then = format!("{} {}", number(then), n.unit);
+    if n.met {
         format!(
-            "of the linear model it is in no estimate; where attitudes are off by degrees the nonlinear terms take it into some, and their sigmas are larger than were it known: {}. A smaller prior of what is held ([simulation.priors]) or more positions make them smaller",
-            each.join(", ")
+            "{required}: a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then}."
         )
+    } else {
+        format!(
+            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then} only."
+        )
+    }
+}
+
+/// The mode of the estimates: data alone or priors as stated, the box of what is left open and its effect,
+/// the curvature.
+fn mode(c: &Calibration) -> Vec<String> {
+    let listed = |of: &[(String, f64, String)]| {
+        of.iter()
+            .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let mut out = vec![if c.assumed.priors.is_empty() {
+        "Data alone: no prior is stated, so none is in an estimate that the record determines.".to_string()
+    } else {
+        format!(
+            "Priors as stated: estimates are the most probable values by the record and these priors (1 sigma): {}.",
+            listed(&c.assumed.priors)
+        )
+    }];
+    if !c.assumed.held.is_empty() {
+        out.push(format!(
+            "Left open: {} (box of 1 sigma about the first estimate).",
+            listed(&c.assumed.held)
+        ));
+        let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
+        let all: Vec<String> = c
+            .quantities
+            .iter()
+            .chain(&c.combinations)
+            .filter(shows)
+            .map(|e| format!("{} +-{} {}", e.name, number(e.open_sigma.unwrap_or(0.0)), e.unit))
+            .collect();
+        out.push(if all.is_empty() {
+            format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (HELD - 1.0))
+        } else {
+            format!(
+                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors under [simulation] or more positions make it smaller.",
+                all.join(", ")
+            )
+        });
+    }
+    out.push(match c.curvature.kappa {
+        Some(k) if c.curvature.from_refits => format!(
+            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from data and priors with errors drawn anew.",
+            number(k),
+            c.curvature.refits - c.curvature.failed
+        ),
+        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 1).", number(k)),
+        None => "Curvature: the run cannot be followed over what is left open.".into(),
     });
     out
 }
@@ -522,7 +589,7 @@ impl Answer for Calibration {
             left("status"),
         ];
         let mut blocks = vec![Block::table(
-            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the scheme would do, in sigma and to sigma)",
+            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the program would do, in sigma and to sigma, where none is stated)",
             columns.clone(),
             self.quantities.iter().map(row),
         )];
@@ -534,11 +601,9 @@ impl Answer for Calibration {
                 rows,
             ));
         }
-        let held = held(self);
-        if !held.is_empty() {
-            blocks.push(Block::list("Held", held));
-        }
+        blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));
+        blocks.extend(Block::list_if_any("Next runs", self.next_runs.iter().map(next_run).collect()));
         blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
         let each = self.positions.len() / self.records.len().max(1);
         let force = self.positions.iter().any(|p| p.force_g.is_some());
@@ -668,7 +733,7 @@ fn covariance_table(t: &CovarianceTable) -> Table {
     Table { name: "covariance".into(), columns, rows: (0..t.names.len()).map(row).collect() }
 }
 
-/// Every measurement and what is left of it, as CSV.
+/// The residuals of all measurements, as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].
@@ -688,143 +753,4 @@ pub fn residuals_csv(c: &Calibration) -> Result<String, ReportError> {
         ]
     });
     crate::csv_text::write(std::iter::once(head.to_vec()).chain(rows))
-}
-
-/// The figures of a calibration: what is left of the measurements over time, by component and record, with three sigma; its Allan deviation and its
-/// correlation with itself; the estimates with three sigma.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
-    let mut files = Vec::new();
-    for (k, record) in c.records.iter().enumerate() {
-        let own: Vec<&ResidualSeries> = c.series.iter().filter(|s| s.record == record.name).collect();
-        let end = if c.records.len() > 1 { format!("-{}", k + 1) } else { String::new() };
-        let mut draw = |name: &str, title: &str, figure: &dyn Fn(&ResidualSeries) -> Figure| {
-            let figures: Vec<Figure> = own.iter().map(|s| figure(s)).collect();
-            let title = format!("{title} {}", record.name);
-            files.extend(picture(&format!("{name}{end}"), grid(&figures, figures.len().min(2), &title))?);
-            Ok::<_, FigureError>(())
-        };
-        draw("residuals", "What the estimate leaves of", &|s| residual_figure(c, s))?;
-        draw("allan", "Allan deviation of what is left of", &allan_figure)?;
-        draw("whiteness", "Correlation of what is left of", &whiteness_figure)?;
-    }
-    let figures = estimate_figures(c);
-    files.extend(picture("estimates", grid(&figures, figures.len().min(3), "Estimates, with three sigma"))?);
-    Ok(files)
-}
-
-/// What is left of a component.
-pub(crate) fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figure {
-    let points: Vec<(f64, f64)> = series.points.iter().map(|p| (p.0, p.1)).collect();
-    let band = series.points.iter().map(|p| (p.0, -3.0 * p.2, 3.0 * p.2));
-    let own = c.positions.iter().filter(|p| p.record == series.record);
-    let (first, last) = (points.first().map_or(0.0, |p| p.0), points.last().map_or(1.0, |p| p.0));
-    let largest = series.points.iter().map(|p| p.1.abs().max(3.0 * p.2)).fold(0.0, f64::max);
-    let half = if largest > 0.0 { 1.15 * largest } else { 1.0 };
-    Figure {
-        title: format!("{}: measurement minus estimate", series.channel),
-        x_label: "t [s]".into(),
-        y_label: format!("residual [{}]", series.unit),
-        bands: vec![Band { color: SKY, points: band.collect() }],
-        lines: vec![
-            line("zero", BLACK, Stroke::Dotted, vec![(first, 0.0), (last, 0.0)]),
-            line("residual, band of +-3 sigma", BLUE, Stroke::Solid, points),
-        ],
-        marks: own.skip(1).map(|p| p.start_s).collect(),
-        x_range: Some((first.min(0.0), last)),
-        y_range: Some((-half, half)),
-        ..Figure::default()
-    }
-}
-
-/// The Allan deviation of what is left, beside that of white noise.
-pub(crate) fn allan_figure(series: &ResidualSeries) -> Figure {
-    let curve = |of: fn(&(f64, f64, f64)) -> f64| series.allan.iter().map(|p| (p.0, 1e6 * of(p))).collect();
-    Figure {
-        title: format!("{}: Allan deviation", series.channel),
-        x_label: "cluster time [s]".into(),
-        y_label: format!("deviation [u{}]", series.unit),
-        lines: vec![
-            line("residuals", BLUE, Stroke::Solid, curve(|p| p.1)),
-            line("white, of the assumed sigma", BLACK, Stroke::Dotted, curve(|p| p.2)),
-        ],
-        log: true,
-        ..Figure::default()
-    }
-}
-
-/// The correlation of what is left with itself, as a bar per lag, and where that of independent residuals lies.
-pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
-    let lags = series.autocorrelation.len();
-    let mut bars = vec![(0.5, 0.0)];
-    for (k, r) in series.autocorrelation.iter().enumerate() {
-        let x = k as f64 + 1.0;
-        bars.extend([(x - 0.25, 0.0), (x - 0.25, *r), (x + 0.25, *r), (x + 0.25, 0.0)]);
-    }
-    let band = 1.96 / (series.count.max(1) as f64).sqrt();
-    let last = lags as f64 + 0.5;
-    let largest = series.autocorrelation.iter().fold(2.0 * band, |m, r| m.max(r.abs()));
-    Figure {
-        title: format!("{}: correlation of residuals", series.channel),
-        x_label: "lag [measurements]".into(),
-        y_label: "correlation".into(),
-        bands: vec![Band { color: SKY, points: vec![(0.5, -band, band), (last, -band, band)] }],
-        lines: vec![line("correlation, band of 95 % if independent", BLUE, Stroke::Solid, bars)],
-        x_range: Some((0.5, last)),
-        y_range: Some((-1.15 * largest, 1.15 * largest)),
-        ..Figure::default()
-    }
-}
-
-/// Estimates by family, each a bar of three sigma as the fit has it.
-pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
-    let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
-    for e in c.quantities.iter().filter(|e| e.determined) {
-        // D_FX, GM_XY, psi_x (record 2)
-        let name = e.name.split(' ').next().unwrap_or(&e.name);
-        let family = name.trim_end_matches(['X', 'Y', 'Z', 'x', 'y', 'z']).trim_end_matches('_');
-        match families.iter_mut().find(|f| f.0 == family) {
-            Some((_, own)) => own.push(e),
-            None => families.push((family.into(), vec![e])),
-        }
-    }
-    let combinations: Vec<&Estimated> = c.combinations.iter().filter(|e| e.determined).collect();
-    for e in combinations {
-        families.push((e.name.clone(), vec![e]));
-    }
-    let figure = |(family, own): &(String, Vec<&Estimated>)| {
-        let last = own.len() as f64 + 0.5;
-        let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.0, 0.0), (last + 0.5, 0.0)])];
-        for (i, e) in own.iter().enumerate() {
-            let (Some(x), Some(sigma)) = (e.estimate, e.sigma_rescaled) else { continue };
-            let (at, half) = (i as f64 + 1.0, 3.0 * sigma);
-            // up, with ends, and the estimate across
-            let bar = [
-                (at - 0.1, x - half),
-                (at + 0.1, x - half),
-                (at, x - half),
-                (at, x),
-                (at - 0.2, x),
-                (at + 0.2, x),
-                (at, x),
-                (at, x + half),
-                (at - 0.1, x + half),
-                (at + 0.1, x + half),
-            ];
-            lines.push(line("", BLUE, Stroke::Solid, bar.to_vec()));
-        }
-        let names = own.iter().enumerate().map(|(i, e)| format!("{}: {}", i + 1, e.name));
-        Figure {
-            title: family.clone(),
-            x_label: if own.len() > 1 { names.collect::<Vec<_>>().join(", ") } else { String::new() },
-            y_label: format!("estimate [{}]", own[0].unit),
-            lines,
-            x_range: Some((0.0, last + 0.5)),
-            whole_x: true,
-            ..Figure::default()
-        }
-    };
-    families.iter().map(figure).collect()
 }

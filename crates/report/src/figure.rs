@@ -78,8 +78,8 @@ pub(crate) struct Figure {
     pub(crate) log_y: bool,
     /// Both axes are those of whole numbers.
     pub(crate) orders: bool,
-    /// What is along x is counted: whole numbers.
-    pub(crate) whole_x: bool,
+    /// Names along x, at 1, 2, ...; empty for numbers.
+    pub(crate) x_names: Vec<String>,
 }
 
 /// Width and height of one figure.
@@ -155,8 +155,14 @@ impl Figure {
         if let Some((low, high)) = self.y_range {
             layout = layout.with_y_axis_min(low).with_y_axis_max(high);
         }
-        if self.whole_x {
-            layout = layout.with_x_tick_step(1.0).with_x_tick_format(TickFormat::Integer);
+        if !self.x_names.is_empty() {
+            let names: Vec<String> = self.x_names.iter().map(|name| shown(name)).collect();
+            let name = move |x: f64| {
+                let at = (1..=names.len()).find(|i| (x - *i as f64).abs() < 1e-6);
+                at.map_or_else(String::new, |i| names[i - 1].clone())
+            };
+            let format = TickFormat::Custom(Arc::new(name));
+            layout = layout.with_x_tick_step(1.0).with_x_tick_format(format);
         }
         if self.orders {
             let step = |range: Option<(f64, f64)>| {

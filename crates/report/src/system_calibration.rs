@@ -1,6 +1,6 @@
 //! A calibration of any system.
 
-use obsdeg_calibration::system::{SystemCalibration, SystemEstimated, SystemFinding};
+use obsdeg_calibration::system::{OtherStarts, SystemCalibration, SystemEstimated, SystemFinding};
 
 use crate::calibration::{COEFFICIENTS, with_coefficients};
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -58,6 +58,22 @@ fn row(e: &SystemEstimated) -> Vec<String> {
         optional(e.sigma_rescaled),
         verdict,
     ]
+}
+
+/// What became of the starts that did not lead to the solution.
+fn other_starts(of: &OtherStarts) -> Option<String> {
+    let mut out = Vec::new();
+    let mut say = |count: usize, what: String| {
+        if count > 0 {
+            out.push(format!("{count} {what}"));
+        }
+    };
+    say(of.near, "led to other solutions that fit nearly as well".into());
+    let least = of.least_higher_chi_square.map_or_else(String::new, |c| format!(" ({} or more)", number(c)));
+    say(of.higher, format!("ended at minima with a larger chi-square{least}"));
+    say(of.unsettled, "did not settle".into());
+    say(of.failed, "gave no numbers: the model cannot be followed from there".into());
+    (!out.is_empty()).then(|| format!("of the other starts, {}", out.join("; ")))
 }
 
 impl Answer for SystemCalibration {
@@ -123,6 +139,7 @@ impl Answer for SystemCalibration {
                 format!("{led} of {of} starts led to this solution; OTHERS fit nearly as well, see below")
             }
         });
+        fit.extend(other_starts(&self.other_starts));
         blocks.push(Block::list("Fit", fit));
         let columns = [
             left("output"),
@@ -204,7 +221,7 @@ impl Answer for SystemCalibration {
     }
 }
 
-/// Every measurement and what is left of it, as CSV.
+/// The residuals of all measurements, as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].
@@ -218,7 +235,7 @@ pub fn system_residuals_csv(c: &SystemCalibration) -> Result<String, ReportError
     crate::csv_text::write(std::iter::once(head.map(String::from).to_vec()).chain(rows))
 }
 
-/// What is left of every output over time, with three sigma.
+/// The residuals of every output over time, with bands of three sigma.
 ///
 /// # Errors
 /// [`FigureError`].
@@ -248,6 +265,6 @@ pub fn system_calibration_figures(c: &SystemCalibration) -> Result<Vec<File>, Fi
         }
     };
     let figures: Vec<_> = c.outputs.iter().enumerate().map(figure).collect();
-    let title = format!("What the estimate leaves of {}", c.name);
+    let title = format!("Residuals, {}", c.name);
     Ok(picture("residuals", grid(&figures, figures.len().min(2), &title))?.into())
 }

@@ -13,7 +13,8 @@ use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
-use super::estimate::{At, Estimate, LOOSE, Problem, TIGHT, WEAK};
+use super::curvature::Bent;
+use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
 use super::gross::Why;
 use super::observe::{By, channel_name};
 use super::offset::Offset;
@@ -21,8 +22,8 @@ use super::run::Key;
 use super::suspects::omitted;
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Estimated, Fit, Moved, Outlier, PositionFit,
-    RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, Fit, Moved, Outlier,
+    PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -174,6 +175,9 @@ pub(crate) struct Parts<'a> {
     pub prediction: &'a Prediction,
     pub problem: &'a Problem<'a>,
     pub estimate: &'a Estimate,
+    /// Its last step as the linear model has it: the covariance of the estimate may be that of repeated ones.
+    pub linear: &'a Solution,
+    pub bent: &'a Bent,
     pub found: &'a Diagnosed,
     /// By run: the moment at which the scheme begins, where it was estimated.
     pub offsets: &'a [Option<Offset>],
@@ -191,6 +195,8 @@ struct Asked {
     degree: Option<usize>,
     /// Whether scheme and records determine it.
     determined: bool,
+    /// Whether they do so only with a prior that is stated.
+    from_prior: bool,
     /// On the unknowns, in SI.
     terms: Vec<(usize, f64)>,
     /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the scheme.
@@ -212,13 +218,16 @@ impl Parts<'_> {
                     let index = &self.problem.unknowns.index[r];
                     let on = |c: &[(usize, f64)]| c.iter().map(|&(s, k)| (index[s], k)).collect::<Vec<_>>();
                     let local = on(&self.estimate.at.x[r].functional(terms));
-                    let (narrow, wide) = (self.estimate.solution.sigma(&local), weaker.sigma(&local));
+                    let (narrow, wide) = (self.linear.sigma(&local), weaker.sigma(&local));
+                    let from_prior =
+                        !verdict.2 && self.has_prior() && !self.problem.unknowns.is_open(&on(terms));
                     Asked {
                         name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
                         unit: units[terms[0].0],
                         status: verdict.0,
                         degree: verdict.1,
-                        determined: verdict.2 && wide <= DETERMINED * narrow,
+                        determined: (verdict.2 || from_prior) && wide <= DETERMINED * narrow,
+                        from_prior,
                         terms: on(terms),
                         local,
                         planned: on(&at_rest[r].functional(terms)),
@@ -243,6 +252,11 @@ impl Parts<'_> {
         (unknowns.collect(), combinations.collect())
     }
 
+    /// Whether priors are stated, or a calibration before.
+    fn has_prior(&self) -> bool {
+        !self.problem.unknowns.stated.is_empty() || self.problem.known.is_some()
+    }
+
     /// The estimate with the prior of the scheme on everything.
     fn with_prior(&self) -> Result<Solution, EkfError> {
         self.problem.step_with_prior(&self.estimate.at)
@@ -258,10 +272,14 @@ impl Parts<'_> {
         }
         let fit = self.fit(&unknowns, &combinations);
         let with_prior = self.with_prior()?;
-        let values = self.problem.values(&self.estimate.at.x);
+        let values = match &self.bent.found {
+            Some((mean, _)) => self.problem.values(&self.problem.moved(&self.estimate.at.x, mean)),
+            None => self.problem.values(&self.estimate.at.x),
+        };
         let solution = &self.estimate.solution;
+        let data_alone = self.problem.unknowns.stated.is_empty();
         let tight = self.problem.step_held(&self.estimate.at, TIGHT)?;
-        let planned: At = self.problem.at(at_rest, 1.0)?;
+        let planned: At = self.problem.at(at_rest)?;
         let planned = self.problem.step(&planned, WEAK)?;
         let none = DMatrix::zeros(0, self.problem.unknowns.n);
         let known = self.problem.known.as_ref().map_or(&none, |(rows, _)| rows);
@@ -274,7 +292,9 @@ impl Parts<'_> {
             let scale = si_per_shown(a.unit);
             let there = |x: f64| a.determined.then_some(x);
             let sigma = solution.sigma(&a.local);
+            let (linear, held) = (self.linear.sigma(&a.local), tight.sigma(&a.local));
             let moved: f64 = a.local.iter().map(|&(i, k)| k * with_prior.x[i]).sum();
+            let open = (sigma * sigma - held * held).max(0.0).sqrt();
             Estimated {
                 name: a.name.clone(),
                 unit: shown_unit(a.unit).into(),
@@ -285,9 +305,12 @@ impl Parts<'_> {
                 sigma: there(sigma / scale),
                 sigma_rescaled: there(between(a, a).max(0.0).sqrt()),
                 predicted_sigma: there(planned.sigma(&a.planned) / scale),
-                held_factor: there(sigma / tight.sigma(&a.local)),
-                prior_shift: there(moved / sigma),
-                prior_factor: there(with_prior.sigma(&a.local) / sigma),
+                required_sigma: self.required(&a.name),
+                held_factor: there(sigma / held),
+                open_sigma: there(open / scale),
+                from_prior: a.determined && a.from_prior,
+                prior_shift: there(moved / linear).filter(|_| data_alone),
+                prior_factor: there(with_prior.sigma(&a.local) / linear).filter(|_| data_alone),
             }
         };
         let row = |a: &Asked| {
@@ -325,6 +348,7 @@ impl Parts<'_> {
             quantities,
             omitted,
             requirements: None,
+            next_runs: Vec::new(),
             combinations: combinations.iter().map(estimated).collect(),
             covariance,
             fit,
@@ -336,6 +360,12 @@ impl Parts<'_> {
             repeatability,
             records,
             assumed: self.assumed(&unknowns),
+            curvature: Curvature {
+                kappa: self.bent.kappa.is_finite().then_some(self.bent.kappa),
+                refits: self.bent.refits,
+                failed: self.bent.failed,
+                from_refits: self.bent.found.is_some(),
+            },
             setup: Setup::of(self.scheme),
             rests_on: self.rests_on.clone(),
             series: self.series(),
@@ -344,16 +374,19 @@ impl Parts<'_> {
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
         out.requirements = self.requirements(&out.quantities, &bench);
+        out.next_runs = self.next_runs(&out, &bench)?;
         Ok(out)
+    }
+
+    /// Largest sigma allowed of a coefficient, in its unit; `None` where none is stated. Psi is not judged.
+    fn required(&self, name: &str) -> Option<f64> {
+        let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");
+        self.conditions.requirements.iter().rfind(of).map(|a| a.value)
     }
 
     /// Outcome of the requirements on coefficients, with what a bench adds to each; `None` where none is
     /// stated.
     fn requirements(&self, quantities: &[Estimated], bench: &[(String, f64)]) -> Option<Requirements> {
-        let stated = |name: &str| {
-            let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");
-            self.conditions.requirements.iter().rfind(of).map(|a| a.value)
-        };
         let added = |name: &str| bench.iter().find(|(of, _)| of == name).map_or(0.0, |(_, added)| *added);
         let sigma = |e: &Estimated| {
             let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
@@ -361,7 +394,7 @@ impl Parts<'_> {
         };
         let claims = quantities.iter().map(|e| Claim {
             name: &e.name,
-            required: stated(&e.name),
+            required: e.required_sigma,
             sigma: sigma(e).ok_or(Miss::NotObservable),
         });
         let mut out = Requirements::of(Basis::Record, claims);
@@ -375,8 +408,7 @@ impl Parts<'_> {
     /// Chi-square of everything: degrees of freedom are measurements minus what they determine.
     fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
         let (_, free) = self.found.sums(|_| true);
-        let left: f64 =
-            self.estimate.at.cost - (&self.estimate.solution.root * &self.estimate.solution.x).norm_squared();
+        let left: f64 = self.estimate.at.cost - (&self.linear.root * &self.linear.x).norm_squared();
         // what several records share counts once: every run alone leaves more free than all together
         let alone = self.problem.runs.len() - 1;
         let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
@@ -438,7 +470,7 @@ impl Parts<'_> {
         let solution = self.problem.step_with(&self.estimate.at, WEAK, Some((r, &rest)))?;
         let (mut moves, mut loses): (Option<Moved>, _) = (None, Vec::new());
         for a in determined {
-            let (with, without) = (self.estimate.solution.sigma(&a.local), solution.sigma(&a.local));
+            let (with, without) = (self.linear.sigma(&a.local), solution.sigma(&a.local));
             if without > LOST * with {
                 loses.push(a.name.clone());
                 continue;
@@ -579,11 +611,27 @@ impl Parts<'_> {
         all.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()).collect()
     }
 
+    /// Unknowns of a run with a stated prior: name, standard deviation, unit.
+    fn priors(&self) -> Vec<(String, f64, String)> {
+        let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
+        let u = &self.problem.unknowns;
+        let stated = (0..names.len()).filter(|&s| u.stated.contains(&u.index[0][s]));
+        stated
+            .map(|s| {
+                (
+                    names[s].clone(),
+                    u.prior[u.index[0][s]] / si_per_shown(units[s]),
+                    shown_unit(units[s]).into(),
+                )
+            })
+            .collect()
+    }
+
     fn assumed(&self, unknowns: &[Asked]) -> Assumed {
         let c = self.conditions;
         let open = unknowns.iter().filter(|a| !a.determined);
         let held = open.map(|a| {
-            let width = LOOSE * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit);
+            let width = BOX * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit);
             (a.name.clone(), width, shown_unit(a.unit).to_string())
         });
         Assumed {
@@ -596,6 +644,7 @@ impl Parts<'_> {
             drift_noise_deg_sqrt_h: c.drift_noise.density_deg_sqrt_h(c.drift_noise_step_s),
             gate: self.options.gate,
             known: self.known.clone(),
+            priors: self.priors(),
             known_differs: self.options.prior.as_ref().map_or_else(Vec::new, |before| {
                 let own = Setup::of(self.scheme);
                 let differs = if before.of.terms == own.terms { None } else { Some(before.of.terms.clone()) };

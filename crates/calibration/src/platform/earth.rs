@@ -45,7 +45,7 @@ impl Parts<'_> {
             run.plan.point.w_n *= 1.0 + by;
             run.plan.point.w_u *= 1.0 + by;
             let (sigmas, at) = (&self.problem.sigmas, &self.estimate.at);
-            let (along, _) = run.along(&conditions, sigmas, &at.x[r], run.len())?;
+            let (along, _) = run.along(&conditions, sigmas, &at.x[r])?;
             let information = Information::of(&along)?;
             Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
         };

@@ -1,10 +1,12 @@
-//! The estimate: Gauss and Newton on the starts of all runs and the constants they share, without a prior on what the records determine.
+//! The estimate: Gauss and Newton on the starts of all runs and the constants they share.
 //!
-//! What no record can tell (the null space of the exact verdict) is held loosely about its first estimate, so that steps stay where the model is near linear; nothing
-//! of it is reported. A weak pull on all else is towards where the iteration is, and so leaves no trace in where it ends.
+//! Two modes. *Data alone*: no prior on what the records determine; what no record can tell (the null space
+//! of the exact verdict) stays within a stated box about its first estimate, one standard deviation wide, and
+//! nothing of it is reported. *Priors as stated*: the unknowns that a file or an option states priors of have
+//! exactly these, and the estimate is the most probable one. A weak pull on all else is towards where the
+//! iteration is, and so leaves no trace in where it ends.
 
 use std::cell::Cell;
-use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{EkfError, Manifold};
@@ -22,17 +24,26 @@ const PASSES: usize = 40;
 const SETTLED: f64 = 1e-4;
 /// It has settled, too, where no step leads further down and the last is less than this.
 const NEARLY: f64 = 0.02;
+/// Most that a step turns an attitude by, in rad: beyond, the linear model is wrong in kind.
+pub(super) const TURN: f64 = 0.4;
 /// Halvings of a step that leads away.
 const HALVINGS: usize = 12;
-/// How much wider than the prior what nobody can know is held.
-pub(crate) const LOOSE: f64 = 10.0;
+/// Eigenvalues below this part of the largest are none: a direction that no prior has a part in.
+const RANK: f64 = 1e-18;
+/// A functional has a part in a direction from this part of both on.
+const OPEN: f64 = 1e-9;
+/// Width of the box of what nothing determines, in prior standard deviations.
+pub(crate) const BOX: f64 = 1.0;
 /// The same where it is taken as known.
 pub(crate) const TIGHT: f64 = 1e-5;
-/// No coefficient is tried that is further from its first estimate, in prior standard deviations: what is held so weakly may go anywhere, and such a
-/// platform turns so fast that to follow it takes minutes.
-const FAR: f64 = 100.0;
 /// How much wider than the prior everything is pulled to where the iteration is.
 pub(crate) const WEAK: f64 = 1e7;
+
+/// Largest angle (rad) by which a correction turns an attitude; the first `3 attitudes` components are turns.
+pub(super) fn largest_turn(correction: &[f64], attitudes: usize) -> f64 {
+    let turns = correction[..3 * attitudes].chunks_exact(3);
+    turns.map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max)
+}
 
 /// The unknowns of all runs: those of each run that are its own (psi, biases), and the coefficients.
 #[derive(Debug, Clone)]
@@ -45,23 +56,25 @@ pub(crate) struct Unknowns {
     pub prior: Vec<f64>,
     /// First estimates (SI).
     pub first: Vec<f64>,
-    /// What is held loosely: directions, a column each.
+    /// Directions that neither records nor priors determine, a column each: they stay within the box.
     pub loose: DMatrix<f64>,
+    /// Unknowns with a prior that is stated.
+    pub stated: Vec<usize>,
     /// Biases of all runs: their prior is a property of the gyros.
     pub biases: Vec<usize>,
-    /// The coefficients, which all runs have in common.
-    coefficients: Range<usize>,
 }
 
 impl Unknowns {
-    /// Of runs of one platform with `psi` states of their own before `coefficients` common ones, and `biases` of their own behind; `prior` and `first` are of
-    /// one run, `null` its directions that nothing determines.
+    /// Of runs of one platform with `psi` states of their own before `coefficients` common ones, and `biases`
+    /// of their own behind; `prior` and `first` are of one run, `null` its directions that nothing
+    /// determines, `stated` says of which states a prior is stated.
     pub(crate) fn new(
         runs: usize,
         [psi, coefficients, biases]: [usize; 3],
         prior: &[f64],
         first: &[f64],
         null: &[Combination],
+        stated: &[bool],
     ) -> Self {
         let own = psi + biases;
         let n = runs * own + coefficients;
@@ -92,11 +105,54 @@ impl Unknowns {
             if common { column(&index) } else { index.iter().for_each(|i| column(std::slice::from_ref(i))) }
         }
         let loose = if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) };
+        let with_prior = index.iter().flat_map(|own| own.iter().zip(stated)).filter(|(_, s)| **s);
+        let mut stated: Vec<usize> = with_prior.map(|(i, _)| *i).collect();
+        stated.sort_unstable();
+        stated.dedup();
         let biases = index.iter().flat_map(|i| i[psi + coefficients..].iter().copied()).collect();
-        Self { index, n, prior: all, first: start, loose, biases, coefficients: runs * own..n }
+        Self { index, n, prior: all, first: start, loose, biases, stated }
     }
 
-    /// Rows that hold the loose directions within `width` times the prior, the least information that does with the prior as its measure, and biases.
+    /// Leaves out of the box what rows of a prior on the unknowns (any x n) determine: of the directions
+    /// those combinations that no row has a part in.
+    pub(crate) fn determined_by(&mut self, prior: &DMatrix<f64>) {
+        let size =
+            |c: usize| (0..self.n).map(|i| (self.loose[(i, c)] / self.prior[i]).powi(2)).sum::<f64>().sqrt();
+        let scaled = DMatrix::from_fn(self.n, self.loose.ncols(), |i, c| {
+            self.loose[(i, c)] / size(c).max(f64::MIN_POSITIVE)
+        });
+        let seen = prior * &scaled;
+        let m = scaled.ncols();
+        if m == 0 || seen.nrows() == 0 {
+            return;
+        }
+        let eigen = (seen.transpose() * &seen).symmetric_eigen();
+        let most = eigen.eigenvalues.amax();
+        let open: Vec<usize> = (0..m).filter(|&k| eigen.eigenvalues[k] <= RANK * most).collect();
+        self.loose = DMatrix::from_fn(self.n, open.len(), |i, c| {
+            (0..m).map(|k| scaled[(i, k)] * eigen.eigenvectors[(k, open[c])]).sum()
+        });
+    }
+
+    /// Rows of the stated priors, with unit errors.
+    pub(crate) fn stated_rows(&self) -> DMatrix<f64> {
+        let mut rows = DMatrix::zeros(self.stated.len(), self.n);
+        self.stated.iter().enumerate().for_each(|(k, &i)| rows[(k, i)] = 1.0 / self.prior[i]);
+        rows
+    }
+
+    /// Whether a functional has a part in what only the box says.
+    pub(crate) fn is_open(&self, terms: &[(usize, f64)]) -> bool {
+        (0..self.loose.ncols()).any(|c| {
+            let of = |&(i, k): &(usize, f64)| (k * self.loose[(i, c)], (k * self.prior[i]).abs());
+            let size = (0..self.n).map(|i| (self.loose[(i, c)] / self.prior[i]).powi(2)).sum::<f64>().sqrt();
+            let (sum, scale) = terms.iter().map(of).fold((0.0, 0.0), |s, x| (s.0 + x.0, s.1 + x.1));
+            sum.abs() > OPEN * scale * size
+        })
+    }
+
+    /// Rows that hold the loose directions within `width` times the prior, the least information that does
+    /// with the prior as its measure, biases, and the stated priors.
     fn holding(&self, width: f64) -> DMatrix<f64> {
         let weighted =
             DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / self.prior[i]);
@@ -106,13 +162,11 @@ impl Unknowns {
         // random biases have a prior that is theirs
         rows = rows.resize_vertically(m + self.biases.len(), 0.0);
         self.biases.iter().enumerate().for_each(|(k, &i)| rows[(m + k, i)] = 1.0 / self.prior[i]);
+        let stated = self.stated_rows();
+        let above = rows.nrows();
+        rows = rows.resize_vertically(above + stated.nrows(), 0.0);
+        rows.rows_mut(above, stated.nrows()).copy_from(&stated);
         rows
-    }
-
-    /// Whether a coefficient is beyond all that is tried.
-    fn far(&self, at: &[PlatformState]) -> bool {
-        let to = self.to_first(at);
-        self.coefficients.clone().any(|i| to[i].abs() > FAR * self.prior[i])
     }
 
     /// Local coordinates of all unknowns at the first estimates, seen from `at`.
@@ -137,12 +191,25 @@ pub(crate) struct Problem<'a> {
     pub sigmas: Vec<f64>,
     /// What was known before of some combinations: rows and values in SI, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
+    /// Errors that are added to measurements and priors, for one of many estimates from data as they might
+    /// have been.
+    pub draw: Option<Draw>,
     /// Hears of every linearisation; where it says no, the iteration ends.
     pub going: &'a dyn Fn(Going<'_>) -> bool,
     /// How many there were.
     pub passes: Cell<usize>,
     /// Whether it said no.
     pub stopped: Cell<bool>,
+}
+
+/// Errors of data as they might have been, in units of the data.
+#[derive(Debug, Clone)]
+pub(crate) struct Draw {
+    /// By run, of every measurement, in the order of rows.
+    pub noise: Vec<Vec<f64>>,
+    /// Of the rows of what is held, and of those that were known before (unit errors).
+    pub held: DVector<f64>,
+    pub known: DVector<f64>,
 }
 
 /// Every run linearised at the estimate.
@@ -161,25 +228,40 @@ pub(crate) struct Estimate {
     pub solution: Solution,
     pub passes: usize,
     pub converged: bool,
+    /// Other minima that are nearly as low.
+    pub rivals: usize,
 }
 
 impl Problem<'_> {
-    /// Linearises all runs at `x`, of each the first `part` of its bins.
-    pub(crate) fn at(&self, x: Vec<PlatformState>, part: f64) -> Result<At, CalibrationError> {
+    /// Linearises all runs at `x`.
+    pub(crate) fn at(&self, x: Vec<PlatformState>) -> Result<At, CalibrationError> {
+        self.at_parts(x, |_| &[])
+    }
+
+    /// The same along trajectories in parts, by run (see [`Run::along_parts`]).
+    pub(super) fn at_parts<'n>(
+        &self,
+        x: Vec<PlatformState>,
+        nodes: impl Fn(usize) -> &'n [(usize, PlatformState)],
+    ) -> Result<At, CalibrationError> {
         self.passes.set(self.passes.get() + 1);
         if !(self.going)(Going::Passes(self.passes.get())) {
             self.stopped.set(true);
         }
-        let most = |run: &Run| ((run.len() as f64 * part).ceil() as usize).max(1);
-        let each = self.runs.iter().zip(&x);
-        let runs = each.map(|(run, x)| run.along(self.conditions, &self.sigmas, x, most(run)));
-        let runs = runs.collect::<Result<Vec<_>, _>>()?;
+        let each = self.runs.iter().zip(&x).enumerate();
+        let runs = each.map(|(r, (run, x))| run.along_parts(self.conditions, &self.sigmas, x, nodes(r)));
+        let mut runs = runs.collect::<Result<Vec<_>, _>>()?;
+        if let Some(draw) = &self.draw {
+            for ((run, _), noise) in runs.iter_mut().zip(&draw.noise) {
+                run.residuals.iter_mut().zip(noise).for_each(|(r, e)| *r += e);
+            }
+        }
         let information =
             runs.iter().map(|(run, _)| Information::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
         let mut cost: f64 = information.iter().map(Information::at_zero).sum();
-        cost += (self.unknowns.holding(LOOSE) * self.unknowns.to_first(&x)).norm_squared();
-        if let Some((rows, values)) = &self.known {
-            cost += (values - rows * self.values(&x)).norm_squared();
+        cost += self.held(&self.unknowns.holding(BOX), &x).norm_squared();
+        if let Some((rows, _)) = &self.known {
+            cost += self.known_left(rows, &x).norm_squared();
         }
         Ok(At { x, runs, information, cost })
     }
@@ -201,6 +283,30 @@ impl Problem<'_> {
         out
     }
 
+    /// What rows that hold unknowns about their first estimates leave at `x`.
+    fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
+        let left = rows * self.unknowns.to_first(x);
+        match &self.draw {
+            Some(draw) => left + &draw.held,
+            None => left,
+        }
+    }
+
+    /// What is left of what was known before at `x`, by its rows.
+    fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
+        let Some((_, values)) = &self.known else { return DVector::zeros(0) };
+        let left = values - rows * self.values(x);
+        match &self.draw {
+            Some(draw) => left + &draw.known,
+            None => left,
+        }
+    }
+
+    /// Rows of what is held and of what was known before.
+    pub(super) fn beside_data(&self) -> (usize, usize) {
+        (self.unknowns.holding(BOX).nrows(), self.known.as_ref().map_or(0, |(_, v)| v.len()))
+    }
+
     /// The next step from `at`: everything pulled there `weak` times as weakly as the prior would.
     pub(crate) fn step(&self, at: &At, weak: f64) -> Result<Solution, EkfError> {
         self.step_with(at, weak, None)
@@ -218,7 +324,7 @@ impl Problem<'_> {
         weak: f64,
         instead: Option<(usize, &Information)>,
     ) -> Result<Solution, EkfError> {
-        self.pulled(self.said(at, instead, LOOSE), weak)
+        self.pulled(self.said(at, instead, BOX), weak)
     }
 
     fn pulled(&self, mut rows: Rows, weak: f64) -> Result<Solution, EkfError> {
@@ -230,7 +336,7 @@ impl Problem<'_> {
 
     /// The step from `at` with the prior of everything about the first estimates.
     pub(crate) fn step_with_prior(&self, at: &At) -> Result<Solution, EkfError> {
-        let mut rows = self.said(at, None, LOOSE);
+        let mut rows = self.said(at, None, BOX);
         let weights = DVector::from_iterator(self.unknowns.n, self.unknowns.prior.iter().map(|s| 1.0 / s));
         let to = self.unknowns.to_first(&at.x).component_mul(&weights);
         rows.add(&DMatrix::from_diagonal(&weights), &to);
@@ -250,9 +356,9 @@ impl Problem<'_> {
             rows.add(&wide, &information.right);
         }
         let holding = self.unknowns.holding(width);
-        rows.add(&holding, &(&holding * self.unknowns.to_first(&at.x)));
-        if let Some((known, values)) = &self.known {
-            rows.add(known, &(values - known * self.values(&at.x)));
+        rows.add(&holding, &self.held(&holding, &at.x));
+        if let Some((known, _)) = &self.known {
+            rows.add(known, &self.known_left(known, &at.x));
         }
         rows
     }
@@ -264,7 +370,7 @@ impl Problem<'_> {
     }
 
     /// Moves `x` by `step` of all unknowns.
-    fn moved(&self, x: &[PlatformState], step: &DVector<f64>) -> Vec<PlatformState> {
+    pub(super) fn moved(&self, x: &[PlatformState], step: &DVector<f64>) -> Vec<PlatformState> {
         let mut out = x.to_vec();
         for (x, index) in out.iter_mut().zip(&self.unknowns.index) {
             let delta: Vec<f64> = index.iter().map(|&i| step[i]).collect();
@@ -273,9 +379,20 @@ impl Problem<'_> {
         out
     }
 
-    /// Iterates from `x` over the first `part` of every run.
-    fn settle(&self, x: Vec<PlatformState>, part: f64) -> Result<Estimate, CalibrationError> {
-        let mut at = self.at(x, part)?;
+    /// Largest angle (rad) by which a step turns a platform anywhere in its run.
+    pub(super) fn turn(&self, at: &At, step: &DVector<f64>) -> f64 {
+        let mut largest: f64 = 0.0;
+        for (((run, _), index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x) {
+            let own: Vec<f64> = index.iter().map(|&i| step[i]).collect();
+            largest = largest.max(largest_turn(&own, x.attitudes()));
+            run.carried(&own, |_, d| largest = largest.max(largest_turn(d, x.attitudes())));
+        }
+        largest
+    }
+
+    /// Iterates from `x`.
+    pub(super) fn settle(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
+        let mut at = self.at(x)?;
         let mut solution = self.step(&at, WEAK)?;
         let (mut passes, mut converged) = (1, false);
         while passes < PASSES && !self.stopped.get() {
@@ -284,12 +401,11 @@ impl Problem<'_> {
                 converged = true;
                 break;
             }
-            let mut step = solution.x.clone();
+            let mut step = &solution.x * (TURN / self.turn(&at, &solution.x)).min(1.0);
             let mut found = None;
             for _ in 0..=HALVINGS {
                 passes += 1;
-                let next = self.moved(&at.x, &step);
-                let next = if self.unknowns.far(&next) { None } else { self.at(next, part).ok() };
+                let next = self.at(self.moved(&at.x, &step)).ok();
                 // by rounding, a sum of squares may grow at the end
                 found = next.filter(|n| n.cost <= at.cost * (1.0 + 1e-9) + 1e-6);
                 if found.is_some() {
@@ -304,39 +420,7 @@ impl Problem<'_> {
         // where nothing leads further down, what is left of a step is what the model bends within it
         let size = (&solution.root * &solution.x).norm();
         converged |= size <= NEARLY * self.scale(&at);
-        Ok(Estimate { at, solution, passes, converged })
-    }
-
-    /// The estimate from `x`: of all of the runs at once, or where that does not settle or fits poorly and `first` is true, of longer and longer parts of them.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] when a number is none.
-    pub(crate) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
-        let direct = self.settle(x.clone(), 1.0);
-        let poor = |e: &Estimate| !e.converged || e.at.cost > 2.0 * self.rows(e);
-        if direct.as_ref().is_ok_and(|e| !first || !poor(e) || self.stopped.get()) {
-            return direct;
-        }
-        let by_and_by = || -> Result<Estimate, CalibrationError> {
-            let mut x = x;
-            let mut passes = 0;
-            for part in [0.125, 0.25, 0.5] {
-                let found = self.settle(x, part)?;
-                passes += found.passes;
-                x = found.at.x;
-            }
-            let found = self.settle(x, 1.0)?;
-            Ok(Estimate { passes: passes + found.passes, ..found })
-        };
-        match (direct, by_and_by()) {
-            (Ok(a), Ok(b)) => {
-                let better = (b.converged, -b.at.cost) > (a.converged, -a.at.cost);
-                let passes = a.passes + b.passes;
-                Ok(Estimate { passes, ..if better { b } else { a } })
-            }
-            (Ok(e), Err(_)) | (Err(_), Ok(e)) => Ok(e),
-            (Err(e), Err(_)) => Err(e),
-        }
+        Ok(Estimate { at, solution, passes, converged, rivals: 0 })
     }
 
     /// The number of measurements.

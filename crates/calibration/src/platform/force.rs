@@ -12,6 +12,10 @@ use super::mistaken::Mistaken;
 /// The specific force of a position is no further than this from the vertical or, where psi goes on in n,
 /// from where the position before left it, in deg.
 const TILT_DEG: f64 = 20.0;
+/// Where psi does not go on in n and the vertical moves by more, it may be further off: so many times its
+/// moves from half to half of all positions until then (twice that is the move of a whole position; azimuth,
+/// too, may become tilt), whichever position is nearer.
+const REACH: f64 = 4.0;
 /// From one position to the next drift moves the vertical by less than this, in deg, beside so many times
 /// what it moves it from half to half of the positions about the slew.
 const JUMP_DEG: f64 = 3.0;
@@ -267,6 +271,7 @@ impl Forces {
         // of the position before: the vertical of its second half in n, and by how much it moved from the
         // first
         let mut before: Option<([f64; 3], f64)> = None;
+        let mut moves = 0.0;
         for (p, line, _) in self.usual() {
             // medians, which rows at the wrong position do not move
             let pieces = &self.pieces[p];
@@ -279,10 +284,18 @@ impl Forces {
                 let jump = before.map_or(f64::INFINITY, |(v, _)| angle(&vertical, &v));
                 jump.min(angle(&vertical, &UP))
             };
-            let (own, held) =
-                (off(p), before.map_or(f64::INFINITY, |(_, by)| JUMP_DEG + MOVES * (by + moved)));
+            let own = off(p);
             let nearest = (0..names.len()).map(off).fold(f64::INFINITY, f64::min);
-            let wrong = own > TILT_DEG || (own > held && own > NEARER * nearest);
+            moves += moved;
+            // from the middle of a half to that of the next drift makes half of both moves, and turns are short
+            // beside positions: twice that is the furthest
+            let about = before.map(|(_, by)| by + moved);
+            let held = about.map_or(f64::INFINITY, |by| JUMP_DEG + MOVES * by);
+            let reach = about.map_or(JUMP_DEG + REACH * moves, |by| JUMP_DEG + by);
+            let furthest = TILT_DEG.max(reach);
+            // where psi does not go on in n, another position may be nearer by drift alone
+            let least = if before.is_some() || reach < TILT_DEG { TILT_DEG.min(held) } else { furthest };
+            let wrong = own > furthest || (own > least && own > NEARER * nearest);
             if !wrong {
                 before = inertial.then(|| (apply(&attitudes[p], &last), moved));
                 continue;

@@ -24,6 +24,9 @@ const BESIDE: usize = 2;
 const STEPS: f64 = 10.0;
 /// Number of equal rows in succession that are stuck, where values seldom repeat.
 const STUCK: usize = 4;
+/// Expected number of such successions by chance, from how often two neighbours are equal, below which they
+/// are stuck.
+const BY_CHANCE: f64 = 1e-5;
 
 /// Row of a record, or the median of a dense bin of rows.
 #[derive(Debug, Clone)]
@@ -104,12 +107,16 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
             out.push((i, off / s, Why::Code));
         }
     }
+    let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
     // values that hardly ever repeat, and then do many times in a row
     for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
         *at += run.len();
         Some(*at - run.len()..*at)
     }) {
         let seldom = 2 * steps.len() > n - run.len();
+        let equal = equal.saturating_sub(run.len() - 1) as f64 / n as f64;
+        let by_chance = n as f64 * equal.powi(run.len() as i32 - 1);
+        let seldom = seldom && by_chance < BY_CHANCE;
         if run.len() >= STUCK && seldom && out.iter().all(|o| !run.contains(&o.0)) {
             out.extend((run.start + 1..run.end).map(|i| (i, 0.0, Why::Stuck)));
         }

@@ -1,6 +1,7 @@
 //! A torquing scheme calibrated from the records of its runs.
 
 mod clock;
+mod curvature;
 mod diagnose;
 mod earth;
 mod estimate;
@@ -8,18 +9,22 @@ mod findings;
 mod force;
 mod gross;
 mod length;
+mod minimum;
 mod mistaken;
+mod next;
 mod observe;
 mod offset;
 mod reading;
 mod residuals;
 mod run;
+mod shooting;
 mod suspects;
 mod timeline;
 
 use std::cell::Cell;
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 use obsdeg_ekf::consistency::chi_square_quantile;
@@ -39,6 +44,7 @@ use offset::Offset;
 use run::Run;
 
 pub use mistaken::Mistaken;
+pub(crate) use observe::TIMES;
 pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
 
 /// Why a scheme cannot be calibrated.
@@ -303,19 +309,34 @@ pub fn calibrate(
     let start = RunStart::new(&planned, &own)?;
     let (n, coefficients, biases) =
         (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
-    let unknowns = Unknowns::new(
+    // what a calibration before holds already does not count again
+    let held =
+        |name: &String| before.is_some_and(|b| b.priors.contains(name) && b.estimates.names.contains(name));
+    let counts = |name: &String| own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
+    let stated: Vec<bool> =
+        planned.platform.names().iter().map(counts).chain(std::iter::repeat_n(false, biases)).collect();
+    let mut unknowns = Unknowns::new(
         runs.len(),
         [n - coefficients, coefficients, biases],
         &start.sigma,
         &start.estimate,
         &prediction.null_space,
+        &stated,
     );
     let known = before.map(|b| known(&b.estimates, &planned, &prediction, &unknowns)).transpose()?;
     let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
+    let mut prior = unknowns.stated_rows();
+    if let Some((rows, _)) = &known {
+        let above = prior.nrows();
+        prior = prior.resize_vertically(above + rows.nrows(), 0.0);
+        prior.rows_mut(above, rows.nrows()).copy_from(rows);
+    }
+    unknowns.determined_by(&prior);
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
     let (mut round, mut passes, mut too_many) = (0, 0, None);
     let lay = |reading: Reading| Run::new(reading, scheme, &planned, &own);
+    let mut rivals = 0;
     let (mut beginnings, mut elsewhere, mut offsets) = (0, false, vec![None; runs.len()]);
     loop {
         round += 1;
@@ -325,11 +346,16 @@ pub fn calibrate(
             unknowns: &unknowns,
             sigmas: sigmas.clone(),
             known: known.clone(),
+            draw: None,
             going,
             passes: Cell::new(passes),
             stopped: Cell::new(false),
         };
         let mut estimate = problem.estimate(x, round == 1)?;
+        if round == 1 {
+            rivals = estimate.rivals;
+        }
+        estimate.rivals = rivals;
         if beginnings < ROUNDS && !problem.stopped.get() {
             beginnings += 1;
             offsets = problem.open(&estimate, &lay)?;
@@ -373,6 +399,11 @@ pub fn calibrate(
             }
         }
         if last || (settled && !leave_out) {
+            let linear = estimate.solution.clone();
+            let bent = problem.bent(&estimate, options.seed)?;
+            if let Some((_, root)) = &bent.found {
+                estimate.solution.inverse_root.clone_from(root);
+            }
             for o in offsets.iter().flatten() {
                 let root = &mut estimate.solution.inverse_root;
                 let columns = root.ncols();
@@ -387,12 +418,14 @@ pub fn calibrate(
                 prediction: &prediction,
                 problem: &problem,
                 estimate: &estimate,
+                linear: &linear,
+                bent: &bent,
                 found: &found,
                 offsets: &offsets,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
                 rests_on,
-                interrupted,
+                interrupted: problem.stopped.get(),
             };
             return parts.answer();
         }

@@ -82,6 +82,9 @@ pub(crate) struct Reading {
     pub by: By,
     /// Bins of every position, times in s from the first sample (labels) or from the start of the scheme.
     pub bins: Vec<Vec<Bin>>,
+    /// Per bin, as these: true if most of its forces point below the horizon of n (a tilt beyond 90 deg);
+    /// false where the record does not say.
+    pub over: Vec<Vec<bool>>,
     /// The time of the record, in s, that is 0 there.
     pub origin: f64,
     /// Earliest and latest origin, in s, where labels leave it open and it is not that of the scheme's clock.
@@ -412,6 +415,8 @@ struct Taking<'a> {
     /// Line, time and values of the samples of the bin, then what the robust pass is to see of every
     /// position.
     samples: Vec<(u64, f64, [f64; 3])>,
+    /// Number of samples of the bin with a force below the horizon of n.
+    over: usize,
     rows: Vec<Vec<gross::Row>>,
     /// By wanted number: how many cells are empty at positions.
     empty: Vec<usize>,
@@ -601,6 +606,8 @@ impl Taking<'_> {
         if let Some(bin) = bin {
             self.put_bin(p, bin, spikes);
         }
+        // f = Z - g points down
+        self.over += usize::from(in_n[1].is_some_and(|z| z < -1.0));
         let values =
             std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
         self.samples.push((line, t, values));
@@ -623,6 +630,7 @@ impl Taking<'_> {
         let samples = std::mem::take(&mut self.samples);
         let index = self.out.bins[p].len();
         self.out.bins[p].push(bin);
+        self.out.over[p].push(2 * std::mem::take(&mut self.over) > samples.len());
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
         if samples.len() < FEWEST {
             let row = |&(line, t, values): &(u64, f64, [f64; 3])| gross::Row {
@@ -759,6 +767,7 @@ pub(crate) fn observe(
         name: record.name().into(),
         by,
         bins: vec![Vec::new(); positions],
+        over: vec![Vec::new(); positions],
         origin: 0.0,
         open: None,
         interval: 1.0,
@@ -798,6 +807,7 @@ pub(crate) fn observe(
         told: Vec::new(),
         rests: Vec::new(),
         samples: Vec::new(),
+        over: 0,
         rows: vec![Vec::new(); positions],
         empty: vec![0; layout.wanted.len()],
         gimbals: None,

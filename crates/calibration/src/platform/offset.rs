@@ -55,7 +55,7 @@ impl Problem<'_> {
         let left = |by: f64| -> Result<(f64, DVector<f64>), CalibrationError> {
             let mut run = lay(own.reading.later(by))?;
             run.counts.clone_from(&own.counts);
-            let (along, _) = run.along(self.conditions, &self.sigmas, &at.x[r], run.len())?;
+            let (along, _) = run.along(self.conditions, &self.sigmas, &at.x[r])?;
             let information = Information::of(&along)?;
             let solution = self.step_with(at, WEAK, Some((r, &information)))?;
             let before = ((own.reading.origin + by - middle) / width).powi(2);

@@ -1,9 +1,9 @@
 //! The record of one run on its own timeline: the scheme with the times of the record, linearised along a trajectory.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
-use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage, Update};
+use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
 use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind};
 
 use super::CalibrationError;
@@ -140,7 +140,8 @@ impl Run {
         })
     }
 
-    /// Linearised along the trajectory from `x0`, with all that counts of its first `most` bins; `sigmas` are those of a sample, by channel.
+    /// Linearised along the trajectory from `x0`, with all of its bins that count; `sigmas` are those of a
+    /// sample, by channel.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
@@ -149,17 +150,34 @@ impl Run {
         conditions: &Conditions,
         sigmas: &[f64],
         x0: &PlatformState,
-        most: usize,
+    ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
+        self.along_parts(conditions, sigmas, x0, &[])
+    }
+
+    /// The same along a trajectory in parts: each node says at which segment its part begins, and with which
+    /// attitude (the constants are those of the trajectory).
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn along_parts(
+        &self,
+        conditions: &Conditions,
+        sigmas: &[f64],
+        x0: &PlatformState,
+        nodes: &[(usize, PlatformState)],
     ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
         let filter = Extended::new(&self.plan, conditions, Update::default())?;
         let (plan, n) = (&self.plan, self.plan.states());
         let (mut out, mut keys) = (Linearised::default(), Vec::new());
         let (mut x, mut bin) = (x0.clone(), 0);
+        let mut nodes = nodes.iter().peekable();
         for (segment, s) in plan.segments.iter().enumerate() {
-            if bin >= most {
-                break;
-            }
             let motion = filter.motion(segment);
+            if let Some((_, node)) = nodes.next_if(|(at, _)| *at == segment) {
+                let begins = x.clone().with_attitude_of(motion.block(), node);
+                out.gaps.push((segment.saturating_sub(1), DVector::from_vec(x.local(&begins))));
+                x = begins;
+            }
             let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
             let mut outputs = Vec::new();
             if let Some((position, i)) = self.bins[segment] {
@@ -175,7 +193,7 @@ impl Run {
                 }
                 bin += 1;
             }
-            out.roots.push(self.root(segment, n));
+            out.roots.push(noise_root(plan, segment, n));
             out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
         }
         if let Some(k) = out.residuals.iter().position(|x| !x.is_finite()) {
@@ -184,19 +202,18 @@ impl Run {
         }
         Ok((out, keys))
     }
+}
 
-    /// The root of the noise of a segment on all states, without directions of none.
-    fn root(&self, segment: usize, n: usize) -> DMatrix<f64> {
-        let root = &self.plan.noise_roots[segment];
-        let moved: Vec<usize> =
-            self.plan.psi_columns(segment).iter().copied().chain(self.plan.unknowns()..n).collect();
-        let there: Vec<usize> = (0..root.ncols()).filter(|&j| root.column(j).amax() > 0.0).collect();
-        let mut out = DMatrix::zeros(n, there.len());
-        for (k, &j) in there.iter().enumerate() {
-            for (i, &row) in moved.iter().enumerate() {
-                out[(row, k)] = root[(i, j)];
-            }
+/// The root of the noise of a segment of a plan on all `n` states, without directions of none.
+pub(super) fn noise_root(plan: &Plan, segment: usize, n: usize) -> DMatrix<f64> {
+    let root = &plan.noise_roots[segment];
+    let moved: Vec<usize> = plan.psi_columns(segment).iter().copied().chain(plan.unknowns()..n).collect();
+    let there: Vec<usize> = (0..root.ncols()).filter(|&j| root.column(j).amax() > 0.0).collect();
+    let mut out = DMatrix::zeros(n, there.len());
+    for (k, &j) in there.iter().enumerate() {
+        for (i, &row) in moved.iter().enumerate() {
+            out[(row, k)] = root[(i, j)];
         }
-        out
     }
+    out
 }

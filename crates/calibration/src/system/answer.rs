@@ -45,6 +45,8 @@ pub struct SystemCalibration {
     pub others: Vec<OtherSolution>,
     /// Number of starts that were tried, then the number that led to the solution.
     pub starts: (usize, usize),
+    /// Ends of the starts that did not lead to the solution.
+    pub other_starts: OtherStarts,
     /// Largest number of starts; fewer are enough when no other solution is to be expected.
     pub starts_at_most: usize,
     /// Profiles of the unknowns that were asked for.
@@ -157,6 +159,22 @@ pub struct OutputFit {
     pub outlier_gate: Option<f64>,
     /// Probability that independent residuals are as correlated as these; null for few.
     pub whiteness_probability: Option<f64>,
+}
+
+/// Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there add up to
+/// the number of starts.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct OtherStarts {
+    /// Number of starts that led to other solutions that fit nearly as well.
+    pub near: usize,
+    /// Number of starts that ended at a minimum with a larger chi-square.
+    pub higher: usize,
+    /// Least chi-square of those minima, dimensionless; null if there are none.
+    pub least_higher_chi_square: Option<f64>,
+    /// Number of starts whose iteration did not settle.
+    pub unsettled: usize,
+    /// Number of starts from which the model gives no numbers.
+    pub failed: usize,
 }
 
 /// Other solution that fits nearly as well.

@@ -21,8 +21,8 @@ use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::system::{FilterState, Numeric};
 
 pub use answer::{
-    OtherSolution, OutputFit, Profile, SystemCalibration, SystemCalibrationError, SystemEstimated,
-    SystemFinding, SystemResidual,
+    OtherSolution, OtherStarts, OutputFit, Profile, SystemCalibration, SystemCalibrationError,
+    SystemEstimated, SystemFinding, SystemResidual,
 };
 
 use crate::Going;
@@ -330,7 +330,7 @@ impl<'a> Calibrating<'a> {
             }
         }
         findings.extend(self.outliers(&residuals, &outputs));
-        let (others, led) = self.others(&ends, &best, &determined, &solution, mean, finer);
+        let (others, led, other_starts) = self.others(&ends, &best, &determined, &solution, mean, finer);
         let profiles = self.profiles(&names, &best, &solution, finer)?;
         Ok(SystemCalibration {
             schema: SCHEMA.into(),
@@ -348,6 +348,7 @@ impl<'a> Calibrating<'a> {
             outputs,
             others,
             starts: (tried, led),
+            other_starts: OtherStarts { failed: tried - ends.len(), ..other_starts },
             starts_at_most: starts.len(),
             profiles,
             samples: self.data.samples,

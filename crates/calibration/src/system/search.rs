@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use obsdeg_evidence::simulation::Noise;
 
 use super::Calibrating;
-use super::answer::OtherSolution;
+use super::answer::{OtherSolution, OtherStarts};
 use super::fit::{Settled, Stuck, settle, size};
 use crate::least_squares::Solution;
 
@@ -92,7 +92,8 @@ impl Calibrating<'_> {
         (ends, tried, first_error)
     }
 
-    /// Solutions apart from the best that fit nearly as well, and how many starts led to the best.
+    /// Solutions apart from the best that fit nearly as well, how many starts led to the best, and what became of
+    /// the others but those that failed.
     pub(super) fn others(
         &mut self,
         ends: &[Settled],
@@ -101,7 +102,7 @@ impl Calibrating<'_> {
         solution: &Solution,
         mean: f64,
         finer: usize,
-    ) -> (Vec<OtherSolution>, usize) {
+    ) -> (Vec<OtherSolution>, usize, OtherStarts) {
         let same = |a: &DVector<f64>, b: &DVector<f64>| {
             (0..a.len()).filter(|&j| determined[j]).all(|j| {
                 (a[j] - b[j]).abs()
@@ -109,19 +110,26 @@ impl Calibrating<'_> {
             })
         };
         let (mut out, mut led): (Vec<OtherSolution>, usize) = (Vec::new(), 0);
+        let unsettled = ends.iter().filter(|e| !e.converged).count();
+        let mut starts = OtherStarts { unsettled, ..OtherStarts::default() };
         for (end, count) in apart(ends, &|j| determined[j]) {
             // with the noise and the steps of the solution
-            let Ok(end) = settle(&mut self.problem, &self.base, end.x.clone(), finer, None) else { continue };
-            if !end.converged {
+            let again = settle(&mut self.problem, &self.base, end.x.clone(), finer, None).ok();
+            let Some(end) = again.filter(|end| end.converged) else {
+                starts.unsettled += count;
                 continue;
-            }
+            };
             if same(&end.x, &best.x) {
                 led += count;
                 continue;
             }
             if end.cost > best.cost + NEAR * mean.max(1e-300) {
+                starts.higher += count;
+                let least = &mut starts.least_higher_chi_square;
+                *least = Some(least.map_or(end.cost, |l| l.min(end.cost)));
                 continue;
             }
+            starts.near += count;
             let known = out.iter_mut().find(|o| same(&end.x, &DVector::from_column_slice(&o.values)));
             match known {
                 Some(o) => o.starts += count,
@@ -133,6 +141,6 @@ impl Calibrating<'_> {
             }
         }
         out.sort_by(|a, b| a.chi_square.total_cmp(&b.chi_square));
-        (out, led)
+        (out, led, starts)
     }
 }

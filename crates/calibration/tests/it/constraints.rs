@@ -233,8 +233,12 @@ fn what_was_known_before_keeps_to_constraints() {
     let (first, second) = (turned(0..5), turned(5..40));
     let model = bound(UNIT, "c = 0.8, s = 0.6");
     let c = calibrated(&model, &first, &options()).expect("calibrated");
-    let before =
-        Before { estimates: c.covariance.clone(), rests_on: c.rests_on.clone(), of: c.model.clone() };
+    let before = Before {
+        priors: Vec::new(),
+        estimates: c.covariance.clone(),
+        rests_on: c.rests_on.clone(),
+        of: c.model.clone(),
+    };
     let known = SystemOptions { prior: Some(before), ..options() };
     let both = calibrated(&model, &second, &known).expect("calibrated");
     let all = calibrated(&model, &turned(0..40), &options()).expect("calibrated");
@@ -269,7 +273,7 @@ fn what_was_known_of_some_is_as_it_was() {
     estimates.covariance[1][0] = 0.03;
     let p = DMatrix::from_fn(2, 2, |i, j| estimates.covariance[i][j]);
     let mean = DVector::from_column_slice(&estimates.estimates);
-    let before = Before { estimates, rests_on: c.rests_on.clone(), of: c.model };
+    let before = Before { priors: Vec::new(), estimates, rests_on: c.rests_on.clone(), of: c.model };
     let known = SystemOptions { prior: Some(before), ..options() };
     let c = calibrated(model, &text, &known).expect("calibrated");
     // normal equations by a and b alone

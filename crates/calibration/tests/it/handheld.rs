@@ -127,7 +127,7 @@ fn errors_of_a_unit_in_the_hand() {
         first.findings
     );
     let (estimates, rests_on) = (first.covariance.clone(), first.rests_on.clone());
-    let prior = Some(Before { estimates, rests_on, of: first.model.clone() });
+    let prior = Some(Before { priors: Vec::new(), estimates, rests_on, of: first.model.clone() });
     let second = calibrated("gyros.toml", &text, &SystemOptions { prior, ..options });
     assert_eq!(second.consistent, Some(true), "{:?}", second.findings);
     for c in [&first, &second] {

@@ -2,12 +2,14 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod campaign;
 mod cells;
 mod constraints;
 mod faults;
 mod formats;
 mod handheld;
 mod models;
+mod next;
 mod omitted;
 mod round_trip;
 mod simulator;

@@ -108,6 +108,8 @@ fn what_is_not_told_apart_has_its_product() {
     assert!((a - b).abs() < 1e-3 * t && (s / t - 1.0).abs() < 1e-3, "{a} {s} {b} {t}");
     assert!((a - 6.0).abs() < 4.0 * s);
     // one solution by what can be told: not all starts are needed
+    let o = &own.other_starts;
+    assert_eq!(own.starts.1 + o.near + o.higher + o.unsettled + o.failed, own.starts.0, "{o:?}");
     assert!(own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16, "{:?}", own.starts);
 }
 
@@ -140,6 +142,7 @@ fn units_of_models() {
         assert!(e.contains(words), "{e}");
     }
     let before = Before {
+        priors: Vec::new(),
         estimates: right.covariance.clone(),
         rests_on: right.rests_on.clone(),
         of: right.model.clone(),

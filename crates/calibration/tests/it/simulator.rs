@@ -10,6 +10,17 @@ pub(crate) type Quaternion = [f64; 4];
 const EARTH_RATE: f64 = 7.292115e-5;
 const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 
+/// What becomes of the error of the attitude when the platform is turned at once.
+#[derive(Debug, Clone)]
+pub(crate) enum AtOnce {
+    /// It is the same in n.
+    Inertial,
+    /// It is the same in platform axes.
+    Platform,
+    /// It is another rotation vector in platform axes (rad) at each position but the first.
+    Reset(Vec<Vector>),
+}
+
 /// What the bench has.
 #[derive(Debug, Clone)]
 pub(crate) struct Bench {
@@ -18,6 +29,8 @@ pub(crate) struct Bench {
     pub(crate) positions: Vec<(&'static str, Vector, f64)>,
     /// How fast it is turned from one to the next, in deg/s; `None`: at once.
     pub(crate) slew_deg_s: Option<f64>,
+    /// What becomes of the error of the attitude where it is turned at once.
+    pub(crate) carry: AtOnce,
     /// psi at the start in platform axes, in rad.
     pub(crate) psi: Vector,
     /// D_F, D_I, D_O, D_S of the gyros X, Y, Z in deg/h (per g).
@@ -51,6 +64,7 @@ impl Default for Bench {
             latitude_deg: 28.2,
             positions: vec![("p1", [0.0, 0.0, 0.0], 1000.0), ("p2", [180.0, 0.0, 0.0], 1000.0)],
             slew_deg_s: None,
+            carry: AtOnce::Inertial,
             psi: [0.1, 0.1, 0.1].map(f64::to_radians),
             drift: [[11.0, 12.0, 13.0], [5.0; 3], [5.0; 3], [5.0; 3]],
             accelerometers: [[0.0; 3]; 3],
@@ -122,15 +136,19 @@ fn vector(q: &Quaternion) -> Vector {
     [k * q[1], k * q[2], k * q[3]]
 }
 
-struct Random(SplitMix64);
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(SplitMix64::new(seed))
+    }
+
     fn uniform(&mut self) -> f64 {
         ((self.0.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
     /// Box and Muller.
-    fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let (u, v) = (self.uniform(), self.uniform());
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
@@ -185,8 +203,13 @@ impl Bench {
                             }
                         }
                     }
-                    // the error of the attitude goes on in n
-                    _ => q = multiply(&multiply(&q, &conjugate(&computed)), &aim),
+                    _ => {
+                        q = match &self.carry {
+                            AtOnce::Inertial => multiply(&multiply(&q, &conjugate(&computed)), &aim),
+                            AtOnce::Platform => multiply(&aim, &multiply(&conjugate(&computed), &q)),
+                            AtOnce::Reset(psi) => multiply(&of_vector(&turned(&aim, &psi[p - 1])), &aim),
+                        }
+                    }
                 }
                 computed = aim;
             }

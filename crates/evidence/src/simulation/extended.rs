@@ -169,6 +169,25 @@ impl PlatformMotion<'_> {
         (c, found, by_k)
     }
 
+    /// Number of the attitude of a state that moves in this segment, from 0.
+    pub fn block(&self) -> usize {
+        self.block
+    }
+
+    /// Psi (rad, in the axes of the unknowns) of the smallest turn of the platform at which gravity is `seen`
+    /// (any length, in n): `E^T g^n = seen`, so that `Z^n = g^n - seen`. None where `seen` points straight
+    /// up.
+    pub fn levelled(&self, seen: &[f64; 3]) -> Option<[f64; 3]> {
+        let across = apply(&cross(seen), &G_N);
+        let sine = across.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let cosine: f64 = seen.iter().zip(&G_N).map(|(s, g)| s * g).sum();
+        let angle = sine.atan2(cosine);
+        if !angle.is_finite() || sine <= 1e-9 * seen.iter().map(|x| x.abs()).sum::<f64>() {
+            return (cosine > 0.0).then_some([0.0; 3]);
+        }
+        Some(apply(&transpose(self.to_n), &across.map(|x| x * angle / sine)))
+    }
+
     /// What the segment is to a linear model.
     pub(super) fn stage(&self) -> &Stage {
         &self.plan.stages[self.segment]

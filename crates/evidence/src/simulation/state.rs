@@ -30,6 +30,20 @@ impl PlatformState {
         self.attitudes.iter().flat_map(rotation_vector).chain(self.constants.iter().copied()).collect()
     }
 
+    /// The same with attitude number `block` at the rotation vector `psi` (rad, in the axes of its unknowns).
+    #[must_use]
+    pub fn with_psi(mut self, block: usize, psi: &[f64; 3]) -> Self {
+        self.attitudes[block] = rotation(psi);
+        self
+    }
+
+    /// The same with attitude number `block` of `other`.
+    #[must_use]
+    pub fn with_attitude_of(mut self, block: usize, other: &Self) -> Self {
+        self.attitudes[block] = other.attitudes[block];
+        self
+    }
+
     /// The functional `c` of the unknowns as one of the local coordinates (of psi: by the derivative of the rotation
     /// vector).
     pub fn functional(&self, c: &[(usize, f64)]) -> Vec<(usize, f64)> {

@@ -220,6 +220,9 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         Finding::NotSettled => {
             "Look at units, labels and times of the record, and state first estimates near the truth ([simulation.estimates]).".into()
         }
+        Finding::Bends { .. } => {
+            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions: record and priors do not determine the unknowns.".into()
+        }
         Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
             (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
                 "Correct the times of the record: its clock fits neither the scheme nor the earth rate. Drifts are wrong by the same part or more."

@@ -3,7 +3,10 @@
 use obsdeg_calibration::Calibration;
 
 use crate::Answer;
-use crate::calibration::{allan_figure, estimate_figures, finding, residual_figure, whiteness_figure};
+use crate::calibration::finding;
+use crate::calibration_figures::{
+    allan_figure, estimate_figures, file_name, residual_figure, whiteness_figure,
+};
 use crate::document::{Block, Document, Drawing, Finding, Grade, Picture, Status};
 use crate::figure::Figure;
 
@@ -18,27 +21,27 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
         Block::Picture(Picture {
             name: format!("{id}_estimates_{}", i + 1),
-            caption: format!("Estimates of {}, with three sigma as the fit has it", figure.title),
+            caption: format!("Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a requirement is stated", figure.title),
             drawing: Drawing::Still(figure.svg()),
         })
     }));
     for (i, s) in c.series.iter().enumerate() {
-        let of = if c.records.len() > 1 { format!(" of {}", s.record) } else { String::new() };
+        let of = if c.records.len() > 1 { format!(" of {}", file_name(&s.record)) } else { String::new() };
         let name = |kind: &str| format!("{id}_{kind}_{}", i + 1);
         let what = &s.channel;
         out.push(curves(
             name("residuals"),
-            format!("What the estimate leaves of {what}{of}, with three sigma"),
+            format!("Residuals of {what}{of}, with bands of three sigma"),
             residual_figure(c, s),
         ));
         if s.allan.len() > 1 {
             let caption = format!(
-                "Allan deviation of what is left of {what}{of}: white noise falls with the root of the time, what rises is none of the model"
+                "Allan deviation of the residuals of {what}{of}: white noise falls with the root of the cluster time; a rise is an error outside the model"
             );
             out.push(curves(name("allan"), caption, allan_figure(s)));
         }
         if !s.autocorrelation.is_empty() {
-            let caption = format!("Correlation of what is left of {what}{of} with what comes later");
+            let caption = format!("Autocorrelation of the residuals of {what}{of}");
             out.push(Block::Picture(Picture {
                 name: name("whiteness"),
                 caption,

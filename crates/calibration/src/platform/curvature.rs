@@ -1,0 +1,184 @@
+//! Whether an estimate is as linear as its covariance takes it for, and what it is where it is not.
+//!
+//! What nothing but a prior determines may be far from its estimate, and bends into the rest: drifts times
+//! angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
+//! longest axes a of the posterior. Below one the covariance of the linear model holds. Above, mean and
+//! covariance are those of many estimates, each from data and priors with errors drawn anew (randomise, then
+//! optimise; Bardsley, Solonen, Haario, Laine 2014, doi:10.1137/140964023).
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_ekf::Manifold;
+use obsdeg_evidence::simulation::{Noise, PlatformState};
+
+use super::CalibrationError;
+use super::estimate::{Draw, Estimate, Problem};
+use crate::least_squares::{Information, Linearised};
+
+/// Longest axes of the posterior that are tried.
+const AXES: usize = 8;
+/// An axis can bend a run where the square of what it turns the platform by is more than this part of what
+/// all measurements could tell from nothing.
+const SEEN: f64 = 0.1;
+/// Curvature from which on estimates are repeated.
+pub(super) const BENT: f64 = 1.0;
+/// Curvature beyond which records and priors do not determine the unknowns.
+pub(crate) const MOST: f64 = 20.0;
+/// Fewest repeated estimates, and how many for each unknown.
+const REFITS: (usize, usize) = (80, 4);
+/// Most products of bins, squared unknowns and repeated estimates.
+const WORK: f64 = 2e9;
+
+/// How an estimate bends.
+#[derive(Debug, Clone)]
+pub(crate) struct Bent {
+    /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is
+    /// nearly as low.
+    pub kappa: f64,
+    /// Repeated estimates, and how many of them did not settle.
+    pub refits: usize,
+    pub failed: usize,
+    /// Their mean about the estimate, and a root (n x any) of their covariance.
+    pub found: Option<(DVector<f64>, DMatrix<f64>)>,
+}
+
+impl Problem<'_> {
+    /// The bend of an estimate.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn bent(&self, estimate: &Estimate, seed: u64) -> Result<Bent, CalibrationError> {
+        let kappa = if estimate.rivals > 0 { f64::INFINITY } else { self.kappa(estimate)? };
+        let mut out = Bent { kappa, refits: 0, failed: 0, found: None };
+        let n = self.unknowns.n;
+        let refits = REFITS.0.max(REFITS.1 * n);
+        let bins: usize = self.runs.iter().map(|run| run.len()).sum();
+        let work = (bins * n * n * refits) as f64;
+        if !(BENT..=MOST).contains(&kappa) || work > WORK || !estimate.converged || self.stopped.get() {
+            return Ok(out);
+        }
+        let mut noise = Noise::new(seed, 0);
+        let mut all: Vec<DVector<f64>> = Vec::with_capacity(refits);
+        for _ in 0..refits {
+            if self.stopped.get() {
+                return Ok(out);
+            }
+            out.refits += 1;
+            let draw = Some(self.drawn(estimate, &mut noise));
+            let other = Problem {
+                conditions: self.conditions,
+                runs: self.runs,
+                unknowns: self.unknowns,
+                sigmas: self.sigmas.clone(),
+                known: self.known.clone(),
+                draw,
+                going: self.going,
+                passes: self.passes.clone(),
+                stopped: self.stopped.clone(),
+            };
+            let settled = other.settle(estimate.at.x.clone());
+            self.passes.set(other.passes.get());
+            self.stopped.set(other.stopped.get());
+            match settled {
+                Ok(e) if e.converged => all.push(self.between(&estimate.at.x, &e.at.x)),
+                _ => out.failed += 1,
+            }
+        }
+        let m = all.len();
+        if m < n + 10 {
+            return Ok(out);
+        }
+        let mean = all.iter().fold(DVector::zeros(n), |s, x| s + x) / m as f64;
+        // the inverse of a covariance from so few is too large by this part (Hartlap, Simon, Schneider 2007,
+        // doi:10.1051/0004-6361:20066170)
+        let scale = 1.0 / ((m - n - 2) as f64).sqrt();
+        let root = DMatrix::from_fn(n, m, |i, j| (all[j][i] - mean[i]) * scale);
+        out.found = Some((mean, root));
+        Ok(out)
+    }
+
+    /// Local coordinates of the starts `to`, seen from the starts `from`.
+    pub(super) fn between(&self, from: &[PlatformState], to: &[PlatformState]) -> DVector<f64> {
+        let mut out = DVector::zeros(self.unknowns.n);
+        for ((from, to), index) in from.iter().zip(to).zip(&self.unknowns.index) {
+            index.iter().zip(to.local(from)).for_each(|(&i, d)| out[i] = d);
+        }
+        out
+    }
+
+    /// Errors as the estimate has them: of every measurement, with the random drift until then, and of the
+    /// priors.
+    fn drawn(&self, estimate: &Estimate, noise: &mut Noise) -> Draw {
+        let of_run = |run: &Linearised, noise: &mut Noise| {
+            let (mut d, mut scratch) = (vec![0.0; run.states()], Vec::new());
+            let mut out = Vec::with_capacity(run.residuals.len());
+            for (stage, root) in run.stages.iter().zip(&run.roots) {
+                stage.transition.apply(&mut d, &mut scratch);
+                for column in root.column_iter() {
+                    let xi = noise.normal();
+                    d.iter_mut().zip(column.iter()).for_each(|(d, g)| *d += g * xi);
+                }
+                for output in &stage.outputs {
+                    let seen: f64 = output.h.iter().map(|&(j, c)| c * d[j]).sum();
+                    out.push(seen + output.r.sqrt() * noise.normal());
+                }
+            }
+            out
+        };
+        let all = estimate.at.runs.iter().map(|(run, _)| of_run(run, noise)).collect();
+        let (held, known) = self.beside_data();
+        let held = DVector::from_fn(held, |_, _| noise.normal());
+        let known = DVector::from_fn(known, |_, _| noise.normal());
+        Draw { noise: all, held, known }
+    }
+
+    /// The longest axes of the posterior that can bend a run, one standard deviation long.
+    pub(super) fn axes(&self, estimate: &Estimate) -> Vec<DVector<f64>> {
+        let (n, prior) = (self.unknowns.n, &self.unknowns.prior);
+        let root = &estimate.solution.inverse_root;
+        let scaled = DMatrix::from_fn(n, root.ncols(), |i, j| root[(i, j)] / prior[i]);
+        let eigen = (&scaled * scaled.transpose()).symmetric_eigen();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let outputs = estimate.at.runs.iter().flat_map(|(run, _)| &run.stages).flat_map(|s| &s.outputs);
+        let least = SEEN / outputs.map(|o| 1.0 / o.r).sum::<f64>().sqrt();
+        let axis = |&k: &usize| {
+            let length = eigen.eigenvalues[k].max(0.0).sqrt();
+            DVector::from_fn(n, |i, _| eigen.eigenvectors[(i, k)] * length * prior[i])
+        };
+        let all = order.iter().take(AXES).map(axis);
+        all.filter(|a| self.turn(&estimate.at, a).powi(2) > least).collect()
+    }
+
+    /// The largest curvature along these axes, both ways.
+    pub(super) fn kappa(&self, estimate: &Estimate) -> Result<f64, CalibrationError> {
+        let mut kappa: f64 = 0.0;
+        for axis in self.axes(estimate) {
+            for a in [axis.clone(), -axis] {
+                kappa = kappa.max(self.bend(estimate, &a)?);
+            }
+        }
+        Ok(kappa)
+    }
+
+    /// The length in sigma of what a start moved by `a` leaves of the measurements beside the linear model.
+    fn bend(&self, estimate: &Estimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
+        let x = self.moved(&estimate.at.x, a);
+        let mut sum = 0.0;
+        for (r, (own, (run, _))) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
+            let Ok((there, _)) = own.along(self.conditions, &self.sigmas, &x[r]) else {
+                return Ok(f64::INFINITY);
+            };
+            let start: Vec<f64> = self.unknowns.index[r].iter().map(|&i| a[i]).collect();
+            let mut seen = Vec::with_capacity(run.residuals.len());
+            run.carried(&start, |step, d| {
+                let outputs = run.stages[step].outputs.iter();
+                seen.extend(outputs.map(|o| o.h.iter().map(|&(j, c)| c * d[j]).sum::<f64>()));
+            });
+            let beside = there.residuals.iter().zip(&run.residuals).zip(&seen);
+            let residuals = beside.map(|((there, here), seen)| there - here + seen).collect();
+            let bend = Linearised { residuals, ..run.clone() };
+            sum += Information::of(&bend).map_or(f64::INFINITY, |i| i.at_zero());
+        }
+        Ok(sum.sqrt())
+    }
+}

@@ -1,0 +1,108 @@
+//! The minimum that is reported: first by multiple shooting, then the lowest of those about an estimate that bends.
+
+use nalgebra::DVector;
+use obsdeg_evidence::simulation::{Noise, PlatformState};
+
+use super::CalibrationError;
+use super::curvature::BENT;
+use super::estimate::{Estimate, Problem};
+
+/// Sum of squares, as a multiple of the number of measurements, above which a fit is poor.
+const POOR: f64 = 2.0;
+/// Starts along an axis of the posterior, in standard deviations.
+const AWAY: [f64; 4] = [3.0, -3.0, 10.0, -10.0];
+/// Number of first estimates that are drawn from the priors, and the seed of these draws.
+const DRAWS: usize = 12;
+const SEED: u64 = 1;
+/// Least difference by which a sum of squares is lower than another.
+const LOWER: f64 = 1e-2;
+/// Largest difference in the sum of squares of a rival minimum: its likelihood is a thousandth or more, since
+/// exp(-14/2) = 0.0009.
+const RIVAL: f64 = 14.0;
+/// Least distance of a rival minimum, in sigma.
+const APART: f64 = 5.0;
+
+impl Problem<'_> {
+    /// The estimate from `x`: where `first` is true from the start by multiple shooting (from `x` itself, too, if
+    /// that does not settle or fits poorly), and the lowest of the minima about it.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is not finite.
+    pub(super) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
+        let before = self.passes.get();
+        if !first {
+            return self.settle(x);
+        }
+        let found = self.lowest(self.first(x)?)?;
+        Ok(Estimate { passes: self.passes.get() - before, ..found })
+    }
+
+    /// The same without a search for a lower minimum.
+    fn first(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
+        let shot = self.shoot(&x).ok().flatten();
+        let Some(start) = shot else { return self.settle(x) };
+        let found = self.settle(start);
+        let poor = |e: &Estimate| !e.converged || e.at.cost > POOR * self.rows(e);
+        if found.as_ref().is_ok_and(|e| !poor(e)) || self.stopped.get() {
+            return found;
+        }
+        match (found, self.settle(x)) {
+            (Ok(a), Ok(b)) => {
+                let better = (b.converged, -b.at.cost) > (a.converged, -a.at.cost);
+                Ok(if better { b } else { a })
+            }
+            (Ok(e), Err(_)) | (Err(_), Ok(e)) => Ok(e),
+            (Err(e), Err(_)) => Err(e),
+        }
+    }
+
+    /// The lowest of the minima about an estimate that bends; others nearly as low are counted as rivals. A bent sum
+    /// of squares has several minima, and the first that is found need not be the most probable one.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is not finite.
+    fn lowest(&self, estimate: Estimate) -> Result<Estimate, CalibrationError> {
+        if self.stopped.get() || self.kappa(&estimate)? < BENT {
+            return Ok(estimate);
+        }
+        let starts = self.starts_about(&estimate);
+        let mut best = estimate;
+        let mut others: Vec<Estimate> = Vec::new();
+        for start in starts {
+            if self.stopped.get() {
+                break;
+            }
+            let Ok(e) = self.settle(start) else { continue };
+            if !e.converged && best.converged {
+                continue;
+            }
+            if e.at.cost < best.at.cost - LOWER {
+                others.push(std::mem::replace(&mut best, e));
+            } else {
+                others.push(e);
+            }
+        }
+        let rival = |e: &&Estimate| {
+            let far = (&best.solution.root * self.between(&best.at.x, &e.at.x)).norm();
+            e.converged && e.at.cost < best.at.cost + RIVAL && far > APART
+        };
+        best.rivals = others.iter().filter(rival).count();
+        Ok(best)
+    }
+
+    /// Starts along the axes of the posterior of an estimate, both ways, and by multiple shooting from first
+    /// estimates drawn from the priors.
+    fn starts_about(&self, estimate: &Estimate) -> Vec<Vec<PlatformState>> {
+        let from = &estimate.at.x;
+        let axes = self.axes(estimate);
+        let mut out: Vec<Vec<PlatformState>> =
+            axes.iter().flat_map(|a| AWAY.map(|by| self.moved(from, &(a * by)))).collect();
+        let mut noise = Noise::new(SEED, 1);
+        for _ in 0..DRAWS {
+            let d = DVector::from_fn(self.unknowns.n, |i, _| self.unknowns.prior[i] * noise.normal());
+            // a start that cannot be followed is none
+            out.extend(self.shoot(&self.moved(&self.at_rest(), &d)).ok().flatten());
+        }
+        out
+    }
+}

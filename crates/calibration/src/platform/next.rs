@@ -1,0 +1,205 @@
+//! Further runs that would bring a coefficient to its requirement, each computed.
+//!
+//! A run is a dwell at one attitude, calibrated with this answer as knowledge of the coefficients and a psi of
+//! its own. Attitudes are the 24 cardinal ones and those of the scheme. Sigmas are those of the linear model with
+//! all coefficients zero, with the noise and the random drift of this answer, by samples as dense as its records
+//! have them.
+
+use nalgebra::{DMatrix, DVector};
+use obsdeg_core::model::{Dwell, Euler, Position, Scheme, cardinal, cardinal_name, cardinal_names};
+use obsdeg_evidence::simulation::{Plan, RunStart, Segment, predict, si_per_shown};
+
+use super::diagnose::Parts;
+use super::estimate::{Unknowns, WEAK};
+use super::run::noise_root;
+use super::{CalibrationError, known};
+use crate::answer::{Calibration, CovarianceTable, Estimated, NextRun};
+use crate::least_squares::{Information, Linearised, Rows, Solution};
+
+/// Longest dwell, in longest dwells of the scheme.
+const LONGEST: f64 = 16.0;
+/// Steps of a dwell: noise of samples and random drift are those of the mean over a step.
+const STEPS: usize = 100;
+/// Largest relative error of a dwell.
+const EXACT: f64 = 0.01;
+
+/// Attitudes that are tried, with their names.
+fn candidates(scheme: &Scheme) -> Vec<(String, Euler)> {
+    let mut out: Vec<(String, Euler)> =
+        cardinal_names().into_iter().filter_map(|n| cardinal(&n).map(|a| (n, a))).collect();
+    for p in &scheme.positions {
+        if cardinal_name(&p.angles).is_none() && out.iter().all(|(_, a)| *a != p.angles) {
+            out.push((p.name.clone(), p.angles.clone()));
+        }
+    }
+    out.retain(|(_, angles)| scheme.gimbals.reach(angles));
+    out
+}
+
+/// What is known of the coefficients, and how a further run is measured.
+struct Further<'p, 'a> {
+    parts: &'p Parts<'a>,
+    table: CovarianceTable,
+    /// Variance of a mean over one second of each channel, as the fit has it.
+    variances: Vec<f64>,
+}
+
+impl Parts<'_> {
+    /// For every requirement that is missed: the attitude of a further run that brings the coefficient closest
+    /// to it, and the dwell that meets it. `bench` has what a bench adds by name, which no run makes smaller.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is not finite.
+    pub(super) fn next_runs(
+        &self,
+        of: &Calibration,
+        bench: &[(String, f64)],
+    ) -> Result<Vec<NextRun>, CalibrationError> {
+        let added = |name: &str| bench.iter().find(|(of, _)| of == name).map_or(0.0, |(_, added)| *added);
+        // sigma that is required of the records, and which of them miss it
+        let target = |e: &Estimated| {
+            let sigma = (e.required_sigma?.powi(2) - added(&e.name).powi(2)).max(0.0).sqrt();
+            let own = e.sigma_rescaled.zip(e.sigma).map(|(r, s)| r.max(s));
+            own.is_none_or(|s| s > sigma).then_some(sigma)
+        };
+        let missed: Vec<(&Estimated, f64)> =
+            of.quantities.iter().filter_map(|e| Some((e, target(e)?))).collect();
+        if missed.is_empty() || self.interrupted || !self.estimate.converged {
+            return Ok(Vec::new());
+        }
+        let interval = self.problem.runs.iter().map(|run| run.reading.interval).fold(f64::INFINITY, f64::min);
+        let factor = of.fit.factor.max(1.0);
+        let variances = self.problem.sigmas.iter().map(|s| s * s * factor * factor * interval).collect();
+        let rescaled = of.covariance.rescaled.clone();
+        let table = CovarianceTable { covariance: rescaled, ..of.covariance.clone() };
+        let further = Further { parts: self, table, variances };
+        let dwells =
+            self.scheme.positions.iter().map(|p| p.dwell.map_or(self.conditions.dwell_s, |d| d.seconds()));
+        let dwell = dwells.fold(0.0, f64::max);
+        let mut sigmas: Vec<(&Euler, Vec<f64>)> = Vec::new();
+        let all = candidates(self.scheme);
+        for (_, angles) in &all {
+            // an attitude that no plan takes is none
+            let Ok(solution) = further.with(angles, dwell) else { continue };
+            sigmas.push((angles, missed.iter().map(|(e, _)| further.sigma(&solution, &e.name)).collect()));
+        }
+        let mut out = Vec::new();
+        for (k, (e, required)) in missed.iter().enumerate() {
+            let Some((angles, own)) = sigmas.iter().min_by(|a, b| a.1[k].total_cmp(&b.1[k])) else {
+                continue;
+            };
+            let name = all.iter().find(|(_, a)| a == *angles).map_or_else(String::new, |(n, _)| n.clone());
+            let (dwell_s, sigma) = further.dwell(angles, &e.name, *required, (dwell, own[k]))?;
+            let improves = e.sigma_rescaled.is_none_or(|s| sigma < 0.99 * s) && sigma.is_finite();
+            out.push(NextRun {
+                unknown: e.name.clone(),
+                unit: e.unit.clone(),
+                sigma: e.sigma_rescaled,
+                required_sigma: *required,
+                attitude: improves.then_some(name),
+                dwell_s: improves.then_some(dwell_s),
+                sigma_then: improves.then_some(sigma),
+                met: sigma <= *required,
+            });
+        }
+        Ok(out)
+    }
+}
+
+impl Further<'_, '_> {
+    /// The coefficients by this answer and a dwell of `dwell_s` at an attitude.
+    fn with(&self, angles: &Euler, dwell_s: f64) -> Result<Solution, CalibrationError> {
+        let (scheme, conditions) = (self.parts.scheme, self.parts.conditions);
+        let own = Position {
+            name: "p1".into(),
+            angles: angles.clone(),
+            dwell: Dwell::from_seconds(dwell_s),
+            rotation: None,
+            slew: None,
+        };
+        let scheme = Scheme { positions: vec![own], ..scheme.clone() };
+        let conditions = super::run::conditions(conditions);
+        let step = dwell_s / STEPS as f64;
+        let plan =
+            Plan::derived(&scheme, &conditions)?.in_steps(&conditions, |_: &Segment| vec![(STEPS, step)])?;
+        let prediction = predict(&plan, self.parts.options.seed)?;
+        let start = RunStart::new(&plan, &conditions)?;
+        let (n, coefficients, biases) = (plan.unknowns(), plan.platform.coefficients(), plan.biases.len());
+        let unknowns = Unknowns::new(
+            1,
+            [n - coefficients, coefficients, biases],
+            &start.sigma,
+            &start.estimate,
+            &[],
+            &vec![false; n + biases],
+        );
+        let information = Information::of(&self.run(&plan, step))?;
+        let mut rows = Rows::new(unknowns.n);
+        let mut wide = DMatrix::zeros(information.root.nrows(), unknowns.n);
+        for (s, &i) in unknowns.index[0].iter().enumerate() {
+            wide.set_column(i, &information.root.column(s));
+        }
+        rows.add(&wide, &DVector::zeros(wide.nrows()));
+        let ((before, _), _) = known(&self.table, &plan, &prediction, &unknowns)?;
+        rows.add(&before, &DVector::zeros(before.nrows()));
+        // random biases have a prior that is theirs
+        let pull = unknowns.prior.iter().enumerate();
+        let pull = pull.map(|(i, s)| 1.0 / if unknowns.biases.contains(&i) { *s } else { WEAK * s });
+        let pull = DVector::from_iterator(unknowns.n, pull);
+        rows.add(&DMatrix::from_diagonal(&pull), &DVector::zeros(unknowns.n));
+        Ok(rows.solve()?)
+    }
+
+    /// The plan as it is linearised where all unknowns are zero, a measurement at the end of every step.
+    fn run(&self, plan: &Plan, step: f64) -> Linearised {
+        let mut out = Linearised::default();
+        for (segment, stage) in plan.stages.iter().enumerate() {
+            let mut one = stage.clone();
+            one.steps = 1;
+            one.outputs.iter_mut().zip(&self.variances).for_each(|(o, v)| o.r = v / step);
+            for _ in 0..stage.steps {
+                out.residuals.extend(one.outputs.iter().map(|_| 0.0));
+                out.roots.push(noise_root(plan, segment, plan.states()));
+                out.stages.push(one.clone());
+            }
+        }
+        out
+    }
+
+    /// Sigma of a coefficient in its shown unit.
+    fn sigma(&self, of: &Solution, name: &str) -> f64 {
+        let platform = &self.parts.planned.platform;
+        // psi of a run of one position is the same as that of the scheme: coefficients follow
+        let coefficients = platform.coefficients();
+        let first = platform.names().len() - coefficients;
+        let Some(k) = platform.names().iter().position(|n| n == name).and_then(|k| k.checked_sub(first))
+        else {
+            return f64::INFINITY;
+        };
+        let n = of.x.len();
+        of.sigma(&[(n - coefficients + k, 1.0)]) / si_per_shown(platform.units()[first + k])
+    }
+
+    /// The least dwell at an attitude with which a coefficient has a sigma of `required`, and that sigma; the
+    /// longest where none has. `from` is a dwell with its sigma.
+    fn dwell(
+        &self,
+        angles: &Euler,
+        name: &str,
+        required: f64,
+        from: (f64, f64),
+    ) -> Result<(f64, f64), CalibrationError> {
+        let at =
+            |dwell: f64| Ok::<_, CalibrationError>((dwell, self.sigma(&self.with(angles, dwell)?, name)));
+        let (mut short, mut long) = (0.0, from);
+        while long.1 > required && long.0 < 0.99 * LONGEST * from.0 {
+            (short, long) = (long.0, at(2.0 * long.0)?);
+        }
+        while long.1 <= required && long.0 - short > EXACT * long.0 && long.0 > 1.0 {
+            let middle = at((short + long.0) / 2.0)?;
+            if middle.1 <= required { long = middle } else { short = middle.0 }
+        }
+        // a whole number of seconds
+        at(long.0.ceil())
+    }
+}
