@@ -653,6 +653,23 @@ class SystemQuantity(Record):
     """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
 
 
+class ConstraintFactor(Record):
+    """A constraint that is a product, and the factor that was taken for it."""
+
+    __slots__ = ()
+
+    constraint: str
+    """Constraint that is a product, as written."""
+    factor: str
+    """Factor that is zero where the verdicts are judged."""
+    others: list[str]
+    """Other factors of the constraint, by which it could hold as well."""
+    given: bool
+    """True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the first with a real point
+    at which the others are not zero, unknowns alone last.
+    """
+
+
 class SystemCombination(Record):
     """Combination of unknowns, with its verdict."""
 
@@ -689,6 +706,8 @@ class BranchSide(Record):
     """
     of_time: bool
     """True if the argument depends on the time."""
+    given: bool
+    """True if the file gives the value of the argument at the start: known starts and constants, and no second segment."""
 
 
 class DigitsReport(Record):
@@ -735,6 +754,8 @@ class SystemAnalysis(Shape):
     """
     constraints: list[str]
     """Equations that hold at the start; their differentials count as rows of order 0."""
+    constraint_factors: list[ConstraintFactor]
+    """Factors that stand for those of these equations that are products: verdicts are those where they are zero."""
     combinations: list[SystemCombination]
     """Combinations of unknowns that the model asks for."""
     unobservable_directions: int
@@ -1203,6 +1224,10 @@ class OmittedEffects(Record):
     """Bound on the probability that a class is wrong, dimensionless; null where no classes were computed."""
     not_classified: str | None
     """Reason why there are no exact classes; null if there are."""
+    estimated: list[str]
+    """Names in the bench that are among the unknowns: estimated, so that their sizes do not count."""
+    attitudes: bool
+    """True if attitudes of the positions are among the terms: those of rotating positions, and of more than 64, are not computed."""
 
 
 class Validity(Record):
@@ -2517,6 +2542,8 @@ class CrossCheck(Shape):
     """Deliberate error of the filter's model; null for the right filter."""
     conditions: ConditionsReport
     """Conditions of the runs, with their units."""
+    bench: str | None
+    """Bench that is stated, in words; no part of a cross-check. Null where none is stated."""
     timeline: list[TimelineReport]
     """Positions and slews of the run, in order of time."""
     passed: bool
@@ -3319,6 +3346,10 @@ class SuspectedChange(Record):
     """Estimate of the fit, in the unit of `unit`."""
     with_: float
     """Estimate with the suspected errors among the unknowns, in the unit of `unit`."""
+    lowest: float
+    """Lowest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of `unit`."""
+    highest: float
+    """Highest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of `unit`."""
 
 
 class Suspicion(Record):
@@ -3335,7 +3366,7 @@ class Suspicion(Record):
     probability: float
     """Bound on the probability that chance gives such a fall to any of the errors that were tried."""
     changes: list[SuspectedChange]
-    """Estimates that the errors change most in their own sigma, the largest change first."""
+    """Estimates that the errors, or an indistinguishable one, change most in their own sigma, the largest change first."""
 
 
 class SilentError(Record):

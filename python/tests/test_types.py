@@ -57,6 +57,7 @@ def answers() -> Iterator[obsdeg.Answer]:
     yield obsdeg.crosscheck("examples/lotka-volterra/model.toml")
     yield obsdeg.calibrate("examples/bench-day/scheme.toml", "examples/bench-day/record.csv")
     yield obsdeg.calibrate("examples/hudson-bay/model.toml", "examples/hudson-bay/data.csv", starts=2, profile="a")
+    yield obsdeg.allan("tests/data/static/imu.csv")
     yield obsdeg.design(4, observable="D_F", carry="inertial")
     yield obsdeg.design(6, carry="reset")
     yield obsdeg.design(5, carry="inertial", refine=True, divide=True, front=[4, 6], restarts=5)

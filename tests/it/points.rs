@@ -276,7 +276,7 @@ fn dependent_gradients_are_refused() {
     for constraints in [&["x = 1", "y = 2", "x + y = 3"][..], &["x^2 = 1", "x = 1"], &["x^2*(y - 2) = 0"]] {
         for seed in 1..=4 {
             let a = judged(constraints, "", seed).unwrap_or_else(|e| panic!("{constraints:?}: {e}"));
-            assert_eq!(a.rank, 3, "{constraints:?}");
+            assert_eq!(a.rank, if constraints.len() > 1 { 3 } else { 2 }, "{constraints:?}");
         }
     }
 }
@@ -293,7 +293,7 @@ fn products_are_judged_by_the_factor_that_is_named() {
         (&["0 = (x - y)*(x + y - a)"], String::new(), &["x - y = 0"], "x - y", &["x + y - a"]),
         (&["(x^2 + 1)*(y - 2)^2/3 = 0"], String::new(), &["y - 2 = 0"], "y - 2", &["x^2 + 1"]),
         (&["x = 1", "-(x*y) = 0"], String::new(), &["x = 1", "y = 0"], "y", &["x"]),
-        (&["x*y*(x + y + a) = 0"], point(1.0, 1.0), &["x = 0"], "x", &["y", "x + y + a"]),
+        (&["x*y*(x + y + a) = 0"], point(1.0, 1.0), &["x + y + a = 0"], "x + y + a", &["x", "y"]),
         (&["y = 0", "x*y = 0"], String::new(), &["y = 0"], "y", &["x"]),
     ] {
         for seed in 1..=6 {
@@ -359,7 +359,7 @@ fn factors_are_taken_that_can_be() {
     for (constraints, output, factors, rank) in [
         ("'x*y = 0', 'y*(x - 1) = 0'", "s='z'", &["y", "y"][..], 2),
         ("'x*y = 0', 'y*x*z = 0'", "s='z'", &["y", "y"], 2),
-        ("'x*y = 0', 'y*(z - 1) = 0'", "s='z + x'", &["y", "y"], 2),
+        ("'x*y = 0', 'y*(z - 1) = 0'", "s='z + x'", &["x", "z - 1"], 2),
         ("'x*y = 0'", "s='y/x + z'", &["y"], 2),
         ("'(x + 1)*(y - x) = 0'", "s='log(x) + z'", &["y - x"], 2),
         ("'x*y/x^2 = 0'", "s='z'", &[], 2),

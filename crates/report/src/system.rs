@@ -247,7 +247,7 @@ impl Answer for SystemAnalysis {
                     w.factor,
                     match w.given {
                         true => "which the values under [simulation.values] hold",
-                        false => "the first of them that leaves most free",
+                        false => "the first with a real point of its own, unknowns alone last",
                     }
                 )
             }));

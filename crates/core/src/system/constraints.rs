@@ -37,7 +37,7 @@ pub struct ConstraintFactor {
     /// Other factors of the constraint, by which it could hold as well.
     pub others: Vec<String>,
     /// True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the
-    /// one that leaves most free, of several the first.
+    /// first with a real point at which the others are not zero, unknowns alone last.
     pub given: bool,
 }
 

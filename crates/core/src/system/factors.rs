@@ -1,9 +1,10 @@
 //! Constraints that are products: one of their factors is zero, and verdicts are those where the same one always is.
 
-use obsdeg_exact::Reals;
+use std::collections::HashMap;
+
+use obsdeg_exact::{Ball, Reals};
 
 use super::constraints::ConstraintFactor;
-use super::held::distinct;
 use super::judge::climb_at;
 use super::model::{PlacedExpression, SystemModel};
 use super::real_points::real_point;
@@ -17,6 +18,9 @@ const CHOICES: usize = 64;
 const OPERATIONS: u64 = 200_000_000;
 /// Size, relative to the largest of a product, up to which a factor is zero at the given values.
 const ZERO: f64 = 1e-9;
+
+/// Size below which a factor is zero at a point of 77 digits.
+const ROUNDING: f64 = 1e-30;
 
 /// A factor of a constraint.
 struct Factor {
@@ -35,8 +39,8 @@ struct Product {
 impl SystemModel {
     /// The same with one factor in the place of each constraint that is a product. Of the choices whose factors have
     /// a real point together with all other constraints, at which the model is defined: factors that are zero at the
-    /// values of the file before all others, then the choice with the fewest independent constraints, then the first as
-    /// written. Unchanged where there is no product, or no such point was found.
+    /// values of the file before all others, then those at whose point no other factor is zero, then factors
+    /// that are no unknown alone (by x = 0 a model loses more than by y = z), then the first as written. Unchanged where there is no product, or no such point was found.
     pub(super) fn by_one_factor(self) -> Self {
         let all = self.constraints.iter().enumerate();
         let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
@@ -44,22 +48,25 @@ impl SystemModel {
             return self;
         }
         let total = products.iter().map(|p| p.factors.len()).fold(1, usize::saturating_mul);
-        let mut best: Option<([usize; 2], Self)> = None;
+        let mut best: Option<([usize; 3], Self)> = None;
         for choice in 0..total.min(CHOICES) {
-            let (mut out, mut left, mut others) = (self.clone(), choice, 0);
+            let (mut out, mut left, mut others) = (self.clone(), choice, Vec::new());
+            let (mut not_given, mut alone) = (0, 0);
             for p in &products {
                 let taken = left % p.factors.len();
                 left /= p.factors.len();
-                others += usize::from(p.given.is_some_and(|given| given != taken));
+                not_given += usize::from(p.given.is_some_and(|given| given != taken));
+                alone += usize::from(p.factors[taken].expression.nodes.len() == 1);
+                others.extend(p.factors.iter().enumerate().filter(|(k, _)| *k != taken).map(|(_, f)| f));
                 out.take(p, taken);
             }
-            if best.as_ref().is_some_and(|(rank, _)| rank[0] < others) {
+            if best.as_ref().is_some_and(|(rank, _)| rank[0] < not_given) {
                 continue;
             }
-            if let Some(independent) = out.independent_at_point()
-                && best.as_ref().is_none_or(|(rank, _)| [others, independent] < *rank)
+            if let Some(zero) = out.zero_at_point(&others)
+                && best.as_ref().is_none_or(|(rank, _)| [not_given, zero, alone] < *rank)
             {
-                best = Some(([others, independent], out));
+                best = Some(([not_given, zero, alone], out));
             }
         }
         best.map_or(self, |(_, out)| out)
@@ -84,8 +91,9 @@ impl SystemModel {
         });
     }
 
-    /// Number of independent constraints at a real point at which the model is defined; `None` where none was found.
-    fn independent_at_point(&self) -> Option<usize> {
+    /// Number of factors that are zero at a real point at which the constraints hold and the model is defined; `None`
+    /// where none was found.
+    fn zero_at_point(&self, factors: &[&Factor]) -> Option<usize> {
         let mut model = self.clone();
         model.work_limit = model.work_limit.within(OPERATIONS);
         let compiled = model.compile().ok()?;
@@ -93,8 +101,13 @@ impl SystemModel {
         let mut spent = Spent::default();
         layout.dependent = real_point(&model, &compiled, &layout, 1, &mut spent).ok()?;
         let mut rng = model.random(1, "factors");
-        let at = climb_at(&model, &compiled, &layout, Reals::<4>, &mut rng, &mut spent);
-        at.is_ok().then(|| distinct(&compiled.constraints).len() - layout.dependent)
+        let at = climb_at(&model, &compiled, &layout, Reals::<4>, &mut rng, &mut spent).ok()?;
+        let names = layout.unknowns.iter().map(|u| u.name.as_str());
+        let names = names.chain(model.constants.iter().map(|c| c.0.name.as_str()));
+        let values: HashMap<&str, f64> = names.zip(at.values.iter().map(Ball::to_f64)).collect();
+        let value = |name: &str| values.get(name).copied().unwrap_or(f64::NAN);
+        let is_zero = |f: &&&Factor| evaluate_f64(&f.expression, &value).abs() < ROUNDING;
+        Some(factors.iter().filter(is_zero).count())
     }
 
     /// The only factor that is zero at the values under `[simulation.values]`, where these are complete, in all
