@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say here.
+/// Help texts of shared options for this command.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.help("Write coefficients, deviations, the settings and figures to a folder"),

@@ -379,7 +379,7 @@ fn factors_are_taken_that_can_be() {
     }
 }
 
-/// Where sums hold in several ways, the way is that of given values. By hand: x*y = x*z at x = 0 leaves y free and
+/// Given values choose the way in which a sum holds. By hand: x*y = x*z at x = 0 leaves y free and
 /// unseen by z, at y = z it leaves x; x^2 = y^2 with x + y seen is of rank 1 at x = -y.
 #[test]
 fn given_values_choose_the_way() {

@@ -13,10 +13,10 @@ use crate::problem::{Kind, Problem};
 
 /// Probability of a confidence band where nothing is said.
 const CONFIDENCE: f64 = 0.95;
-/// What that probability may be.
+/// Range of that probability.
 const PROBABILITY: [f64; 2] = [0.5, 0.9999];
 
-/// What `allan` is asked.
+/// Request of `allan`: columns, confidence and gravity.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Allan {
@@ -43,7 +43,7 @@ impl Default for Allan {
 /// Noise of the sensors of a static record.
 ///
 /// # Errors
-/// What is wrong with an option or the record.
+/// [`Problem`] of an option or of the record.
 pub fn allan(a: &Allan, record: Record, host: &Host<'_>) -> Result<SensorNoiseReport, Problem> {
     let ranges = [("--confidence", a.confidence, PROBABILITY), ("--gravity", a.gravity, GRAVITY)];
     for (option, found, [low, high]) in ranges {
@@ -63,7 +63,7 @@ pub fn allan(a: &Allan, record: Record, host: &Host<'_>) -> Result<SensorNoiseRe
 /// Files beside the JSON: coefficients, deviations, the table for a scheme file, figures.
 ///
 /// # Errors
-/// What cannot be drawn.
+/// [`ReportError`] of a figure that cannot be drawn.
 pub fn files(found: &SensorNoiseReport) -> Result<Vec<File>, ReportError> {
     let coefficients = written(found, Format::Csv, Layout::default())?;
     let deviations = obsdeg_report::csv(found, Some("columns.deviations"))?;

@@ -308,7 +308,7 @@ struct Records {
     before: Option<Source>,
 }
 
-/// What the noise of sensors is found in.
+/// Record of a request for the noise of sensors.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct StaticRecords {

@@ -133,7 +133,7 @@ fn pair(lengths: &[usize], m: usize, other: usize) -> [[f64; TERMS]; TERMS] {
 pub struct TermFit {
     /// Coefficient and its standard deviation; `None` where it is not resolved.
     pub found: Option<(f64, f64)>,
-    /// What the coefficient is below with probability [`LIMIT`].
+    /// Upper limit: the coefficient lies below it with probability [`LIMIT`].
     pub limit: f64,
     /// The least coefficient that this record resolves, beside the noises that it has.
     pub least: f64,

@@ -1,5 +1,5 @@
-//! What the effects of errors that are not estimated cost beyond the sigmas: 33 coefficients by seven positions with
-//! slews, and the twelve by the paper's two.
+//! Time of the effects of errors that are not estimated, beyond that of the sigmas: 33 coefficients by seven
+//! positions with slews, and the twelve by the paper's two.
 
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Scheme, scheme_file};

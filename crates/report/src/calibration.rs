@@ -209,7 +209,7 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// What is wrong with estimates that bend.
+/// Sentence on estimates that bend.
 fn bends(kappa: Option<f64>, refits: usize, failed: usize) -> String {
     let size = kappa.map_or_else(
         || {

@@ -7,7 +7,7 @@ use crate::figure::{BLUE, Band, Figure, FigureError, ORANGE, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, words};
 
-/// What a record says of one coefficient.
+/// Table row of one coefficient.
 fn row(column: &ColumnNoise, c: &NoiseCoefficient) -> Vec<String> {
     let text = |x: Option<f64>| x.map_or_else(|| "-".into(), number);
     vec![

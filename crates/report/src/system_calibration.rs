@@ -60,7 +60,7 @@ fn row(e: &SystemEstimated) -> Vec<String> {
     ]
 }
 
-/// What became of the starts that did not lead to the solution.
+/// Sentence on the starts that did not lead to the solution.
 fn other_starts(of: &OtherStarts) -> Option<String> {
     let mut out = Vec::new();
     let mut say = |count: usize, what: String| {

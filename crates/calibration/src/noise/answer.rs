@@ -1,4 +1,4 @@
-//! What a static record says of the noise of sensors: plain data.
+//! Noise of the sensors of a static record, as plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

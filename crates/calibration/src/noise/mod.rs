@@ -22,7 +22,7 @@ pub(crate) const FEWEST: usize = 128;
 /// Probability below which the three noises do not explain the deviations.
 const UNEXPLAINED: f64 = 1e-3;
 
-/// Why a static record says nothing of noise.
+/// Reason why no noise was found in a static record.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoiseError {
     /// The record.
@@ -87,7 +87,7 @@ pub enum NoiseError {
         record: String,
         /// The column.
         column: String,
-        /// What went wrong.
+        /// Error of the fit.
         source: EkfError,
     },
     /// Interrupted.
@@ -95,7 +95,7 @@ pub enum NoiseError {
     Interrupted,
 }
 
-/// How a static record is taken.
+/// Columns, confidence and gravity with which a static record is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseOptions {
     /// Names of the columns that are used; empty for all with a unit of a sensor.

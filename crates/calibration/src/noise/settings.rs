@@ -84,7 +84,7 @@ pub(super) fn table(settings: &[NoiseSetting]) -> String {
     if lines.is_empty() { String::new() } else { format!("[simulation]\n{}\n", lines.join("\n")) }
 }
 
-/// What the figures mean elsewhere.
+/// Notes on the settings of other commands that the coefficients stand for.
 pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     let (gyros, accelerometers) =
         (sensors(columns, SensorKind::Gyro), sensors(columns, SensorKind::Accelerometer));

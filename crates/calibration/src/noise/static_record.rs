@@ -23,7 +23,7 @@ const MOST_NUMBERS: usize = 50_000_000;
 const USUAL: f64 = 0.5;
 /// A cell is far off beyond this many standard deviations of its distance from the mean of its neighbours.
 const FAR: f64 = 8.0;
-/// It is told that a record is read every so many rows.
+/// Number of rows from one report of progress to the next.
 const OFTEN: usize = 10_000;
 
 /// Index, kind and scale of a column of a sensor, with its title.

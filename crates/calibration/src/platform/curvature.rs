@@ -1,6 +1,6 @@
-//! Whether an estimate is as linear as its covariance takes it for, and what it is where it is not.
+//! Curvature of an estimate: the test of the linear model of its covariance, and mean and covariance without it.
 //!
-//! What nothing but a prior determines may be far from its estimate, and bends into the rest: drifts times
+//! Unknowns that a prior alone determines may be far from their estimates, and bend into the others: drifts times
 //! angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
 //! longest axes a of the posterior. Below one the covariance of the linear model holds. Above, mean and
 //! covariance are those of many estimates, each from data and priors with errors drawn anew (randomise, then
@@ -28,7 +28,7 @@ const REFITS: (usize, usize) = (80, 4);
 /// Most products of bins, squared unknowns and repeated estimates.
 const WORK: f64 = 2e9;
 
-/// How an estimate bends.
+/// Curvature of an estimate, with mean and covariance where it counts.
 #[derive(Debug, Clone)]
 pub(crate) struct Bent {
     /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is

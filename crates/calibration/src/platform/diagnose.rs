@@ -195,7 +195,7 @@ struct Asked {
     degree: Option<usize>,
     /// Whether scheme and records determine it.
     determined: bool,
-    /// Whether they do so only with a prior that is stated.
+    /// True if they do so only with a prior that is stated.
     from_prior: bool,
     /// On the unknowns, in SI.
     terms: Vec<(usize, f64)>,
@@ -252,7 +252,7 @@ impl Parts<'_> {
         (unknowns.collect(), combinations.collect())
     }
 
-    /// Whether priors are stated, or a calibration before.
+    /// True if priors are stated, or a calibration before is given.
     fn has_prior(&self) -> bool {
         !self.problem.unknowns.stated.is_empty() || self.problem.known.is_some()
     }

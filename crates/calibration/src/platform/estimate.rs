@@ -65,7 +65,7 @@ pub(crate) struct Unknowns {
 }
 
 impl Unknowns {
-    /// Of runs of one platform with `psi` states of their own before `coefficients` common ones, and `biases`
+    /// Unknowns of runs of one platform, with `psi` states of their own before `coefficients` common ones, and `biases`
     /// of their own behind; `prior` and `first` are of one run, `null` its directions that nothing
     /// determines, `stated` says of which states a prior is stated.
     pub(crate) fn new(
@@ -141,7 +141,7 @@ impl Unknowns {
         rows
     }
 
-    /// Whether a functional has a part in what only the box says.
+    /// True if a functional has a part in directions that the box alone bounds.
     pub(crate) fn is_open(&self, terms: &[(usize, f64)]) -> bool {
         (0..self.loose.ncols()).any(|c| {
             let of = |&(i, k): &(usize, f64)| (k * self.loose[(i, c)], (k * self.prior[i]).abs());
@@ -207,7 +207,7 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Draw {
     /// By run, of every measurement, in the order of rows.
     pub noise: Vec<Vec<f64>>,
-    /// Of the rows of what is held, and of those that were known before (unit errors).
+    /// Errors of the rows that hold unknowns, and of those known before (unit variance).
     pub held: DVector<f64>,
     pub known: DVector<f64>,
 }
@@ -283,7 +283,7 @@ impl Problem<'_> {
         out
     }
 
-    /// What rows that hold unknowns about their first estimates leave at `x`.
+    /// Residuals at `x` of the rows that hold unknowns about their first estimates.
     fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
         let left = rows * self.unknowns.to_first(x);
         match &self.draw {
@@ -292,7 +292,7 @@ impl Problem<'_> {
         }
     }
 
-    /// What is left of what was known before at `x`, by its rows.
+    /// Residuals at `x` of the rows of what was known before.
     fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
         let Some((_, values)) = &self.known else { return DVector::zeros(0) };
         let left = values - rows * self.values(x);

@@ -12,7 +12,7 @@ use super::mistaken::Mistaken;
 /// The specific force of a position is no further than this from the vertical or, where psi goes on in n,
 /// from where the position before left it, in deg.
 const TILT_DEG: f64 = 20.0;
-/// Where psi does not go on in n and the vertical moves by more, it may be further off: so many times its
+/// Largest tilt where psi does not go on in n and the vertical moves by more: so many times its
 /// moves from half to half of all positions until then (twice that is the move of a whole position; azimuth,
 /// too, may become tilt), whichever position is nearer.
 const REACH: f64 = 4.0;

@@ -36,7 +36,7 @@ fn candidates(scheme: &Scheme) -> Vec<(String, Euler)> {
     out
 }
 
-/// What is known of the coefficients, and how a further run is measured.
+/// Covariance of the coefficients, and the conditions of a further run.
 struct Further<'p, 'a> {
     parts: &'p Parts<'a>,
     table: CovarianceTable,

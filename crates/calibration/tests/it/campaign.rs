@@ -33,7 +33,7 @@ struct Case {
     carry: Carry,
     /// Standard deviations of the drifts over 12 deg/h and 5 deg/h/g.
     scale: f64,
-    /// Whether these are stated as priors.
+    /// True if these are stated as priors.
     priors: bool,
 }
 
@@ -153,7 +153,7 @@ fn nees(bench: &Bench, c: &Calibration, combinations: &[(String, f64)]) -> (f64,
     (e.dot(&p.cholesky().expect("definite").solve(&e)), own.len())
 }
 
-/// What came of the records of a case.
+/// Outcomes of the records of a case.
 #[derive(Debug, Default)]
 struct Outcome {
     unsettled: usize,
@@ -198,7 +198,7 @@ fn run(case: &Case, seeds: std::ops::Range<u64>) -> Outcome {
     out
 }
 
-/// What every case must show of so many records: each gives an answer, none ends unsettled, false alarms are
+/// The demands on every case, by so many records: each gives an answer, none ends unsettled, false alarms are
 /// at most 1 % (one record in any case), and the mean NEES of answers without a finding is in its 99.9 %
 /// band. Each case is printed.
 fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {

@@ -1,4 +1,4 @@
-//! What next: the run that would meet a requirement is computed, and a run that is made so meets it; a prior counts
+//! Further runs: the one that would meet a requirement is computed, and a run that is made so meets it; a prior counts
 //! once, however many records there are.
 
 use obsdeg_calibration::record::Record;

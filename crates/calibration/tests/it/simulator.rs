@@ -10,7 +10,7 @@ pub(crate) type Quaternion = [f64; 4];
 const EARTH_RATE: f64 = 7.292115e-5;
 const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 
-/// What becomes of the error of the attitude when the platform is turned at once.
+/// Carry of the error of the attitude through a turn at once.
 #[derive(Debug, Clone)]
 pub(crate) enum AtOnce {
     /// It is the same in n.
@@ -29,7 +29,7 @@ pub(crate) struct Bench {
     pub(crate) positions: Vec<(&'static str, Vector, f64)>,
     /// How fast it is turned from one to the next, in deg/s; `None`: at once.
     pub(crate) slew_deg_s: Option<f64>,
-    /// What becomes of the error of the attitude where it is turned at once.
+    /// Carry of the error of the attitude through turns at once.
     pub(crate) carry: AtOnce,
     /// psi at the start in platform axes, in rad.
     pub(crate) psi: Vector,

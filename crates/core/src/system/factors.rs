@@ -14,11 +14,10 @@ use crate::language::{Expression, Node, component, evaluate_f64};
 
 /// Choices of one factor in each product that are tried at most.
 const CHOICES: usize = 64;
-/// Operations of the search for a point of each.
+/// Operations of the search for points of all of them.
 const OPERATIONS: u64 = 200_000_000;
 /// Size, relative to the largest of a product, up to which a factor is zero at the given values.
 const ZERO: f64 = 1e-9;
-
 /// Size below which a factor is zero at a point of 77 digits.
 const ROUNDING: f64 = 1e-30;
 
@@ -40,7 +39,8 @@ impl SystemModel {
     /// The same with one factor in the place of each constraint that is a product. Of the choices whose factors have
     /// a real point together with all other constraints, at which the model is defined: factors that are zero at the
     /// values of the file before all others, then those at whose point no other factor is zero, then factors
-    /// that are no unknown alone (by x = 0 a model loses more than by y = z), then the first as written. Unchanged where there is no product, or no such point was found.
+    /// that are no unknown alone (by x = 0 a model loses more than by y = z), then the first as written. Unchanged
+    /// where there is no product, or no such point was found.
     pub(super) fn by_one_factor(self) -> Self {
         let all = self.constraints.iter().enumerate();
         let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
@@ -48,7 +48,7 @@ impl SystemModel {
             return self;
         }
         let total = products.iter().map(|p| p.factors.len()).fold(1, usize::saturating_mul);
-        let mut best: Option<([usize; 3], Self)> = None;
+        let (mut best, mut spent): (Option<([usize; 3], Self)>, _) = (None, Spent::default());
         for choice in 0..total.min(CHOICES) {
             let (mut out, mut left, mut others) = (self.clone(), choice, Vec::new());
             let (mut not_given, mut alone) = (0, 0);
@@ -63,7 +63,10 @@ impl SystemModel {
             if best.as_ref().is_some_and(|(rank, _)| rank[0] < not_given) {
                 continue;
             }
-            if let Some(zero) = out.zero_at_point(&others)
+            if spent.operations >= OPERATIONS {
+                break;
+            }
+            if let Some(zero) = out.zero_at_point(&others, &mut spent)
                 && best.as_ref().is_none_or(|(rank, _)| [not_given, zero, alone] < *rank)
             {
                 best = Some(([not_given, zero, alone], out));
@@ -93,15 +96,14 @@ impl SystemModel {
 
     /// Number of factors that are zero at a real point at which the constraints hold and the model is defined; `None`
     /// where none was found.
-    fn zero_at_point(&self, factors: &[&Factor]) -> Option<usize> {
+    fn zero_at_point(&self, factors: &[&Factor], spent: &mut Spent) -> Option<usize> {
         let mut model = self.clone();
-        model.work_limit = model.work_limit.within(OPERATIONS);
+        model.work_limit = model.work_limit.within(OPERATIONS - spent.operations);
         let compiled = model.compile().ok()?;
         let mut layout = Layout::new(&model, &compiled, Some(0));
-        let mut spent = Spent::default();
-        layout.dependent = real_point(&model, &compiled, &layout, 1, &mut spent).ok()?;
+        layout.dependent = real_point(&model, &compiled, &layout, 1, spent).ok()?;
         let mut rng = model.random(1, "factors");
-        let at = climb_at(&model, &compiled, &layout, Reals::<4>, &mut rng, &mut spent).ok()?;
+        let at = climb_at(&model, &compiled, &layout, Reals::<4>, &mut rng, spent).ok()?;
         let names = layout.unknowns.iter().map(|u| u.name.as_str());
         let names = names.chain(model.constants.iter().map(|c| c.0.name.as_str()));
         let values: HashMap<&str, f64> = names.zip(at.values.iter().map(Ball::to_f64)).collect();
