@@ -221,6 +221,14 @@ fn small_texts_that_ask_for_too_much_are_refused() {
             format!("name = \"m\"\n[states]\n{long} = \"-{long}\"\n[outputs]\ny = \"{long}\"\n"),
             "a name of 1000000 characters; expected at most 256",
         ),
+        // 64 choices of factors, none of which has a real point: the work of all of them is bounded
+        (
+            format!(
+                "name = \"m\"\nconstraints = [{}]\nparameters = [\"x\", \"y\"]\n[outputs]\ns = \"x + y\"\n",
+                (1..=6).map(|k| format!("\"(x^2+x+{k})*(y^2+y+{k}) = 0\"")).collect::<Vec<_>>().join(", ")
+            ),
+            "beyond --work-limit 600",
+        ),
     ] {
         let mut file = tempfile::NamedTempFile::new().expect("a file");
         file.write_all(text.as_bytes()).expect("written");
