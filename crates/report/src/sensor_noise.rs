@@ -162,6 +162,6 @@ pub fn sensor_noise_figures(r: &SensorNoiseReport) -> Result<Vec<File>, FigureEr
         ..Figure::default()
     };
     let figures: Vec<Figure> = r.columns.iter().map(figure).collect();
-    let title = format!("Allan deviations, {}", r.record);
+    let title = format!("Allan deviations, {}", crate::calibration_figures::file_name(&r.record));
     Ok(picture("allan", grid(&figures, figures.len().min(2), &title))?.into())
 }
