@@ -64,6 +64,7 @@ impl Bench {
             Some(a) if positions == 0 => {
                 refuse(a, "the number of positions is not known beforehand; state it (--positions)".into())
             }
+            Some(a) if positions == 1 => refuse(a, "the scheme has one position".into()),
             Some(a) => refuse(a, format!("the scheme has {positions} positions")),
             None => Ok(()),
         }
