@@ -3,10 +3,47 @@
 
 use scraper::Html;
 
-use crate::program::{json, run, stderr};
+use crate::program::{json, run, stderr, stdout};
 use crate::report::{report, table, texts};
 
 const BENCH: &str = "examples/bench-errors/scheme.toml";
+
+/// The scheme of the datasheet has the noise that `allan` finds in the record beside it, and what its README says of
+/// it is so: sigmas meet every requirement, totals do not, by the bias.
+#[test]
+fn a_record_at_rest_and_a_datasheet_make_a_bench() {
+    let folder = "examples/bench-datasheet";
+    let found = json(&["allan", &format!("{folder}/rest.csv"), "--format", "json"]);
+    let table = found["simulation_table"].as_str().expect("a table");
+    let key = |text: &str| text.lines().find(|l| l.starts_with("accelerometer_noise_g")).map(str::to_owned);
+    let scheme = std::fs::read_to_string(format!("{folder}/scheme.toml")).expect("a scheme");
+    assert!(key(table).is_some());
+    assert_eq!(key(table), key(&scheme));
+    let noise: f64 = number(key(table).expect("the key").split_once(" = ").expect("a value").1);
+    // 5 ug by 2400 samples of three sensors, the largest of them: four sigma
+    assert!((noise / 5e-6 - 1.0).abs() < 4.0 / (2.0 * 2400f64).sqrt(), "{noise}");
+    let answer = json(&["compare", &format!("{folder}/scheme.toml"), "--format", "json"]);
+    let all = answer["schemes"][0]["quantities"].as_array().expect("quantities");
+    let of = |q: &serde_json::Value, k: &str| q[k].as_f64().expect("a number");
+    let coefficients = all.iter().filter(|q| q["name"].as_str().expect("a name").starts_with("D_"));
+    let (mut missed, mut least, mut largest) = (0, f64::INFINITY, 0.0f64);
+    for q in coefficients {
+        least = least.min(of(q, "requirement") / of(q, "sigma"));
+        largest = largest.max(of(q, "total") / of(q, "requirement"));
+        missed += u32::from(of(q, "total") > of(q, "requirement"));
+        assert!((of(q, "requirement") / of(q, "total") / of(q, "margin") - 1.0).abs() < 1e-12, "{q}");
+    }
+    assert!(least >= 15.0 && missed == 8 && (largest - 71.0).abs() < 0.5, "{least} {missed} {largest}");
+    let terms = ["--terms", "F,I,O,S,K0,M6", "--format", "json", "-q"];
+    let with = json(&[&["simulate", "--scheme", &format!("{folder}/scheme.toml")][..], &terms].concat());
+    let margin = with["requirements"]["worst"]["margin"].as_f64().expect("a number");
+    assert!((1.0 / margin - 10.0).abs() < 1.0, "{margin}");
+    // the table has the totals that its margins are of
+    let printed = stdout(&run(&["compare", &format!("{folder}/scheme.toml")]));
+    let row = printed.lines().find(|l| l.trim_start().starts_with("D_IZ ")).expect("a row");
+    assert!(row.contains("7.143") && row.contains("0.01400"), "{row}");
+    assert!(printed.contains("margin: required over total"), "{printed}");
+}
 
 /// Numbers of a text with a unit behind them: `1.5 deg/h`.
 fn number(text: &str) -> f64 {

@@ -147,7 +147,8 @@ pub fn omitted_verdicts(
             let changing: Vec<usize> = (0..model.terms().len()).filter(changing).collect();
             let mut exact = vec![Vec::new(); model.terms().len()];
             if !changing.is_empty() {
-                let changes = exact_changes(platform, &model.only(&changing), seed);
+                let changed: Vec<&[u64]> = changing.iter().map(|&j| first.changes[j].as_slice()).collect();
+                let changes = exact_changes(platform, &model.only(&changing), &changed, seed);
                 changing.into_iter().zip(changes).for_each(|(j, of)| exact[j] = of);
             }
             let order = values.roots().order;
@@ -273,8 +274,14 @@ fn reset_rows(
 }
 
 /// Exact changes by silent errors at generic latitude, where they hold at every one: per error, per unknown; `None`
-/// for what is no number with roots times powers of the rates, or depends on dwells or generic angles.
-fn exact_changes(platform: &Platform, model: &OmittedModel, seed: u64) -> Vec<Vec<Option<Coefficient>>> {
+/// for what is no number with roots times powers of the rates, depends on dwells or generic angles, or is zero in
+/// `changed` (errors x unknowns).
+fn exact_changes(
+    platform: &Platform,
+    model: &OmittedModel,
+    changed: &[&[u64]],
+    seed: u64,
+) -> Vec<Vec<Option<Coefficient>>> {
     let generic = |s: &Scheme| Scheme { latitude: None, ..s.clone() };
     let Ok(platform) = Platform::new(generic(platform.scheme())) else { return Vec::new() };
     let turning = model.turning().map_or_else(|| platform.scheme().clone(), generic);
@@ -314,6 +321,8 @@ fn exact_changes(platform: &Platform, model: &OmittedModel, seed: u64) -> Vec<Ve
         let number = Number::Radical(recover_radical(&[one.0, two.0], &images)?);
         Some(Coefficient { number, rates })
     };
-    let n = platform.names().len();
-    (0..model.terms().len()).map(|j| (0..n).map(|c| recovered(j, c)).collect()).collect()
+    let of = |(j, changed): (usize, &&[u64])| {
+        changed.iter().enumerate().map(|(c, x)| (*x != 0).then(|| recovered(j, c)).flatten()).collect()
+    };
+    changed.iter().enumerate().map(of).collect()
 }

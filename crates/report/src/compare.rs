@@ -79,43 +79,46 @@ fn by_unknown(schemes: &[ComparedScheme]) -> Block {
             names.push(&q.name);
         }
     }
+    let with_bench = schemes.iter().flat_map(|r| &r.quantities).any(|q| q.total.is_some());
     let mut rows = Vec::new();
     for name in names {
         for r in schemes {
             let Some(q) = r.quantities.iter().find(|q| q.name == *name) else { continue };
-            rows.push(vec![
+            let mut row = vec![
                 name.clone(),
                 r.name.clone(),
                 words::degree(q.degree),
                 words::accuracy_order(q.degree, q.accuracy_order, r.has_accuracy_orders),
                 optional(q.sigma),
+            ];
+            row.extend(with_bench.then(|| optional(q.total)));
+            row.extend([
                 q.unit.clone(),
                 optional(q.requirement),
                 optional(q.margin),
                 excitation(q),
                 if q.carried_by.len() == r.positions.len() { "all".into() } else { list(&q.carried_by) },
             ]);
+            rows.push(row);
         }
     }
-    Block::table(
-        format!(
-            "By unknown ({}; margin: required over sigma)",
-            stated::predicted_of(schemes.iter().map(|r| &r.conditions))
-        ),
-        [
-            left("unknown"),
-            left("scheme"),
-            right("degree"),
-            right("accuracy"),
-            right("sigma"),
-            left("unit"),
-            right(REQUIREMENTS[2]),
-            right(REQUIREMENTS[3]),
-            left("excitation per position"),
-            left("only by"),
-        ],
-        rows,
-    )
+    let mut columns =
+        vec![left("unknown"), left("scheme"), right("degree"), right("accuracy"), right("sigma")];
+    columns.extend(with_bench.then(|| right("total")));
+    columns.extend([
+        left("unit"),
+        right(REQUIREMENTS[2]),
+        right(REQUIREMENTS[3]),
+        left("excitation per position"),
+        left("only by"),
+    ]);
+    let margin = if with_bench {
+        "total: uncertainty with the bench of the scheme; margin: required over total, over sigma without a bench"
+    } else {
+        "margin: required over sigma"
+    };
+    let predicted = stated::predicted_of(schemes.iter().map(|r| &r.conditions));
+    Block::table(format!("By unknown ({predicted}; {margin})"), columns, rows)
 }
 
 /// `; half turns to p2 about -N, to p3 about N`.

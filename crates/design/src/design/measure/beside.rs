@@ -247,33 +247,33 @@ impl Evaluator {
         }
     }
 
-    /// Changes of the coefficients that count by one sigma of every error with a size (errors x d), in units
-    /// of the evaluator; `l` is the root of the information.
-    fn contributions(&self, of: &Omitted, beside: &Beside, l: &[f64]) -> Vec<Vec<f64>> {
+    /// Changes of the coefficients that count by one sigma of every error with a size (shape d each, in units
+    /// of the evaluator), one after the other; `l` is the root of the information.
+    fn each_contribution(&self, of: &Omitted, beside: &Beside, l: &[f64], mut take: impl FnMut(&[f64])) {
         let (n, begin) = (self.n, 3 + self.nuisance);
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         let mut y = vec![0.0; n];
-        let sized = (0..beside.squares.len()).filter(|&j| of.sizes[of.kind(j)] > 0.0);
-        let change = |j: usize| {
+        for j in (0..beside.squares.len()).filter(|&j| of.sizes[of.kind(j)] > 0.0) {
             self.forward(&beside.cross[j * n..][..n], l, first, &mut y);
             // of what counts alone, which comes last
             for i in (begin..n).rev() {
-                let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * y[k]).sum();
-                y[i] = (y[i] - sum) / l[i * n + i];
+                y[i] /= l[i * n + i];
+                let (before, x) = (&l[i * n + begin..i * n + i], y[i]);
+                y[begin..i].iter_mut().zip(before).for_each(|(y, l)| *y -= l * x);
             }
             let size = of.sizes[of.kind(j)];
-            y[begin..].iter().map(|b| b * size).collect()
-        };
-        sized.map(change).collect()
+            y[begin..].iter_mut().for_each(|b| *b *= size);
+            take(&y[begin..]);
+        }
     }
 
     /// The same as variances that the errors add to each coefficient that counts; empty without errors.
     pub(crate) fn added_variances(&self, state: &State, l: &[f64]) -> Vec<f64> {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return Vec::new() };
         let mut out = vec![0.0; self.n - 3 - self.nuisance];
-        for change in self.contributions(of, beside, l) {
+        self.each_contribution(of, beside, l, |change| {
             out.iter_mut().zip(change).for_each(|(sum, b)| *sum += b * b);
-        }
+        });
         out
     }
 
@@ -286,10 +286,10 @@ impl Evaluator {
         let root = nalgebra::DMatrix::from_fn(d, d, block);
         let inverse = root.solve_lower_triangular(&nalgebra::DMatrix::identity(d, d))?;
         let mut covariance = inverse.transpose() * inverse;
-        for change in self.contributions(of, beside, l) {
-            let b = nalgebra::DVector::from_vec(change);
+        self.each_contribution(of, beside, l, |change| {
+            let b = nalgebra::DVector::from_column_slice(change);
             covariance += &b * b.transpose();
-        }
+        });
         let unit = self.dph * self.dph;
         let values = (covariance / unit).symmetric_eigenvalues();
         Some(match criterion {

@@ -119,25 +119,54 @@ impl Evaluator {
     /// that counts is not determined. Sigmas are in deg/h (per g); where errors that are not estimated count they are
     /// total uncertainties. `root` is working space.
     pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
-        self.value_of(state, criterion, root, true)
-    }
-
-    /// The same of the sigmas alone, which no total is below.
-    pub(crate) fn sigma_value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
-        self.value_of(state, criterion, root, false)
-    }
-
-    fn value_of(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>, total: bool) -> f64 {
-        if !self.root(state, root) {
-            return f64::INFINITY;
+        match self.root(state, root) {
+            true => self.by_root(state, criterion, root, &mut Vec::new(), true),
+            false => f64::INFINITY,
         }
+    }
+
+    /// The same of the sigmas alone, which no total is below. `variances` becomes those of the coefficients that count,
+    /// where the criterion is made of them.
+    pub(crate) fn sigma_value(
+        &self,
+        state: &State,
+        criterion: &Criterion,
+        root: &mut Vec<f64>,
+        variances: &mut Vec<f64>,
+    ) -> f64 {
+        variances.clear();
+        match self.root(state, root) {
+            true => self.by_root(state, criterion, root, variances, false),
+            false => f64::INFINITY,
+        }
+    }
+
+    /// [`Self::value`] from the root and the variances of [`Self::sigma_value`].
+    pub(crate) fn total_by_root(
+        &self,
+        state: &State,
+        criterion: &Criterion,
+        root: &[f64],
+        variances: &mut Vec<f64>,
+    ) -> f64 {
+        self.by_root(state, criterion, root, variances, true)
+    }
+
+    fn by_root(
+        &self,
+        state: &State,
+        criterion: &Criterion,
+        root: &[f64],
+        own: &mut Vec<f64>,
+        total: bool,
+    ) -> f64 {
         let total = total && state.beside.is_some();
         if total && matches!(criterion, Criterion::D | Criterion::E) {
             return self.of_total_covariance(state, criterion, root).unwrap_or(f64::INFINITY);
         }
         let (n, begin) = (self.n, 3 + self.nuisance);
         let d = n - begin;
-        let l = &root[..];
+        let l = root;
         if *criterion == Criterion::D {
             // the geometric mean of the principal sigmas
             let logs: f64 = (begin..n).map(|i| l[i * n + i].ln()).sum();
@@ -151,7 +180,10 @@ impl Evaluator {
         }
         let added = if total { self.added_variances(state, l) } else { Vec::new() };
         let added = added.into_iter().chain(std::iter::repeat(0.0));
-        let variances = (begin..n).map(|i| self.variance(l, i)).zip(added).map(|(own, added)| own + added);
+        if own.is_empty() {
+            own.extend((begin..n).map(|i| self.variance(l, i)));
+        }
+        let variances = own.iter().zip(added).map(|(own, added)| own + added);
         match criterion {
             Criterion::A => (variances.sum::<f64>() / d as f64).sqrt() / self.dph,
             Criterion::Margin(limits) => {

@@ -31,17 +31,51 @@ impl Evaluator {
 
     /// Adds a position to `state`; the result goes to `out`.
     pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+        self.extend_any(state, stop, true, out);
+    }
+
+    /// The same without the effects of errors that are not estimated: those of `out` stay as they were. Enough for
+    /// sigmas and for bounds on them.
+    pub(crate) fn extend_information(&self, state: &State, stop: Stop, out: &mut State) {
+        self.extend_any(state, stop, false, out);
+    }
+
+    /// What [`Self::extend_information`] leaves out, to the `out` of the same `state` and `stop`.
+    pub(crate) fn extend_errors(&self, state: &State, stop: Stop, out: &mut State) {
+        if self.carry() == Carry::Reset {
+            return self.add_beside(state, stop.candidate, out);
+        }
+        let at = (stop.candidate, self.way_to(state.path.last().copied(), stop));
+        match self.locals {
+            PSI_EPS => {
+                let local = self.functionals::<PSI_EPS, MAX_DRIFTS>(state, stop);
+                self.extend_beside(state, at, &local, out);
+            }
+            _ => {
+                let local = self.functionals::<LOCAL, MAX_UNKNOWNS>(state, stop);
+                self.extend_beside(state, at, &local, out);
+            }
+        }
+    }
+
+    fn extend_any(&self, state: &State, stop: Stop, beside: bool, out: &mut State) {
         if let Some(bias) = &self.bias {
             return self.extend_correlated(bias, state, stop, false, out);
         }
         // sizes that the compiler knows
         match self.locals {
-            PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, out),
-            _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, out),
+            PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, beside, out),
+            _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, beside, out),
         }
     }
 
-    fn extend_in<const L: usize, const N: usize>(&self, state: &State, stop: Stop, out: &mut State) {
+    fn extend_in<const L: usize, const N: usize>(
+        &self,
+        state: &State,
+        stop: Stop,
+        beside: bool,
+        out: &mut State,
+    ) {
         let n = self.n;
         let carry = self.carry();
         let Candidate { c, own, dwell, .. } = &self.candidates[stop.candidate];
@@ -55,7 +89,9 @@ impl Evaluator {
             for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
                 *sum = x + y;
             }
-            self.add_beside(state, stop.candidate, out);
+            if beside {
+                self.add_beside(state, stop.candidate, out);
+            }
             return;
         }
         let local = self.functionals::<L, N>(state, stop);
@@ -71,7 +107,9 @@ impl Evaluator {
                 }
             }
         }
-        self.extend_beside(state, (stop.candidate, turn), &local, out);
+        if beside {
+            self.extend_beside(state, (stop.candidate, turn), &local, out);
+        }
         self.go_on(dwelling, c, &local, out);
     }
 }

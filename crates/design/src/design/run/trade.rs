@@ -15,7 +15,7 @@ use crate::design::search::scoring::Search;
 /// Factors on all sizes of the bench.
 const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
 /// Restarts of the exchange at each of them, besides those from the schemes found.
-const RESTARTS: u64 = 8;
+const RESTARTS: u64 = 4;
 
 impl Task<'_> {
     /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma; empty where the
@@ -43,7 +43,11 @@ impl Task<'_> {
             if !best.complete {
                 return Vec::new();
             }
-            sequences.extend(best.found.iter().filter(same).map(|s| s.sequence.clone()));
+            for s in best.found.iter().filter(same) {
+                if !sequences.contains(&s.sequence) {
+                    sequences.push(s.sequence.clone());
+                }
+            }
         }
         let mut points: Vec<BiasPoint> = sequences.iter().filter_map(|s| self.point(evaluator, s)).collect();
         points.sort_by(|a, b| a.sigma.total_cmp(&b.sigma).then(a.bias.total_cmp(&b.bias)));
@@ -60,7 +64,7 @@ impl Task<'_> {
     /// Figures of a sequence; `None` where rounding hides them.
     fn point(&self, evaluator: &Evaluator, sequence: &[Stop]) -> Option<BiasPoint> {
         let (state, mut root) = (evaluator.state_of(sequence), Vec::new());
-        let sigma = evaluator.sigma_value(&state, &self.criterion, &mut root);
+        let sigma = evaluator.sigma_value(&state, &self.criterion, &mut root, &mut Vec::new());
         let total = evaluator.value(&state, &self.criterion, &mut root);
         let added = evaluator.added_variances(&state, &root);
         let unit = evaluator.dph;

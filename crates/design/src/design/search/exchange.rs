@@ -3,11 +3,12 @@
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
 
+use crate::design::measure::evaluator::State;
 use crate::design::measure::stop::Stop;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{Meter, PATIENCE};
 use crate::design::search::score::{Scored, Worth};
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::{Search, Trial};
 
 /// Rounds of one exchange before it is given up.
 const ROUNDS: usize = 50;
@@ -55,10 +56,11 @@ impl Search<'_> {
             let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
             let mut best = Best::default();
             let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
+            let mut trial = Trial::new(self.evaluator);
             // takes what is better; false when the search is stopped
-            let mut try_out = |now: &[Stop], held: &mut Scored| {
+            let mut try_out = |before: (&State, usize), now: &[Stop], held: &mut Scored| {
                 best.examined += 1;
-                let other = self.worth(now);
+                let other = self.worth_behind(before, now, &mut trial);
                 if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
                     let mut other = self.judged(other.clone());
                     self.evaluator.tidy(&mut other.sequence);
@@ -76,11 +78,13 @@ impl Search<'_> {
             'rounds: for _ in 0..ROUNDS {
                 let round = held.worth;
                 for place in 0..k {
+                    // a choice may turn to the next position another way, never to this one
+                    let before = self.evaluator.state_of(&now[..place]);
                     let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
                     for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
                         now[place] = stop;
                         next.into_iter().for_each(|next| now[place + 1] = next);
-                        if !try_out(&now, &mut held) {
+                        if !try_out((&before, place), &now, &mut held) {
                             break 'rounds;
                         }
                     }
@@ -89,8 +93,9 @@ impl Search<'_> {
                 for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
                     let first = b > 0 || firsts.is_none_or(|f| f.contains(&now[a].candidate));
                     if first && self.evaluator.ordered() && now[a].candidate != now[b].candidate {
+                        let before = self.evaluator.state_of(&now[..b]);
                         now.swap(a, b);
-                        if !try_out(&now, &mut held) {
+                        if !try_out((&before, b), &now, &mut held) {
                             break 'rounds;
                         }
                         now.copy_from_slice(&held.sequence);

@@ -52,6 +52,7 @@ struct Walk<'a> {
     meter: &'a Meter<'a>,
     states: Vec<State>,
     root: Vec<f64>,
+    variances: Vec<f64>,
     sequence: Vec<Stop>,
     /// Working space.
     members: Vec<usize>,
@@ -69,6 +70,7 @@ impl<'a> Walk<'a> {
             meter,
             states: (0..=k).map(|_| search.evaluator.start()).collect(),
             root: Vec::new(),
+            variances: Vec::new(),
             sequence: Vec::with_capacity(k),
             members: Vec::with_capacity(k),
             best: Best::default(),
@@ -78,17 +80,21 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Whether times are within the limits.
-    fn push(&mut self, stop: Stop) -> bool {
+    /// Puts a position behind the sequence; true if times are within the limits. The last one of a sequence takes no
+    /// effects of errors that are not estimated, which [`Self::score`] adds where they count.
+    fn push(&mut self, stop: Stop, last: bool) -> bool {
         let (search, depth) = (self.search, self.sequence.len());
         self.pushed += 1;
         if self.pushed.is_multiple_of(PATIENCE) {
             self.stopped = !self.meter.report(0, 0, None);
         }
-        let last = self.sequence.last().map(|s| s.candidate);
-        let slew = last.map_or(0.0, |last| search.evaluator.slew_s(last, stop.candidate));
+        let before = self.sequence.last().map(|s| s.candidate);
+        let slew = before.map_or(0.0, |before| search.evaluator.slew_s(before, stop.candidate));
         let (behind, ahead) = self.states.split_at_mut(depth + 1);
-        search.evaluator.extend(&behind[depth], stop, &mut ahead[0]);
+        match last {
+            true => search.evaluator.extend_information(&behind[depth], stop, &mut ahead[0]),
+            false => search.evaluator.extend(&behind[depth], stop, &mut ahead[0]),
+        }
         self.sequence.push(stop);
         let c = search.constraints;
         beyond(slew, c.slew_s) == 0.0 && beyond(ahead[0].seconds, c.total_s) == 0.0
@@ -96,8 +102,11 @@ impl<'a> Walk<'a> {
 
     /// The sequence as it is; `images` of it are searched.
     fn score(&mut self, degree: usize, images: usize) {
-        let (search, state) = (self.search, &self.states[self.sequence.len()]);
-        let mut value = search.evaluator.sigma_value(state, search.criterion, &mut self.root);
+        let (search, depth) = (self.search, self.sequence.len());
+        let (behind, ahead) = self.states.split_at_mut(depth);
+        let state = &mut ahead[0];
+        let mut value =
+            search.evaluator.sigma_value(state, search.criterion, &mut self.root, &mut self.variances);
         self.best.examined += 1;
         if self.best.examined.is_multiple_of(PATIENCE) {
             self.stopped = !self.meter.report(0, PATIENCE, self.best.found.first());
@@ -107,15 +116,17 @@ impl<'a> Walk<'a> {
             self.best.lost += 1;
             return;
         }
-        let wanted = |best: &Best, worth: &Worth| {
-            [best.ties.wants(worth), best.wants(search.keep, worth, state.seconds)]
-        };
+        let seconds = state.seconds;
+        let wanted =
+            |best: &Best, worth: &Worth| [best.ties.wants(worth), best.wants(search.keep, worth, seconds)];
         if wanted(&self.best, &worth) == [false; 2] {
             return;
         }
         // a total, which is not below it
-        let counts = search.evaluator.omitted.is_some();
-        value = if counts { search.evaluator.value(state, search.criterion, &mut self.root) } else { value };
+        if search.evaluator.omitted.is_some() {
+            search.evaluator.extend_errors(&behind[depth - 1], self.sequence[depth - 1], state);
+            value = search.evaluator.total_by_root(state, search.criterion, &self.root, &mut self.variances);
+        }
         let worth = Worth { value, ..worth };
         let [ties, kept] = wanted(&self.best, &worth);
         if !ties && !kept {
@@ -126,7 +137,7 @@ impl<'a> Walk<'a> {
         }
         self.best.ties.add(&worth, images, 1);
         if kept {
-            let scored = Scored { worth, seconds: state.seconds, sequence: self.sequence.clone() };
+            let scored = Scored { worth, seconds, sequence: self.sequence.clone() };
             self.best.add(search.keep, scored);
         }
     }
@@ -147,7 +158,7 @@ impl<'a> Walk<'a> {
         let (rows, evaluator) = (self.search.rows, self.search.evaluator);
         let before = self.sequence.last().map(|s| s.candidate);
         for stop in (0..rows.candidates()).flat_map(|c| evaluator.stops(before, c)) {
-            if self.push(stop) {
+            if self.push(stop, false) {
                 self.visit(sets, degree, k);
             }
             self.sequence.pop();
@@ -165,7 +176,7 @@ impl<'a> Walk<'a> {
         set_of(&self.sequence, &mut members);
         let last = sets.completing(&members).filter(|&c| among(c));
         for stop in last.flat_map(|c| evaluator.stops(before, c)) {
-            if self.push(stop) {
+            if self.push(stop, true) {
                 self.score(degree, 1);
             }
             self.sequence.pop();
@@ -187,7 +198,7 @@ impl<'a> Walk<'a> {
         screen.pairs(&self.states[depth], limit, alive, scratch);
         self.best.excluded += alive.iter().filter(|alive| !**alive).count() as u64;
         for (first, alive) in alive.chunks_exact(candidates).enumerate().filter(|(_, a)| a.contains(&true)) {
-            if self.push(first.into()) {
+            if self.push(first.into(), false) {
                 self.visit_last(sets, degree, |second| alive[second]);
             }
             self.sequence.pop();
@@ -203,7 +214,7 @@ impl<'a> Walk<'a> {
         self.sequence.truncate(common);
         let mut within = beyond(self.states[common].seconds, self.search.constraints.total_s) == 0.0;
         for &stop in &sequence[common..] {
-            within &= self.push(stop);
+            within &= self.push(stop, false);
         }
         within
     }

@@ -1,7 +1,7 @@
 //! A search: what it chooses from, what it minimises, and the score of one sequence.
 
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::Evaluator;
+use crate::design::measure::evaluator::{Evaluator, State};
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::Rows;
 use crate::design::search::constraints::Constraints;
@@ -28,6 +28,19 @@ pub struct Search<'a> {
     pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
 }
 
+/// Working space of one trial after the other.
+pub(crate) struct Trial {
+    now: State,
+    next: State,
+    root: Vec<f64>,
+}
+
+impl Trial {
+    pub(crate) fn new(evaluator: &Evaluator) -> Self {
+        Self { now: evaluator.start(), next: evaluator.start(), root: Vec::new() }
+    }
+}
+
 impl Search<'_> {
     /// The worst of these degrees, if they are within the caps.
     pub(crate) fn worst(&self, degrees: Vec<Option<usize>>) -> Option<usize> {
@@ -44,12 +57,23 @@ impl Search<'_> {
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
     }
 
-    /// What a sequence is worth, with its time. Its degrees are those of one field.
-    pub(crate) fn worth(&self, sequence: &[Stop]) -> Scored {
-        let state = self.evaluator.state_of(sequence);
-        let mut root = Vec::new();
-        let value = self.evaluator.value(&state, self.criterion, &mut root);
-        let mut violation = self.constraints.violation(self.evaluator, sequence, &state, &mut root);
+    /// What a sequence is worth, with its time, where the state behind the first so many positions is known; at
+    /// least one position follows. Its degrees are those of one field.
+    pub(crate) fn worth_behind(
+        &self,
+        (state, known): (&State, usize),
+        sequence: &[Stop],
+        trial: &mut Trial,
+    ) -> Scored {
+        let Trial { now, next, root } = trial;
+        self.evaluator.extend(state, sequence[known], now);
+        for &stop in &sequence[known + 1..] {
+            self.evaluator.extend(now, stop, next);
+            std::mem::swap(now, next);
+        }
+        let state = &*now;
+        let value = self.evaluator.value(state, self.criterion, root);
+        let mut violation = self.constraints.violation(self.evaluator, sequence, state, root);
         let degree =
             self.only_degree().or_else(|| self.worst(self.rows.likely_degrees(&candidates(sequence))));
         if degree.is_none() {

@@ -130,9 +130,9 @@ impl<'a> Screen<'a> {
         let mut mean = vec![0.0; n * n];
         let mut alone = Vec::with_capacity(count);
         for first in 0..count {
-            bare.extend(&start, first.into(), &mut one);
+            bare.extend_information(&start, first.into(), &mut one);
             for second in 0..count {
-                bare.extend(&one, second.into(), &mut two);
+                bare.extend_information(&one, second.into(), &mut two);
                 mean.iter_mut().zip(&two.information).for_each(|(sum, x)| *sum += x);
             }
             alone.push(one.clone());
@@ -191,8 +191,8 @@ impl<'a> Screen<'a> {
             on.tried[pair] = true;
             // the information of that pair, with some of the mean: that is regular
             let count = self.evaluator.candidates.len();
-            self.evaluator.extend(state, (pair / count).into(), &mut on.one);
-            self.evaluator.extend(&on.one, (pair % count).into(), &mut on.two);
+            self.evaluator.extend_information(state, (pair / count).into(), &mut on.one);
+            self.evaluator.extend_information(&on.one, (pair % count).into(), &mut on.two);
             let both = on.two.information.iter().zip(&on.mean);
             on.mixed
                 .information

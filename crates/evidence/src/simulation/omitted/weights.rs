@@ -153,21 +153,29 @@ impl Reduced {
     fn add(&mut self, left: &[f64], right: &[f64]) {
         let (n, m) = (self.root.ncols(), self.right.ncols());
         let rows = left.len() / n;
-        let mut j = DMatrix::zeros(n + rows, n);
-        j.view_mut((0, 0), (n, n)).copy_from(&self.root);
-        j.view_mut((n, 0), (rows, n)).copy_from(&DMatrix::from_row_slice(rows, n, left));
-        let mut o = DMatrix::zeros(n + rows, m);
-        o.view_mut((0, 0), (n, m)).copy_from(&self.right);
-        o.view_mut((n, 0), (rows, m)).copy_from(&DMatrix::from_row_slice(rows, m, right));
-        for (sum, column) in self.squares.iter_mut().zip(o.column_iter()) {
-            *sum += column.rows_range(n..).norm_squared();
+        // errors that enter no sample so far have nothing to reduce
+        let enters = |j: &usize| {
+            right.iter().skip(*j).step_by(m).any(|x| *x != 0.0)
+                || self.right.column(*j).iter().any(|x| *x != 0.0)
+        };
+        let entering: Vec<usize> = (0..m).filter(enters).collect();
+        let j = DMatrix::from_fn(n + rows, n, |r, c| match r.checked_sub(n) {
+            Some(r) => left[r * n + c],
+            None => self.root[(r, c)],
+        });
+        let mut o = DMatrix::from_fn(n + rows, entering.len(), |r, c| match r.checked_sub(n) {
+            Some(r) => right[r * m + entering[c]],
+            None => self.right[(r, entering[c])],
+        });
+        for (&k, column) in entering.iter().zip(o.column_iter()) {
+            self.squares[k] += column.rows_range(n..).norm_squared();
         }
         let qr = j.qr();
         qr.q_tr_mul(&mut o);
         self.root = qr.r();
-        self.right.copy_from(&o.view((0, 0), (n, m)));
-        for (sum, column) in self.information.iter_mut().zip(o.column_iter()) {
-            *sum += column.rows_range(n..).norm_squared();
+        for (&k, column) in entering.iter().zip(o.column_iter()) {
+            self.right.set_column(k, &column.rows_range(..n));
+            self.information[k] += column.rows_range(n..).norm_squared();
         }
     }
 
