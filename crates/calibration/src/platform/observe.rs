@@ -712,6 +712,12 @@ impl Taking<'_> {
             }
             found.into_iter().for_each(|cell| self.cell(cell));
         }
+        // one value that is far from its neighbours here and there in the record is a code too
+        let all: Vec<(usize, f64)> = self.out.cells.iter().map(|(c, _)| (c.axis, c.value)).collect();
+        let again = |c: &gross::Cell| all.iter().filter(|a| **a == (c.axis, c.value)).count() > 1;
+        for (cell, _) in self.out.cells.iter_mut().filter(|(c, _)| c.why == gross::Why::Far && again(c)) {
+            cell.why = gross::Why::Code;
+        }
     }
 }
 
