@@ -2728,20 +2728,6 @@ class FindingNotSettled(Record):
     kind: Literal["not_settled"]
 
 
-class FindingBends(Record):
-    """Estimates that bend over what the records leave open, so that no covariance describes their errors."""
-
-    __slots__ = ()
-
-    kind: Literal["bends"]
-    kappa: float | None
-    """Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if another minimum fits nearly as well."""
-    refits: int
-    """Number of repeated estimates from data with errors drawn anew."""
-    failed: int
-    """Number of repeated estimates that did not converge."""
-
-
 class FindingForce(Record):
     """Specific force that is not one g long, with no unknown that explains it."""
 
@@ -2924,7 +2910,6 @@ class FindingKnown(Record):
 Finding = Union[
     FindingInterrupted,
     FindingNotSettled,
-    FindingBends,
     FindingForce,
     FindingCells,
     FindingClock,
@@ -2987,6 +2972,10 @@ class Estimated(Record):
     """
     prior_factor: float | None
     """Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null as `prior_shift`."""
+    left_open: bool
+    """True if scheme and records determine it at small drifts, but at the drifts of these records what they leave open bends the run, so
+    that no sigma describes its error. `determined` is false then.
+    """
 
 
 class NextRun(Record):

@@ -17,7 +17,7 @@ mod design;
 mod engines;
 mod examples;
 mod expressions;
-mod ferraris;
+
 #[cfg(unix)]
 mod files;
 mod formulas;
@@ -33,6 +33,7 @@ mod models;
 mod not_estimated;
 mod points;
 mod program;
+mod recorded;
 mod reference_verdicts;
 mod release;
 mod remedies;

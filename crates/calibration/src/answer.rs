@@ -92,16 +92,6 @@ pub enum Finding {
     Interrupted,
     /// Iteration that did not converge.
     NotSettled,
-    /// Estimates that bend over what the records leave open, so that no covariance describes their errors.
-    Bends {
-        /// Curvature in sigma, dimensionless; null if the run cannot be followed over its prior, or if
-        /// another minimum fits nearly as well.
-        kappa: Option<f64>,
-        /// Number of repeated estimates from data with errors drawn anew.
-        refits: usize,
-        /// Number of repeated estimates that did not converge.
-        failed: usize,
-    },
     /// Specific force that is not one g long, with no unknown that explains it.
     Force {
         /// Name of the record with this finding.
@@ -334,6 +324,10 @@ pub struct Estimated {
     /// Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null
     /// as `prior_shift`.
     pub prior_factor: Option<f64>,
+    /// True if scheme and records determine it at small drifts, but at the drifts of these records what they leave
+    /// open bends the run, so that no sigma describes its error. `determined` is false then.
+    #[serde(default)]
+    pub left_open: bool,
 }
 
 /// Estimates with the covariance of their errors.

@@ -46,17 +46,20 @@ pub struct Spike {
     pub sigmas: f64,
 }
 
+/// Most channels: three components of Z and an azimuth.
+pub const CHANNELS: usize = 4;
+
 /// One sample: its line, its time, its channels, and their standard deviations where the record gives them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// The line.
     pub line: u64,
     /// In s.
     pub t: f64,
-    /// Per channel.
-    pub z: Vec<Option<f64>>,
+    /// Per channel; those behind the last channel are not read.
+    pub z: [Option<f64>; CHANNELS],
     /// Per channel, where the record says so.
-    pub sigma: Option<Vec<f64>>,
+    pub sigma: Option<[f64; CHANNELS]>,
     /// The temperature, where the record has it.
     pub temperature: Option<f64>,
 }
@@ -94,10 +97,17 @@ impl Binner {
 
     /// The bin of what there is, if there is anything.
     pub fn end(&mut self, spikes: &mut Vec<Spike>) -> Option<Bin> {
-        let now = std::mem::take(&mut self.now);
+        let mut now = std::mem::take(&mut self.now);
+        let bin = self.bin(&now, spikes);
+        now.clear();
+        self.now = now;
+        bin
+    }
+
+    fn bin(&self, now: &[Sample], spikes: &mut Vec<Spike>) -> Option<Bin> {
         let (first, last) = (now.first()?, now.last()?);
         let t = first.t + now.iter().map(|s| s.t - first.t).sum::<f64>() / now.len() as f64;
-        let channels = (0..self.sigmas.len()).map(|c| self.channel(&now, c, t, spikes)).collect();
+        let channels = (0..self.sigmas.len()).map(|c| self.channel(now, c, t, spikes)).collect();
         let warm: Vec<f64> = now.iter().filter_map(|s| s.temperature).collect();
         let temperature = (!warm.is_empty()).then(|| warm.iter().sum::<f64>() / warm.len() as f64);
         Some(Bin { t, lines: (first.line, last.line), channels, temperature })
@@ -106,7 +116,7 @@ impl Binner {
     fn channel(&self, now: &[Sample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
         let mut points: Vec<(f64, f64, u64)> =
             now.iter().filter_map(|s| Some((s.t - t, s.z[c]?, s.line))).collect();
-        if let ([(_, value, _)], Some(sigma)) = (&points[..], now.first().and_then(|s| s.sigma.as_ref())) {
+        if let ([(_, value, _)], Some(sigma)) = (&points[..], now.first().and_then(|s| s.sigma)) {
             let variance = sigma[c] * sigma[c];
             return Some(Mean { value: *value, variance, given: true, samples: 1, scatter: 0.0, free: 0 });
         }
@@ -170,7 +180,7 @@ mod tests {
     use super::*;
 
     fn sample(line: u64, t: f64, z: f64) -> Sample {
-        Sample { line, t, z: vec![Some(z)], sigma: None, temperature: None }
+        Sample { line, t, z: [Some(z), None, None, None], sigma: None, temperature: None }
     }
 
     fn binned(samples: impl Iterator<Item = Sample>) -> (Vec<Bin>, Vec<Spike>) {
@@ -223,8 +233,8 @@ mod tests {
         let given = |line: u64, z: Option<f64>| Sample {
             line,
             t: line as f64,
-            z: vec![z],
-            sigma: Some(vec![0.5]),
+            z: [z, None, None, None],
+            sigma: Some([0.5; CHANNELS]),
             temperature: None,
         };
         let (bins, _) = binned([given(1, Some(2.0)), given(2, None), given(3, Some(4.0))].into_iter());

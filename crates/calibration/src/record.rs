@@ -295,15 +295,27 @@ impl Lines {
                 let other = SEPARATORS.iter().find(|(c, _)| !text.contains(',') && text.contains(*c));
                 self.separator = other.map_or(',', |(c, _)| *c);
             }
-            self.cells.clear();
             if text.contains('"') {
+                self.cells.clear();
                 let mut builder = csv::ReaderBuilder::new();
                 let builder = builder.has_headers(false).delimiter(self.separator as u8);
                 let mut reader = builder.from_reader(text.as_bytes());
                 let cells = reader.records().next().transpose().map_err(|e| wrong(e.to_string()))?;
                 self.cells.extend(cells.iter().flatten().map(|c| c.trim().to_string()));
             } else {
-                self.cells.extend(text.split(self.separator).map(|c| c.trim().to_string()));
+                // strings of the row before are filled again
+                let mut count = 0;
+                for cell in text.split(self.separator).map(str::trim) {
+                    match self.cells.get_mut(count) {
+                        Some(own) => {
+                            own.clear();
+                            own.push_str(cell);
+                        }
+                        None => self.cells.push(cell.into()),
+                    }
+                    count += 1;
+                }
+                self.cells.truncate(count);
             }
             return Ok(true);
         }
@@ -589,9 +601,12 @@ impl Record {
             }
             (before, any) = (t, true);
             // what is not there is NaN
-            for x in &numbers[..wanted.len()] {
-                digest.update((x.unwrap_or(f64::NAN) + 0.0).to_le_bytes());
+            let mut bytes = [0; 8 * MOST];
+            let bytes = &mut bytes[..8 * wanted.len()];
+            for (x, place) in numbers.iter().zip(bytes.chunks_exact_mut(8)) {
+                place.copy_from_slice(&(x.unwrap_or(f64::NAN) + 0.0).to_le_bytes());
             }
+            digest.update(&*bytes);
             each(Row { line, numbers: &numbers[..wanted.len()], label })
         };
         match rows {

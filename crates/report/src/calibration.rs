@@ -2,8 +2,8 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Estimated, Finding, ForceCause, ForceError, Gap,
-    NextRun, PositionFit, PositionsBy, RecordReport,
+    Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Curvature, Estimated, Finding, ForceCause,
+    ForceError, Gap, NextRun, PositionFit, PositionsBy, RecordReport,
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -99,7 +99,6 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
         Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up. Check the times and attitudes of the scheme against the run (--dry-run shows how the record is read); state priors of the drifts under [simulation]; add positions".into(),
-        Finding::Bends { kappa, refits, failed } => bends(*kappa, *refits, *failed),
         Finding::Force { record, length_g, alike, least, most, causes } => {
             let of = of(record, records);
             if *alike {
@@ -209,28 +208,26 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// Sentence on estimates that bend.
-fn bends(kappa: Option<f64>, refits: usize, failed: usize) -> String {
-    let size = kappa.map_or_else(
-        || {
-            "other values fit nearly as well, or the run cannot be followed over what the records leave open"
-                .to_string()
-        },
-        |k| {
-            format!(
-                "over what the records leave open the run differs from its linear model by {} sigma",
-                number(k)
-            )
-        },
-    );
-    let failed = if failed > 0 {
-        format!(", and {failed} of {refits} repeated estimates did not settle")
-    } else {
-        String::new()
+/// That no estimate stands at the drifts of the record; `None` if they do. Nothing is wrong with the record then.
+fn left_open(c: &Calibration) -> Option<String> {
+    if !c.quantities.iter().chain(&c.combinations).any(|e| e.left_open) {
+        return None;
+    }
+    let who = match (c.assumed.priors.is_empty(), c.records.len() > 1) {
+        (true, false) => "this record alone leaves",
+        (true, true) => "these records alone leave",
+        (false, false) => "this record and the stated priors leave",
+        (false, true) => "these records and the stated priors leave",
     };
-    format!(
-        "the records and priors do NOT determine the estimates: {size}{failed}. Do not use estimates and sigmas; state smaller priors under [simulation] or add positions"
-    )
+    let Curvature { kappa, refits, failed, .. } = c.curvature;
+    let why = match kappa {
+        Some(_) if failed > 0 => format!("{failed} of {refits} repeated estimates do not settle"),
+        Some(k) => format!("the run differs from its linear model by {} sigma", number(k)),
+        None => "other values fit nearly as well, or the run cannot be followed".into(),
+    };
+    Some(format!(
+        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma describes the errors then, so no estimate is given. State priors of the drifts as small as is true (`priors` under [simulation]), or add positions"
+    ))
 }
 
 /// From this factor of sigma on, what is left open shows.
@@ -246,6 +243,7 @@ fn verdict(e: &Estimated) -> String {
         }
         (true, Some(_)) => "estimated".into(),
         (true, None) => "estimated; not by derivatives alone".into(),
+        (false, _) if e.left_open => "left open at these drifts".into(),
         (false, Some(_)) => "observable by the scheme, not determined by these records".into(),
         (false, None) => e.status.to_string(),
     }
@@ -575,6 +573,7 @@ impl Answer for Calibration {
             let psi = "; those on psi are not judged, since psi here is that of the start of a record";
             format!("{}{psi}.", stated::capital(&stated::requirements(r)))
         }));
+        lead.extend(left_open(self));
         lead.extend(by_default(&self.assumed));
         lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
         let columns = [

@@ -197,11 +197,20 @@ struct Asked {
     determined: bool,
     /// True if they do so only with a prior that is stated.
     from_prior: bool,
+    /// True if no covariance describes its error: what they leave open bends the run.
+    left_open: bool,
     /// On the unknowns, in SI.
     terms: Vec<(usize, f64)>,
     /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the scheme.
     local: Vec<(usize, f64)>,
     planned: Vec<(usize, f64)>,
+}
+
+impl Asked {
+    /// True if there is an estimate with a sigma.
+    fn stands(&self) -> bool {
+        self.determined && !self.left_open
+    }
 }
 
 impl Parts<'_> {
@@ -221,13 +230,15 @@ impl Parts<'_> {
                     let (narrow, wide) = (self.linear.sigma(&local), weaker.sigma(&local));
                     let from_prior =
                         !verdict.2 && self.has_prior() && !self.problem.unknowns.is_open(&on(terms));
+                    let determined = (verdict.2 || from_prior) && wide <= DETERMINED * narrow;
                     Asked {
                         name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
                         unit: units[terms[0].0],
                         status: verdict.0,
                         degree: verdict.1,
-                        determined: (verdict.2 || from_prior) && wide <= DETERMINED * narrow,
+                        determined,
                         from_prior,
+                        left_open: determined && self.bent.leaves_open(),
                         terms: on(terms),
                         local,
                         planned: on(&at_rest[r].functional(terms)),
@@ -266,10 +277,11 @@ impl Parts<'_> {
         let weaker = self.problem.step(&self.estimate.at, 10.0 * WEAK)?;
         let at_rest = self.problem.at_rest();
         let (unknowns, combinations) = self.asked(&weaker, &at_rest);
-        let determined: Vec<&Asked> = unknowns.iter().chain(&combinations).filter(|a| a.determined).collect();
-        if determined.is_empty() {
+        let all = || unknowns.iter().chain(&combinations);
+        if !all().any(|a| a.determined) {
             return Err(CalibrationError::Nothing);
         }
+        let determined: Vec<&Asked> = all().filter(|a| a.stands()).collect();
         let fit = self.fit(&unknowns, &combinations);
         let with_prior = self.with_prior()?;
         let values = match &self.bent.found {
@@ -290,7 +302,7 @@ impl Parts<'_> {
         };
         let estimated = |a: &Asked| {
             let scale = si_per_shown(a.unit);
-            let there = |x: f64| a.determined.then_some(x);
+            let there = |x: f64| a.stands().then_some(x);
             let sigma = solution.sigma(&a.local);
             let (linear, held) = (self.linear.sigma(&a.local), tight.sigma(&a.local));
             let moved: f64 = a.local.iter().map(|&(i, k)| k * with_prior.x[i]).sum();
@@ -300,7 +312,8 @@ impl Parts<'_> {
                 unit: shown_unit(a.unit).into(),
                 status: a.status,
                 degree: a.degree,
-                determined: a.determined,
+                determined: a.stands(),
+                left_open: a.left_open,
                 estimate: there(a.terms.iter().map(|&(i, k)| k * values[i]).sum::<f64>() / scale),
                 sigma: there(sigma / scale),
                 sigma_rescaled: there(between(a, a).max(0.0).sqrt()),
@@ -308,7 +321,7 @@ impl Parts<'_> {
                 required_sigma: self.required(&a.name),
                 held_factor: there(sigma / held),
                 open_sigma: there(open / scale),
-                from_prior: a.determined && a.from_prior,
+                from_prior: a.stands() && a.from_prior,
                 prior_shift: there(moved / linear).filter(|_| data_alone),
                 prior_factor: there(with_prior.sigma(&a.local) / linear).filter(|_| data_alone),
             }

@@ -60,6 +60,8 @@ pub(crate) struct Unknowns {
     pub loose: DMatrix<f64>,
     /// Unknowns with a prior that is stated.
     pub stated: Vec<usize>,
+    /// True if the scheme alone leaves directions undetermined, whatever priors are stated.
+    pub undetermined: bool,
     /// Biases of all runs: their prior is a property of the gyros.
     pub biases: Vec<usize>,
 }
@@ -110,7 +112,7 @@ impl Unknowns {
         stated.sort_unstable();
         stated.dedup();
         let biases = index.iter().flat_map(|i| i[psi + coefficients..].iter().copied()).collect();
-        Self { index, n, prior: all, first: start, loose, biases, stated }
+        Self { index, n, prior: all, first: start, loose, biases, stated, undetermined: !null.is_empty() }
     }
 
     /// Leaves out of the box what rows of a prior on the unknowns (any x n) determine: of the directions

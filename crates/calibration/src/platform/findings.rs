@@ -3,17 +3,12 @@
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
 use super::STRICT;
-use super::curvature::MOST as BENDS;
 use super::diagnose::{MapBoth, Parts};
 use super::gross::Why;
 use super::length::wrong;
 use super::run::Run;
-use crate::answer::{Calibration, CellKind, Curvature, Finding, ForceLength, PositionFit, RecordReport};
+use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
 
-/// Curvature up to which the linear covariance stands without repeated estimates.
-const LINEAR: f64 = 1.0;
-/// One in so many repeated estimates may fail to settle.
-const FAILED: usize = 10;
 /// The paths agree to this, in sigma.
 const AGREE: f64 = 1e-6;
 /// A position that fits this many times worse than the others in the middle is named by itself.
@@ -27,11 +22,6 @@ impl Parts<'_> {
             out.push(Finding::Interrupted);
         } else if !self.estimate.converged {
             out.push(Finding::NotSettled);
-        }
-        let Curvature { kappa, refits, failed, from_refits } = c.curvature;
-        let bends = kappa.is_none_or(|k| k > BENDS) || FAILED * failed > refits;
-        if bends || !from_refits && kappa.is_none_or(|k| k > LINEAR) {
-            out.push(Finding::Bends { kappa, refits, failed });
         }
         if !self.planned.platform.observed().accelerometers {
             out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));

@@ -14,6 +14,8 @@ const AWAY: [f64; 4] = [3.0, -3.0, 10.0, -10.0];
 /// Number of first estimates that are drawn from the priors, and the seed of these draws.
 const DRAWS: usize = 12;
 const SEED: u64 = 1;
+/// Most bins times squared unknowns of records whose minima are sought where nothing bends.
+const SEARCHED: usize = 1_000_000;
 /// Least difference by which a sum of squares is lower than another.
 const LOWER: f64 = 1e-2;
 /// Largest difference in the sum of squares of a rival minimum: its likelihood is a thousandth or more, since
@@ -57,15 +59,24 @@ impl Problem<'_> {
     }
 
     /// The lowest of the minima about an estimate that bends; others nearly as low are counted as rivals. A bent sum
-    /// of squares has several minima, and the first that is found need not be the most probable one.
+    /// of squares has several minima, and the first that is found need not be the most probable one. Where the
+    /// scheme leaves directions undetermined, such a minimum may be far from the most probable one and not bent
+    /// itself, so minima are sought from the priors there too.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
     fn lowest(&self, estimate: Estimate) -> Result<Estimate, CalibrationError> {
-        if self.stopped.get() || self.kappa(&estimate)? < BENT {
+        if self.stopped.get() {
             return Ok(estimate);
         }
-        let starts = self.starts_about(&estimate);
+        let bins: usize = self.runs.iter().map(|run| run.len()).sum();
+        let starts = if self.kappa(&estimate)? >= BENT {
+            self.starts_about(&estimate)
+        } else if self.unknowns.undetermined && bins * self.unknowns.n.pow(2) <= SEARCHED {
+            self.from_priors()
+        } else {
+            return Ok(estimate);
+        };
         let mut best = estimate;
         let mut others: Vec<Estimate> = Vec::new();
         for start in starts {
@@ -90,14 +101,19 @@ impl Problem<'_> {
         Ok(best)
     }
 
-    /// Starts along the axes of the posterior of an estimate, both ways, and by multiple shooting from first
-    /// estimates drawn from the priors.
+    /// Starts along the axes of the posterior of an estimate, both ways, and those drawn from the priors.
     fn starts_about(&self, estimate: &Estimate) -> Vec<Vec<PlatformState>> {
         let from = &estimate.at.x;
         let axes = self.axes(estimate);
         let mut out: Vec<Vec<PlatformState>> =
             axes.iter().flat_map(|a| AWAY.map(|by| self.moved(from, &(a * by)))).collect();
-        let mut noise = Noise::new(SEED, 1);
+        out.extend(self.from_priors());
+        out
+    }
+
+    /// Starts by multiple shooting from first estimates drawn from the priors.
+    fn from_priors(&self) -> Vec<Vec<PlatformState>> {
+        let (mut noise, mut out) = (Noise::new(SEED, 1), Vec::new());
         for _ in 0..DRAWS {
             let d = DVector::from_fn(self.unknowns.n, |i, _| self.unknowns.prior[i] * noise.normal());
             // a start that cannot be followed is none

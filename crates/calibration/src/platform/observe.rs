@@ -15,7 +15,7 @@ use super::mistaken::Mistaken;
 use super::timeline::{self, Gap, Intervals};
 use crate::Going;
 use crate::answer::{self, EmptyCells, PositionsBy};
-use crate::bins::{Bin, Binner, FEWEST, Sample, Spike};
+use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
 
@@ -420,6 +420,8 @@ struct Taking<'a> {
     rows: Vec<Vec<gross::Row>>,
     /// By wanted number: how many cells are empty at positions.
     empty: Vec<usize>,
+    /// Numbers of the row that is taken.
+    numbers: Vec<Option<f64>>,
     /// The position whose gimbals are furthest off, by how much in deg, and the line.
     gimbals: Option<(usize, f64, u64)>,
 }
@@ -470,7 +472,9 @@ impl Taking<'_> {
         }
         self.out.span.1 = time;
         self.out.samples += 1;
-        let mut numbers = row.numbers.to_vec();
+        let mut numbers = std::mem::take(&mut self.numbers);
+        numbers.clear();
+        numbers.extend_from_slice(row.numbers);
         // values that the file says are missing ones
         let codes = &self.plan.platform.scheme().recording.missing;
         if !codes.is_empty() {
@@ -486,13 +490,14 @@ impl Taking<'_> {
             // a row without forces says nothing of rest
             if let [Some(x), Some(y), Some(z)] = numbers[1..4] {
                 let mut told = std::mem::take(&mut self.told);
-                detector.push(time, vec![x, y, z], (row.line, numbers, dt), &mut told);
+                detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut told);
                 told.drain(..).try_for_each(|one| self.at_rest(&one))?;
                 self.told = told;
             } else {
                 self.out.unused += 1;
             }
             self.detector = Some(detector);
+            self.numbers = numbers;
             return Ok(());
         }
         let found = self.position(row, time, dt)?;
@@ -501,7 +506,9 @@ impl Taking<'_> {
             // a part of it is of the way here
             self.layout.divide(&mut numbers, None);
         }
-        self.put(&(row.line, numbers, dt), time, found)
+        let taken = self.put((row.line, &numbers, dt), time, found);
+        self.numbers = numbers;
+        taken
     }
 
     /// How long before `time` the sample before was, unless there is a gap between them.
@@ -525,17 +532,17 @@ impl Taking<'_> {
         let positions = self.plan.attitudes.len();
         let found = told.interval.filter(|k| *k < positions);
         self.intervals.push(time, told.sample.0, found);
-        self.put(&told.sample, time, found)
+        let (line, numbers, dt) = &told.sample;
+        self.put((*line, numbers, *dt), time, found)
     }
 
     /// Puts a sample where it was taken.
     fn put(
         &mut self,
-        (line, numbers, dt): &Kept,
+        (line, numbers, dt): (u64, &[Option<f64>], Option<f64>),
         time: f64,
         found: Option<usize>,
     ) -> Result<(), CalibrationError> {
-        let line = *line;
         let own_time = matches!(self.out.by, By::Label | By::Static);
         if found != self.now {
             self.end();
@@ -582,14 +589,21 @@ impl Taking<'_> {
                 self.length.1 += 1;
             }
         }
-        let z = self.plan.components.iter().map(|&k| if k == AZIMUTH { in_n[3] } else { in_n[k - 1] });
-        let z: Vec<Option<f64>> = z.collect();
+        let components = &self.plan.components;
+        let mut z = [None; CHANNELS];
+        for (z, &k) in z.iter_mut().zip(components) {
+            *z = in_n[if k == AZIMUTH { 3 } else { k - 1 }];
+        }
         let mut sigma = None;
         if let Some(own) = self.layout.sigmas_in_n(numbers, c) {
-            let of = |&k: &usize| if k == AZIMUTH { None } else { own[k - 1] };
-            let all: Vec<f64> = self.plan.components.iter().map(|k| of(k).unwrap_or(f64::NAN)).collect();
+            let mut all = [f64::NAN; CHANNELS];
+            for (sigma, &k) in all.iter_mut().zip(components).filter(|(_, k)| **k != AZIMUTH) {
+                *sigma = own[k - 1].unwrap_or(f64::NAN);
+            }
             // a value with a sigma that is none is a mistake; without a value nobody asks
-            if let Some(k) = (0..z.len()).find(|&k| z[k].is_some() && (all[k].is_nan() || all[k] <= 0.0)) {
+            if let Some(k) =
+                (0..components.len()).find(|&k| z[k].is_some() && (all[k].is_nan() || all[k] <= 0.0))
+            {
                 return Err(CalibrationError::Sigma {
                     record: self.out.name.clone(),
                     line,
@@ -697,6 +711,12 @@ impl Taking<'_> {
                 self.forces.leave_out(p, lines);
             }
             found.into_iter().for_each(|cell| self.cell(cell));
+        }
+        // one value that is far from its neighbours here and there in the record is a code too
+        let all: Vec<(usize, f64)> = self.out.cells.iter().map(|(c, _)| (c.axis, c.value)).collect();
+        let again = |c: &gross::Cell| all.iter().filter(|a| **a == (c.axis, c.value)).count() > 1;
+        for (cell, _) in self.out.cells.iter_mut().filter(|(c, _)| c.why == gross::Why::Far && again(c)) {
+            cell.why = gross::Why::Code;
         }
     }
 }
@@ -810,6 +830,7 @@ pub(crate) fn observe(
         over: 0,
         rows: vec![Vec::new(); positions],
         empty: vec![0; layout.wanted.len()],
+        numbers: Vec::new(),
         gimbals: None,
     };
     let (name, mut rows) = (record.name().to_string(), 0_usize);

@@ -94,3 +94,17 @@ fn codes_are_asked_about() {
     let stuck = |f: &&Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Stuck, .. });
     assert_eq!(c.findings.iter().filter(stuck).count(), 3, "{:?}", c.findings);
 }
+
+/// One cell at each of three positions with the same value: a code, though no position has it twice.
+#[test]
+fn a_code_here_and_there_is_asked_about() {
+    let bench = bench();
+    let mut own = bench.record();
+    for k in places(&own) {
+        own[k].f[1] = -9999.0;
+    }
+    let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+    let code = |f: &Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Code, count: 3, .. });
+    assert!(c.findings.iter().any(code) && c.outliers.is_empty(), "{:?} {:?}", c.findings, c.outliers);
+    is_near(&bench, &c, "codes");
+}

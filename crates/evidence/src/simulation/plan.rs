@@ -9,7 +9,7 @@ use obsdeg_core::model::{
     AZIMUTH, Block, Carry, ErrorTerm, Float, LOCAL, Matrix3, Path, Platform, Point, Scheme, Source, Station,
     Unknowns, earth_rate_in, local_dynamics, local_output,
 };
-use obsdeg_ekf::integrate::{runge_kutta, van_loan};
+use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, SensorNoise, Stage, Transition};
 
 use super::biases::{Bias, biases, root};
@@ -291,7 +291,7 @@ impl Plan {
         let (phi, q) = match &s.kind {
             SegmentKind::Dwell => {
                 let phi = match conditions.propagation {
-                    Propagation::Exponential => self.exponential(block, s.dt)?,
+                    Propagation::Exponential => self.exponential(block, s.dt),
                     Propagation::Rk4 => {
                         runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi
                     }
@@ -357,16 +357,16 @@ impl Plan {
     }
 
     /// Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by `S_i`.
-    fn exponential(&self, block: &Block<f64>, dt: f64) -> Result<DMatrix<f64>, SimulationError> {
-        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
-        let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
-        let (local, _) = van_loan(&f, &DMatrix::zeros(LOCAL, LOCAL), dt)?;
+    fn exponential(&self, block: &Block<f64>, dt: f64) -> DMatrix<f64> {
+        let (turned, held) = earth_step(self.point.w_n, self.point.w_u, dt);
         let n = self.unknowns();
         let mut phi = DMatrix::identity(n, n);
         // psi+ = P^T (A (P psi + J D) + B E D - J D); in local unknowns (drift alone) P = 1
         for (k, &column) in block.columns.iter().enumerate() {
             let after: [f64; 3] = std::array::from_fn(|r| {
-                let of_local: Vec<f64> = (0..LOCAL).map(|l| local[(r, l)]).collect();
+                let mut of_local = [0.0; LOCAL];
+                of_local[..3].copy_from_slice(&turned[r]);
+                of_local[3..6].copy_from_slice(&held[r]);
                 let torqued = if k < 3 { 0.0 } else { block.rows[r][k] };
                 block.entry(&Float, &of_local, k) - torqued
             });
@@ -374,28 +374,41 @@ impl Plan {
                 phi[(row, column)] = (0..3).map(|r| block.rows[r][i] * after[r]).sum();
             }
         }
-        Ok(phi)
+        phi
     }
 
     /// The covariance on psi of a drift of standard deviation `held` (rad/s) held over `dt`.
     fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
-        // B = integral of exp(W t) = 1 dt + (1 - cos x)/x^2 W dt^2 + (x - sin x)/x^3 W^2 dt^3 with x = w dt
-        let f = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
-        let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
-        let x = W_IE * dt;
-        let half = (x / 2.0).sin() / (x / 2.0);
-        let (first, second) = (
-            0.5 * half * half,
-            if x < 0.1 { 1.0 / 6.0 - x * x / 120.0 + x.powi(4) / 5040.0 } else { (x - x.sin()) / x.powi(3) },
-        );
-        let w2 = times(&w, &w);
-        let b: Matrix3<f64> = std::array::from_fn(|i| {
-            std::array::from_fn(|j| (f64::from(u8::from(i == j)) + first * w[i][j] + second * w2[i][j]) * dt)
-        });
+        let (_, b) = earth_step(self.point.w_n, self.point.w_u, dt);
         let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
         let to_psi = times(&transpose(&p), &b);
         times(&to_psi, &transpose(&to_psi)).map(|row| row.map(|x| x * held * held))
     }
+}
+
+/// psi after `dt` s by psi before (`exp(W dt)`, W the rate of the earth in rad/s) and by a constant drift meanwhile
+/// (the integral of `exp(W t)`, in s): Rodrigues' formula. A plan of a record has one for every bin: buffers of
+/// matrix products between what is kept of each would leave the memory full of holes.
+fn earth_step(w_n: f64, w_u: f64, dt: f64) -> (Matrix3<f64>, Matrix3<f64>) {
+    let f = local_dynamics(&Float, &w_n, &w_u);
+    let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
+    let w2 = times(&w, &w);
+    let x = w_n.hypot(w_u) * dt;
+    let series = x < 0.1;
+    let half = if x > 0.0 { (x / 2.0).sin() / (x / 2.0) } else { 1.0 };
+    // sin x / x, (1 - cos x) / x^2, (x - sin x) / x^3
+    let third = if series {
+        1.0 / 6.0 - x * x / 120.0 + x.powi(4) / 5040.0 - x.powi(6) / 362_880.0
+    } else {
+        (x - x.sin()) / x.powi(3)
+    };
+    let (first, second) = (1.0 - third * x * x, 0.5 * half * half);
+    let of = |a: f64, b: f64| -> Matrix3<f64> {
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| f64::from(u8::from(i == j)) + a * w[i][j] + b * w2[i][j])
+        })
+    };
+    (of(first, second), of(second, third).map(|row| row.map(|x| x * dt)))
 }
 
 /// Rates, attitudes and turns at once of a scheme with a latitude and without generic angles.
@@ -643,5 +656,28 @@ impl Plan {
     /// Whether the unknowns are coefficients, not the drift itself.
     pub(crate) fn has_coefficients(&self) -> bool {
         self.platform.scheme().unknowns != Unknowns::Drift
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use obsdeg_ekf::integrate::van_loan;
+
+    /// Against the exponential of the whole dynamics, from steps of microseconds to five days.
+    #[test]
+    fn earth_steps_are_exponentials() {
+        let (w_n, w_u) = (W_IE * 0.8, W_IE * 0.6);
+        let f = local_dynamics(&Float, &w_n, &w_u);
+        let f = DMatrix::from_fn(6, 6, |i, j| f[i][j]);
+        for dt in [1e-6, 1e-2, 10.0, 1300.0, 1371.0, 1372.0, 9e4, 4.3e5] {
+            let (phi, _) = van_loan(&f, &DMatrix::zeros(6, 6), dt).expect("finite");
+            let (turned, held) = earth_step(w_n, w_u, dt);
+            for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
+                assert!((turned[i][j] - phi[(i, j)]).abs() < 1e-13, "{dt}: {} {}", turned[i][j], phi[(i, j)]);
+                let of = (held[i][j] - phi[(i, 3 + j)]) / dt;
+                assert!(of.abs() < 1e-13, "{dt}: {} {}", held[i][j], phi[(i, 3 + j)]);
+            }
+        }
     }
 }

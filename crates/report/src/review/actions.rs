@@ -173,7 +173,14 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
             words::names(by_scheme)
         ));
     }
-    let by_record = without(|u| u.degree.is_some());
+    let open = without(|u| u.left_open);
+    if !open.is_empty() {
+        out.push(format!(
+            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions, for {}: the record leaves them open at these drifts.",
+            words::names(open)
+        ));
+    }
+    let by_record = without(|u| u.degree.is_some() && !u.left_open);
     if !by_record.is_empty() {
         out.push(format!(
             "Record longer or more runs for {}: these do not determine them.",
@@ -219,9 +226,6 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         Finding::Interrupted => "Run the same command again, to its end.".into(),
         Finding::NotSettled => {
             "Look at units, labels and times of the record, and state first estimates near the truth ([simulation.estimates]).".into()
-        }
-        Finding::Bends { .. } => {
-            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions: record and priors do not determine the unknowns.".into()
         }
         Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
             (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
