@@ -50,7 +50,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     figures: Option<PathBuf>,
 
-    /// Write a certificate of the verdicts on a scheme (JSON): its witness proves them to checkers that share no code with obsdeg
+    /// Write a certificate of the verdicts on one scheme or rational model (JSON): its witness proves them to
+    /// checkers that share no code with obsdeg
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     certificate: Option<PathBuf>,
 }
