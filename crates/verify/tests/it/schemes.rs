@@ -46,7 +46,8 @@ fn draw(rng: &mut SplitMix64) -> String {
         1 => text += "combinations = [\"D_FZ - wN*psi_y\", \"sqrt(3)*wU*psi_x + D_FY\"]\n",
         _ => {}
     }
-    if text.contains("reset") || !text.contains("\"F\"") {
+    // at a pole wN is 0, and so is what a combination divides by
+    if text.contains("reset") || !text.contains("\"F\"") || text.contains("latitude_deg = 90") {
         text = text.lines().filter(|l| !l.starts_with("comb")).map(|l| format!("{l}\n")).collect();
     }
     let step = *pick(rng, &["90", "90", "15", "45", "1", "0.5"]);
