@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, title};
+use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, title};
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
 use crate::engine::{EngineArguments, Meanwhile, notice};
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::{Output, write_files};
+use crate::output::{Output, write_file, write_files};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -25,6 +25,7 @@ Examples:
   obsdeg analyze model.toml                             any system x' = f(x, u, p, t), z = h
   obsdeg analyze examples/*/scheme.toml -o all.csv      several, one after another
   obsdeg analyze --angles NUE --angles NDW --figures pictures
+  obsdeg analyze scheme.toml --certificate c.json       the proof, for obsdeg verify and other checkers
 
 Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in rad/s and Z in g.
 
@@ -48,18 +49,30 @@ pub(crate) struct Arguments {
     /// Draw the positions of every scheme, with g and the earth rate, as SVG into a folder
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     figures: Option<PathBuf>,
+
+    /// Write a certificate of the verdicts on one scheme or rational model (JSON): its witness proves them to
+    /// checkers that share no code with obsdeg
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    certificate: Option<PathBuf>,
 }
 
 pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     interrupt::ends()?;
     let target = &a.output.target;
     a.output.check()?;
+    if let Some(path) = a.certificate.as_ref().filter(|path| path.exists() && !target.force) {
+        return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
+    }
     a.asked.input.given = given;
     let read = a.asked.input.read(a.files.read()?)?;
     let message = match read[..] {
         [(_, Input::Model(_))] => "judging the model",
         _ => "solving symbolically (--solutions off leaves it out)",
     };
+    // what has no certificate says so before anything is solved or written
+    let certificate =
+        a.certificate.as_ref().map(|path| Ok::<_, Failure>((path, certificate(&a.asked, &read)?)));
+    let certificate = certificate.transpose()?;
     let read = Arc::new(read);
     let (judged, banner) = a.engine.lend(message, target.quiet, verdicts(&a.asked, &read), |worker| {
         Ok(analyze(&a.asked, &read, &mut Host { worker, ..Host::silent() })?)
@@ -75,6 +88,9 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
             figures.push(file);
         }
         write_files(folder, &figures, target.force)?;
+    }
+    if let Some((path, file)) = certificate {
+        write_file(path, &file.bytes)?;
     }
     a.output.write(&judged)?;
     notice(&banner, target.quiet);

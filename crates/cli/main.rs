@@ -27,6 +27,7 @@ mod schema;
 mod simulate;
 mod terminal;
 mod third_party;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -83,6 +84,8 @@ enum Command {
     Report(report::Arguments),
     /// Recompute the equations and claims of the paper: what agrees, and what does not
     Paper(paper::Arguments),
+    /// Check a certificate of `obsdeg analyze --certificate`, with code of its own
+    Verify(verify::Arguments),
     /// Print what others wrote of this build, and the texts of their licences
     Licences(licences::Arguments),
     /// Print the completion script of a shell
@@ -187,6 +190,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Design(a) => design::run(&a),
         Command::Report(a) => report::run(a, given),
         Command::Paper(a) => paper::run(&a),
+        Command::Verify(a) => verify::run(&a),
         Command::Licences(a) => licences::run(&a),
         Command::Completions(a) => completions::run(&a),
         Command::Man(a) => completions::man(&a),

@@ -266,6 +266,12 @@ pub(crate) fn write_files(folder: &Path, files: &[File], force: bool) -> Result<
     place(folder, &below(folder, files).collect::<Vec<_>>())
 }
 
+/// Puts one file in place, over what is there.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    files::destination(path).map_err(|e| cannot_write(path, &e))?;
+    place(path, &[(path.to_path_buf(), bytes)])
+}
+
 /// Where files go below a folder.
 fn below<'a>(folder: &'a Path, files: &'a [File]) -> impl Iterator<Item = (PathBuf, &'a [u8])> {
     files.iter().map(|file| (folder.join(&file.name), file.bytes.as_slice()))

@@ -4,6 +4,7 @@ use clap::{Args, ValueEnum};
 use obsdeg_calibration::noise::SensorNoiseReport;
 use obsdeg_calibration::{Calibration, SystemCalibration};
 use obsdeg_core::analysis::Analysis;
+use obsdeg_core::certificate::{Certificate, ModelCertificate};
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
@@ -25,6 +26,10 @@ enum Kind {
     Allan,
     /// The JSON of `obsdeg analyze`
     Analysis,
+    /// The JSON of `obsdeg analyze --certificate`
+    Certificate,
+    /// The JSON of `obsdeg analyze --certificate` of a model
+    ModelCertificate,
     /// The JSON of `obsdeg paper`
     Audit,
     /// The JSON of `obsdeg simulate`
@@ -67,6 +72,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut schema = match a.kind {
         Kind::Allan => written::<SensorNoiseReport>(),
         Kind::Analysis => written::<Analysis>(),
+        Kind::Certificate => written::<Certificate>(),
+        Kind::ModelCertificate => written::<ModelCertificate>(),
         Kind::Audit => written::<Audit>(),
         Kind::Simulation => written::<Simulation>(),
         Kind::Crosscheck => written::<CrossCheck>(),

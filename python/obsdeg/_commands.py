@@ -142,7 +142,7 @@ def analyze(*what: Judged, digits: int | None = DIGITS, progress: Progress | boo
         as it does where a key is pressed.
     **options
         Those of ``obsdeg analyze``, in :class:`obsdeg.options.Analyze` with their units: ``carry``, ``latitude`` [deg], ``terms``,
-        ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``, ``frame``, ``formulas``, ``seed``, ...
+        ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``, ``frame``, ``formulas``, ``certificate``, ``seed``, ...
 
     Returns
     -------

@@ -135,6 +135,8 @@ class Analyze(Seeded, Positions, total=False):
     """Z and its derivatives, and psi and eps at each position, as formulas."""
     omitted: bool
     """Exact classes (no effect, silent, visible) of the errors that a scheme does not estimate [default: True]."""
+    certificate: bool
+    """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
 
 
 class Simulate(Seeded, Positions, Filtered, total=False):

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
+use std::sync::OnceLock;
 
 use obsdeg_exact::SplitMix64;
 
@@ -166,6 +167,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "beta=-1e300:1e300",
         ],
         "figures" => &["pictures", ".", "s.toml"],
+        "certificate" => &["new.json", "s.toml", ".", ""],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "require-met"
         | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
@@ -182,6 +184,7 @@ fn operands(command: &str) -> &'static [&'static str] {
         "compare" | "report" => &["s.toml", "t.toml", "m.toml", "none.toml"],
         "calibrate" => &["s.toml"],
         "allan" => &["n.csv", "n.csv", "r.csv", "none.csv"],
+        "verify" => &["v.json", "s.toml", "none.json"],
         "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
         "completions" => &["bash", "zsh", "nothing"],
         "licences" => &["uPlot", "nalgebra", "nothing"],
@@ -223,6 +226,7 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         "design",
         "report",
         "paper",
+        "verify",
         "schema",
         "completions",
         "licences",
@@ -248,6 +252,7 @@ fn folder() -> tempfile::TempDir {
     {
         fs::write(folder.path().join(name), text).expect("written");
     }
+    fs::write(folder.path().join("v.json"), certificate()).expect("written");
     folder
 }
 
@@ -258,6 +263,19 @@ fn noise() -> String {
     let line = |k: u32| format!("{k},{},{}\n", next(), 1.0 + 1e-4 * next());
     let lines: String = (0..2000).map(line).collect();
     format!("t [s],wx [deg/h],fx [g]\n{lines}")
+}
+
+/// A certificate of two positions.
+fn certificate() -> &'static str {
+    static TEXT: OnceLock<String> = OnceLock::new();
+    TEXT.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("v.json");
+        let mut asked =
+            obsdeg(&["analyze", "--angles", "NUE", "--angles", "NDW", "--solutions", "off", "--certificate"]);
+        assert!(asked.arg(&path).stdout(Stdio::null()).status().expect("it runs").success());
+        fs::read_to_string(path).expect("a certificate")
+    })
 }
 
 /// A record of s.toml, of no errors but noise.
@@ -277,8 +295,9 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 13] = [
+    const TAKEN: [&str; 14] = [
         "ascii",
+        "certificate",
         "count-limit",
         "engine-wait",
         "force",
@@ -318,7 +337,7 @@ fn a_model_refuses_what_is_about_schemes() {
 fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
     let options = options(command);
-    let fair = ["man", "schema", "completions", "licences"].contains(&command);
+    let fair = ["man", "schema", "completions", "licences", "verify"].contains(&command);
     assert!(fair || options.len() > 3, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
     for _ in 0..if fair { 4 } else { DRAWN } {

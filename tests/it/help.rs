@@ -3,8 +3,8 @@
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
-const COMMANDS: [(&str, usize); 13] = [
-    ("analyze", 46),
+const COMMANDS: [(&str, usize); 14] = [
+    ("analyze", 47),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 48),
@@ -13,6 +13,7 @@ const COMMANDS: [(&str, usize); 13] = [
     ("design", 70),
     ("report", 60),
     ("paper", 18),
+    ("verify", 14),
     ("licences", 12),
     ("completions", 12),
     ("man", 14),

@@ -299,7 +299,7 @@ fn nothing_is_said_of_sets_that_were_not_examined() {
             proven: false,
         };
         r.schemes[0].alternatives.all = Some(all);
-        let origin = Origin { command: String::new(), inputs: Vec::new() };
+        let origin = Origin { command: String::new(), inputs: Vec::new(), certificates: Vec::new() };
         let files = obsdeg_report::review(&r, &[], &origin, ReviewFormat::Markdown, "f").expect("files");
         String::from_utf8(files[0].bytes.clone()).expect("UTF-8")
     };

@@ -8,15 +8,17 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// The kinds of `obsdeg schema`.
-const KINDS: [&str; 16] = [
+const KINDS: [&str; 18] = [
     "allan",
     "analysis",
     "audit",
     "calibration",
+    "certificate",
     "comparison",
     "crosscheck",
     "design",
     "model",
+    "model-certificate",
     "part",
     "scheme",
     "simulation",
@@ -132,6 +134,15 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["design", "--minimum", "--terms", "gyros", "--carry", "inertial"],
     ] {
         answer(&json(&[line, &["--format", "json"]].concat()), &line.join(" "));
+    }
+    for file in [five, "examples/lotka-volterra/model.toml"] {
+        let path = folder.path().join("c.json").display().to_string();
+        stdout(&run(&["analyze", file, "--solutions", "off", "--certificate", &path, "--force"]));
+        let mut value: Value =
+            serde_json::from_str(&std::fs::read_to_string(&path).expect("written")).expect("JSON");
+        // what is no answer says its layout under another key
+        value["schema"] = value["layout"].clone();
+        answer(&value, file);
     }
     // every schema of an answer was used
     let unused: Vec<&String> = schemas

@@ -78,6 +78,7 @@ fn all_crates() -> Vec<(&'static str, PathBuf)> {
         "python",
         "library",
         "cli",
+        "verify",
         "web",
     ];
     let place = |name: &'static str| {

@@ -29,7 +29,8 @@ pub(crate) fn faults(root: &Value, schema: &Value, value: &Value, place: &str) -
                     out.push(format!("{place}: {found} of {keyword}"));
                 }
             }
-            "type" | "const" | "enum" | "minimum" | "maximum" | "minItems" | "maxItems" | "pattern" => {
+            "type" | "const" | "enum" | "minimum" | "maximum" | "minItems" | "maxItems" | "minLength"
+            | "maxLength" | "pattern" => {
                 if !holds(keyword, of, value) {
                     out.push(format!("{place}: {keyword} is {of}, found {value}"));
                 }
@@ -76,7 +77,7 @@ fn choices(root: &Value, of: &Value, value: &Value, place: &str) -> usize {
     all.filter(|schema| faults(root, schema, value, place).is_empty()).count()
 }
 
-/// Keywords of one value: numbers limit numbers only, lengths lists, patterns texts.
+/// Keywords of one value: numbers limit numbers only, lengths lists or texts, patterns texts.
 fn holds(keyword: &str, of: &Value, value: &Value) -> bool {
     let limit = || of.as_f64().expect("a number");
     let length = || of.as_u64().expect("a length") as usize;
@@ -91,6 +92,8 @@ fn holds(keyword: &str, of: &Value, value: &Value) -> bool {
         "maximum" => value.as_f64().is_none_or(|x| x <= limit()),
         "minItems" => value.as_array().is_none_or(|list| list.len() >= length()),
         "maxItems" => value.as_array().is_none_or(|list| list.len() <= length()),
+        "minLength" => value.as_str().is_none_or(|text| text.chars().count() >= length()),
+        "maxLength" => value.as_str().is_none_or(|text| text.chars().count() <= length()),
         _ => {
             let pattern = Regex::new(of.as_str().expect("a pattern")).expect("a pattern");
             value.as_str().is_none_or(|text| pattern.is_match(text))
@@ -133,6 +136,8 @@ mod tests {
             (json!({ "maximum": 90 }), json!("text"), json!(90.5)),
             (json!({ "minItems": 2 }), json!([1, 2]), json!([1])),
             (json!({ "maxItems": 1 }), json!([1]), json!([1, 2])),
+            (json!({ "minLength": 1 }), json!("a"), json!("")),
+            (json!({ "maxLength": 1 }), json!("a"), json!("aa")),
             (json!({ "pattern": "^a+$" }), json!("aa"), json!("ab")),
             (json!({ "required": ["a"] }), json!({ "a": 1 }), json!({ "b": 1 })),
             (json!({ "items": { "type": "string" } }), json!(["a"]), json!(["a", 1])),

@@ -4,10 +4,13 @@ use std::ops::RangeInclusive;
 
 use clap::{ArgAction, Args};
 use obsdeg_core::analysis::{Analysis, AnalysisOptions};
+use obsdeg_core::certificate::{CertificateError, certify, certify_model};
+use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
-use obsdeg_report::{Answer, Document, Several, Table};
+use obsdeg_report::{Answer, Document, File, Several, Table};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::arguments::{ANY, InputOptions, SEED, Word, check_whole, one_of, whole};
 use crate::host::{Host, Now};
@@ -50,6 +53,10 @@ pub struct Analyze {
     /// Exact classes of the errors that a scheme does not estimate
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
     pub omitted: bool,
+
+    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
+    #[arg(skip)]
+    pub certificate: bool,
 }
 
 /// The orders that may be asked for.
@@ -66,6 +73,7 @@ impl Default for Analyze {
             frame: Frame::default(),
             formulas: false,
             omitted: true,
+            certificate: false,
         }
     }
 }
@@ -220,6 +228,32 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
             Judgements::Several(Several(judged))
         }
     })
+}
+
+/// The certificate of the verdicts on the one scheme or model that was read, under its name `certificate.json`.
+///
+/// # Errors
+/// What has no certificate.
+pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
+    let text = match read {
+        [(_, Input::Scheme(scheme))] => certify(scheme, options.seed)?.text(),
+        [(_, Input::Model(file))] => match certify_model(&file.model, options.seed) {
+            Err(CertificateError::Model(e)) => return Err(file.wrong(&e)),
+            certified => certified?.text(),
+        },
+        _ => return Err(Problem::input("a certificate is of one scheme or model; found several files")),
+    };
+    let text = text.map_err(|e| Problem::internal(e.to_string()))?;
+    Ok(File { name: "certificate.json".into(), bytes: text.into_bytes() })
+}
+
+/// The SHA-256 of the certificate of a scheme, in hexadecimal digits. It does not depend on a seed.
+///
+/// # Errors
+/// What has no certificate.
+pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
+    let text = certify(scheme, SEED)?.text().map_err(|e| Problem::internal(e.to_string()))?;
+    Ok(Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {

@@ -21,7 +21,7 @@ use crate::text;
 pub(crate) const SEED: u64 = 1;
 
 /// Options that concern a model as well as a scheme.
-const OF_BOTH: [&str; 18] = [
+const OF_BOTH: [&str; 19] = [
     "files",
     "scheme",
     "model",
@@ -34,6 +34,7 @@ const OF_BOTH: [&str; 18] = [
     "seed",
     "format",
     "table",
+    "certificate",
     "ascii",
     "output",
     "force",

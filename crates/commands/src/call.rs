@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::allan::{Allan, allan, files as allan_files};
-use crate::analyze::{Analyze, analyze};
+use crate::analyze::{Analyze, analyze, certificate};
 use crate::arguments::Given;
 use crate::calibrate::{Calibrate, calibrate};
 use crate::compare::{Compare, compare};
@@ -227,7 +227,11 @@ fn answered<W: Wanted>(
             asked.options.input.given = asked.given;
             let read = asked.options.input.read(asked.files.sources)?;
             let judged = analyze(&asked.options, &read, host)?;
-            W::whole(judged, true, move |_| Ok(position_figures(&read)))
+            let wanted = asked.options.certificate;
+            let certificate = wanted.then(|| certificate(&asked.options, &read)).transpose()?;
+            W::whole(judged, true, move |_| {
+                Ok(position_figures(&read).into_iter().chain(certificate.clone()).collect())
+            })
         }
         "simulate" => {
             let mut asked: Request<Simulate, Sources> = Request::read(request)?;

@@ -19,6 +19,7 @@ use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, posit
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
@@ -713,6 +714,8 @@ fn scheme_file(
     let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
     let noisy = conditions.as_stated().drift_noise_in_words().is_some() || !conditions.gyro_noise.is_none();
     let drift = if noisy { "the random drift below" } else { "no random drift" };
+    let digest = certificate_digest(&scheme);
+    let digest = digest.map_or_else(|_| String::new(), |hex| format!("# sha256 of its certificate: {hex}\n"));
     let name = search.map_or("", |s| s.criterion.as_str());
     let largest = |sigma: f64| format!("largest sigma of {what} {sigma:.3e} deg/h (per g)");
     let reached = match (unit, best.worst_sigma_dph) {
@@ -724,7 +727,7 @@ fn scheme_file(
         }
     };
     Ok(format!(
-        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, {drift}, seed {}\n# {}\n{}",
+        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, {drift}, seed {}\n# {}\n{digest}{}",
         found.candidates.len(),
         best.total_s,
         found.seed,

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use obsdeg_calibration::CalibrationError;
 use obsdeg_core::analysis::AnalysisError;
+use obsdeg_core::certificate::CertificateError;
 use obsdeg_core::solution::CombinationError;
 use obsdeg_design::design::DesignError;
 use obsdeg_evidence::prediction::PredictionError;
@@ -87,6 +88,16 @@ impl Problem {
     pub fn in_file(mut self, name: &str) -> Self {
         self.message = format!("{} (in {name})", self.message);
         self
+    }
+}
+
+/// What a certificate does not cover, or what is wrong with the scheme or model.
+impl From<CertificateError> for Problem {
+    fn from(e: CertificateError) -> Self {
+        match e {
+            CertificateError::Analysis(e) => e.into(),
+            CertificateError::Model(_) | CertificateError::NotCovered { .. } => Self::input(e.to_string()),
+        }
     }
 }
 

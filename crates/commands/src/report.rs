@@ -10,6 +10,7 @@ use obsdeg_report::{File, Origin, ReviewFormat};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{ConditionOptions, RUNS};
 use crate::host::{Host, Now};
@@ -64,6 +65,7 @@ impl Default for Report {
 pub struct Reviewed {
     review: DesignReview,
     calibrations: Vec<(String, Calibration)>,
+    certificates: Vec<String>,
 }
 
 /// A calibration that is part of a review: what it is called, and its JSON.
@@ -125,7 +127,12 @@ pub fn report(
         ReviewError::Interrupted => Problem::interrupted(),
         e @ ReviewError::Analysis { .. } => Problem::input(e.to_string()),
     })?;
-    Ok(Reviewed { review, calibrations })
+    let digest = |e: &Entry| match certificate_digest(&e.scheme) {
+        Ok(hex) => format!("sha256 of the certificate of {}: {hex}", e.name),
+        Err(why) => format!("{}: {why}", e.name),
+    };
+    let certificates = entries.iter().map(digest).collect();
+    Ok(Reviewed { review, calibrations, certificates })
 }
 
 impl Reviewed {
@@ -139,13 +146,14 @@ impl Reviewed {
     /// # Errors
     /// What cannot be drawn.
     pub fn files(&self, origin: &Origin, format: ReviewFormat, folder: &str) -> Result<Vec<File>, Problem> {
-        Ok(obsdeg_report::review(&self.review, &self.calibrations, origin, format, folder)?)
+        let origin = Origin { certificates: self.certificates.clone(), ..origin.clone() };
+        Ok(obsdeg_report::review(&self.review, &self.calibrations, &origin, format, folder)?)
     }
 }
 
 /// What a review was made by and of: a command that gives the same answer, and the digest of every file.
 pub fn origin<'a>(command: String, sources: impl Iterator<Item = &'a Source>) -> Origin {
-    Origin { command, inputs: sources.map(digest).collect() }
+    Origin { command, inputs: sources.map(digest).collect(), certificates: Vec::new() }
 }
 
 /// `sha256 of scheme.toml: ...`

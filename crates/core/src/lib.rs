@@ -39,6 +39,7 @@
 
 pub mod accuracy;
 pub mod analysis;
+pub mod certificate;
 pub mod degree;
 pub mod engine;
 pub mod findings;

@@ -332,6 +332,8 @@ pub struct Origin {
     pub command: String,
     /// Every file that it read, with its digest.
     pub inputs: Vec<String>,
+    /// Per scheme: the digest of its certificate, or why it has none.
+    pub certificates: Vec<String>,
 }
 
 /// The files of a design review, with calibrations by name: the text first, then the pictures that it refers to, in `folder` beside it.

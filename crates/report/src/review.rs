@@ -90,6 +90,7 @@ pub(crate) fn document(
         blocks.push(Block::Text(CALIBRATED.into()));
         blocks.extend(calibrated::section(c, &format!("c{}", i + 1)));
     }
+    certificates(&mut blocks, origin);
     blocks.push(section(1, "Notation"));
     blocks.push(notation::notation(r));
     blocks.push(section(1, "About this report"));
@@ -113,6 +114,25 @@ pub(crate) fn document(
         .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
         .collect();
     Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
+}
+
+/// What checks the exact verdicts of schemes without this program.
+fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
+    if origin.certificates.is_empty() {
+        return;
+    }
+    blocks.push(section(1, "How to check this without obsdeg"));
+    let steps = [
+        "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a certificate: a JSON file that proves them.",
+        "obsdeg analyze SCHEME.toml --certificate c.json writes it. The same verdicts give the same bytes, whatever the seed.",
+        "The digest below identifies the file: sha256sum c.json.",
+        "python3 tools/verify_certificate.py c.json SCHEME.toml checks it with the standard library of Python alone; obsdeg verify c.json \
+         SCHEME.toml with a crate that shares no code with the engine.",
+        "The chapter Certificates of the book specifies the file and the check, so that you can write a checker of your own.",
+        "Predicted sigmas, the run and the evidence by a filter are not part of a certificate.",
+    ];
+    blocks.push(Block::list("", steps.map(String::from).to_vec()));
+    blocks.push(Block::list("Certificates", origin.certificates.clone()));
 }
 
 fn section(level: usize, title: impl Into<String>) -> Block {

@@ -357,13 +357,18 @@ fn direct(
 
 /// The image of a component of a unit vector that is a square root of a ratio of small numbers.
 fn recognised(roots: &RootField, x: f64) -> Option<u64> {
+    Some(radical(x)?.image(roots))
+}
+
+/// The same exactly.
+pub(crate) fn radical(x: f64) -> Option<Radical> {
     for (place, radicand) in [1.0f64, 2.0, 3.0, 6.0].into_iter().enumerate() {
         for den in 1..=6 {
             let num = (x / radicand.sqrt() * f64::from(den)).round();
             if (num * radicand.sqrt() / f64::from(den) - x).abs() < 1e-9 {
                 let mut coefficients = [Ratio { num: 0, den: 1 }; 4];
                 coefficients[place] = Ratio { num: num as i64, den: i64::from(den) };
-                return Some(Radical { coefficients }.image(roots));
+                return Some(Radical { coefficients });
             }
         }
     }

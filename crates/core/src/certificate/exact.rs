@@ -1,0 +1,247 @@
+//! The numbers of an exact certificate, recovered from their images in two prime fields with four embeddings
+//! each.
+//!
+//! All rows are homogeneous in the rates: give every drift coefficient the weight 1, psi 0, a row of order k
+//! the weight k. Where `wN` is not 0, rows of order at most k span what `wN psi_x, wN psi_z, eps_x, eps_z -
+//! wN psi_y, eps_y` (those of order at most k) of every position span, and in `wN psi` and the coefficients
+//! these hold no rate. So an entry of a null vector is a number times a power of `wN`, and a coefficient of a
+//! solution, at `wN = 1`, a polynomial in `wU` of degree at most 2 (of a combination: more, by the powers in
+//! it).
+
+use std::collections::BTreeMap;
+
+use obsdeg_exact::radical::embeddings;
+use obsdeg_exact::{Field, RootField};
+
+use super::witness::{Found, Staircase};
+use super::{ExactNumber, ExactVector, Exactly, number};
+use crate::degree::coefficient::{Coefficient, Number, power, recover_radical};
+use crate::degree::ensemble::Verdicts;
+use crate::model::platform::{Platform, Sample};
+use crate::model::{Angle, Source};
+
+/// The numbers of an exact certificate.
+pub(super) struct ExactWitness {
+    /// Null vectors, per order and free unknown.
+    pub null_vectors: Vec<Vec<ExactVector>>,
+    /// Coefficients of the solution rows, per functional; `None` where it is not observable.
+    pub coefficients: Vec<Option<Vec<ExactNumber>>>,
+}
+
+/// A combination in the field of a sample, at these rates; powers of a rate that is 0 are 0.
+pub(super) fn image(c: &Exactly, sample: &Sample, rates: [u64; 2]) -> Vec<(usize, u64)> {
+    let f = &sample.roots.field;
+    let value = |c: &Coefficient| match &c.number {
+        Number::Radical(radical) => {
+            f.mul(radical.image(&sample.roots), power(f, rates, c.rates).unwrap_or(0))
+        }
+        _ => 0,
+    };
+    c.iter().map(|(column, c)| (*column, value(c))).collect()
+}
+
+/// The fields, embeddings and rates at which everything is solved.
+struct Points<'a> {
+    platform: &'a Platform,
+    fields: [RootField; 2],
+    /// `stairs[field][embedding][point]`.
+    stairs: [[Vec<Solved>; 4]; 2],
+    /// The values of `wU` (of the only rate that is not 0: 1).
+    rates: Vec<[u64; 2]>,
+    pole: bool,
+    /// The lowest power of `wU` in a combination, at most 0.
+    lowest: i32,
+}
+
+/// The staircase at one point, with the inverses of its minors.
+struct Solved {
+    sample: Sample,
+    staircase: Staircase,
+    inverses: Vec<Vec<Vec<u64>>>,
+}
+
+/// The exact numbers of a certificate; `None` where the angles or the terms do not allow it, or a number is
+/// not small.
+pub(super) fn exact(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    staircase: &Staircase,
+    combinations: &[Exactly],
+    found: &[Found],
+) -> Option<ExactWitness> {
+    let scheme = platform.scheme();
+    let mut angles = scheme.positions.iter().flat_map(|p| p.angles.iter().map(Angle::turn));
+    let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == Source::Gravity);
+    if !drifts || !angles.all(|a| a.is_multiple_of_deg(15)) {
+        return None;
+    }
+    let points = Points::new(platform, verdicts, staircase, combinations)?;
+    let null_vectors =
+        (0..staircase.ranks.len()).map(|k| points.null_vectors(staircase, k)).collect::<Option<_>>()?;
+    let one = |c: usize| vec![(c, Coefficient::one())];
+    let functionals = (0..platform.names().len()).map(one).chain(combinations.iter().cloned());
+    let coefficients = functionals
+        .zip(found)
+        .map(|(c, found)| match (found.degree, &found.solution) {
+            (Some(degree), Some(rows)) => points.coefficients(staircase, &c, degree, rows).map(Some),
+            _ => Some(None),
+        })
+        .collect::<Option<_>>()?;
+    Some(ExactWitness { null_vectors, coefficients })
+}
+
+impl<'a> Points<'a> {
+    /// Solves everything at all points; `None` if the basis rows are others at one of them.
+    fn new(
+        platform: &'a Platform,
+        verdicts: &Verdicts,
+        staircase: &Staircase,
+        combinations: &[Exactly],
+    ) -> Option<Self> {
+        let latitude = platform.scheme().latitude;
+        let [pole, equator] =
+            [latitude.is_some_and(|l| l.is_pole()), latitude.is_some_and(|l| l.is_equator())];
+        let powers = || combinations.iter().flatten().map(|(_, c)| c.rates[1]).chain([0]);
+        let (lowest, highest) = (powers().min()?, powers().max()?);
+        let rates: Vec<[u64; 2]> = match (pole, equator) {
+            (true, _) => vec![[0, 1]],
+            (_, true) => vec![[1, 0]],
+            _ => (1..=(highest - lowest + 3) as u64).map(|t| [1, t]).collect(),
+        };
+        let solved = |values: &crate::model::platform::RandomValues, a: u64, rates: &[u64; 2]| {
+            let at = rates.map(|t| values.roots().field.from_u64(t));
+            let sample = values.sample_at(platform.scheme(), a, at);
+            let other = Staircase::new(platform, &sample);
+            let same = other.basis == staircase.basis && other.ranks == staircase.ranks;
+            let inverses = (0..other.ranks.len()).map(|k| other.inverse(k)).collect::<Option<_>>();
+            Some(Solved { sample, inverses: inverses?, staircase: other }).filter(|_| same)
+        };
+        let mut stairs = [0, 1].map(|_| [0; 4].map(|_| Vec::new()));
+        for (field, values) in stairs.iter_mut().zip(&verdicts.values) {
+            for (slot, a) in field.iter_mut().zip(embeddings(values.roots().order)) {
+                *slot = rates.iter().map(|r| solved(values, a, r)).collect::<Option<_>>()?;
+            }
+        }
+        let fields = [0, 1].map(|i| *verdicts.values[i].roots());
+        Some(Self { platform, fields, stairs, rates, pole, lowest })
+    }
+
+    /// 0 for psi, 1 for a coefficient.
+    fn weight(&self, column: usize) -> i32 {
+        i32::from(column >= self.platform.names().len() - self.platform.coefficients())
+    }
+
+    /// A number times the rate that is not 0 (of two: `wN`) to a power, as a certificate writes it.
+    fn times_power(&self, images: &[[u64; 4]; 2], [a, b]: [i32; 2]) -> Option<ExactNumber> {
+        let number_ = Number::Radical(recover_radical(&self.fields, images)?);
+        let small = a.abs().max(b.abs()) <= 9;
+        small.then(|| number(&Coefficient { number: number_, rates: [a, b] }))
+    }
+
+    fn null_vectors(&self, staircase: &Staircase, order: usize) -> Option<Vec<ExactVector>> {
+        let images = self
+            .stairs
+            .each_ref()
+            .map(|embeddings| embeddings.each_ref().map(|points| points[0].staircase.null_vectors(order)));
+        let names = self.platform.names();
+        let vector = |(i, &free): (usize, &usize)| {
+            let mut out = BTreeMap::new();
+            for (column, name) in names.iter().enumerate() {
+                let values = images.each_ref().map(|field| field.each_ref().map(|n| n[i][column]));
+                if values.iter().flatten().all(|x| *x == 0) {
+                    continue;
+                }
+                let degree = self.weight(column) - self.weight(free);
+                if self.pole && degree != 0 {
+                    return None;
+                }
+                out.insert(name.clone(), self.times_power(&values, [degree, 0])?);
+            }
+            Some(out)
+        };
+        staircase.free(order).iter().enumerate().map(vector).collect()
+    }
+
+    /// The coefficients of the rows of a solution.
+    fn coefficients(
+        &self,
+        staircase: &Staircase,
+        c: &Exactly,
+        degree: usize,
+        rows: &[usize],
+    ) -> Option<Vec<ExactNumber>> {
+        // homogeneous parts, by weight
+        let mut parts: BTreeMap<i32, Exactly> = BTreeMap::new();
+        for (column, x) in c {
+            let weight = x.rates[0] + x.rates[1] + self.weight(*column);
+            parts.entry(weight).or_default().push((*column, x.clone()));
+        }
+        let mut out = vec![ExactNumber::new(); rows.len()];
+        for (weight, part) in parts {
+            // y[field][embedding][point][row]
+            let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
+                let f = s.sample.roots.field;
+                let rates = [f.from_u64(*w_n), f.from_u64(*w_u)];
+                s.staircase.solution(&s.inverses[degree], &image(&part, &s.sample, rates))
+            };
+            let y = self.stairs.each_ref().map(|embeddings| {
+                embeddings.each_ref().map(|points| {
+                    points.iter().zip(&self.rates).map(|(s, r)| solved(s, r)).collect::<Vec<_>>()
+                })
+            });
+            for (slot, &row) in out.iter_mut().zip(rows) {
+                let power = weight - staircase.basis[row].0.1 as i32;
+                slot.extend(self.terms(power, |field, embedding, point| y[field][embedding][point][row])?);
+            }
+        }
+        Some(out)
+    }
+
+    /// The terms of a homogeneous coefficient of degree `power` by its values at all points.
+    fn terms(&self, power: i32, value: impl Fn(usize, usize, usize) -> u64) -> Option<ExactNumber> {
+        if let [[w_n, _]] = self.rates[..] {
+            let images = [0, 1].map(|i| [0, 1, 2, 3].map(|a| value(i, a, 0)));
+            let rates = if w_n == 0 { [0, power] } else { [power, 0] };
+            return self.times_power(&images, rates);
+        }
+        // times wU^-lowest it is a polynomial in wU
+        let polynomials = [0, 1].map(|i| {
+            let f = self.fields[i].field;
+            [0, 1, 2, 3].map(|a| {
+                let points = self.rates.iter().enumerate().map(|(j, [_, t])| {
+                    let t = f.from_u64(*t);
+                    (t, f.mul(value(i, a, j), f.pow(t, self.lowest.unsigned_abs().into())))
+                });
+                interpolate(&f, &points.collect::<Vec<_>>())
+            })
+        });
+        let mut out = ExactNumber::new();
+        for j in 0..self.rates.len() {
+            let images = polynomials.each_ref().map(|field| field.each_ref().map(|p| p[j]));
+            let b = j as i32 + self.lowest;
+            out.extend(self.times_power(&images, [power - b, b])?);
+        }
+        Some(out)
+    }
+}
+
+/// The coefficients, lowest first, of the polynomial through points with different arguments (Newton).
+fn interpolate(f: &Field, points: &[(u64, u64)]) -> Vec<u64> {
+    let n = points.len();
+    let mut differences: Vec<u64> = points.iter().map(|p| p.1).collect();
+    for k in 1..n {
+        for i in (k..n).rev() {
+            let step = f.inv(f.sub(points[i].0, points[i - k].0));
+            differences[i] = f.mul(f.sub(differences[i], differences[i - 1]), step);
+        }
+    }
+    let mut out = vec![0; n];
+    for (&d, &(t, _)) in differences.iter().zip(points).rev() {
+        // out = out (x - t) + d
+        for j in (0..n).rev() {
+            let below = if j > 0 { out[j - 1] } else { d };
+            out[j] = f.sub(below, f.mul(t, out[j]));
+        }
+    }
+    out
+}

@@ -1,0 +1,186 @@
+//! The witness that rows give in one field, and the rows of a scheme as they are defined, `H_c F^k S_i`.
+
+use obsdeg_exact::{Echelon, Field};
+
+use super::RowName;
+use crate::degree::status::Status;
+use crate::model::platform::{LOCAL, Platform, Sample, local_dynamics, local_output};
+
+/// Orders 0 to 3 suffice: `F^4 = -(wN^2 + wU^2) F^2`.
+const ORDERS: usize = 4;
+
+/// Basis rows, pivots and ranks of the rows in one field.
+pub(super) struct Staircase {
+    field: Field,
+    rows: Vec<(RowName, Vec<u64>)>,
+    /// Basis rows, each with its pivot.
+    pub basis: Vec<(RowName, usize)>,
+    /// Their indices in `rows`.
+    of_basis: Vec<usize>,
+    /// `dim V_0, ..., dim V_K`, where `V_K = V_3`.
+    pub ranks: Vec<usize>,
+    /// Per order 0 to 3: the space of all rows up to it.
+    spaces: Vec<Echelon>,
+}
+
+/// What the rows say of one functional.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    pub status: Status,
+    pub degree: Option<usize>,
+    /// Indices of basis rows.
+    pub solution: Option<Vec<usize>>,
+    pub hidden_by: Option<usize>,
+    pub excited_by: Option<RowName>,
+}
+
+/// All rows of orders 0 to 3, by order, segment, component.
+fn all_rows(platform: &Platform, sample: &Sample) -> Vec<(RowName, Vec<u64>)> {
+    let point = &sample.point;
+    let field = point.ring;
+    let f = local_dynamics(&field, &point.w_n, &point.w_u);
+    let mut outputs = local_output(&field, platform.observed());
+    let blocks = platform.blocks(point);
+    let mut out = Vec::with_capacity(ORDERS * blocks.len() * outputs.len());
+    for order in 0..ORDERS {
+        for (i, block) in blocks.iter().enumerate() {
+            for (component, functional) in &outputs {
+                let mut row = vec![0; platform.names().len()];
+                for (k, &column) in block.columns.iter().enumerate() {
+                    row[column] = block.entry(&field, functional, k);
+                }
+                out.push(((i + 1, order, *component), row));
+            }
+        }
+        for (_, functional) in &mut outputs {
+            let old = *functional;
+            *functional = std::array::from_fn(|j| field.dot(0, (0..LOCAL).map(|i| (old[i], f[i][j]))));
+        }
+    }
+    out
+}
+
+impl Staircase {
+    /// The rows of `platform` at `sample`, from the lowest order up.
+    pub(super) fn new(platform: &Platform, sample: &Sample) -> Self {
+        Self::of(sample.roots.field, platform.names().len(), all_rows(platform, sample))
+    }
+
+    /// Rows of some columns, listed by their order; those of the highest order add nothing.
+    pub(super) fn of(field: Field, columns: usize, rows: Vec<(RowName, Vec<u64>)>) -> Self {
+        let mut space = Echelon::new(field, columns);
+        let (mut basis, mut of_basis, mut ranks, mut spaces) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for order in 0..=rows.iter().map(|r| r.0.1).max().unwrap_or(0) {
+            for (index, (name, row)) in rows.iter().enumerate().filter(|(_, r)| r.0.1 == order) {
+                if space.insert(row) {
+                    basis.extend(space.pivots().last().map(|pivot| (*name, pivot)));
+                    of_basis.push(index);
+                }
+            }
+            ranks.push(space.rank());
+            spaces.push(space.clone());
+        }
+        let last = ranks.iter().position(|r| *r == space.rank()).unwrap_or(0);
+        ranks.truncate(last + 1);
+        Self { field, rows, basis, of_basis, ranks, spaces }
+    }
+
+    /// The unknowns that are no pivots at an order, in their order.
+    pub(super) fn free(&self, order: usize) -> Vec<usize> {
+        let space = &self.spaces[order];
+        (0..space.columns()).filter(|&c| space.pivot_row(c).is_none()).collect()
+    }
+
+    /// The null vectors at an order: one per free unknown, in their order.
+    pub(super) fn null_vectors(&self, order: usize) -> Vec<Vec<u64>> {
+        self.spaces[order].null_space()
+    }
+
+    /// The inverse of the minor of the basis rows up to an order and their pivots; `None` where it is
+    /// singular.
+    pub(super) fn inverse(&self, order: usize) -> Option<Vec<Vec<u64>>> {
+        let rank = self.ranks[order];
+        let minor = |i: usize| self.basis[..rank].iter().map(move |(_, p)| self.rows[self.of_basis[i]].1[*p]);
+        invert(&self.field, (0..rank).map(|i| minor(i).collect()).collect())
+    }
+
+    /// The solution `y` of `y M = c`, for a functional of the span of the rows up to an order.
+    pub(super) fn solution(&self, inverse: &[Vec<u64>], c: &[(usize, u64)]) -> Vec<u64> {
+        let f = &self.field;
+        let mut y = vec![0; inverse.len()];
+        for (i, row) in inverse.iter().enumerate() {
+            let at = c.iter().find(|(column, _)| *column == self.basis[i].1).map_or(0, |(_, x)| *x);
+            if at != 0 {
+                for (y, &x) in y.iter_mut().zip(row) {
+                    *y = f.add(*y, f.mul(at, x));
+                }
+            }
+        }
+        y
+    }
+
+    /// Status, degree and witness of functionals, each as columns and values.
+    pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<Found> {
+        let orders = 0..self.ranks.len();
+        let null: Vec<_> = orders.clone().map(|k| (self.free(k), self.null_vectors(k))).collect();
+        let inverses: Vec<_> = orders.map(|k| self.inverse(k).unwrap_or_default()).collect();
+        let excites = |c: &[(usize, u64)]| {
+            let seen = self.rows.iter().find(|(_, row)| c.iter().any(|(column, _)| row[*column] != 0));
+            seen.map(|(name, _)| *name)
+        };
+        let dot = |n: &Vec<u64>, c: &[(usize, u64)]| self.field.dot(0, c.iter().map(|&(k, x)| (n[k], x)));
+        functionals
+            .iter()
+            .map(|c| {
+                let hidden: Vec<Option<usize>> = null
+                    .iter()
+                    .map(|(free, vectors)| {
+                        free.iter().zip(vectors).find(|(_, n)| dot(n, c) != 0).map(|(f, _)| *f)
+                    })
+                    .collect();
+                let degree = hidden.iter().position(Option::is_none);
+                let solution = degree.map(|k| {
+                    let y = self.solution(&inverses[k], c);
+                    (0..y.len()).filter(|&j| y[j] != 0).collect()
+                });
+                let excited = excites(c);
+                let hidden_by = match degree {
+                    Some(k) => k.checked_sub(1).and_then(|k| hidden[k]),
+                    None => hidden.last().copied().flatten(),
+                };
+                Found {
+                    status: Status::of(degree, excited.is_some()),
+                    degree,
+                    solution,
+                    hidden_by,
+                    excited_by: excited.filter(|_| degree.is_none()),
+                }
+            })
+            .collect()
+    }
+}
+
+/// The inverse of a square matrix, if it has one.
+fn invert(f: &Field, mut m: Vec<Vec<u64>>) -> Option<Vec<Vec<u64>>> {
+    let n = m.len();
+    for (i, row) in m.iter_mut().enumerate() {
+        row.extend((0..n).map(|j| if i == j { f.one() } else { 0 }));
+    }
+    for c in 0..n {
+        let pivot = (c..n).find(|&i| m[i][c] != 0)?;
+        m.swap(c, pivot);
+        let scale = f.inv(m[c][c]);
+        let row: Vec<u64> = m[c].iter().map(|&x| f.mul(x, scale)).collect();
+        for (i, other) in m.iter_mut().enumerate() {
+            let factor = f.neg(other[c]);
+            if i != c && factor != 0 {
+                for (x, &y) in other.iter_mut().zip(&row).filter(|(_, y)| **y != 0) {
+                    *x = f.add(*x, f.mul(factor, y));
+                }
+            }
+        }
+        m[c] = row;
+    }
+    Some(m.into_iter().map(|row| row[n..].to_vec()).collect())
+}

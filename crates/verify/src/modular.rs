@@ -1,0 +1,406 @@
+//! The check modulo primes: random fields, and what the rows say in one of them.
+
+use num_bigint::BigInt;
+use sha2::{Digest, Sha256};
+
+use crate::file::{Functional, Number, RowName, Witness};
+use crate::problem::{About, Matrix, Problem, Ring, Slew, Source, TURN, times as product};
+use crate::{Refused, need, refusal};
+
+/// Numbers that whoever wrote the certificate did not choose: SHA-256 of it, with a counter.
+pub(crate) struct Randomness {
+    seed: [u8; 32],
+    count: u64,
+}
+
+impl Randomness {
+    pub(crate) fn new(certificate: &[u8]) -> Self {
+        Self { seed: Sha256::digest(certificate).into(), count: 0 }
+    }
+
+    /// A random number below `m`.
+    pub(crate) fn below(&mut self, m: u64) -> u64 {
+        let block: [u8; 32] =
+            Sha256::new().chain_update(self.seed).chain_update(self.count.to_be_bytes()).finalize().into();
+        self.count += 1;
+        block[..8].iter().fold(0, |x, &byte| x << 8 | u64::from(byte)) % m
+    }
+}
+
+pub(crate) fn times(a: u64, b: u64, p: u64) -> u64 {
+    (u128::from(a) * u128::from(b) % u128::from(p)) as u64
+}
+
+fn power(mut a: u64, mut e: u64, p: u64) -> u64 {
+    let mut out = 1;
+    while e > 0 {
+        if e & 1 == 1 {
+            out = times(out, a, p);
+        }
+        a = times(a, a, p);
+        e >>= 1;
+    }
+    out
+}
+
+/// The inverse of a number that is not 0 modulo the prime `p`.
+pub(crate) fn inverse(a: u64, p: u64) -> u64 {
+    power(a, p - 2, p)
+}
+
+/// Miller and Rabin with the first twelve primes, which decides all numbers below 2^64.
+pub(crate) fn is_prime(n: u64) -> bool {
+    let small = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+    if small.iter().any(|q| n % q == 0) {
+        return small.contains(&n);
+    }
+    let s = (n - 1).trailing_zeros();
+    small.iter().all(|&base| {
+        let mut x = power(base, (n - 1) >> s, n);
+        x == 1
+            || x == n - 1
+            || (1..s).any(|_| {
+                x = times(x, x, n);
+                x == n - 1
+            })
+    })
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// Order of the roots of unity that hold all angles.
+fn order_of(problem: &Problem) -> u64 {
+    let turns = problem.slews.iter().flatten().map(|s| &s.angle);
+    let angles = problem.positions.iter().flatten().chain(&problem.latitude).chain(turns);
+    TURN as u64 / angles.fold(15_000_000_000, |g, a| gcd(g, a.unsigned_abs()))
+}
+
+/// A random prime field with a root of unity and rates.
+pub(crate) struct PrimeField {
+    pub p: u64,
+    z: u64,
+    order: u64,
+    rates: [u64; 2],
+    /// The image of pi.
+    pi: u64,
+    /// Images of the square roots of 1, 2, 3, 6 at these indices.
+    roots: [u64; 7],
+}
+
+impl PrimeField {
+    pub(crate) fn new(problem: &Problem, random: &mut Randomness) -> Self {
+        let order = order_of(problem);
+        let first = (1 << 60) / order;
+        let p = loop {
+            let p = 1 + order * (first + 1 + random.below(first - 1));
+            if is_prime(p) {
+                break p;
+            }
+        };
+        let z = loop {
+            let z = power(2 + random.below(p - 2), (p - 1) / order, p);
+            if [2, 3, 5].iter().all(|q| order % q != 0 || power(z, order / q, p) != 1) {
+                break z;
+            }
+        };
+        let mut field = Self { p, z, order, rates: [0; 2], pi: 0, roots: [1; 7] };
+        field.rates = [1 + random.below(p - 1), 1 + random.below(p - 1)];
+        field.pi = 1 + random.below(p - 1);
+        if let Some(latitude) = problem.latitude {
+            let (cos, sin) = field.cos_sin(latitude);
+            field.rates = [cos, sin].map(|x| times(field.rates[0], x, p));
+        }
+        let sum = |part| (field.root(part) + field.root(order - part)) % p;
+        let (two, three) = (sum(order / 8), sum(order / 12));
+        (field.roots[2], field.roots[3], field.roots[6]) = (two, three, times(two, three, p));
+        field
+    }
+
+    fn root(&self, exponent: u64) -> u64 {
+        power(self.z, exponent, self.p)
+    }
+
+    fn inverse(&self, a: u64) -> u64 {
+        inverse(a, self.p)
+    }
+
+    /// The image of an exact number.
+    fn image(&self, number: &Number) -> u64 {
+        let p = self.p;
+        let of = |n: &BigInt| u64::try_from(((n % p) + p) % p).unwrap_or(0);
+        let rate =
+            |w: u64, e: i32| power(if e < 0 { self.inverse(w) } else { w }, e.unsigned_abs().into(), p);
+        number.0.iter().fold(0, |sum, ((r, a, b), q)| {
+            let factors = [
+                self.inverse(of(q.denom())),
+                self.roots[usize::from(*r)],
+                rate(self.rates[0], *a),
+                rate(self.rates[1], *b),
+            ];
+            (sum + factors.into_iter().fold(of(q.numer()), |x, y| times(x, y, p))) % p
+        })
+    }
+}
+
+impl PrimeField {
+    /// `a I + b [u x] + c u u^T`.
+    fn mixed(&self, u: &[u64], [a, b, c]: [u64; 3]) -> Matrix<u64> {
+        let mut out = vec![vec![0; 3]; 3];
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            for (column, slot) in out[i].iter_mut().enumerate() {
+                let skew = match column {
+                    _ if column == k => u[j],
+                    _ if column == j => self.neg(&u[k]),
+                    _ => 0,
+                };
+                let skew = self.mul(&b, &skew);
+                let unit = if column == i { a } else { 0 };
+                let outer = self.mul(&c, &self.mul(&u[i], &u[column]));
+                *slot = self.add(&self.add(&unit, &skew), &outer);
+            }
+        }
+        out
+    }
+
+    /// The axis of a turn in c, from the attitude `a` to `to`; zero where the attitudes give none.
+    fn axis(&self, turn: &Slew, a: &Matrix<u64>, to: &Matrix<u64>) -> Vec<u64> {
+        let back: Matrix<u64> = (0..3).map(|i| a.iter().map(|row| row[i]).collect()).collect();
+        let unit = |i: usize| (0..3).map(|j| u64::from(i == j)).collect::<Vec<u64>>();
+        let v = match &turn.about {
+            About::Platform(i) => return unit(*i),
+            About::Middle(gamma) => {
+                let (cos, sin) = self.cos_sin(*gamma);
+                return vec![self.neg(&sin), cos, 0];
+            }
+            About::Geographic(i) => unit(*i),
+            About::Direction(v) => v.iter().map(|x| self.image(x)).collect(),
+            About::Shortest => {
+                let (r, sin) = (product(self, to, &back), self.cos_sin(turn.angle).1);
+                let half = self.inverse(self.add(&sin, &sin));
+                let difference =
+                    |j: usize, k: usize| self.mul(&half, &self.add(&r[k][j], &self.neg(&r[j][k])));
+                vec![difference(1, 2), difference(2, 0), difference(0, 1)]
+            }
+        };
+        let column: Matrix<u64> = v.into_iter().map(|x| vec![x]).collect();
+        product(self, &back, &column).into_iter().flatten().collect()
+    }
+
+    /// Refuses slews whose axes have not the length 1, or that do not lead from position to position.
+    pub(crate) fn check_slews(&self, problem: &Problem) -> Result<(), Refused> {
+        let attitudes = problem.attitudes(self);
+        for (i, turns) in problem.slews.iter().enumerate() {
+            let mut a = attitudes[i.saturating_sub(1)].clone();
+            let mut length = true;
+            for turn in turns {
+                let u = self.axis(turn, &a, &attitudes[i]);
+                length &= u.iter().fold(0, |sum, x| self.add(&sum, &self.mul(x, x))) == 1;
+                a = self.turned(&a, turn, &u);
+            }
+            let expected = "turns about axes of length 1 that lead to the position";
+            need(length && a == attitudes[i], &format!("problem.slews.{i}"), expected, "others")?;
+        }
+        Ok(())
+    }
+
+    /// The attitude behind a turn: `A exp([u x] phi)`.
+    fn turned(&self, a: &Matrix<u64>, turn: &Slew, u: &[u64]) -> Matrix<u64> {
+        let (cos, sin) = self.cos_sin(turn.angle);
+        product(self, a, &self.mixed(u, [cos, sin, self.add(&1, &self.neg(&cos))]))
+    }
+}
+
+impl Ring for PrimeField {
+    type Element = u64;
+    fn zero(&self) -> u64 {
+        0
+    }
+    fn one(&self) -> u64 {
+        1
+    }
+    fn add(&self, a: &u64, b: &u64) -> u64 {
+        (a + b) % self.p
+    }
+    fn mul(&self, a: &u64, b: &u64) -> u64 {
+        times(*a, *b, self.p)
+    }
+    fn neg(&self, a: &u64) -> u64 {
+        (self.p - a) % self.p
+    }
+    fn is_zero(&self, a: &u64) -> bool {
+        *a == 0
+    }
+    fn cos_sin(&self, angle: i64) -> (u64, u64) {
+        let (turn, order) = (TURN as u64, self.order);
+        let z = self.root(angle.rem_euclid(TURN) as u64 / (turn / order));
+        let (back, half) = (self.inverse(z), self.p.div_ceil(2));
+        let sin = times(times((z + self.p - back) % self.p, half, self.p), self.root(order / 4 * 3), self.p);
+        (times((z + back) % self.p, half, self.p), sin)
+    }
+    fn rates(&self) -> [u64; 2] {
+        self.rates
+    }
+    fn left(&self, problem: &Problem, attitudes: &[Matrix<u64>]) -> Vec<Matrix<u64>> {
+        let n = problem.coefficients.len();
+        let mut total = vec![vec![0; n]; 3];
+        let mut out = Vec::with_capacity(attitudes.len());
+        for (i, turns) in problem.slews.iter().enumerate() {
+            let mut a = attitudes[i.saturating_sub(1)].clone();
+            for turn in turns {
+                let u = self.axis(turn, &a, &attitudes[i]);
+                let (cos, sin) = self.cos_sin(turn.angle);
+                let turn_angle = (turn.angle.rem_euclid(self.p as i64)) as u64;
+                let phi = times(times(self.pi, turn_angle, self.p), self.inverse(TURN as u64 / 2), self.p);
+                let j = self.mixed(&u, [sin, self.add(&1, &self.neg(&cos)), self.add(&phi, &self.neg(&sin))]);
+                // E(u): along the input axis, times the component of u
+                let mut e = vec![vec![0; n]; 3];
+                for (k, c) in problem.coefficients.iter().enumerate().filter(|(_, c)| c.of == Source::Rate) {
+                    let negative = c.factors.iter().fold(c.input.1, |sign, f| sign != f.1);
+                    let x = c.factors.iter().fold(1, |x, f| self.mul(&x, &u[f.0]));
+                    e[c.input.0][k] = if negative { self.neg(&x) } else { x };
+                }
+                let jump = product(self, &product(self, &a, &j), &e);
+                for (row, jump) in total.iter_mut().zip(&jump) {
+                    for (x, y) in row.iter_mut().zip(jump) {
+                        *x = self.add(x, y);
+                    }
+                }
+                a = self.turned(&a, turn, &u);
+            }
+            out.push(total.clone());
+        }
+        out
+    }
+}
+
+/// What the rows say in one field.
+pub(crate) struct Judged {
+    pub basis: Vec<(usize, usize, usize, String)>,
+    pub ranks: Vec<usize>,
+    pub witnesses: Vec<Witness>,
+}
+
+/// `v - factor e`.
+fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
+    for (x, &y) in v.iter_mut().zip(e).filter(|(_, y)| **y != 0) {
+        *x = (*x + p - times(factor, y, p)) % p;
+    }
+}
+
+/// The images of functionals, as long as a row.
+pub(crate) fn images(problem: &Problem, field: &PrimeField, functionals: &[Functional]) -> Vec<Vec<u64>> {
+    let dense = |c: &Functional| {
+        let mut v = vec![0; problem.names.len()];
+        for (name, number) in &c.0 {
+            if let Some(column) = problem.column(name) {
+                v[column] = field.image(number);
+            }
+        }
+        v
+    };
+    functionals.iter().map(dense).collect()
+}
+
+/// Goes through rows modulo `p` from the lowest order up: basis rows, pivots, ranks, and the witness of every
+/// functional.
+pub(crate) fn judge(
+    p: u64,
+    names: &[String],
+    rows: &[(RowName, Vec<u64>)],
+    functionals: &[Vec<u64>],
+) -> Judged {
+    let n = names.len();
+    let mut witnesses: Vec<Witness> = functionals.iter().map(|_| Witness::default()).collect();
+    // reduced echelon form; the columns beyond n say how a row is made of basis rows
+    let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
+    let (mut basis, mut ranks) = (Vec::new(), Vec::new());
+    for k in 0..=rows.iter().map(|r| r.0.1).max().unwrap_or(0) {
+        for ((i, order, c), row) in rows.iter().filter(|r| r.0.1 == k) {
+            if basis.len() == n {
+                break;
+            }
+            let mut v = row.clone();
+            v.resize(2 * n, 0);
+            v[n + basis.len()] = 1;
+            for (pivot, e) in &reduced {
+                let factor = v[*pivot];
+                subtract(&mut v, factor, e, p);
+            }
+            let Some(pivot) = (0..n).find(|&j| v[j] != 0) else { continue };
+            let scale = inverse(v[pivot], p);
+            v.iter_mut().for_each(|x| *x = times(*x, scale, p));
+            for (_, e) in &mut reduced {
+                let factor = e[pivot];
+                subtract(e, factor, &v, p);
+            }
+            reduced.push((pivot, v));
+            basis.push((*i, *order, *c, names[pivot].clone()));
+        }
+        ranks.push(basis.len());
+        for (c, witness) in functionals.iter().zip(&mut witnesses).filter(|(_, w)| w.degree.is_none()) {
+            let mut rest = c.clone();
+            rest.resize(2 * n, 0);
+            for (pivot, e) in reduced.iter().filter(|(pivot, _)| c[*pivot] != 0) {
+                subtract(&mut rest, c[*pivot], e, p);
+            }
+            match (0..n).find(|&j| rest[j] != 0) {
+                Some(hidden) => witness.hidden_by = Some(names[hidden].clone()),
+                None => {
+                    let used = basis.iter().enumerate().filter(|(j, _)| rest[n + j] != 0);
+                    witness.degree = Some(k);
+                    witness.solution = Some(used.map(|(_, (i, k, c, _))| (*i, *k, *c)).collect());
+                }
+            }
+        }
+    }
+    let last = ranks.iter().position(|r| *r == basis.len()).unwrap_or(0);
+    ranks.truncate(last + 1);
+    for (c, witness) in functionals.iter().zip(&mut witnesses) {
+        let excites = |row: &[u64]| row.iter().zip(c).any(|(x, c)| *x != 0 && *c != 0);
+        let excited = rows.iter().find(|(_, row)| excites(row)).map(|(name, _)| *name);
+        let status = match (witness.degree, excited) {
+            (Some(_), _) => "observable",
+            (None, Some(_)) => "inseparable",
+            (None, None) => "not_excited",
+        };
+        witness.status = status.into();
+        witness.excited_by = excited.filter(|_| witness.degree.is_none());
+    }
+    Judged { basis, ranks, witnesses }
+}
+
+/// Number of primes that make a false claim pass with a probability below 1e-12, at least 2, and that
+/// probability, where one prime misleads with a probability of at most `each`.
+///
+/// # Errors
+/// Eight primes do not suffice.
+pub(crate) fn primes(each: f64) -> Result<(usize, f64), Refused> {
+    let of = |count: usize| each.powi(count as i32);
+    let count = (2..=8).find(|&count| of(count) < 1e-12);
+    let expected = "a problem that eight primes decide with a probability of error below 1e-12";
+    count.map_or_else(|| Err(refusal("problem", expected, "a larger one")), |count| Ok((count, of(count))))
+}
+
+/// Bound on the probability that one prime misleads.
+pub(crate) fn error_bound(problem: &Problem, levels: usize, functionals: &[Functional]) -> f64 {
+    let order = order_of(problem);
+    let parts = [2, 3, 5].into_iter().filter(|q| order % q == 0);
+    let phi = parts.fold(order, |phi, q| phi / q * (q - 1)) as f64;
+    let n = problem.names.len() as f64;
+    let mut bits = 3.0 * (problem.factors() as f64 + 1.0) + 9.0 + n.log2() / 2.0;
+    let half = TURN as u64 / 2;
+    let turns: Vec<u64> = problem.slews.iter().flatten().map(|s| s.angle.unsigned_abs()).collect();
+    if !turns.is_empty() {
+        let common = turns.iter().fold(half, |g, angle| gcd(g, *angle));
+        bits += 24.0 + (turns.len() as f64).log2() + ((half / common) as f64).log2();
+    }
+    let terms = |c: &Functional| c.0.values().map(|x| x.0.len()).sum::<usize>();
+    let t = functionals[problem.names.len()..].iter().map(terms).max().unwrap_or(0) as f64;
+    let decisions = levels as f64 * (1.0 + functionals.len() as f64);
+    let two60 = 2f64.powi(60);
+    let prime = (n * bits + 40.0 * (t + 1.0)) * phi * 61.0 * std::f64::consts::LN_2 / (60.0 * two60);
+    decisions * ((5.0 * n + 40.0) / two60 + prime)
+}

@@ -1,0 +1,65 @@
+//! The checker in Python, `tools/verify_certificate.py`.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use serde_json::json;
+
+/// The checker in Python, asked certificate by certificate.
+pub(crate) struct Python {
+    child: Child,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+}
+
+const DRIVER: &str = r#"
+import json, sys
+sys.path.insert(0, sys.argv[1])
+sys.dont_write_bytecode = True
+from verify_certificate import Refused, verify
+for line in sys.stdin:
+    certificate, scheme = json.loads(line)
+    try:
+        answer = [True, "\n".join(verify(certificate.encode(), scheme))]
+    except Refused as e:
+        answer = [False, str(e)]
+    print(json.dumps(answer), flush=True)
+"#;
+
+impl Python {
+    /// `None` where there is no Python 3.11.
+    pub(crate) fn start() -> Option<Self> {
+        let probe = Command::new("python3").args(["-c", "import tomllib"]).stderr(Stdio::null()).status();
+        if !probe.is_ok_and(|s| s.success()) {
+            eprintln!("skipped: no python3 with tomllib");
+            return None;
+        }
+        let tools = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tools");
+        let mut child = Command::new("python3")
+            .args(["-c", DRIVER])
+            .arg(tools)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("python3 starts");
+        let input = child.stdin.take().expect("a pipe");
+        let output = BufReader::new(child.stdout.take().expect("a pipe"));
+        Some(Self { child, input, output })
+    }
+
+    /// Accepted or refused, and what was printed.
+    pub(crate) fn asks(&mut self, certificate: &str, scheme: Option<&str>) -> (bool, String) {
+        writeln!(self.input, "{}", json!([certificate, scheme])).expect("written");
+        let mut line = String::new();
+        self.output.read_line(&mut line).expect("an answer");
+        serde_json::from_str(&line).unwrap_or_else(|e| panic!("{e}: {line:?} about {certificate}"))
+    }
+}
+
+impl Drop for Python {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
