@@ -73,7 +73,7 @@ impl Problem<'_> {
         let starts = if self.kappa(&estimate)? >= BENT {
             self.starts_about(&estimate)
         } else if self.unknowns.undetermined && bins * self.unknowns.n.pow(2) <= SEARCHED {
-            self.from_priors()
+            self.drawn_starts()
         } else {
             return Ok(estimate);
         };
@@ -107,12 +107,12 @@ impl Problem<'_> {
         let axes = self.axes(estimate);
         let mut out: Vec<Vec<PlatformState>> =
             axes.iter().flat_map(|a| AWAY.map(|by| self.moved(from, &(a * by)))).collect();
-        out.extend(self.from_priors());
+        out.extend(self.drawn_starts());
         out
     }
 
     /// Starts by multiple shooting from first estimates drawn from the priors.
-    fn from_priors(&self) -> Vec<Vec<PlatformState>> {
+    fn drawn_starts(&self) -> Vec<Vec<PlatformState>> {
         let (mut noise, mut out) = (Noise::new(SEED, 1), Vec::new());
         for _ in 0..DRAWS {
             let d = DVector::from_fn(self.unknowns.n, |i, _| self.unknowns.prior[i] * noise.normal());
