@@ -51,7 +51,7 @@ pub(crate) fn inverse(a: u64, p: u64) -> u64 {
 /// Miller and Rabin with the first twelve primes, which decides all numbers below 2^64.
 pub(crate) fn is_prime(n: u64) -> bool {
     let small = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-    if small.iter().any(|q| n % q == 0) {
+    if small.iter().any(|q| n.is_multiple_of(*q)) {
         return small.contains(&n);
     }
     let s = (n - 1).trailing_zeros();
@@ -101,7 +101,7 @@ impl PrimeField {
         };
         let z = loop {
             let z = power(2 + random.below(p - 2), (p - 1) / order, p);
-            if [2, 3, 5].iter().all(|q| order % q != 0 || power(z, order / q, p) != 1) {
+            if [2, 3, 5].iter().all(|q| !order.is_multiple_of(*q) || power(z, order / q, p) != 1) {
                 break z;
             }
         };
@@ -387,7 +387,7 @@ pub(crate) fn primes(each: f64) -> Result<(usize, f64), Refused> {
 /// Bound on the probability that one prime misleads.
 pub(crate) fn error_bound(problem: &Problem, levels: usize, functionals: &[Functional]) -> f64 {
     let order = order_of(problem);
-    let parts = [2, 3, 5].into_iter().filter(|q| order % q == 0);
+    let parts = [2, 3, 5].into_iter().filter(|q| order.is_multiple_of(*q));
     let phi = parts.fold(order, |phi, q| phi / q * (q - 1)) as f64;
     let n = problem.names.len() as f64;
     let mut bits = 3.0 * (problem.factors() as f64 + 1.0) + 9.0 + n.log2() / 2.0;

@@ -8,6 +8,7 @@
 //! solution, at `wN = 1`, a polynomial in `wU` of degree at most 2 (of a combination: more, by the powers in
 //! it).
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use obsdeg_exact::radical::embeddings;
@@ -178,17 +179,23 @@ impl<'a> Points<'a> {
         }
         let mut out = vec![ExactNumber::new(); rows.len()];
         for (weight, part) in parts {
-            // y[field][embedding][point][row]
+            // y[field][embedding][point][row]; what is observable at the given latitude alone has no solution
+            let holds = Cell::new(true);
             let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;
-                let rates = [f.from_u64(*w_n), f.from_u64(*w_u)];
-                s.staircase.solution(&s.inverses[degree], &image(&part, &s.sample, rates))
+                let c = image(&part, &s.sample, [f.from_u64(*w_n), f.from_u64(*w_u)]);
+                let y = s.staircase.solution(&s.inverses[degree], &c);
+                holds.set(holds.get() && s.staircase.makes(&y, &c));
+                y
             };
             let y = self.stairs.each_ref().map(|embeddings| {
                 embeddings.each_ref().map(|points| {
                     points.iter().zip(&self.rates).map(|(s, r)| solved(s, r)).collect::<Vec<_>>()
                 })
             });
+            if !holds.get() {
+                return None;
+            }
             for (slot, &row) in out.iter_mut().zip(rows) {
                 let power = weight - staircase.basis[row].0.1 as i32;
                 slot.extend(self.terms(power, |field, embedding, point| y[field][embedding][point][row])?);

@@ -258,8 +258,8 @@ fn combinations(platform: &Platform, judged: &Judged<'_>) -> Vec<Exactly> {
     let writable = |c: &Coefficient| {
         matches!(c.number, Number::Radical(_))
             && !c.is_zero()
-            && !(pole && c.rates[0] != 0)
-            && !(equator && c.rates[1] != 0)
+            && (c.rates[0] == 0 || !pole)
+            && (c.rates[1] == 0 || !equator)
     };
     found
         .into_iter()

@@ -120,6 +120,21 @@ impl Staircase {
         y
     }
 
+    /// Whether `y` times the first basis rows makes a functional.
+    pub(super) fn makes(&self, y: &[u64], c: &[(usize, u64)]) -> bool {
+        let f = &self.field;
+        let mut rest = vec![0; self.spaces[0].columns()];
+        for &(column, x) in c {
+            rest[column] = f.sub(rest[column], x);
+        }
+        for (&y, &row) in y.iter().zip(&self.of_basis) {
+            for (rest, &x) in rest.iter_mut().zip(&self.rows[row].1) {
+                *rest = f.add(*rest, f.mul(y, x));
+            }
+        }
+        rest.iter().all(|x| *x == 0)
+    }
+
     /// Status, degree and witness of functionals, each as columns and values.
     pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<Found> {
         let orders = 0..self.ranks.len();
