@@ -571,6 +571,7 @@ def verify(data, scheme=None):
     for _ in range(count):
         field = PrimeField(problem, random)
         images = [{problem.names.index(k): field.image(v) for k, v in c.items()} for c in functionals]
+        need(all(x for c in images for x in c.values()), "combinations", "expected numbers other than 0", "found one that is 0 at this latitude")
         compare(judge(field.p, problem.names, field.rows(problem), images), ranks, basis, claims)
     if exact:
         rows = Exact(problem)
@@ -714,6 +715,14 @@ def known_keys(table, known):
     need(not other, "scheme", "expected keys of standing positions", f"found {text(other)}")
 
 
+def by_key(axes, keys):
+    """Axes of a scheme file, a table or a list in the order of the keys, as a table."""
+    own = dict(zip(keys, axes)) if isinstance(axes, list) and len(axes) == len(keys) else axes
+    good = isinstance(own, dict) and sorted(own) == sorted(keys) and all(isinstance(a, str) for a in own.values())
+    need(good, "scheme", f"expected axes {', '.join(keys)}", f"found {text(axes)}")
+    return own
+
+
 def scheme_terms(file):
     """The terms of a scheme file, families written out."""
     terms, frame = file.get("terms", ["F", "I", "O", "S"]), file.get("frame", "accelerometers")
@@ -756,9 +765,9 @@ def read_scheme(scheme, claimed):
     signed = lambda a: a if a[:1] in "+-" else f"+{a}"
     gyros = []
     for letter, axes in zip(SENSORS, default):
-        own = geometry.get(letter, dict(zip("IOS", axes.split())))
+        own = by_key(geometry.get(letter, axes.split()), "IOS")
         gyros.append({k: signed(own[k]) for k in "IOS"})
-    inputs = geometry.get("accelerometers", {"X": "+x", "Y": "+y", "Z": "+z"})
+    inputs = by_key(geometry.get("accelerometers", ["+x", "+y", "+z"]), SENSORS)
     latitude = file.get("latitude_deg")
     positions = [position(p) for p in file.get("position", [])]
     act = file.get("carry") == "inertial" and len(positions) > 1 and any(t in RATE for t in terms)

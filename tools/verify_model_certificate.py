@@ -55,6 +55,10 @@ class Model:
         self.states, self.unknowns, self.outputs = len(states), len(states) + len(parameters), outputs
         self.slots = states + parameters + constants + [name for name, _ in inputs]
         self.state_names = states
+        for name in self.slots + [name for name, _ in outputs]:
+            form = name[:1].isalpha() or name[:1] == "_"
+            form = form and len(name) <= 256 and all(c.isalnum() or c in "_[],.@'" for c in name)
+            need(form, "problem", "expected names of letters, digits and _ that begin with a letter or _", f"found {text(name)}")
         need(len(set(self.slots)) == len(self.slots), "problem", "expected different names", "found one twice")
         need(1 <= self.unknowns <= 300 and len(self.slots) <= 1000, "problem", "expected 1 to 300 unknowns, 1000 names", f"found {len(self.slots)}")
         listed("problem.rates", self.rates, self.states, self.states)

@@ -37,8 +37,8 @@ def place(path: Path, text: bytes) -> None:
         raise
 
 
-#: Most characters of a text that is read.
-TEXT = 10_000_000
+#: Most characters of a text that is read: as many as bytes on the command line.
+TEXT = 50_000_000
 
 
 def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:

@@ -218,8 +218,32 @@ fn small_texts_that_ask_for_too_much_are_refused() {
             "the powers in it are too high",
         ),
         (
-            format!("name = \"m\"\n[states]\n{long} = \"-{long}\"\n[outputs]\ny = \"{long}\"\n"),
+            format!("name = \"m\"\n[states]\n{long} = \"-1\"\n[outputs]\ny = \"1\"\n"),
             "a name of 1000000 characters; expected at most 256",
+        ),
+        (
+            format!("name = \"m\"\n[states]\nx = \"-x\"\n[outputs]\n{long} = \"x\"\n"),
+            "a name of 1000000 characters; expected at most 256",
+        ),
+        (
+            format!("name = \"m\"\n[states]\nx = \"-{long}*x\"\n[outputs]\ny = \"x\"\n"),
+            "a name of at most 256 characters",
+        ),
+        (
+            format!("name = \"{long}\"\n[states]\nx = \"-x\"\n[outputs]\ny = \"x\"\n"),
+            "a name of a model of 1000000 characters; expected at most 4000",
+        ),
+        (
+            format!(
+                "name = \"m\"\n[states]\nx = {{ equation = \"-x\", unit = \"{long}\" }}\n[outputs]\ny = \"x\"\n"
+            ),
+            "a unit of 1000000 characters; expected at most 256",
+        ),
+        (
+            format!(
+                "name = \"m\"\n[states]\nx = {{ equation = \"-x\", description = \"{long}\" }}\n[outputs]\ny = \"x\"\n"
+            ),
+            "a description of 1000000 characters; expected at most 4000",
         ),
         // 64 choices of factors, none of which has a real point: the work of all of them is bounded
         (
@@ -240,6 +264,7 @@ fn small_texts_that_ask_for_too_much_are_refused() {
         let stderr = String::from_utf8_lossy(&done.stderr);
         let beginning: String = stderr.chars().take(400).collect();
         assert!(done.status.code() == Some(2) && stderr.contains(expected), "{expected}: {beginning}");
+        assert!(stderr.len() < 10_000, "{expected}: {} bytes: {beginning}", stderr.len());
     }
 }
 

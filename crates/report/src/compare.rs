@@ -257,9 +257,11 @@ impl Answer for Comparison {
                 }
             }
         }
+        let with_bench = self.schemes.iter().any(|r| r.conditions.bench.is_some());
+        let figure = if with_bench { "worst total(D), with the bench" } else { "worst sigma(D)" };
         blocks.push(Block::table(
-            "Sensitivity of the worst sigma(D)",
-            [left("condition"), left("scheme"), right("rank with dwell"), left("worst sigma(D)")],
+            format!("Sensitivity of the {figure}"),
+            [left("condition"), left("scheme"), right("rank with dwell"), left(figure)],
             rows,
         ));
         for r in &self.schemes {

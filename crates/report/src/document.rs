@@ -242,7 +242,10 @@ pub(crate) fn number(x: f64) -> String {
     } else if !(1e-3..1e5).contains(&magnitude) {
         format!("{x:.3e}")
     } else {
-        let decimals = (3 - magnitude.log10().floor() as i32).clamp(0, 6) as usize;
+        // the exponent behind rounding: 0.99999 is 1.000
+        let rounded = format!("{magnitude:.3e}");
+        let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse::<i32>().ok()).unwrap_or(0);
+        let decimals = (3 - exponent).clamp(0, 6) as usize;
         format!("{x:.decimals$}")
     }
 }

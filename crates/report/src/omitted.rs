@@ -64,7 +64,7 @@ fn row(f: &FamilyEffect) -> Vec<String> {
         f.worst.as_ref().map_or_else(none, |w| w.unknown.clone()),
         f.worst_in_sigmas.map_or_else(none, |x| format!("{} {}", short(1.0 / x), f.unit)),
         f.visible_from.map_or_else(none, |x| format!("{} {}", short(x), f.unit)),
-        f.uses_up.as_ref().map_or_else(none, |u| format!("{} {} ({})", short(u.size), f.unit, u.unknown)),
+        f.uses_up.as_ref().map_or_else(none, |u| format!("{} {} ({})", below(u.size), f.unit, u.unknown)),
     ]
 }
 
@@ -135,8 +135,8 @@ fn advice(of: &OmittedEffects) -> Vec<String> {
 /// One change, as it was tried.
 pub(crate) fn advised(a: &Advice) -> String {
     let what = match a.kind {
-        AdviceKind::Estimate => format!("Estimate {} too (add to --terms)", a.what),
-        AdviceKind::Relevel => "Level the platform again before each position (--carry reset)".into(),
+        AdviceKind::Estimate => format!("Estimate {} too (add to `terms` of the scheme)", a.what),
+        AdviceKind::Relevel => "Level the platform again before each position (carry reset)".into(),
         AdviceKind::AddPosition => format!("Add a position {}, as long as the last one", a.what),
     };
     format!(
@@ -223,6 +223,11 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         }
         .into(),
     ];
+    if !of.budgets.is_empty() {
+        out.push(
+            "uses up a margin at: size in place of that of the bench, for the requirements that are met with it".into(),
+        );
+    }
     if !of.torquers_in_turns {
         out.push("GS and GM act at the earth rate alone: the turns between positions are not stated".into());
     }

@@ -136,7 +136,7 @@ fn of_scheme(certificate: &[u8], scheme: Option<&str>) -> Result<Vec<String>, Re
     for _ in 0..count {
         let field = PrimeField::new(&problem, &mut random);
         field.check_slews(&problem)?;
-        let (rows, functionals) = (problem.rows(&field), images(&problem, &field, &functionals));
+        let (rows, functionals) = (problem.rows(&field), images(&problem, &field, &functionals)?);
         compare(&judge(field.p, &problem.names, &rows, &functionals), &file.ranks, &file.basis, &claims)?;
     }
     if exactly {

@@ -115,11 +115,26 @@ pub(crate) fn verify(certificate: &[u8], compared: bool) -> Result<Vec<String>, 
     Ok(out)
 }
 
+/// True for at most 256 letters, digits and `_ [ ] , . @ '`, a letter or `_` first: such a name can not pass for
+/// an expression or for a sentence of the answer.
+fn is_name(name: &str) -> bool {
+    let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
+    first && name.chars().count() <= 256 && name.chars().all(|c| c.is_alphanumeric() || "_[],.@'".contains(c))
+}
+
 impl Model {
     fn new(raw: RawModel) -> Result<Self, Refused> {
         let inputs = raw.inputs.iter().map(|input| &input.0);
         let slots: Vec<String> =
             raw.states.iter().chain(&raw.parameters).chain(&raw.constants).chain(inputs).cloned().collect();
+        let wrong = slots.iter().chain(raw.outputs.iter().map(|o| &o.0)).find(|name| !is_name(name));
+        if let Some(name) = wrong {
+            return Err(refusal(
+                "problem",
+                "names of letters, digits and _ that begin with a letter or _",
+                name,
+            ));
+        }
         let mut sorted: Vec<&String> = slots.iter().collect();
         sorted.sort();
         let twice = sorted.windows(2).find(|pair| pair[0] == pair[1]);

@@ -290,16 +290,22 @@ fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
     }
 }
 
-/// The images of functionals, as long as a row.
-pub(crate) fn images(problem: &Problem, field: &PrimeField, functionals: &[Functional]) -> Vec<Vec<u64>> {
+/// The images of functionals, as long as a row. Refused is an entry that is 0 at the latitude of the problem, such
+/// as `wN - wU` at 45 deg.
+pub(crate) fn images(
+    problem: &Problem,
+    field: &PrimeField,
+    functionals: &[Functional],
+) -> Result<Vec<Vec<u64>>, Refused> {
     let dense = |c: &Functional| {
         let mut v = vec![0; problem.names.len()];
         for (name, number) in &c.0 {
             if let Some(column) = problem.column(name) {
                 v[column] = field.image(number);
+                need(v[column] != 0, &format!("combinations, {name}"), "a number other than 0", "0")?;
             }
         }
-        v
+        Ok(v)
     };
     functionals.iter().map(dense).collect()
 }

@@ -113,20 +113,8 @@ fn read(scheme: &str, claimed: Option<&[Vec<RawTurn>]>) -> Result<RawProblem, Re
     let empty = Value::Table(toml::Table::new());
     let geometry = file.get("geometry").unwrap_or(&empty);
     let gyro = |letter: &str, defaults: [&str; 3]| {
-        let own = geometry.get(letter);
-        let axis = |key: &str, default| {
-            let value = own.map_or(Ok(default), |own| text(own.get(key), "", "an axis"));
-            value.map(signed)
-        };
-        Ok::<_, Refused>(RawGyro {
-            I: axis("I", defaults[0])?,
-            O: axis("O", defaults[1])?,
-            S: axis("S", defaults[2])?,
-        })
-    };
-    let accelerometer = |letter: &str, default| {
-        let own = geometry.get("accelerometers");
-        own.map_or(Ok(default), |own| text(own.get(letter), "", "an axis")).map(signed)
+        let [i, o, s] = axes(geometry.get(letter), ["I", "O", "S"], defaults)?;
+        Ok::<_, Refused>(RawGyro { I: i, O: o, S: s })
     };
     let (positions, entries) = match file.get("position") {
         Some(Value::Array(list)) => (list.iter().map(position).collect::<Result<Vec<_>, _>>()?, list),
@@ -151,9 +139,24 @@ fn read(scheme: &str, claimed: Option<&[Vec<RawTurn>]>) -> Result<RawProblem, Re
             gyro("Y", ["+y", "-z", "-x"])?,
             gyro("Z", ["+z", "+x", "+y"])?,
         ],
-        accelerometers: [accelerometer("X", "+x")?, accelerometer("Y", "+y")?, accelerometer("Z", "+z")?],
+        accelerometers: axes(geometry.get("accelerometers"), ["X", "Y", "Z"], ["+x", "+y", "+z"])?,
         positions,
     })
+}
+
+/// Three axes, in a table with these keys or in a list in their order.
+fn axes(own: Option<&Value>, keys: [&str; 3], defaults: [&str; 3]) -> Result<[String; 3], Refused> {
+    let found = match own {
+        None => return Ok(defaults.map(signed)),
+        Some(Value::Array(list)) if list.len() == 3 => [Some(&list[0]), Some(&list[1]), Some(&list[2])],
+        Some(Value::Table(table)) => {
+            known_keys(table, &keys)?;
+            keys.map(|key| table.get(key))
+        }
+        Some(other) => return refused("three axes", other.type_str()),
+    };
+    let [a, b, c] = found.map(|axis| text(axis, "", "an axis").map(signed));
+    Ok([a?, b?, c?])
 }
 
 fn position(entry: &Value) -> Result<[String; 3], Refused> {

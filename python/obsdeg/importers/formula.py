@@ -56,7 +56,7 @@ _READ = {**FUNCTIONS, **DERIVED, "exp": bounded_exp}
 _PRINTED = {f: name for name, f in FUNCTIONS.items() if name != "sqrt"} | {sympy.atan2: "atan2"}
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
     r"|(?P<name>[^\W\d][\w!]*)|(?P<sign>\*\*|//|[-+*/^(),]))"
 )
 #: Factors above which a product is made at once.

@@ -17,7 +17,7 @@ _MACRO = re.compile(r"@ODEmodel\s*\(")
 _LEFT = re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$")
 _OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
 # 2x, 3(a + b): a number in front multiplies; in 1e5*x it is all of 1e5
-_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
+_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
 
 
 def load(path: str | Path, *, model: int = 1) -> System:

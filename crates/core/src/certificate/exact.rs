@@ -179,13 +179,15 @@ impl<'a> Points<'a> {
         }
         let mut out = vec![ExactNumber::new(); rows.len()];
         for (weight, part) in parts {
-            // y[field][embedding][point][row]; what is observable at the given latitude alone has no solution
+            // y[field][embedding][point][row]; what is observable at the given latitude alone has no solution, and
+            // a row whose coefficient is zero at it alone (such as wN - wU at 45 deg) is none of `rows`
             let holds = Cell::new(true);
             let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;
                 let c = image(&part, &s.sample, [f.from_u64(*w_n), f.from_u64(*w_u)]);
                 let y = s.staircase.solution(&s.inverses[degree], &c);
-                holds.set(holds.get() && s.staircase.makes(&y, &c));
+                let listed = y.iter().enumerate().all(|(i, y)| *y == 0 || rows.contains(&i));
+                holds.set(holds.get() && listed && s.staircase.makes(&y, &c));
                 y
             };
             let y = self.stairs.each_ref().map(|embeddings| {

@@ -134,7 +134,24 @@ fn check_shape(model: &SystemModel, compiled: &Compiled) -> Result<(), Certifica
     if compiled.dag.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi)) {
         return Err(not_covered("functions", "rational models"));
     }
-    Ok(())
+    let inputs =
+        model.known_inputs.iter().map(|i| &i.0.name).chain(model.unknown_inputs.iter().map(|i| &i.0.name));
+    let named = model.parameters.iter().map(|n| &n.name).chain(model.constants.iter().map(|c| &c.0.name));
+    let names = model.states.iter().map(|s| &s.named.name).chain(inputs).chain(named);
+    let mut names = names.chain(model.outputs.iter().map(|o| &o.0.name));
+    match names.find(|name| !is_name(name)) {
+        Some(name) => Err(not_covered(format!("the name `{name}`"), NAMES)),
+        None => Ok(()),
+    }
+}
+
+/// Names that certificates cover.
+const NAMES: &str = "names of letters, digits and _ [ ] , . @ ' that begin with a letter or _, at most 256";
+
+/// True for a name that a checker takes: one that can not pass for an expression.
+fn is_name(name: &str) -> bool {
+    let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
+    first && name.chars().count() <= 256 && name.chars().all(|c| c.is_alphanumeric() || "_[],.@'".contains(c))
 }
 
 /// Refuses what the layout does not cover: starts and inputs that are not generic.

@@ -9,6 +9,8 @@ use obsdeg_exact::Field;
 
 /// Deepest nesting of brackets, signs and powers.
 pub const MAX_DEPTH: usize = 200;
+/// Most characters of a name.
+pub const MAX_NAME: usize = 256;
 
 /// An expression: its operations in order, the last one being the whole.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -6,7 +6,7 @@ pub(crate) mod parser;
 pub(crate) mod vectors;
 
 pub use expression::{
-    Environment, Expression, ExpressionError, Function, MAX_DEPTH, Names, Node, constant, evaluate,
+    Environment, Expression, ExpressionError, Function, MAX_DEPTH, MAX_NAME, Names, Node, constant, evaluate,
     evaluate_f64, from_i128,
 };
 pub(crate) use expression::{among, nearest};

@@ -7,7 +7,9 @@ use winnow::combinator::{Infix, Prefix, expression};
 use winnow::error::{ErrMode, ParserError};
 use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
-use super::expression::{Expression, ExpressionError, Function, MAX_DEPTH, Names, Node, evaluate_f64};
+use super::expression::{
+    Expression, ExpressionError, Function, MAX_DEPTH, MAX_NAME, Names, Node, evaluate_f64,
+};
 use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
 
 /// The shapes of names that are no scalars.
@@ -227,6 +229,9 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     let mut length = rest.find(|c| !more(c)).unwrap_or(rest.len());
     if names == Names::Platform && rest[length..].starts_with("^n") {
         length += 2;
+    }
+    if rest[..length].chars().nth(MAX_NAME).is_some() {
+        return wrong(input, "a name of at most 256 characters");
     }
     let name = rest[..length].to_string();
     input.next_slice(length);

@@ -7,7 +7,7 @@ use super::constraints::{ConstraintFactor, below, slots_of};
 use super::dag::{Dag, DagError, Op};
 use super::error::ModelError;
 use super::work::WorkLimit;
-use crate::language::{Expression, Function, among, nearest};
+use crate::language::{Expression, Function, MAX_NAME, among, nearest};
 use crate::model::recording::Recording;
 
 /// Where something is written.
@@ -199,8 +199,10 @@ pub(crate) const MAX_UNKNOWNS: usize = 4000;
 pub(crate) const MAX_EXPERIMENTS: usize = 20;
 /// Highest degree of an input that is a polynomial in time.
 pub(crate) const MAX_DEGREE: usize = 50;
-/// Most characters of a name.
-pub(crate) const MAX_NAME: usize = 256;
+/// Most characters of a unit of an unknown, an input or an output.
+const MAX_UNIT: usize = 256;
+/// Most characters of a description of one of these, and of the name of a model.
+const MAX_DESCRIPTION: usize = 4000;
 /// Most operations of a system.
 pub(crate) const MAX_NODES: usize = 200_000;
 
@@ -355,6 +357,17 @@ pub struct CompiledSegment {
     pub carry: Vec<(usize, usize)>,
 }
 
+/// Refuses a text of more than `most` characters of what is named `of`.
+fn check_length(what: &str, of: &str, text: &str, most: usize) -> Result<(), ModelError> {
+    if text.chars().nth(most).is_none() {
+        return Ok(());
+    }
+    let shown: String = of.chars().take(20).collect();
+    let more = if shown.len() < of.len() { "..." } else { "" };
+    let message = format!("a {what} of {} characters; expected at most {most}", text.chars().count());
+    Err(ModelError { what: format!("`{shown}{more}`"), message, span: None })
+}
+
 impl SystemModel {
     /// The equations as written, known inputs that are functions of time first, then definitions: `u = ...`,
     /// `a = ...`, `x' = ...`, `y = ...`; what one text says of all entries of a vector stands once. An
@@ -484,15 +497,11 @@ impl SystemModel {
                 "two outputs of this name; expected different names".into(),
             );
         }
+        self.check_texts()?;
         let mut seen: HashSet<String> = HashSet::new();
         let names = self.roles().into_iter().filter(|r| r.1 != Role::Time).map(|r| r.0);
         for name in names.chain(self.definitions.iter().map(|d| d.0.clone())) {
-            if let Some((cut, _)) = name.char_indices().nth(MAX_NAME) {
-                let shown: String = name[..cut].chars().take(20).collect();
-                let found = name.chars().count();
-                let message = format!("a name of {found} characters; expected at most {MAX_NAME}");
-                return refuse(format!("`{shown}...`"), message);
-            }
+            check_length("name", &name, &name, MAX_NAME)?;
             if Function::named(name.split('[').next().unwrap_or_default()).is_some() {
                 return refuse(
                     format!("`{name}`"),
@@ -515,6 +524,21 @@ impl SystemModel {
                 return refuse(format!("`{name}`"), "given twice; expected different names".into());
             }
             seen.insert(name);
+        }
+        Ok(())
+    }
+
+    /// Refuses texts that are too long for a column of a table.
+    fn check_texts(&self) -> Result<(), ModelError> {
+        check_length("name of a model", &self.name, &self.name, MAX_DESCRIPTION)?;
+        let inputs = self.known_inputs.iter().map(|i| &i.0).chain(self.unknown_inputs.iter().map(|i| &i.0));
+        let constants = self.constants.iter().map(|c| &c.0);
+        let outputs = self.outputs.iter().map(|o| &o.0);
+        let states = self.states.iter().map(|s| &s.named);
+        for of in states.chain(&self.parameters).chain(inputs).chain(constants).chain(outputs) {
+            check_length("name", &of.name, &of.name, MAX_NAME)?;
+            check_length("unit", &of.name, &of.unit, MAX_UNIT)?;
+            check_length("description", &of.name, &of.description, MAX_DESCRIPTION)?;
         }
         Ok(())
     }

@@ -239,7 +239,13 @@ impl Conditions {
 
     /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error; `None` where none is stated.
     pub fn bench_in_words(&self) -> Option<String> {
-        let listed: Vec<String> = self.bench.iter().map(|a| format!("{} {}", a.name, a.value)).collect();
+        // of two sizes of the same error the later one counts
+        let counts = |i: &usize| {
+            let own = &self.bench[*i].name;
+            !self.bench[i + 1..].iter().any(|later| later.name == *own || concerns(&later.name, own))
+        };
+        let counting = (0..self.bench.len()).filter(counts).map(|i| &self.bench[i]);
+        let listed: Vec<String> = counting.map(|a| format!("{} {}", a.name, a.value)).collect();
         (!listed.is_empty()).then(|| listed.join(", "))
     }
 

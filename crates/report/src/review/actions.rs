@@ -78,6 +78,12 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     out
 }
 
+/// True if the sigma of an unknown meets its requirement, whatever the bench adds.
+fn sigma_meets(review: &ComparedScheme, name: &str) -> bool {
+    let own = review.quantities.iter().find(|q| q.name == name);
+    own.and_then(|q| q.sigma.zip(q.requirement)).is_some_and(|(sigma, required)| sigma <= required)
+}
+
 /// Whether longer dwells meet what is too large.
 fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
@@ -92,6 +98,19 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
             format!(
                 "Dwell {} times as long: by prediction this meets the requirement of {names}.",
                 number(*factor)
+            )
+        }
+        None if large.iter().all(|name| sigma_meets(review, name)) => {
+            let tried = review
+                .omitted
+                .advice
+                .iter()
+                .min_by(|a, b| a.total_over_required.total_cmp(&b.total_over_required));
+            let tried = tried.map_or_else(String::new, |a| {
+                format!(" Best change that was tried: {}.", omitted::advised(a))
+            });
+            format!(
+                "Change the positions, the bench or the requirements: for {names} sigma alone meets the requirement, the total with the bench does not.{tried}"
             )
         }
         None => {

@@ -1,5 +1,7 @@
 //! Certificates of random schemes and published models and the changes of them, held against both checkers.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "what was measured")]
+
 mod models;
 mod python;
 mod schemes;

@@ -187,3 +187,23 @@ fn models_without_certificates() {
         assert!(error.contains(reason), "{error}");
     }
 }
+
+/// Names that pass for an expression or for a sentence of the answer are refused, by both checkers.
+#[test]
+fn names_that_lie_are_refused() {
+    let model = model_file::read("name='m'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'")
+        .expect("a model");
+    let text = certify_model(&model, 1).expect("a certificate").text().expect("JSON");
+    let mut python = Python::start();
+    assert!(verify(text.as_bytes(), None).is_ok());
+    for lie in ["k\\nRank 9 of 9; verified exactly.", "2", "(a * b)", "", "z = k + x; y", "a b", "k\\u202e"] {
+        let forged = text.replace("\"k\"", &format!("\"{lie}\""));
+        assert_ne!(forged, text);
+        let refused = verify(forged.as_bytes(), None).expect_err("refused").to_string();
+        assert!(refused.contains("names of letters, digits and _"), "{lie}: {refused}");
+        if let Some(python) = &mut python {
+            let (accepted, said) = python.asks(&forged, None);
+            assert!(!accepted && said.contains("names of letters, digits and _"), "{lie}: {said}");
+        }
+    }
+}

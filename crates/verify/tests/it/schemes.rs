@@ -170,7 +170,7 @@ fn belongs(kind: &str, path: &[String], value: &Value) -> bool {
             first == "combinations" && path.len() == 6 && path[2] == "terms" && ["0", "1"].contains(&last)
         }
         "solution" => of_claim && path[2] == "solution" && path.len() == 5,
-        _ => of_claim && ["hidden_by", "unknown"].contains(&last) || of_claim && path[2] == "excited_by",
+        _ => of_claim && (["hidden_by", "unknown"].contains(&last) || path[2] == "excited_by"),
     }
 }
 
@@ -358,5 +358,55 @@ fn schemes_without_certificates() {
     for (text, reason) in cases {
         let error = certify(&scheme(text), 1).expect_err("not covered").to_string();
         assert!(error.contains(reason), "{error}");
+    }
+}
+
+/// What holds at the latitude of the scheme alone has a certificate of kind modular that both checkers accept; a
+/// combination that is zero there is refused.
+#[test]
+fn what_holds_at_one_latitude_is_modular() {
+    let head = "carry = \"inertial\"\nlatitude_deg = 45\nterms = [\"F\", \"I\", \"O\", \"S\", \"II\", \"IO\", \"OS\"]\n\
+                combinations = [\"D_FX - D_FZ\", \"2*psi_x + wU/wN*psi_z\"]\n";
+    let positions =
+        ["-900, 180, 675", "-1035, 765, -90", "-1035, -585, 135", "1080, 810, 180", "-945, 585, 855"]
+            .map(|angles| format!("[[position]]\nangles_deg = [{angles}]\n"))
+            .concat();
+    let text = format!("{head}{positions}");
+    let (certificate, json) = certified(&text);
+    assert_eq!(certificate.kind, Kind::Modular);
+    assert!(!certificate.combinations.is_empty());
+    verify(json.as_bytes(), Some(&text)).expect("accepted");
+    let mut python = Python::start();
+    if let Some(python) = &mut python {
+        assert!(python.asks(&json, Some(&text)).0);
+    }
+    // wN - wU is zero at 45 deg
+    let mut value: Value = serde_json::from_str(&json).expect("JSON");
+    let terms = value["combinations"][0]["terms"].as_object_mut().expect("terms");
+    let first = terms.values_mut().next().expect("a term");
+    *first = json!([[1, 1, 1, 1, 0], [-1, 1, 1, 0, 1]]);
+    let forged = value.to_string();
+    let refused = verify(forged.as_bytes(), None).expect_err("refused").to_string();
+    assert!(refused.contains("a number other than 0"), "{refused}");
+    if let Some(python) = &mut python {
+        let (accepted, said) = python.asks(&forged, None);
+        assert!(!accepted && said.contains("numbers other than 0"), "{said}");
+    }
+}
+
+/// Axes as a list are those of a table in its order.
+#[test]
+fn axes_in_a_list() {
+    let positions = "[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
+    let axes = ["[\"-y\", \"+z\", \"x\"]", "{ X = \"-y\", Y = \"+z\", Z = \"x\" }"];
+    let text =
+        axes.map(|a| format!("terms = [\"F\", \"K0\"]\n[geometry]\naccelerometers = {a}\n{positions}"));
+    let json = certified(&text[1]).1;
+    let mut python = Python::start();
+    for text in &text {
+        verify(json.as_bytes(), Some(text)).expect("accepted");
+        if let Some(python) = &mut python {
+            assert!(python.asks(&json, Some(text)).0, "{text}");
+        }
     }
 }
