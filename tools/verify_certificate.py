@@ -397,7 +397,7 @@ class PrimeField:
 
 
 def judge(p, names, rows, functionals):
-    """What rows, each (segment, order, component) and entries, say modulo a prime: basis, ranks, and per functional status, degree, witness."""
+    """Basis, ranks, and per functional status, degree and witness, by rows (segment, order, component; entries) modulo a prime."""
     n = len(names)
     found = [{"degree": None, "solution": None, "hidden_by": None, "excited_by": None} for _ in functionals]
     # reduced echelon form; the columns beyond n tell how each row is made of the basis rows
@@ -593,7 +593,7 @@ def verify(data, scheme=None):
 
 
 def compare(found, ranks, basis, claims):
-    """What a certificate says must be what the rows say modulo a prime."""
+    """Refuses claims that differ from those found modulo a prime."""
     found_basis, found_ranks, witnesses = found
     same("ranks", ranks, found_ranks)
     same("basis", basis, found_basis)

@@ -218,6 +218,10 @@ fn small_texts_that_ask_for_too_much_are_refused() {
             "the powers in it are too high",
         ),
         (
+            format!("name = \"m\"\n[states]\n{long} = \"-{long}\"\n[outputs]\ny = \"{long}\"\n"),
+            "a name of at most 256 characters",
+        ),
+        (
             format!("name = \"m\"\n[states]\n{long} = \"-1\"\n[outputs]\ny = \"1\"\n"),
             "a name of 1000000 characters; expected at most 256",
         ),

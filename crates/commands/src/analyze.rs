@@ -233,7 +233,7 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 /// The certificate of the verdicts on the one scheme or model that was read, under its name `certificate.json`.
 ///
 /// # Errors
-/// What has no certificate.
+/// [`Problem`] of a scheme or model that certificates do not cover.
 pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
     let text = match read {
         [(_, Input::Scheme(scheme))] => certify(scheme, options.seed)?.text(),
@@ -250,7 +250,7 @@ pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
 /// The SHA-256 of the certificate of a scheme, in hexadecimal digits. It does not depend on a seed.
 ///
 /// # Errors
-/// What has no certificate.
+/// [`Problem`] of a scheme or model that certificates do not cover.
 pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
     let text = certify(scheme, SEED)?.text().map_err(|e| Problem::internal(e.to_string()))?;
     Ok(Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())

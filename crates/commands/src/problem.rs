@@ -91,7 +91,7 @@ impl Problem {
     }
 }
 
-/// What a certificate does not cover, or what is wrong with the scheme or model.
+/// Bad input: a scheme or model that certificates do not cover, or that has a fault of its own.
 impl From<CertificateError> for Problem {
     fn from(e: CertificateError) -> Self {
         match e {

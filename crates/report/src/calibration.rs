@@ -208,7 +208,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// That no estimate stands at the drifts of the record; `None` if they do. Nothing is wrong with the record then.
+/// Sentence that no estimate stands at the drifts of the record, with which nothing is wrong then; `None` if
+/// estimates stand.
 fn left_open(c: &Calibration) -> Option<String> {
     if !c.quantities.iter().chain(&c.combinations).any(|e| e.left_open) {
         return None;

@@ -116,7 +116,7 @@ pub(crate) fn document(
     Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
 }
 
-/// What checks the exact verdicts of schemes without this program.
+/// Section on checking the exact verdicts of schemes without this program.
 fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
     if origin.certificates.is_empty() {
         return;

@@ -75,7 +75,7 @@ pub(crate) struct Claimed {
     pub witness: Witness,
 }
 
-/// What the certificate claims of a functional, or what a checker finds.
+/// Status, degree and witness of a functional: claimed by the certificate, or found by the checker.
 #[derive(Serialize, Default)]
 pub(crate) struct Witness {
     pub status: String,

@@ -204,7 +204,7 @@ fn claims<'a>(
     Ok((functionals, claims))
 }
 
-/// What was verified of one functional.
+/// Sentence on what was verified of one functional.
 fn sentence((name, claim): &Claim<'_>, how: &str) -> String {
     let hidden = claim.hidden_by.as_deref().unwrap_or_default();
     match (claim.degree, claim.excited_by) {

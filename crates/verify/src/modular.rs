@@ -276,7 +276,7 @@ impl Ring for PrimeField {
     }
 }
 
-/// What the rows say in one field.
+/// Basis rows, ranks and witnesses in one field.
 pub(crate) struct Judged {
     pub basis: Vec<(usize, usize, usize, String)>,
     pub ranks: Vec<usize>,

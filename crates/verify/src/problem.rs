@@ -43,14 +43,14 @@ pub(crate) struct Problem {
     pub slews: Vec<Vec<Slew>>,
 }
 
-/// How a coefficient enters.
+/// Sensor, axis and factors of a coefficient.
 pub(crate) struct Coefficient {
     pub of: Source,
     pub input: Axis,
     pub factors: Vec<Axis>,
 }
 
-/// What the factors of a coefficient are components of.
+/// Vector whose components are the factors of a coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Source {
     Gravity,
@@ -206,7 +206,7 @@ impl Problem {
         self.coefficients.iter().map(|c| c.factors.len()).max().unwrap_or(0)
     }
 
-    /// Whether an error of an accelerometer is unknown.
+    /// True if an error of an accelerometer is unknown.
     fn force(&self) -> bool {
         self.coefficients.iter().any(|c| c.of == Source::Force)
     }

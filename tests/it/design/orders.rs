@@ -360,7 +360,7 @@ fn both_searches_order_as_brute_force() {
     searches_order_as_brute_force(40);
 }
 
-/// The same of 200 tasks.
+/// Both searches against brute force, 200 tasks.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn both_searches_order_as_brute_force_at_length() {
@@ -420,7 +420,7 @@ fn what_a_bound_leaves_out_is_not_missed() {
     bounds_miss_nothing(80);
 }
 
-/// The same of 400 tasks.
+/// Bounds against exhaustion, 400 tasks.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn what_a_bound_leaves_out_is_not_missed_at_length() {

@@ -61,7 +61,7 @@ fn parts_together_are_the_whole() {
     parts_are_the_whole(&[1, 3, 7]);
 }
 
-/// The same of more parts than some tasks have starts.
+/// Parts against the whole, with more parts than some tasks have starts.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn parts_together_are_the_whole_at_length() {

@@ -480,7 +480,7 @@ fn formulas_without_the_engine_give_the_truth() {
     without_the_engine(1);
 }
 
-/// The same of three times as many schemes.
+/// Formulas without the engine, three times as many schemes.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn formulas_without_the_engine_give_the_truth_at_length() {

@@ -167,9 +167,9 @@ pub enum CertificateError {
     /// The layout does not cover the scheme or model.
     #[error("no certificate: found {found}; certificates cover {expected}")]
     NotCovered {
-        /// What the scheme or model has.
+        /// Feature of the scheme or model that the layout does not cover.
         found: String,
-        /// What the layout covers.
+        /// Features that the layout covers instead.
         expected: &'static str,
     },
 }
@@ -285,7 +285,7 @@ fn number(c: &Coefficient) -> ExactNumber {
     parts.filter(|(q, _)| q.num != 0).map(|(q, root)| [q.num, q.den, root, a, b]).collect()
 }
 
-/// What is found of a functional as it is written.
+/// Verdict and witness of a functional in the form of the file.
 fn proof(
     found: Found,
     coefficients: Option<Vec<ExactNumber>>,
@@ -302,7 +302,7 @@ fn proof(
     }
 }
 
-/// Everything as it is written.
+/// The certificate in the form of the file.
 fn written(
     platform: &Platform,
     staircase: &Staircase,

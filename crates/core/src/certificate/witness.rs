@@ -23,7 +23,7 @@ pub(super) struct Staircase {
     spaces: Vec<Echelon>,
 }
 
-/// What the rows say of one functional.
+/// Status, degree and witness of one functional by the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Found {
     pub status: Status,
@@ -120,7 +120,7 @@ impl Staircase {
         y
     }
 
-    /// Whether `y` times the first basis rows makes a functional.
+    /// True if `y` times the first basis rows is the functional `c`.
     pub(super) fn makes(&self, y: &[u64], c: &[(usize, u64)]) -> bool {
         let f = &self.field;
         let mut rest = vec![0; self.spaces[0].columns()];

@@ -2,9 +2,19 @@
 
 use std::ops::Range;
 
+/// Most characters of the place of a fault that are shown: a name may be as long as a file.
+const LONGEST_PLACE: usize = 320;
+
+fn shortened(place: &str) -> String {
+    match place.char_indices().nth(LONGEST_PLACE) {
+        Some((cut, _)) => format!("{}...", &place[..cut]),
+        None => place.into(),
+    }
+}
+
 /// Error of a model that cannot be judged: the place, the fault and the expectation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what}: {message}")]
+#[error("{}: {message}", shortened(what))]
 pub struct ModelError {
     /// Place of the fault in words, such as `the equation of x1`.
     pub what: String,

@@ -130,15 +130,8 @@ fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
     Ok(out)
 }
 
-/// Most characters of the place of a fault in words: a name may be as long as a file.
-const LONGEST_PLACE: usize = 320;
-
 impl Reader<'_> {
     pub(super) fn at(&self, span: Range<usize>, what: String, message: String) -> ModelError {
-        let what = match what.char_indices().nth(LONGEST_PLACE) {
-            Some((cut, _)) => format!("{}...", &what[..cut]),
-            None => what,
-        };
         ModelError { what, message, span: Some(span) }
     }
 

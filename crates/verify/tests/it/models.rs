@@ -60,7 +60,7 @@ fn both_checkers_accept_certificates_of_published_models() {
     assert!(judged > 1000, "{judged}");
 }
 
-/// Whether a place belongs to a kind of change that makes a false claim.
+/// True for a place of a kind of change that makes a false claim.
 fn belongs(kind: &str, path: &[String]) -> bool {
     let (first, last) = (path.first().map_or("", String::as_str), path.last().map_or("", String::as_str));
     match kind {
@@ -175,7 +175,7 @@ fn a_change_of_the_equations_is_another_statement() {
     );
 }
 
-/// What certificates of models do not cover says so.
+/// Models that certificates do not cover are refused with the feature.
 #[test]
 fn models_without_certificates() {
     for (from, to, reason) in [

@@ -145,7 +145,7 @@ pub(crate) fn places(
 const KINDS: [&str; 10] =
     ["entry", "degree", "status", "scheme", "rank", "row", "pivot", "solution", "combination", "name"];
 
-/// Whether a place belongs to a kind of change.
+/// True for a place of a kind of change.
 fn belongs(kind: &str, path: &[String], value: &Value) -> bool {
     let first = path.first().map_or("", String::as_str);
     let last = path.last().map_or("", String::as_str);
@@ -174,7 +174,7 @@ fn belongs(kind: &str, path: &[String], value: &Value) -> bool {
     }
 }
 
-/// Whether another coefficient makes a false claim of the place of a combination: the whole is observable,
+/// True where another coefficient makes a false claim of the place of a combination: the whole is observable,
 /// and this unknown is not.
 fn is_told_apart(certificate: &Value, path: &[String]) -> bool {
     let combination = &certificate["combinations"][path[1].parse::<usize>().expect("an index")];
@@ -344,7 +344,7 @@ fn hostile_files() {
     assert!(verify(many.as_bytes(), None).expect_err("too many").to_string().contains("1 to 1000 positions"));
 }
 
-/// What certificates do not cover says so.
+/// Schemes that certificates do not cover are refused with the feature.
 #[test]
 fn schemes_without_certificates() {
     let cases = [
@@ -361,7 +361,7 @@ fn schemes_without_certificates() {
     }
 }
 
-/// What holds at the latitude of the scheme alone has a certificate of kind modular that both checkers accept; a
+/// A verdict that holds at the latitude of the scheme alone has a certificate of kind modular that both checkers accept; a
 /// combination that is zero there is refused.
 #[test]
 fn what_holds_at_one_latitude_is_modular() {

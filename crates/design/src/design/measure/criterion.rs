@@ -125,8 +125,8 @@ impl Evaluator {
         }
     }
 
-    /// The same of the sigmas alone, which no total is below. `variances` becomes those of the coefficients that count,
-    /// where the criterion is made of them.
+    /// Criterion of the sigmas alone, which no total is below. `variances` takes the variances of the coefficients that
+    /// count, where the criterion is made of them.
     pub(crate) fn sigma_value(
         &self,
         state: &State,
@@ -141,18 +141,9 @@ impl Evaluator {
         }
     }
 
-    /// [`Self::value`] from the root and the variances of [`Self::sigma_value`].
-    pub(crate) fn total_by_root(
-        &self,
-        state: &State,
-        criterion: &Criterion,
-        root: &[f64],
-        variances: &mut Vec<f64>,
-    ) -> f64 {
-        self.by_root(state, criterion, root, variances, true)
-    }
-
-    fn by_root(
+    /// The criterion from the root of the information and the variances of the coefficients that count, which are
+    /// computed where `own` is empty; of the total uncertainties with `total`, of the sigmas without.
+    pub(crate) fn by_root(
         &self,
         state: &State,
         criterion: &Criterion,

@@ -125,7 +125,7 @@ impl<'a> Walk<'a> {
         // a total, which is not below it
         if search.evaluator.omitted.is_some() {
             search.evaluator.extend_errors(&behind[depth - 1], self.sequence[depth - 1], state);
-            value = search.evaluator.total_by_root(state, search.criterion, &self.root, &mut self.variances);
+            value = search.evaluator.by_root(state, search.criterion, &self.root, &mut self.variances, true);
         }
         let worth = Worth { value, ..worth };
         let [ties, kept] = wanted(&self.best, &worth);

@@ -57,8 +57,8 @@ impl Search<'_> {
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
     }
 
-    /// What a sequence is worth, with its time, where the state behind the first so many positions is known; at
-    /// least one position follows. Its degrees are those of one field.
+    /// Score and time of a sequence from the state behind its first `known` positions; at least one position follows.
+    /// Degrees are those of one field.
     pub(crate) fn worth_behind(
         &self,
         (state, known): (&State, usize),
