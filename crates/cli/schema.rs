@@ -3,7 +3,6 @@
 use clap::{Args, ValueEnum};
 use obsdeg_calibration::noise::SensorNoiseReport;
 use obsdeg_calibration::{Calibration, SystemCalibration};
-use obsdeg_core::analysis::Analysis;
 use obsdeg_core::certificate::{Certificate, ModelCertificate};
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
@@ -13,6 +12,7 @@ use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::Simulation;
+use obsdeg_evidence::simulation::SchemeAnalysis;
 use obsdeg_evidence::system::{SystemEvidence, SystemRun};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema, schema_for};
@@ -71,7 +71,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut schema = match a.kind {
         Kind::Allan => written::<SensorNoiseReport>(),
-        Kind::Analysis => written::<Analysis>(),
+        Kind::Analysis => written::<SchemeAnalysis>(),
         Kind::Certificate => written::<Certificate>(),
         Kind::ModelCertificate => written::<ModelCertificate>(),
         Kind::Audit => written::<Audit>(),

@@ -135,6 +135,9 @@ class Analyze(Seeded, Positions, total=False):
     """Z and its derivatives, and psi and eps at each position, as formulas."""
     omitted: bool
     """Exact classes (no effect, silent, visible) of the errors that a scheme does not estimate [default: True]."""
+    sensitivities: bool
+    """Changes of the estimates per unit of each error that a scheme does not estimate, by the weights of the record
+    that the scheme states [default: False]."""
     certificate: bool
     """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
 

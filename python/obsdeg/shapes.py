@@ -538,272 +538,6 @@ class EngineBusy(Record):
     """Advice on how to get the missing solutions."""
 
 
-class Analysis(Shape):
-    """Analysis of one scheme: verdicts, solutions and remedies."""
-
-    schema: str
-    """Layout of this answer: `obsdeg.analysis/1`."""
-    version: str
-    """Version of the program that wrote it."""
-    carry: Carry
-    """Carry: quantity that continues from one position to the next."""
-    latitude_deg: float | None
-    """Latitude in degrees; null when generic."""
-    geometry: Geometry
-    """Mounting of the gyros and accelerometers."""
-    terms: str
-    """Unknown terms of the gyro model, or `drift`."""
-    measured_azimuth: bool
-    """True if psi_y^n is measured."""
-    positions: list[PositionReport]
-    """Positions of the scheme, in order of time."""
-    stations: list[StationLabel]
-    """Stations: points at which the derivatives in solutions are taken, that is the positions and attitudes during rotations."""
-    rank_profile: list[int]
-    """Rank profile: dim V_0, dim V_1, ..., the rank of the derivatives of Z up to each order."""
-    rank: int
-    """Rank of all derivatives of Z up to the last order."""
-    unknowns: list[str]
-    """Names of the unknowns, in model order."""
-    has_accuracy_orders: bool
-    """True if accuracy orders were computed. They are not for rotating segments; notes give other reasons."""
-    quantities: list[Quantity]
-    """Verdicts on the unknowns, best first."""
-    combinations: list[CombinationReport]
-    """Observable combinations beyond single unknowns, by degree, and those asked for."""
-    null_space: list[list[Component]]
-    """Basis of the directions that Z does not observe, without unknowns that are not excited."""
-    carries: list[CarryReport]
-    """Verdicts under the other carries, where they differ."""
-    omitted: OmittedVerdicts | None
-    """Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where none are computed (rotating
-    segments, the drift as unknown, very many columns).
-    """
-    to_resolve: Remedies
-    """Changes that make the unobservable unknowns observable."""
-    degenerate_loci: list[Locus] | None
-    """Conditions on generic angles under which a verdict changes; null if they were not computed."""
-    degenerate_loci_incomplete: str | None
-    """Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if it has all that one equation
-    describes.
-    """
-    formulas: list[Formula] | None
-    """Formulas of Z and its derivatives, position by position; null if not asked for."""
-    frame: Frame
-    """Axes in which Z is printed in solutions."""
-    gimbals: GimbalReport | None
-    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
-    certainty: Certainty
-    """Certainty of the verdicts: method, error bound, primes and seed."""
-    notes: list[str]
-    """Limitations of this answer, each with its reason."""
-    engine_busy: EngineBusy | None
-    """Mark of an answer without the formulas that need the symbolic engine, because other processes held it for the whole of --engine-
-    wait; null otherwise.
-    """
-
-
-class NumberOfSolutionsCounted(Record):
-    """Number of solutions, complex ones included, by elimination at a random point modulo each prime."""
-
-    __slots__ = ()
-
-    counted: int
-
-
-class NumberOfSolutionsUndecided(Record):
-    """Locally unique. The text is the reason why the number of solutions is not decided."""
-
-    __slots__ = ()
-
-    undecided: str
-
-NumberOfSolutions = Union[Literal["one_by_expression"], NumberOfSolutionsCounted, NumberOfSolutionsUndecided]
-"""Number of values of an unknown among all points with the same outputs. one_by_expression: Single value: the solving expression depends
-on outputs, inputs, constants and unknowns that have one solution.
-"""
-
-
-class SystemQuantity(Record):
-    """Verdict on one unknown of a system."""
-
-    __slots__ = ()
-
-    name: str
-    """Name of the unknown, as in the model."""
-    kind: str
-    """Kind of the unknown: state, parameter or input."""
-    unit: str
-    """Unit of the unknown, as in the model file."""
-    description: str
-    """Description of the unknown, as in the model file."""
-    status: Status
-    """Verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
-    resolved up to the bound on the order.
-    """
-    degree: int | None
-    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
-    partners: list[str]
-    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
-    solution: str | None
-    """Expression of the unknown in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher
-    degree, in which it is linear; verified in both fields. Null if none was found.
-    """
-    number_of_solutions: NumberOfSolutions | None
-    """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
-
-
-class ConstraintFactor(Record):
-    """A constraint that is a product, and the factor that was taken for it."""
-
-    __slots__ = ()
-
-    constraint: str
-    """Constraint that is a product, as written."""
-    factor: str
-    """Factor that is zero where the verdicts are judged."""
-    others: list[str]
-    """Other factors of the constraint, by which it could hold as well."""
-    given: bool
-    """True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the first with a real point
-    at which the others are not zero, unknowns alone last.
-    """
-
-
-class SystemCombination(Record):
-    """Combination of unknowns, with its verdict."""
-
-    __slots__ = ()
-
-    expression: str
-    """Combination as written in the model, or `b*x1`."""
-    degree: int | None
-    """Observable degree of the combination; null if it is not observable."""
-
-
-class SymmetryReport(Record):
-    """Symmetry of the system, in words."""
-
-    __slots__ = ()
-
-    words: str
-    """Change that leaves every output as it is (if `rests_on_bound`: its derivatives up to the bound at the start), for every `c` (every
-    positive one where something is multiplied or divided): `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is
-    multiplied or divided at c = 0, nothing changes.
-    """
-    unknowns: list[str]
-    """Unknowns that the symmetry changes."""
-
-
-class BranchSide(Record):
-    """Side of a branch of abs or sign on which the verdicts were computed."""
-
-    __slots__ = ()
-
-    condition: str
-    """Condition on the argument of abs or sign that holds at the start of the runs at both random points, and with it where the verdicts
-    hold: `t - 7 < 0`. An argument that had either sign is named with both.
-    """
-    of_time: bool
-    """True if the argument depends on the time."""
-    given: bool
-    """True if the file gives the value of the argument at the start: known starts and constants, and no second segment."""
-
-
-class DigitsReport(Record):
-    """Margin of rank decisions in real numbers of many digits, at two random points."""
-
-    __slots__ = ()
-
-    digits: tuple[int, int]
-    """Number of decimal digits at the first and at the second point."""
-    nonzero_log10: float
-    """Decimal logarithm (dimensionless) of the smallest number, relative to its row, that is proven to differ from zero."""
-    zero_log10: float | None
-    """Decimal logarithm (dimensionless) of the widest error bound, relative to its row, of a number that counts as zero; null if all
-    were exact.
-    """
-
-
-class SystemAnalysis(Shape):
-    """Analysis of one system: verdicts, combinations, symmetries and remedies."""
-
-    schema: str
-    """Layout of this answer: `obsdeg.system/1`."""
-    version: str
-    """Version of the program that wrote it."""
-    name: str
-    """Name of the system, as in its file."""
-    description: str
-    """Description of the system, as in its file."""
-    equations: list[str]
-    """Equations as written: `u = ...` of known inputs that are functions of time, definitions, `x' = ...`, `y = ...`."""
-    rank_profile: list[int]
-    """Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order."""
-    rank: int
-    """Rank of all output derivatives up to the last order."""
-    unknowns: int
-    """Number of unknowns that are judged."""
-    quantities: list[SystemQuantity]
-    """Verdicts on the unknowns, in model order."""
-    known: list[str]
-    """States with a known initial value."""
-    time: str | None
-    """Time at which the first segment was judged: a number, or `generic` (almost every time, as in all later segments); null if the
-    equations do not depend on time.
-    """
-    constraints: list[str]
-    """Equations that hold at the start; their differentials count as rows of order 0."""
-    constraint_factors: list[ConstraintFactor]
-    """Factors that stand for those of these equations that are products: verdicts are those where they are zero."""
-    combinations: list[SystemCombination]
-    """Combinations of unknowns that the model asks for."""
-    unobservable_directions: int
-    """Number of independent directions that change no output."""
-    symmetries: list[SymmetryReport]
-    """Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on the order only if
-    `rests_on_bound`.
-    """
-    other_directions: list[list[str]]
-    """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
-    invariants: list[SystemCombination]
-    """Observable combinations of unobservable unknowns."""
-    last_order: int
-    """Highest order of derivatives that was examined."""
-    bound: int
-    """Order of derivatives at which the search ends at the latest."""
-    closed: bool
-    """True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts hold up to the bound on the
-    order only.
-    """
-    rests_on_bound: bool
-    """True if a verdict holds up to the bound on the order only."""
-    branches: list[str]
-    """Functions with branches (abs, sign, roots, asin, acos) of unknowns, inputs, generic constants or the time. The verdicts hold on
-    the branch of points near one, or where the model is undefined there, on the first branch that was found.
-    """
-    branch_sides: list[BranchSide]
-    """Sides of the branches of abs and sign on which the verdicts hold."""
-    to_resolve: Remedies
-    """Changes that make the unobservable unknowns observable."""
-    note: str | None
-    """Reason why solving expressions were not sought, or not all of them; null otherwise."""
-    counting_order: int | None
-    """Order of the derivatives with which solutions were counted by elimination; null if none were."""
-    independent_functions: int | None
-    """Number of functions whose values are proven to be independent of each other at a generic point (Ax 1971, doi:10.2307/1970774), so
-    that random values in prime fields replace them; 0 for a rational model, null if functions were evaluated in real numbers.
-    """
-    primes: tuple[str, str] | None
-    """Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers."""
-    error_bound: float | None
-    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
-    digits: DigitsReport | None
-    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
-    seed: int
-    """Seed of all random choices."""
-
-
 class AccelerometerBias(Record):
     """Bias instability of the accelerometers: a first-order Gauss-Markov process of each, which continues in platform axes."""
 
@@ -866,143 +600,6 @@ class MeasurementReport(Record):
     """Keys of the conditions above that nobody states, so that the program chose them: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg.
     """
-
-
-class Slew(Record):
-    """Slew of finite duration to a position."""
-
-    __slots__ = ()
-
-    to: str
-    """Name of the position that the slew leads to."""
-    turn: Turn
-    """Turn of the slew: its axis and angle."""
-
-
-class ComparisonQuantity(Record):
-    """Verdict, sigma and requirement of one unknown of a scheme."""
-
-    __slots__ = ()
-
-    name: str
-    """Name of the unknown, as in the scheme's model."""
-    unit: str
-    """Unit of sigma, of the requirement and of `sigma_extended`."""
-    status: Status
-    """Verdict: observable, inseparable or not excited."""
-    degree: int | None
-    """Observable degree; null if the unknown is not observable."""
-    accuracy_order: int | None
-    """Accuracy order; null if no dwell makes the unknown observable, or if none were computed."""
-    sigma: float | None
-    """Predicted standard deviation at the end of the scheme under the stated conditions, in the unit of `unit`; null if neither samples
-    nor stated priors bound it.
-    """
-    by_prior: bool
-    """True if the samples do not determine the unknown, so that sigma depends on stated priors alone."""
-    sigma_extended: float | None
-    """Standard deviation of a coefficient at the end by a filter with full attitudes, with the prior, in the unit of `unit`; null if the
-    small-angle model holds for the stated drifts, or none are stated.
-    """
-    requirement: float | None
-    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
-    total: float | None
-    """Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a sigma."""
-    margin: float | None
-    """Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is no requirement or no sigma."""
-    excitation: list[float]
-    """Factors by which the unknown enters the drift, position by position, dimensionless: products of components of g (1 for D_F), root
-    mean square over the arc of a rotating segment. Empty for psi.
-    """
-    carried_by: list[str]
-    """Positions without which the unknown is not observable."""
-
-
-class Worst(Record):
-    """Largest sigma of a drift coefficient."""
-
-    __slots__ = ()
-
-    name: str
-    """Name of the coefficient with this sigma."""
-    sigma_dph: float
-    """Standard deviation of the coefficient, in deg/h (per g, per g^2)."""
-
-Basis = Literal["predicted", "predicted_with_prior", "run", "record"]
-"""Source of the sigmas that are compared with requirements. The prediction alone decides whether a scheme meets its requirements; a run
-is an example, a record its confirmation. predicted: Information of all samples with the stated noise and random drift, psi at the end
-of the scheme (under reset carry at the end of each position); no prior knowledge. predicted_with_prior: Information of all samples as
-in `predicted`, with the stated priors. run: Filter at the end of a simulated run, with its prior and its random drift, whether they
-are stated or chosen by the program. record: Estimates of a calibration from a record.
-"""
-
-
-class Margin(Record):
-    """Margin of a requirement, with its unknown."""
-
-    __slots__ = ()
-
-    name: str
-    """Name of the unknown with this margin."""
-    margin: float
-    """Required over found sigma, dimensionless: met from 1."""
-
-Miss = Literal["too_large", "not_observable", "rests_on_prior", "inconsistent", "no_number"]
-"""Reason why a requirement is missed. too_large: Sigma above the requirement. not_observable: Unknown that the outputs do not determine.
-rests_on_prior: Sigma hardly below the prior's: it repeats the prior. inconsistent: Error beyond four sigma: the filter is wrong.
-no_number: Sigma or estimate that is not a finite number.
-"""
-
-
-class Missed(Record):
-    """Unknown that misses its requirement."""
-
-    __slots__ = ()
-
-    name: str
-    """Name of the unknown that misses."""
-    why: Miss
-    """Reason why the requirement is missed."""
-
-
-class Requirements(Record):
-    """Outcome of all requirements: those met, those missed and the smallest margin."""
-
-    __slots__ = ()
-
-    basis: Basis
-    """Source of the sigmas that decide."""
-    stated: int
-    """Number of unknowns with a requirement."""
-    met: int
-    """Number of unknowns that meet their requirement."""
-    worst: Margin | None
-    """Smallest margin among the sigmas that count; null if there is none."""
-    missed: list[Missed]
-    """Unknowns that miss their requirement, in model order."""
-    with_bench: bool | None
-    """True if the sigmas are total uncertainties, with the errors of a stated bench."""
-    on_prior: list[str]
-    """Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated priors alone."""
-
-
-class OtherCarry(Record):
-    """Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
-    left out.
-    """
-
-    __slots__ = ()
-
-    carry: Carry
-    """Carry: quantity that continues from one position to the next."""
-    worst: Worst | None
-    """Largest sigma of a drift coefficient in deg/h (per g); null if a coefficient is not observable, or if nothing was judged."""
-    without_slews: bool
-    """True if the slews of the scheme are left out there, since only inertial carry has slews."""
-    requirements: Requirements | None
-    """Outcome of the requirements; null if nothing was judged."""
-    not_judged: str | None
-    """Reason why nothing was judged; left out where something was."""
 
 
 class ChangePerUnit(Record):
@@ -1228,6 +825,422 @@ class OmittedEffects(Record):
     """Names in the bench that are among the unknowns: estimated, so that their sizes do not count."""
     attitudes: bool
     """True if attitudes of the positions are among the terms: those of rotating positions, and of more than 64, are not computed."""
+
+
+class Sensitivities(Record):
+    """Changes of the estimates of a scheme per unit of each error that it does not estimate, by the weights of one record."""
+
+    __slots__ = ()
+
+    conditions: MeasurementReport
+    """Conditions of the record whose noise and priors weight the samples."""
+    effects: OmittedEffects
+    """Effects of the errors on the estimates from this record."""
+
+
+class Analysis(Shape):
+    """Verdicts on a scheme, with the sensitivities of its estimates where they are asked for."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.analysis/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    carry: Carry
+    """Carry: quantity that continues from one position to the next."""
+    latitude_deg: float | None
+    """Latitude in degrees; null when generic."""
+    geometry: Geometry
+    """Mounting of the gyros and accelerometers."""
+    terms: str
+    """Unknown terms of the gyro model, or `drift`."""
+    measured_azimuth: bool
+    """True if psi_y^n is measured."""
+    positions: list[PositionReport]
+    """Positions of the scheme, in order of time."""
+    stations: list[StationLabel]
+    """Stations: points at which the derivatives in solutions are taken, that is the positions and attitudes during rotations."""
+    rank_profile: list[int]
+    """Rank profile: dim V_0, dim V_1, ..., the rank of the derivatives of Z up to each order."""
+    rank: int
+    """Rank of all derivatives of Z up to the last order."""
+    unknowns: list[str]
+    """Names of the unknowns, in model order."""
+    has_accuracy_orders: bool
+    """True if accuracy orders were computed. They are not for rotating segments; notes give other reasons."""
+    quantities: list[Quantity]
+    """Verdicts on the unknowns, best first."""
+    combinations: list[CombinationReport]
+    """Observable combinations beyond single unknowns, by degree, and those asked for."""
+    null_space: list[list[Component]]
+    """Basis of the directions that Z does not observe, without unknowns that are not excited."""
+    carries: list[CarryReport]
+    """Verdicts under the other carries, where they differ."""
+    omitted: OmittedVerdicts | None
+    """Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where none are computed (rotating
+    segments, the drift as unknown, very many columns).
+    """
+    to_resolve: Remedies
+    """Changes that make the unobservable unknowns observable."""
+    degenerate_loci: list[Locus] | None
+    """Conditions on generic angles under which a verdict changes; null if they were not computed."""
+    degenerate_loci_incomplete: str | None
+    """Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if it has all that one equation
+    describes.
+    """
+    formulas: list[Formula] | None
+    """Formulas of Z and its derivatives, position by position; null if not asked for."""
+    frame: Frame
+    """Axes in which Z is printed in solutions."""
+    gimbals: GimbalReport | None
+    """Angles and turns beyond the gimbal limits of the scheme; left out where it states none."""
+    certainty: Certainty
+    """Certainty of the verdicts: method, error bound, primes and seed."""
+    notes: list[str]
+    """Limitations of this answer, each with its reason."""
+    engine_busy: EngineBusy | None
+    """Mark of an answer without the formulas that need the symbolic engine, because other processes held it for the whole of --engine-
+    wait; null otherwise.
+    """
+    sensitivities: Sensitivities | None
+    """Changes of the estimates per unit of each error that is not estimated; left out unless they are asked for."""
+
+
+class NumberOfSolutionsCounted(Record):
+    """Number of solutions, complex ones included, by elimination at a random point modulo each prime."""
+
+    __slots__ = ()
+
+    counted: int
+
+
+class NumberOfSolutionsUndecided(Record):
+    """Locally unique. The text is the reason why the number of solutions is not decided."""
+
+    __slots__ = ()
+
+    undecided: str
+
+NumberOfSolutions = Union[Literal["one_by_expression"], NumberOfSolutionsCounted, NumberOfSolutionsUndecided]
+"""Number of values of an unknown among all points with the same outputs. one_by_expression: Single value: the solving expression depends
+on outputs, inputs, constants and unknowns that have one solution.
+"""
+
+
+class SystemQuantity(Record):
+    """Verdict on one unknown of a system."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown, as in the model."""
+    kind: str
+    """Kind of the unknown: state, parameter or input."""
+    unit: str
+    """Unit of the unknown, as in the model file."""
+    description: str
+    """Description of the unknown, as in the model file."""
+    status: Status
+    """Verdict: locally observable (no other value nearby gives the same outputs), inseparable from its partners, not excited, or not
+    resolved up to the bound on the order.
+    """
+    degree: int | None
+    """Observable degree: the smallest order of derivatives that determines the unknown; null if it is not observable."""
+    partners: list[str]
+    """Unknowns indistinguishable from it: those in a common unobservable direction of minimal support."""
+    solution: str | None
+    """Expression of the unknown in outputs, inputs, their derivatives (up to two orders beyond the degree) and unknowns of no higher
+    degree, in which it is linear; verified in both fields. Null if none was found.
+    """
+    number_of_solutions: NumberOfSolutions | None
+    """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
+
+
+class ConstraintFactor(Record):
+    """A constraint that is a product, and the factor that was taken for it."""
+
+    __slots__ = ()
+
+    constraint: str
+    """Constraint that is a product, as written."""
+    factor: str
+    """Factor that is zero where the verdicts are judged."""
+    others: list[str]
+    """Other factors of the constraint, by which it could hold as well."""
+    given: bool
+    """True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the first with a real point
+    at which the others are not zero, unknowns alone last.
+    """
+
+
+class SystemCombination(Record):
+    """Combination of unknowns, with its verdict."""
+
+    __slots__ = ()
+
+    expression: str
+    """Combination as written in the model, or `b*x1`."""
+    degree: int | None
+    """Observable degree of the combination; null if it is not observable."""
+
+
+class SymmetryReport(Record):
+    """Symmetry of the system, in words."""
+
+    __slots__ = ()
+
+    words: str
+    """Change that leaves every output as it is (if `rests_on_bound`: its derivatives up to the bound at the start), for every `c` (every
+    positive one where something is multiplied or divided): `multiply alpha by c; divide gamma by c`. At c = 1, and where nothing is
+    multiplied or divided at c = 0, nothing changes.
+    """
+    unknowns: list[str]
+    """Unknowns that the symmetry changes."""
+
+
+class BranchSide(Record):
+    """Side of a branch of abs or sign on which the verdicts were computed."""
+
+    __slots__ = ()
+
+    condition: str
+    """Condition on the argument of abs or sign that holds at the start of the runs at both random points, and with it where the verdicts
+    hold: `t - 7 < 0`. An argument that had either sign is named with both.
+    """
+    of_time: bool
+    """True if the argument depends on the time."""
+    given: bool
+    """True if the file gives the value of the argument at the start: known starts and constants, and no second segment."""
+
+
+class DigitsReport(Record):
+    """Margin of rank decisions in real numbers of many digits, at two random points."""
+
+    __slots__ = ()
+
+    digits: tuple[int, int]
+    """Number of decimal digits at the first and at the second point."""
+    nonzero_log10: float
+    """Decimal logarithm (dimensionless) of the smallest number, relative to its row, that is proven to differ from zero."""
+    zero_log10: float | None
+    """Decimal logarithm (dimensionless) of the widest error bound, relative to its row, of a number that counts as zero; null if all
+    were exact.
+    """
+
+
+class SystemAnalysis(Shape):
+    """Analysis of one system: verdicts, combinations, symmetries and remedies."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.system/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    name: str
+    """Name of the system, as in its file."""
+    description: str
+    """Description of the system, as in its file."""
+    equations: list[str]
+    """Equations as written: `u = ...` of known inputs that are functions of time, definitions, `x' = ...`, `y = ...`."""
+    rank_profile: list[int]
+    """Rank profile: dim V_0, dim V_1, ..., the rank of the output derivatives up to each order."""
+    rank: int
+    """Rank of all output derivatives up to the last order."""
+    unknowns: int
+    """Number of unknowns that are judged."""
+    quantities: list[SystemQuantity]
+    """Verdicts on the unknowns, in model order."""
+    known: list[str]
+    """States with a known initial value."""
+    time: str | None
+    """Time at which the first segment was judged: a number, or `generic` (almost every time, as in all later segments); null if the
+    equations do not depend on time.
+    """
+    constraints: list[str]
+    """Equations that hold at the start; their differentials count as rows of order 0."""
+    constraint_factors: list[ConstraintFactor]
+    """Factors that stand for those of these equations that are products: verdicts are those where they are zero."""
+    combinations: list[SystemCombination]
+    """Combinations of unknowns that the model asks for."""
+    unobservable_directions: int
+    """Number of independent directions that change no output."""
+    symmetries: list[SymmetryReport]
+    """Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on the order only if
+    `rests_on_bound`.
+    """
+    other_directions: list[list[str]]
+    """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
+    invariants: list[SystemCombination]
+    """Observable combinations of unobservable unknowns."""
+    last_order: int
+    """Highest order of derivatives that was examined."""
+    bound: int
+    """Order of derivatives at which the search ends at the latest."""
+    closed: bool
+    """True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts hold up to the bound on the
+    order only.
+    """
+    rests_on_bound: bool
+    """True if a verdict holds up to the bound on the order only."""
+    branches: list[str]
+    """Functions with branches (abs, sign, roots, asin, acos) of unknowns, inputs, generic constants or the time. The verdicts hold on
+    the branch of points near one, or where the model is undefined there, on the first branch that was found.
+    """
+    branch_sides: list[BranchSide]
+    """Sides of the branches of abs and sign on which the verdicts hold."""
+    to_resolve: Remedies
+    """Changes that make the unobservable unknowns observable."""
+    note: str | None
+    """Reason why solving expressions were not sought, or not all of them; null otherwise."""
+    counting_order: int | None
+    """Order of the derivatives with which solutions were counted by elimination; null if none were."""
+    independent_functions: int | None
+    """Number of functions whose values are proven to be independent of each other at a generic point (Ax 1971, doi:10.2307/1970774), so
+    that random values in prime fields replace them; 0 for a rational model, null if functions were evaluated in real numbers.
+    """
+    primes: tuple[str, str] | None
+    """Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers."""
+    error_bound: float | None
+    """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
+    digits: DigitsReport | None
+    """Margin of the rank decisions in real numbers; null for a model judged in prime fields."""
+    seed: int
+    """Seed of all random choices."""
+
+
+class Slew(Record):
+    """Slew of finite duration to a position."""
+
+    __slots__ = ()
+
+    to: str
+    """Name of the position that the slew leads to."""
+    turn: Turn
+    """Turn of the slew: its axis and angle."""
+
+
+class ComparisonQuantity(Record):
+    """Verdict, sigma and requirement of one unknown of a scheme."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown, as in the scheme's model."""
+    unit: str
+    """Unit of sigma, of the requirement and of `sigma_extended`."""
+    status: Status
+    """Verdict: observable, inseparable or not excited."""
+    degree: int | None
+    """Observable degree; null if the unknown is not observable."""
+    accuracy_order: int | None
+    """Accuracy order; null if no dwell makes the unknown observable, or if none were computed."""
+    sigma: float | None
+    """Predicted standard deviation at the end of the scheme under the stated conditions, in the unit of `unit`; null if neither samples
+    nor stated priors bound it.
+    """
+    by_prior: bool
+    """True if the samples do not determine the unknown, so that sigma depends on stated priors alone."""
+    sigma_extended: float | None
+    """Standard deviation of a coefficient at the end by a filter with full attitudes, with the prior, in the unit of `unit`; null if the
+    small-angle model holds for the stated drifts, or none are stated.
+    """
+    requirement: float | None
+    """Largest sigma allowed, in the unit of `unit`; null if none is required."""
+    total: float | None
+    """Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a sigma."""
+    margin: float | None
+    """Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is no requirement or no sigma."""
+    excitation: list[float]
+    """Factors by which the unknown enters the drift, position by position, dimensionless: products of components of g (1 for D_F), root
+    mean square over the arc of a rotating segment. Empty for psi.
+    """
+    carried_by: list[str]
+    """Positions without which the unknown is not observable."""
+
+
+class Worst(Record):
+    """Largest sigma, with a bench the largest total uncertainty, of a drift coefficient."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the coefficient with this sigma."""
+    sigma_dph: float
+    """Standard deviation of the coefficient, with a bench its total uncertainty, in deg/h (per g, per g^2)."""
+
+Basis = Literal["predicted", "predicted_with_prior", "run", "record"]
+"""Source of the sigmas that are compared with requirements. The prediction alone decides whether a scheme meets its requirements; a run
+is an example, a record its confirmation. predicted: Information of all samples with the stated noise and random drift, psi at the end
+of the scheme (under reset carry at the end of each position); no prior knowledge. predicted_with_prior: Information of all samples as
+in `predicted`, with the stated priors. run: Filter at the end of a simulated run, with its prior and its random drift, whether they
+are stated or chosen by the program. record: Estimates of a calibration from a record.
+"""
+
+
+class Margin(Record):
+    """Margin of a requirement, with its unknown."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown with this margin."""
+    margin: float
+    """Required over found sigma, dimensionless: met from 1."""
+
+Miss = Literal["too_large", "not_observable", "rests_on_prior", "inconsistent", "no_number"]
+"""Reason why a requirement is missed. too_large: Sigma above the requirement. not_observable: Unknown that the outputs do not determine.
+rests_on_prior: Sigma hardly below the prior's: it repeats the prior. inconsistent: Error beyond four sigma: the filter is wrong.
+no_number: Sigma or estimate that is not a finite number.
+"""
+
+
+class Missed(Record):
+    """Unknown that misses its requirement."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown that misses."""
+    why: Miss
+    """Reason why the requirement is missed."""
+
+
+class Requirements(Record):
+    """Outcome of all requirements: those met, those missed and the smallest margin."""
+
+    __slots__ = ()
+
+    basis: Basis
+    """Source of the sigmas that decide."""
+    stated: int
+    """Number of unknowns with a requirement."""
+    met: int
+    """Number of unknowns that meet their requirement."""
+    worst: Margin | None
+    """Smallest margin among the sigmas that count; null if there is none."""
+    missed: list[Missed]
+    """Unknowns that miss their requirement, in model order."""
+    with_bench: bool | None
+    """True if the sigmas are total uncertainties, with the errors of a stated bench."""
+    on_prior: list[str]
+    """Unknowns with a requirement that the samples do not determine, so that their sigma depends on stated priors alone."""
+
+
+class OtherCarry(Record):
+    """Scheme under another carry than its own: same positions, dwells, noise and requirements. Slews, which only inertial carry has, are
+    left out.
+    """
+
+    __slots__ = ()
+
+    carry: Carry
+    """Carry: quantity that continues from one position to the next."""
+    worst: Worst | None
+    """Largest sigma of a drift coefficient in deg/h (per g); null if a coefficient is not observable, or if nothing was judged."""
+    without_slews: bool
+    """True if the slews of the scheme are left out there, since only inertial carry has slews."""
+    requirements: Requirements | None
+    """Outcome of the requirements; null if nothing was judged."""
+    not_judged: str | None
+    """Reason why nothing was judged; left out where something was."""
 
 
 class Validity(Record):
@@ -1645,7 +1658,7 @@ class Found(Record):
     """
     worst_sigma_dph: float | None
     """Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if one is stated, no drift
-    noise; null if none is required.
+    noise; with a bench the largest total uncertainty; null if none is required.
     """
     worst: str | None
     """Coefficient with the largest sigma; null if none is required."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import pickle
 import random
 from decimal import Decimal
@@ -377,3 +378,14 @@ def test_exporters_take_models() -> None:
     assert exporters.to_sympy(model) == exporters.to_sympy(MODEL) and exporters.to_si_jl(model) == exporters.to_si_jl(MODEL)
     back = obsdeg.Model(exporters.read_model(model))
     assert obsdeg.analyze(back).statuses == obsdeg.analyze(model).statuses
+
+
+def test_analyze_gives_the_changes_per_unit() -> None:
+    """Changes per unit are there where they are asked for: 1 ug of K0 is a tilt of 1e-6 rad in the psi of a position."""
+    asked = obsdeg.analyze([(0, 0, 0), (180, 0, 0)], carry="reset", sensitivities=True).sensitivities
+    assert asked is not None
+    k0 = next(t for t in asked.effects.terms if t.name == "K0_X")
+    psi = next(s for s in k0.sensitivities if s.unknown == "psi_z@1")
+    # Z1 = psi_z + K0_X: the tilt takes the whole of it, in deg per ug
+    assert abs(abs(psi.per_unit) / math.degrees(1e-6) - 1) < 1e-9
+    assert obsdeg.analyze([(0, 0, 0), (180, 0, 0)]).sensitivities is None

@@ -1,10 +1,12 @@
 //! Help and messages: `-h` in lines, `--help` at length, where models of other tools are read, colours.
 
+use obsdeg_core::system::WorkLimit;
+
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 14] = [
-    ("analyze", 47),
+    ("analyze", 48),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 48),
@@ -67,6 +69,10 @@ fn help_is_in_lines() {
         }
     }
     assert!(text(&["analyze", "-h"]).contains("left out: generic"));
+    for help in ["-h", "--help"] {
+        let text = text(&["analyze", help]).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(&format!("operations (default: {}", WorkLimit::DEFAULT.0)) || text.contains(&format!("(default: {}, some seconds)", WorkLimit::DEFAULT.0)), "{text}");
+    }
     // verdicts of a report are generic without one
     assert!(text(&["report", "-h"]).contains("28.2 for numbers"));
     // a held engine is named on stderr, quiet or not (tests/symbolic.rs)

@@ -3,11 +3,12 @@
 use std::ops::RangeInclusive;
 
 use clap::{ArgAction, Args};
-use obsdeg_core::analysis::{Analysis, AnalysisOptions};
+use obsdeg_core::analysis::AnalysisOptions;
 use obsdeg_core::certificate::{CertificateError, certify, certify_model};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
+use obsdeg_evidence::simulation::{Conditions, SchemeAnalysis, sensitivities};
 use obsdeg_report::{Answer, Document, File, Several, Table};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -54,6 +55,11 @@ pub struct Analyze {
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
     pub omitted: bool,
 
+    /// Changes of the estimates per unit of each error that a scheme does not estimate, in deg/h per ug and so on, by the weights of the record
+    /// that the scheme file states (dwell, step, noise, priors); what it does not state is chosen as compare does and said
+    #[arg(long, help_heading = "Solutions")]
+    pub sensitivities: bool,
+
     /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
     #[arg(skip)]
     pub certificate: bool,
@@ -73,6 +79,7 @@ impl Default for Analyze {
             frame: Frame::default(),
             formulas: false,
             omitted: true,
+            sensitivities: false,
             certificate: false,
         }
     }
@@ -96,7 +103,7 @@ const FRAMES: [Word<Frame>; 2] = [
 #[serde(untagged)]
 pub enum Judged {
     /// On a scheme.
-    Scheme(Box<Analysis>),
+    Scheme(Box<SchemeAnalysis>),
     /// On a model.
     Model(Box<SystemAnalysis>),
 }
@@ -142,7 +149,7 @@ impl Judged {
             None => format!("{name} not observable"),
         };
         let degrees: Vec<String> = match self {
-            Self::Scheme(a) => a.quantities.iter().map(|q| degree(&q.name, q.degree)).collect(),
+            Self::Scheme(a) => a.verdicts.quantities.iter().map(|q| degree(&q.name, q.degree)).collect(),
             Self::Model(a) => a.quantities.iter().map(|q| degree(&q.name, q.degree)).collect(),
         };
         let first = self.sentences().into_iter().next().unwrap_or_default();
@@ -260,12 +267,20 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
     let &Analyze { seed, solutions, formulas, frame, omitted, count_limit, order, .. } = options;
     Ok(match input {
         Input::Scheme(scheme) => {
+            // a record that can not be predicted says so before anything is solved
+            let of_record = options
+                .sensitivities
+                .then(|| sensitivities(scheme, &Conditions::of(scheme), seed))
+                .transpose()?;
             let options = AnalysisOptions { seed, solutions, formulas, frame, omitted };
-            Judged::Scheme(Box::new(obsdeg_core::analysis::analyze(
-                scheme,
-                options,
-                host.worker.as_deref_mut(),
-            )?))
+            let worker = host.worker.as_deref_mut();
+            let verdicts = obsdeg_core::analysis::analyze(scheme, options, worker)?;
+            Judged::Scheme(Box::new(SchemeAnalysis { verdicts, sensitivities: of_record }))
+        }
+        Input::Model(_) if options.sensitivities => {
+            return Err(Problem::input(
+                "--sensitivities found a model; expected a scheme: the errors that are not estimated are those of a platform",
+            ));
         }
         Input::Model(file) => {
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);

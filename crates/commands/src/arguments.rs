@@ -134,7 +134,7 @@ pub struct InputOptions {
     pub measured_azimuth: bool,
 
     /// Limit of the work of a verdict on a model at a random point, in millions of operations, with half as many
-    /// bytes: what takes more is refused before it is computed (default: 400, some seconds)
+    /// bytes: what takes more is refused before it is computed (default: 600, some seconds)
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(WORK))]
     pub work_limit: Option<u64>,
 

@@ -85,8 +85,8 @@ pub struct MeasurementOptions {
     pub requirement: Vec<Assignment>,
 
     /// Bench: sizes (one sigma) of errors that the scheme does not estimate, by error or family:
-    /// K0=20,latitude=10. Units: ug (K0), ppm (K1, GS, earth_rate, gravity), arcsec (M, GM, latitude, azimuth,
-    /// attitude). Requirements are then judged by the total uncertainty (default: none counts; 0 to 1e9)
+    /// K0=20,latitude=10. Units: ug (K0), ug/g^2 (K2, Kx), ug/g^3 (K3), ppm (K1, GS, earth_rate, gravity), arcsec (M, GM,
+    /// latitude, azimuth, attitude), deg/h, deg/h/g (D_F; D_I, D_O, D_S), deg/h/g^2 (D_II ... D_OS). Requirements are then judged by the total uncertainty (default: none counts; 0 to 1e9)
     #[arg(long, value_name = "NAME=X", value_delimiter = ',', value_parser = benched)]
     #[serde(with = "text::list")]
     pub bench: Vec<Assignment>,

@@ -70,12 +70,12 @@ pub struct Margin {
     pub margin: f64,
 }
 
-/// Largest sigma of a drift coefficient.
+/// Largest sigma, with a bench the largest total uncertainty, of a drift coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Worst {
     /// Name of the coefficient with this sigma.
     pub name: String,
-    /// Standard deviation of the coefficient, in deg/h (per g, per g^2).
+    /// Standard deviation of the coefficient, with a bench its total uncertainty, in deg/h (per g, per g^2).
     pub sigma_dph: f64,
 }
 

@@ -4,8 +4,10 @@ use obsdeg_core::analysis::{Analysis, Component, PositionReport, Solution};
 use obsdeg_core::degree::Status;
 use obsdeg_core::solution::Formula;
 
+use obsdeg_evidence::simulation::SchemeAnalysis;
+
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
-use crate::{Answer, gimbals, latex, omitted, resolve, words};
+use crate::{Answer, gimbals, latex, omitted, resolve, stated, words};
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
@@ -108,6 +110,27 @@ fn degenerate_angles(a: &Analysis) -> Option<Block> {
         None => "Degenerate angles",
     };
     Block::list_if_any(heading, lines)
+}
+
+impl Answer for SchemeAnalysis {
+    fn layout(&self) -> Option<&str> {
+        self.verdicts.layout()
+    }
+
+    fn document(&self) -> Document {
+        let mut out = self.verdicts.document();
+        let Some(s) = &self.sensitivities else { return out };
+        out.blocks.extend(omitted::blocks(&s.effects, ""));
+        out.blocks.push(Block::list(
+            "Sensitivities: the record that weights the samples",
+            stated::measurement(&s.conditions),
+        ));
+        out
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        self.verdicts.sentences()
+    }
 }
 
 impl Answer for Analysis {

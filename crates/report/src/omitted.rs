@@ -3,8 +3,8 @@
 use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_evidence::simulation::omitted::{
-    Advice, AdviceKind, Budget, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
-    SuspectedChange,
+    Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
+    SAMPLES, SuspectedChange,
 };
 
 use crate::document::{Block, left, number, right};
@@ -159,26 +159,31 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
         right("contribution"),
         right("percent"),
     ];
+    let sensitivity = |l: &BudgetLine| match l.value_unit == b.unit {
+        true => number(l.sensitivity),
+        false => format!("{} {} per {}", number(l.sensitivity), b.unit, l.value_unit),
+    };
     let row = |source: String, [kind, value, sensitivity]: [String; 3], contribution: f64, percent: f64| {
         let percent = format!("{percent:.1}");
         vec![source, kind, value, sensitivity, format!("{} {}", number(contribution), b.unit), percent]
     };
     let large = b.lines.iter().take_while(|l| l.percent >= LEAST).count().min(most);
-    // one small source alone stands by itself
-    let large = if b.lines.len() - large == 1 { b.lines.len() } else { large };
-    let (shown, rest) = b.lines.split_at(large);
+    // the samples, and one small source alone, stand by themselves
+    let alone = b.lines.len() - large == 1;
+    let shown = |(i, l): (usize, &BudgetLine)| alone || i < large || l.source == SAMPLES;
+    let (shown, rest): (Vec<_>, Vec<_>) = b.lines.iter().enumerate().partition(|&line| shown(line));
     let mut rows: Vec<Vec<String>> = shown
         .iter()
-        .map(|l| {
+        .map(|(_, l)| {
             let value = format!("{} {}", number(l.value), l.value_unit);
-            let texts = [format!("{:?}", l.evaluation), value, number(l.sensitivity)];
+            let texts = [format!("{:?}", l.evaluation), value, sensitivity(l)];
             row(l.source.clone(), texts, l.contribution, l.percent)
         })
         .collect();
     let none = || ["-", "-", "-"].map(String::from);
     if !rest.is_empty() {
-        let contribution = rest.iter().map(|l| l.contribution * l.contribution).sum::<f64>().sqrt();
-        let percent = rest.iter().map(|l| l.percent).sum();
+        let contribution = rest.iter().map(|(_, l)| l.contribution * l.contribution).sum::<f64>().sqrt();
+        let percent = rest.iter().map(|(_, l)| l.percent).sum();
         rows.push(row(format!("{} smaller sources", rest.len()), none(), contribution, percent));
     }
     rows.push(row("total".into(), none(), b.total, b.lines.iter().map(|l| l.percent).sum()));
@@ -193,7 +198,7 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
 fn printed(budgets: &[Budget]) -> Vec<&Budget> {
     let over = |b: &Budget| b.requirement.map_or(0.0, |r| b.total / r);
     let share = |b: &Budget| {
-        let own = b.lines.iter().filter(|l| l.source != obsdeg_evidence::simulation::omitted::SAMPLES);
+        let own = b.lines.iter().filter(|l| l.source != SAMPLES);
         own.map(|l| l.percent).sum::<f64>()
     };
     let mut out: Vec<&Budget> = budgets.iter().filter(|b| b.lines.len() > 1).collect();
@@ -265,30 +270,38 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
     all.into_iter().take(shown).map(|(_, line)| line).chain(more).collect()
 }
 
-/// The sentence of the first lines: what would use up the margin without a bench, or that the bench counts.
+/// The sentences of the first lines: what the bench does not count, and which sizes of errors that it does not state
+/// would use up a margin.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
     let estimated = of.estimated.join(", ");
-    if bench || !all_met {
-        let said = || format!("Of the bench, {estimated} is estimated: its size does not count.");
-        return (!of.estimated.is_empty()).then(said);
+    let not_counted = || format!("Of the bench, {estimated} is estimated: its size does not count.");
+    let not_counted = (!of.estimated.is_empty()).then(not_counted);
+    if !all_met {
+        return not_counted;
     }
-    let stated = match of.estimated.is_empty() {
-        true => "No bench is stated (--bench).".to_string(),
-        false => format!("No size of the bench counts: {estimated} is estimated."),
+    let stated = match (bench, of.estimated.is_empty()) {
+        (false, true) => Some("No bench is stated (--bench).".to_string()),
+        (false, false) => Some(format!("No size of the bench counts: {estimated} is estimated.")),
+        (true, _) => not_counted,
     };
+    // a family of which the bench states every term, zero too, counts as stated
+    let open = |f: &&FamilyEffect| of.terms.iter().any(|t| t.family == f.family && t.size.is_none());
     let limit = |f: &FamilyEffect| {
         let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| below(u.size));
         let alone = if one == all { String::new() } else { format!(" (one term alone: {one})") };
         Some(format!("{} < {all} {}{alone}", f.family, f.unit))
     };
-    let listed: Vec<String> = of.families.iter().filter_map(limit).collect();
-    (!listed.is_empty()).then(|| {
-        format!(
-            "{stated} Met while, each family by itself, 1 sigma of each of its terms: {}{}.",
-            listed.join(", "),
-            if of.attitudes { "" } else { "; attitudes are not computed here" }
-        )
-    })
+    let listed: Vec<String> = of.families.iter().filter(open).filter_map(limit).collect();
+    if listed.is_empty() {
+        return if bench { stated } else { None };
+    }
+    let met = format!(
+        "{}, each family by itself, 1 sigma of each of its terms: {}{}.",
+        if bench { "Met while, of what the bench does not state" } else { "Met while" },
+        listed.join(", "),
+        if of.attitudes { "" } else { "; attitudes are not computed here" }
+    );
+    Some(stated.into_iter().chain([met]).collect::<Vec<_>>().join(" "))
 }
 
 /// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a coefficient.

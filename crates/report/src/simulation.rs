@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_evidence::simulation::{
-    CoefficientFloor, ConditionsReport, Estimate, FilterReason, FilterReport, Simulation, TimelineReport,
-    Validity,
+    CoefficientFloor, ConditionsReport, Estimate, FilterReason, FilterReport, Outcome, Simulation,
+    TimelineReport, Validity,
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
@@ -159,14 +159,18 @@ fn linear(e: &Estimate) -> Option<Vec<String>> {
     Some(vec![e.name.clone(), e.unit.clone(), own, sigma, error, format!("{:.2}", l.error / l.sigma)])
 }
 
+/// Outcome of an unknown; of one whose sigma alone meets its requirement and whose total with the bench does not, that.
+fn outcome(e: &Estimate) -> &'static str {
+    match (e.outcome, e.required_sigma) {
+        (Outcome::Converging, Some(required)) if e.sigma <= required => "missed by the bench",
+        (outcome, _) => words::outcome(outcome),
+    }
+}
+
 fn row(e: &Estimate) -> Vec<String> {
     let mut out = vec![e.name.clone(), e.unit.clone()];
     out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
-    out.extend([
-        optional(e.predicted_sigma),
-        optional(e.time_to_requirement_s),
-        words::outcome(e.outcome).into(),
-    ]);
+    out.extend([optional(e.predicted_sigma), optional(e.time_to_requirement_s), outcome(e).into()]);
     out
 }
 

@@ -321,7 +321,7 @@ pub struct Found {
     /// the largest sigma over its requirement, psi included where it counts.
     pub value: f64,
     /// Largest sigma of a required drift coefficient, in deg/h (per g): information of all samples, prior if
-    /// one is stated, no drift noise; null if none is required.
+    /// one is stated, no drift noise; with a bench the largest total uncertainty; null if none is required.
     pub worst_sigma_dph: Option<f64>,
     /// Coefficient with the largest sigma; null if none is required.
     pub worst: Option<String>,
