@@ -46,7 +46,7 @@ def answers() -> Iterator[obsdeg.Answer]:
             except obsdeg.ProblemError:
                 # without numbers there is no run
                 continue
-    yield obsdeg.analyze(angles=PAPER, formulas=True, combination="D_IX - D_IY")
+    yield obsdeg.analyze(angles=PAPER, formulas=True, combination="D_IX - D_IY", sensitivities=True)
     yield obsdeg.analyze(angles=["NUE@X_p:360", "alpha,0,0"], latitude=90)
     yield obsdeg.analyze(angles=PAPER, terms="all", carry="inertial", path="gimbals", solutions=False)
     yield obsdeg.paper()

@@ -71,7 +71,11 @@ fn help_is_in_lines() {
     assert!(text(&["analyze", "-h"]).contains("left out: generic"));
     for help in ["-h", "--help"] {
         let text = text(&["analyze", help]).split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(text.contains(&format!("operations (default: {}", WorkLimit::DEFAULT.0)) || text.contains(&format!("(default: {}, some seconds)", WorkLimit::DEFAULT.0)), "{text}");
+        assert!(
+            text.contains(&format!("operations (default: {}", WorkLimit::DEFAULT.0))
+                || text.contains(&format!("(default: {}, some seconds)", WorkLimit::DEFAULT.0)),
+            "{text}"
+        );
     }
     // verdicts of a report are generic without one
     assert!(text(&["report", "-h"]).contains("28.2 for numbers"));
