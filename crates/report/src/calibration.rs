@@ -461,7 +461,7 @@ fn mode(c: &Calibration) -> Vec<String> {
     }];
     if !c.assumed.held.is_empty() {
         out.push(format!(
-            "Left open: {} (box of 1 sigma about the first estimate).",
+            "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 times as much into the others).",
             listed(&c.assumed.held)
         ));
         let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
