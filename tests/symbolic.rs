@@ -117,7 +117,8 @@ fn uncounted() -> Request {
     request(Job::Derive { dynamics, order: 1000 })
 }
 
-/// The limit is one of work, where it is counted, and of processor time elsewhere; the next question is answered.
+/// The limit is one of work, where it is counted, and of processor time elsewhere; the next question is
+/// answered.
 #[test]
 fn work_ends_at_its_limit() {
     let mut w = worker_of(1);
@@ -131,7 +132,8 @@ fn work_ends_at_its_limit() {
     assert_eq!(w.ask(&solve(vec![strings(["2"])], strings(["1"]))), Ok((strings(["1/2"]), false)));
 }
 
-/// Whoever started it may be killed at any time: its pipe is closed then, and the worker leaves in the middle of its work.
+/// Whoever started it may be killed at any time: its pipe is closed then, and the worker leaves in the middle
+/// of its work.
 #[test]
 fn a_worker_ends_with_whoever_started_it() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
@@ -181,7 +183,8 @@ fn everybody_waits_for_a_turn() {
     }
 }
 
-/// While another process keeps the engine the verdicts come all the same, and what is missing is said, quiet or not.
+/// While another process keeps the engine the verdicts come all the same, and what is missing is said, quiet
+/// or not.
 #[test]
 fn a_held_engine_keeps_no_verdict_waiting() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -314,8 +317,8 @@ fn verdicts_are_said_before_the_engine_is_there() {
     }
 }
 
-/// No model starts the engine: with expressions, of every third reference model, nothing is missing while another
-/// process keeps it.
+/// No model starts the engine: with expressions, of every third reference model, nothing is missing while
+/// another process keeps it.
 #[test]
 fn no_model_starts_the_engine() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -47,12 +47,13 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     scheme: Option<PathBuf>,
 
-    /// The model file of any other system; FILE is the record then, with columns `t`, outputs, known inputs, `sigma_NAME` of either,
-    /// `experiment`, `segment`
+    /// The model file of any other system; FILE is the record then, with columns `t`, outputs, known inputs,
+    /// `sigma_NAME` of either, `experiment`, `segment`
     #[arg(long, value_name = "FILE", conflicts_with = "scheme")]
     model: Option<PathBuf>,
 
-    /// A calibration of the same platform or system before: the JSON that -o writes (one that was not consistent counts with its sigmas rescaled)
+    /// A calibration of the same platform or system before: the JSON that -o writes (one that was not
+    /// consistent counts with its sigmas rescaled)
     #[arg(long = "prior", value_name = "FILE")]
     before: Option<PathBuf>,
 

@@ -14,15 +14,15 @@ use crate::progress::Spinner;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Solutions")]
 pub(crate) struct EngineArguments {
-    /// How much work the symbolic engine may do for one formula, 0 (none) to 1000000: a unit is five million products of terms, about half a second, and
-    /// ends at the same place on every machine and under any load. What cannot be counted (factorisation) ends after two seconds of
-    /// processor time per unit
+    /// How much work the symbolic engine may do for one formula, 0 (none) to 1000000: a unit is five million
+    /// products of terms, about half a second, and ends at the same place on every machine and under any
+    /// load. What cannot be counted (factorisation) ends after two seconds of processor time per unit
     #[arg(long, value_name = "UNITS", default_value_t = 5, value_parser = whole::<u64>(0..=1_000_000))]
     symbolic_limit: u64,
 
     /// Longest wait for other obsdeg processes of the same user, 0 to 86400 s: the symbolic engine runs once
-    /// per user. Then the answer comes without the formulas that need the engine, and says so. No other option
-    /// depends on the clock
+    /// per user. Then the answer comes without the formulas that need the engine, and says so. No other
+    /// option depends on the clock
     #[arg(long, value_name = "SECONDS", default_value_t = 10, value_parser = whole::<u64>(0..=86_400))]
     engine_wait: u64,
 }
@@ -49,7 +49,8 @@ impl EngineArguments {
         })))
     }
 
-    /// What `work` finds with the engine, with a sign of life, and what the engine says of itself; then the next process may have it.
+    /// What `work` finds with the engine, with a sign of life, and what the engine says of itself; then the
+    /// next process may have it.
     pub(crate) fn lend<T>(
         &self,
         message: &'static str,
@@ -69,7 +70,8 @@ impl EngineArguments {
     }
 }
 
-/// Names on stderr the parts of the answer that are missing without the engine, and how to get them; quiet or not.
+/// Names on stderr the parts of the answer that are missing without the engine, and how to get them; quiet or
+/// not.
 pub(crate) fn say_busy(worker: &Worker) {
     let why = match worker.failure() {
         Some(WorkerError::Busy { seconds: 0 }) => {

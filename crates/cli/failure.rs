@@ -18,8 +18,8 @@ pub(crate) const INTERNAL: u8 = 3;
 /// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input: nothing in them reaches a
-/// terminal but text.
+/// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input:
+/// nothing in them reaches a terminal but text.
 pub(crate) fn say(message: &str) {
     say_as(message, |line| line.into());
 }

@@ -1,8 +1,9 @@
 //! Files put in place: whole or not at all, and never in place of what is no file.
 //!
-//! What is written comes first into a folder beside its destination, `.obsdeg-NAME-PID-N`, and is moved from there. Whoever uses that
-//! folder holds a lock on the file `lock` in it, which the system releases when the process ends, however it ends. So a folder whose
-//! lock is free was left by a process that was killed: the next run that writes NAME removes it, and nothing else.
+//! What is written comes first into a folder beside its destination, `.obsdeg-NAME-PID-N`, and is moved from
+//! there. Whoever uses that folder holds a lock on the file `lock` in it, which the system releases when the
+//! process ends, however it ends. So a folder whose lock is free was left by a process that was killed: the
+//! next run that writes NAME removes it, and nothing else.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{Error, ErrorKind, Result, Write};
@@ -19,8 +20,8 @@ fn staging() -> MutexGuard<'static, Option<PathBuf>> {
     STAGING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits until no file is being put in place and removes what was not: the program is about to end. Nothing is
-/// written beside a destination from now on: whoever wants to waits for the end.
+/// Waits until no file is being put in place and removes what was not: the program is about to end. Nothing
+/// is written beside a destination from now on: whoever wants to waits for the end.
 pub(crate) fn abandon() {
     let mut held = staging();
     if let Some(folder) = held.take() {
@@ -30,8 +31,8 @@ pub(crate) fn abandon() {
     std::mem::forget(held);
 }
 
-/// Refuses a file beyond the limit that the system sets (`ulimit -f`): the signal of a write beyond it ends the
-/// program with the folder left there.
+/// Refuses a file beyond the limit that the system sets (`ulimit -f`): the signal of a write beyond it ends
+/// the program with the folder left there.
 fn within_limit(bytes: &[u8]) -> Result<()> {
     #[cfg(unix)]
     {
@@ -86,8 +87,8 @@ pub(crate) fn kind(found: fs::FileType) -> &'static str {
     if found.is_dir() { "a folder" } else { "no regular file" }
 }
 
-/// Writes files and moves them in place in their order; `target` is what the user named, a file or a folder of these files. Files
-/// that are replaced keep their permissions, others have the usual ones.
+/// Writes files and moves them in place in their order; `target` is what the user named, a file or a folder
+/// of these files. Files that are replaced keep their permissions, others have the usual ones.
 ///
 /// # Errors
 /// With the file that could not be written; nothing is in place then, unless moving failed.

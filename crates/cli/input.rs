@@ -23,7 +23,8 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// What the file at `path` is meant as, by how it begins; nothing is said of stdin, pipes and what cannot be read.
+    /// What the file at `path` is meant as, by how it begins; nothing is said of stdin, pipes and what cannot
+    /// be read.
     pub(crate) fn of(path: &Path) -> Option<Self> {
         const BEGINNING: u64 = 1 << 16;
         if is_stdin(path) || !path.metadata().is_ok_and(|m| m.is_file()) {
@@ -66,8 +67,8 @@ pub(crate) fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// The text of a file, or of stdin (`-`); `what` it is stands in the errors. Pipes and devices are read too (`/dev/stdin`, `<(command)`), up to the same
-/// limit; a pipe that nobody writes to is refused.
+/// The text of a file, or of stdin (`-`); `what` it is stands in the errors. Pipes and devices are read too
+/// (`/dev/stdin`, `<(command)`), up to the same limit; a pipe that nobody writes to is refused.
 pub(crate) fn read(path: &Path, what: &str) -> Result<Source, Failure> {
     let stdin = is_stdin(path);
     let path = if stdin { Path::new("stdin") } else { path };

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::files;
 
-/// From now on an interrupt ends the program at once, with the code that a shell gives a program ended by Ctrl-C. Files that are
-/// being put in place are all there first; otherwise there is none.
+/// From now on an interrupt ends the program at once, with the code that a shell gives a program ended by
+/// Ctrl-C. Files that are being put in place are all there first; otherwise there is none.
 pub(crate) fn ends() -> Result<(), Failure> {
     listen(|| {
         eprintln!("interrupted");

@@ -33,8 +33,9 @@ pub(crate) struct Output {
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
 
-    /// Nothing but ASCII in tables and messages (default: where the locale is not UTF-8, which on a terminal it
-    /// also is where none of LC_ALL, LC_CTYPE, LANG is set, and on a terminal under TERM=dumb; pipes and files are UTF-8 without a locale)
+    /// Nothing but ASCII in tables and messages (default: where the locale is not UTF-8, which on a terminal
+    /// it also is where none of LC_ALL, LC_CTYPE, LANG is set, and on a terminal under TERM=dumb; pipes and
+    /// files are UTF-8 without a locale)
     #[arg(long)]
     ascii: bool,
 
@@ -90,7 +91,8 @@ impl Output {
         given.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures and series too.
+    /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures
+    /// and series too.
     fn is_file(&self) -> bool {
         let path = self.target.path().filter(|path| !path.is_dir());
         let files = ["json", "md", "csv", "tex", "txt"];
@@ -185,7 +187,8 @@ impl Target {
         self.output.as_deref().filter(|path| *path != Path::new("-"))
     }
 
-    /// Refuses early, before any work, what cannot be written to a file: one that exists, and what is no file.
+    /// Refuses early, before any work, what cannot be written to a file: one that exists, and what is no
+    /// file.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(path) = self.path() else { return Ok(()) };
         files::destination(path).map_err(|e| cannot_write(path, &e))?;
@@ -255,7 +258,8 @@ fn check_is_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Puts files into a folder, which is made where there is none; those that are there are replaced only when `force` says so.
+/// Puts files into a folder, which is made where there is none; those that are there are replaced only when
+/// `force` says so.
 pub(crate) fn write_files(folder: &Path, files: &[File], force: bool) -> Result<(), Failure> {
     check_is_folder(folder)?;
     if let Some((path, _)) = below(folder, files).find(|(path, _)| path.exists() && !force) {

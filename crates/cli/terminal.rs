@@ -27,8 +27,9 @@ fn said(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|v| !v.is_empty())
 }
 
-/// True if a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are those of ASCII: a terminal is believed
-/// to be of it, but what goes into pipes is read as files are, as UTF-8 (and Windows knows no such variables).
+/// True if a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are
+/// those of ASCII: a terminal is believed to be of it, but what goes into pipes is read as files are, as
+/// UTF-8 (and Windows knows no such variables).
 fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
     let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));

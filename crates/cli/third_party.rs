@@ -1,6 +1,6 @@
 //! What others wrote of a build: packages, their licences, and the texts of these, each once. The table is
-//! `licenses/third-party.z` (JSON, deflated), written from the graphs of all builds by `tests/it/licences.rs`, which
-//! reads this file too.
+//! `licenses/third-party.z` (JSON, deflated), written from the graphs of all builds by
+//! `tests/it/licences.rs`, which reads this file too.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,8 @@ pub(crate) struct Package {
     pub(crate) licence: String,
     /// Address of the source.
     pub(crate) source: String,
-    /// Builds that hold it: program, symbolica (the program with that feature), pdf (likewise), wheel, workbench.
+    /// Builds that hold it: program, symbolica (the program with that feature), pdf (likewise), wheel,
+    /// workbench.
     pub(crate) builds: Vec<String>,
     /// Operating systems and architectures that it is limited to, as `linux-x86_64`; empty if it is not.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

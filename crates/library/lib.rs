@@ -1,8 +1,9 @@
 //! Which unknowns of a system can be solved from its output, and how many derivatives does each need?
 //!
-//! The front door of obsdeg: a scheme or a model goes in, an answer comes out. An answer is plain data, the same that
-//! the program writes as JSON. What stands behind it (the crates `obsdeg-core`, `obsdeg-evidence`, `obsdeg-design`,
-//! `obsdeg-calibration`) may change its modules from version to version; the names here stay.
+//! The front door of obsdeg: a scheme or a model goes in, an answer comes out. An answer is plain data, the
+//! same that the program writes as JSON. What stands behind it (the crates `obsdeg-core`, `obsdeg-evidence`,
+//! `obsdeg-design`, `obsdeg-calibration`) may change its modules from version to version; the names here
+//! stay.
 //!
 //! | question | function | answer |
 //! | --- | --- | --- |

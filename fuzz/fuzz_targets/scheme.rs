@@ -1,4 +1,5 @@
-//! Any text as a scheme file: read and validated, written back and read again as the same, analysed and planned; or refused.
+//! Any text as a scheme file: read and validated, written back and read again as the same, analysed and
+//! planned; or refused.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,9 +1,11 @@
 //! The book and the README do what they say: every command in them runs, and prints what is shown.
 //!
-//! A block of `console` shows commands (`$ ...`) and what they print on stdout, a line `...` stands for any lines; a block of `sh` is a
-//! script that must succeed. Before a block `<!-- file NAME -->` makes it a file of that name, `<!-- exit code N -->` says that its commands
-//! end so, and their errors are shown behind what they print. Commands run one after the other, in a folder of their own with the examples in
-//! it; blocks of `pycon` are run by `python/tests/test_readme.py`. `UPDATE_BOOK=1` writes into the texts what is printed: between two `...` the lines that are most like those that are there.
+//! A block of `console` shows commands (`$ ...`) and what they print on stdout, a line `...` stands for any
+//! lines; a block of `sh` is a script that must succeed. Before a block `<!-- file NAME -->` makes it a file
+//! of that name, `<!-- exit code N -->` says that its commands end so, and their errors are shown behind what
+//! they print. Commands run one after the other, in a folder of their own with the examples in it; blocks of
+//! `pycon` are run by `python/tests/test_readme.py`. `UPDATE_BOOK=1` writes into the texts what is printed:
+//! between two `...` the lines that are most like those that are there.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,7 +17,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A block between fences: what stands behind the first fence, the comment before it, the first of its lines (counted from 0), and these.
+/// A block between fences: what stands behind the first fence, the comment before it, the first of its lines
+/// (counted from 0), and these.
 #[derive(Debug, Default)]
 struct Block<'a> {
     info: &'a str,
@@ -74,7 +77,8 @@ fn likeness(a: &str, b: &str) -> f64 {
     if same(a, b) || all == 0 { 1.0 } else { f64::from(common) / all as f64 }
 }
 
-/// What is shown, renewed: of every run of lines that is shown the run of as many printed lines that is most like it, in their order.
+/// What is shown, renewed: of every run of lines that is shown the run of as many printed lines that is most
+/// like it, in their order.
 fn renewed(shown: &[&str], printed: &[&str]) -> Vec<String> {
     if !shown.contains(&"...") {
         return printed.iter().map(|l| l.trim_end().to_string()).collect();

@@ -132,9 +132,9 @@ fn later_segments_begin_later() {
     }
 }
 
-/// Symmetries, combinations and remedies are those of the side on which the verdicts hold. By hand, for p > q:
-/// y = 2 b (p - q) + p q, where one of b, p, q tells the others; for p < q: y = p q without b. And for x' = a + b |x - y|:
-/// y and a move together.
+/// Symmetries, combinations and remedies are those of the side on which the verdicts hold. By hand, for p >
+/// q: y = 2 b (p - q) + p q, where one of b, p, q tells the others; for p < q: y = p q without b. And for x'
+/// = a + b |x - y|: y and a move together.
 #[test]
 fn all_that_is_said_is_of_one_side() {
     let mut seen = std::collections::BTreeSet::new();

@@ -134,7 +134,8 @@ fn a_review_of_the_run() {
             assert!(text.contains(words), "{file}: {words}");
         }
     }
-    // the small angles are those of what was estimated: rates of the axes of 3.2, 4.1 and 3.2 deg/h at most (with all terms of one sign) for 3942 s
+    // the small angles are those of what was estimated: rates of the axes of 3.2, 4.1 and 3.2 deg/h at most
+    // (with all terms of one sign) for 3942 s
     let largest = |more: &[&str]| -> f64 {
         let to = path("d.md");
         let line = [&["report", SCHEME, "--runs", "2", "-o", &to, "-q", "--force"], more].concat();
@@ -224,8 +225,8 @@ fn the_same_from_everywhere() {
     let piped: Value =
         serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
     assert_eq!(estimates(&csv), estimates(&piped));
-    // a record and one that says the same: coefficients as before, with sigmas smaller by the root of two, and a psi for each
-    // (what fits badly by chance fits as badly twice: there is a check that fails)
+    // a record and one that says the same: coefficients as before, with sigmas smaller by the root of two,
+    // and a psi for each (what fits badly by chance fits as badly twice: there is a check that fails)
     fs::write(&path, parquet(&another(&text))).expect("written");
     let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);
     let twice: Value = serde_json::from_slice(&twice.stdout).expect("JSON");

@@ -67,8 +67,8 @@ fn solutions_of_the_fields_wait_for_no_engine() {
     assert_eq!(a["notes"], serde_json::json!([]));
 }
 
-/// Where they hold sines and cosines, decimals stand for them when the engine is not to be had: a limit of no work stops it before its
-/// first answer.
+/// Where they hold sines and cosines, decimals stand for them when the engine is not to be had: a limit of no
+/// work stops it before its first answer.
 #[test]
 fn without_the_engine_solutions_are_decimals_and_it_is_said() {
     let refused = json(&[&CONSTANT[..], &["--format", "json", "--symbolic-limit", "0"]].concat());
@@ -557,7 +557,8 @@ fn models_from_files() {
     refused(&["analyze"], &["--angles", "FILE"]);
 }
 
-/// What is said of one unknown counts before what is said of its family, in whatever order; what concerns no unknown is refused.
+/// What is said of one unknown counts before what is said of its family, in whatever order; what concerns no
+/// unknown is refused.
 #[test]
 fn options_by_name_and_by_family() {
     const FIVE: &str = "examples/five-positions/scheme.toml";
@@ -597,7 +598,8 @@ fn options_by_name_and_by_family() {
     assert!(run(&["analyze", "--scheme", &path, "--solutions", "off"]).status.success());
 }
 
-/// Under reset carry every position has a psi of its own: each is held against the one psi of the other carries.
+/// Under reset carry every position has a psi of its own: each is held against the one psi of the other
+/// carries.
 #[test]
 fn psi_under_the_other_carries() {
     let two =

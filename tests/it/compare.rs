@@ -147,7 +147,8 @@ fn requirements_are_those_of_all_unknowns() {
     assert_eq!(said.collect::<Vec<_>>(), unseen);
 }
 
-/// The excitation of a rotating segment is the root mean square over its arc: by integrals of squares of sines.
+/// The excitation of a rotating segment is the root mean square over its arc: by integrals of squares of
+/// sines.
 #[test]
 fn excitation_of_an_arc() {
     let turning = |angle: &str, terms: &str| {
@@ -302,8 +303,9 @@ fn files_are_named_and_wrong_ones_refused() {
     }
 }
 
-/// What samples with slews determine without a prior, to the strict: the sigmas are from an independent computation of 70 digits; what is
-/// coupled by 6e-7 to what is not determined has none, however small that is.
+/// What samples with slews determine without a prior, to the strict: the sigmas are from an independent
+/// computation of 70 digits; what is coupled by 6e-7 to what is not determined has none, however small that
+/// is.
 #[test]
 fn sigmas_with_slews_are_those_without_a_prior() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -335,8 +337,9 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     assert_eq!((coupled["D_SY"], coupled["D_IX"]), (None, None));
 }
 
-/// Where the paper's drifts break the small-angle model, sigmas of full attitudes stand beside the predicted ones: for D_FX the
-/// 0.03 deg/h that an independent extended filter had, not 0.0003; at a thousandth of the drifts there are none.
+/// Where the paper's drifts break the small-angle model, sigmas of full attitudes stand beside the predicted
+/// ones: for D_FX the 0.03 deg/h that an independent extended filter had, not 0.0003; at a thousandth of the
+/// drifts there are none.
 #[test]
 fn sigmas_at_the_schemes_own_drifts() {
     let compared = |conditions: Conditions| {

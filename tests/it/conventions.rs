@@ -1,4 +1,5 @@
-//! What users of other programs expect of a command line: how files are named, formats, ASCII, the manual, words that are completed.
+//! What users of other programs expect of a command line: how files are named, formats, ASCII, the manual,
+//! words that are completed.
 
 use std::path::Path;
 

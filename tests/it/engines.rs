@@ -1,5 +1,5 @@
-//! Two engines, one verdict: what is judged in prime fields is judged again in real numbers of many digits, which share the
-//! graph and the staircase but no arithmetic, no elimination and no values of functions.
+//! Two engines, one verdict: what is judged in prime fields is judged again in real numbers of many digits,
+//! which share the graph and the staircase but no arithmetic, no elimination and no values of functions.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -54,8 +54,8 @@ fn hold(model: &SystemModel, text: &str, order: Option<usize>, count: &mut Count
     }
 }
 
-/// Draws models: polynomials and quotients in states, parameters, inputs, constants of given value, with known starts, segments,
-/// jumps and experiments now and then.
+/// Draws models: polynomials and quotients in states, parameters, inputs, constants of given value, with
+/// known starts, segments, jumps and experiments now and then.
 struct Draw {
     rng: SplitMix64,
     functions: bool,
@@ -167,7 +167,8 @@ fn a_thousand_random_rational_models_in_both_engines() {
     assert_eq!((count.agree, count.apart), (1000, 1000), "{count:?}");
 }
 
-/// Functions of arguments that are independent are judged in prime fields: by true values they must be what they are there.
+/// Functions of arguments that are independent are judged in prime fields: by true values they must be what
+/// they are there.
 #[test]
 fn random_function_models_in_both_engines() {
     let count = random_models(true, 0..60);

@@ -73,7 +73,8 @@ fn files_have_the_usual_permissions() {
     assert_eq!(fs::metadata(&private).expect("there").mode() & 0o777, 0o600);
 }
 
-/// A device, a pipe, a folder: refused, with --force too, and still there; a link to a file leads to the file.
+/// A device, a pipe, a folder: refused, with --force too, and still there; a link to a file leads to the
+/// file.
 #[test]
 fn only_files_are_replaced() {
     let (_folder, at) = folder();
@@ -193,7 +194,8 @@ fn a_file_is_what_it_says() {
     assert!(stderr(&other).contains("is a scheme file; expected a model file"), "{}", stderr(&other));
 }
 
-/// An interrupted command says nothing that it has not found: no evidence, no file, the exit code of an interrupt.
+/// An interrupted command says nothing that it has not found: no evidence, no file, the exit code of an
+/// interrupt.
 #[test]
 fn an_interrupt_ends_with_its_code() {
     let (folder, at) = folder();
@@ -225,8 +227,8 @@ fn an_interrupt_ends_with_its_code() {
 const SMALL: &str = "name = 'm'\n[states]\nx = '-x'\n[outputs]\ny = 'x'\n[simulation]\nduration = 5\nstep = 0.5\n\
                      values = { x = 1 }\npriors = { x = 0.5 }\nnoise = { y = 0.1 }\n";
 
-/// Runs that are interrupted at random times leave what was there, or the whole folder, and nothing else: of ten runs one
-/// draws the figures of a scheme, the others those of a small model.
+/// Runs that are interrupted at random times leave what was there, or the whole folder, and nothing else: of
+/// ten runs one draws the figures of a scheme, the others those of a small model.
 #[expect(clippy::print_stderr, reason = "what was measured")]
 fn interruptions_leave_nothing(count: u64) {
     let (_folder, at) = folder();

@@ -1,4 +1,5 @@
-//! The matrices of the front door against the verdicts: ranks of H F^k S_i by singular values, without the engine.
+//! The matrices of the front door against the verdicts: ranks of H F^k S_i by singular values, without the
+//! engine.
 
 use nalgebra::DMatrix;
 use obsdeg::error::MatricesError;
@@ -9,7 +10,8 @@ fn scheme(angles: &[[i32; 3]], carry: Carry) -> Scheme {
     Scheme { carry, ..Scheme::of_angles(angles.iter().map(|a| a.map(Angle::from_degrees))) }
 }
 
-/// The rank of all Z^(k) of orders up to `orders`, with time in units of 1/w_ie, so that every entry is of order 1.
+/// The rank of all Z^(k) of orders up to `orders`, with time in units of 1/w_ie, so that every entry is of
+/// order 1.
 fn rank(scheme: &Scheme, orders: u32) -> usize {
     let [w_n, w_u] = earth_rates(41.0);
     let w = w_n.hypot(w_u);

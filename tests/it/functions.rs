@@ -1,5 +1,5 @@
-//! Models with functions: true values, at given points, in related arguments, in every segment its own. What is expected is
-//! written down by hand.
+//! Models with functions: true values, at given points, in related arguments, in every segment its own. What
+//! is expected is written down by hand.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
@@ -14,7 +14,8 @@ fn judged(text: &str) -> Judgement {
     judge(&model, 7, None).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// `name 2, other -`: degrees, `-` for what no output sees, `~` for what is not told from others, `?` for what is not seen.
+/// `name 2, other -`: degrees, `-` for what no output sees, `~` for what is not told from others, `?` for
+/// what is not seen.
 fn verdicts(text: &str) -> String {
     let j = judged(text);
     let one = |c: usize| {
@@ -267,7 +268,8 @@ fn points_lie_where_the_model_is_defined() {
     );
 }
 
-/// A definite value against the same model with the value written in by hand: the same verdicts, orders and ranks.
+/// A definite value against the same model with the value written in by hand: the same verdicts, orders and
+/// ranks.
 #[test]
 fn substituted_by_hand() {
     for (functions, by_hand) in [
@@ -354,8 +356,8 @@ fn certainty_names_what_it_rests_on() {
     assert!(matches!(judged(&still("x", "x^2", "")).certainty, SystemCertainty::Primes(_)));
 }
 
-/// Which models prime fields may judge: those whose functions have independent values. Each of the others has a relation, a
-/// special value or a branch, which random values would miss.
+/// Which models prime fields may judge: those whose functions have independent values. Each of the others has
+/// a relation, a special value or a branch, which random values would miss.
 #[test]
 fn only_independent_functions_are_judged_in_prime_fields() {
     let by_primes = |states: &str, output: &str, rest: &str| {

@@ -1,4 +1,5 @@
-//! Texts from hostile files, paths and arguments: whatever they hold, in every format and on the terminal they are text.
+//! Texts from hostile files, paths and arguments: whatever they hold, in every format and on the terminal
+//! they are text.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +10,8 @@ use serde_json::Value;
 
 use crate::program::obsdeg;
 
-/// Colour, bell, backspace, end of text, window title, C1, the other direction of writing; what markup and spreadsheets act on.
+/// Colour, bell, backspace, end of text, window title, C1, the other direction of writing; what markup and
+/// spreadsheets act on.
 const NASTY: &str = "\u{1b}[31m\u{7}\u{8}\u{0}\u{1b}]0;t\u{7}\u{9b}2J\u{85}\u{202e}\u{2066}\u{200f}\u{2028}\u{7f}\u{ffff}`<b>|$^{}\\\"'&%#_*[x](y)";
 
 /// The same in a string of TOML or JSON.

@@ -89,7 +89,8 @@ fn judged(text: &str) -> Judgement {
     judge(&read(text), 3, None).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// A rigid body with a biased gyro that sees two landmarks, in vectors and by hand in scalars: the same system.
+/// A rigid body with a biased gyro that sees two landmarks, in vectors and by hand in scalars: the same
+/// system.
 #[test]
 fn vectors_are_their_components() {
     let vectors = r#"
@@ -409,8 +410,8 @@ fn constraints_against_coordinates_of_their_own() {
     assert_eq!(degrees(&line), [("x", 0), ("y", 0)].map(|(n, d)| (n.to_string(), Some(d))));
 }
 
-/// A gyro and gravity: with |q| = 1 only yaw is open, and the rank counts the constraint; a turn matrix instead of the quaternion and the small-angle
-/// count agree.
+/// A gyro and gravity: with |q| = 1 only yaw is open, and the rank counts the constraint; a turn matrix
+/// instead of the quaternion and the small-angle count agree.
 #[test]
 fn attitudes_on_their_constraint() {
     let attitude = |constraints: &str, state: &str, turned: &str, b: &str| {
@@ -547,7 +548,8 @@ fn experiments_that_are_wrong_are_named() {
     assert!(many.contains("21 [[experiment]]; expected at most 20"), "{many}");
 }
 
-/// The information of several experiments, with segments, confirms the verdicts; inputs that are the same where they should differ refute them.
+/// The information of several experiments, with segments, confirms the verdicts; inputs that are the same
+/// where they should differ refute them.
 #[test]
 fn evidence_of_several_experiments() {
     let text = |second: &str| {
@@ -586,7 +588,8 @@ fn evidence_of_several_experiments() {
     assert!(!refuted.passed, "{refuted:?}");
 }
 
-/// A unit quaternion in filter and information: consistent, of the exact rank, and values off the sphere are refused.
+/// A unit quaternion in filter and information: consistent, of the exact rank, and values off the sphere are
+/// refused.
 #[test]
 fn evidence_on_constraints() {
     let text = std::fs::read_to_string(

@@ -155,8 +155,8 @@ fn four_hundred_positions_and_duplicates_are_fine() {
     assert_eq!(d.rank(), 15);
 }
 
-/// Primes are printed, so anybody can write a combination that they divide: it has other primes, and is not taken for nothing.
-/// D_FZ is not told from psi_y.
+/// Primes are printed, so anybody can write a combination that they divide: it has other primes, and is not
+/// taken for nothing. D_FZ is not told from psi_y.
 #[test]
 fn nobody_aims_at_the_primes_of_a_scheme() {
     let with = |combination: &str| {

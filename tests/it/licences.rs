@@ -1,6 +1,6 @@
 //! Packages of others in every build: the table of licences against the graphs that cargo resolves and the
-//! texts in the sources. `UPDATE_LICENCES=1 cargo test --test it licences::` writes the table, the texts for the
-//! wheel and the workbench and the wheel's SBOM again (`cargo fetch` first: all platforms are read).
+//! texts in the sources. `UPDATE_LICENCES=1 cargo test --test it licences::` writes the table, the texts for
+//! the wheel and the workbench and the wheel's SBOM again (`cargo fetch` first: all platforms are read).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -143,7 +143,8 @@ fn the_platform_is_one_of_them() {
     assert_eq!(model.findings.asked, [Verdict { status: Status::Observable, degree: Some(1) }]);
 }
 
-/// A reader of JSON that holds numbers as doubles keeps 53 bits of them: primes are text, of a scheme and of a model.
+/// A reader of JSON that holds numbers as doubles keeps 53 bits of them: primes are text, of a scheme and of
+/// a model.
 #[test]
 fn primes_are_text() {
     let text = "name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"\n";
@@ -367,12 +368,14 @@ fn jacobians_against_differences() {
     }
 }
 
-/// What starts forget is a direction that a linearised filter believes to know to any precision: no figure of the run rests on it.
+/// What starts forget is a direction that a linearised filter believes to know to any precision: no figure of
+/// the run rests on it.
 #[test]
 fn a_filter_is_not_asked_what_it_cannot_know() {
     let of = |name: &str| simulate_system(&example(name), 1).expect("a run").0.consistency;
     let forgotten = of("two-compartment");
-    // seven states, of which the fast mode of the start is a function of the rates; all seven together give 1e39
+    // seven states, of which the fast mode of the start is a function of the rates; all seven together give
+    // 1e39
     assert_eq!(forgotten.unresolved_directions, 1);
     assert!(forgotten.nees > forgotten.nees_limit && forgotten.nees < 1e12, "{forgotten:?}");
     let (_, limit) = chi_square_band(6.0, 1.0, 0.999);
@@ -414,7 +417,8 @@ fn what_a_constraint_holds_is_not_judged() {
     }
 }
 
-/// Slopes, prior inflation and null vectors of the information confirm the exact verdicts on every example that has numbers.
+/// Slopes, prior inflation and null vectors of the information confirm the exact verdicts on every example
+/// that has numbers.
 #[test]
 fn the_information_confirms_the_verdicts() {
     let mut slopes = 0;
@@ -470,8 +474,8 @@ fn what_is_not_measured_is_no_agreement() {
     assert!(e.quantities.iter().all(|q| q.slope.outcome == Agreement::Agrees));
 }
 
-/// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two horizons that agree by chance
-/// refute nothing.
+/// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two
+/// horizons that agree by chance refute nothing.
 #[test]
 fn slopes_that_do_not_settle_are_not_measured() {
     for (theta, input) in [("0.5", "sin(t)"), ("1", "0.5*cos(3*t)")] {
@@ -485,8 +489,8 @@ fn slopes_that_do_not_settle_are_not_measured() {
     }
 }
 
-/// The filter of a model: consistent where everything is observable; where a direction is not, a filter that is linearised anew takes
-/// up information that is not there, and the run says whose.
+/// The filter of a model: consistent where everything is observable; where a direction is not, a filter that
+/// is linearised anew takes up information that is not there, and the run says whose.
 #[test]
 fn filters_of_models() {
     let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
@@ -514,7 +518,8 @@ fn filters_of_models() {
     assert!(error.to_string().contains("no value; expected one under [simulation.values]"), "{error}");
 }
 
-/// Solving expressions against derivatives taken by hand (chain rule, in floating point), and by the whole program.
+/// Solving expressions against derivatives taken by hand (chain rule, in floating point), and by the whole
+/// program.
 #[cfg(feature = "symbolica")]
 #[test]
 fn solving_expressions() {
@@ -566,8 +571,8 @@ fn solving_expressions() {
     assert!(none.is_empty() && note.as_str().is_some_and(|n| n.contains("without functions")), "{note}");
 }
 
-/// 1/x grows by 2k in time and y = s1/(1/x + s2), so that 1/x and s2 can be shifted against each other; a number of three digits in a
-/// direction comes out as itself.
+/// 1/x grows by 2k in time and y = s1/(1/x + s2), so that 1/x and s2 can be shifted against each other; a
+/// number of three digits in a direction comes out as itself.
 #[test]
 fn directions_that_are_polynomials() {
     let read = |states: &str, parameters: &str, y: &str| {
@@ -585,7 +590,8 @@ fn directions_that_are_polynomials() {
     assert_eq!(tilt, ["add c to phi; subtract 981/100 c from b"]);
 }
 
-/// Primes are printed, so anybody can write a model in which they divide a factor: that model has other primes.
+/// Primes are printed, so anybody can write a model in which they divide a factor: that model has other
+/// primes.
 #[test]
 fn nobody_aims_at_the_primes() {
     // those of seed 1, when they did not depend on the input
@@ -642,9 +648,10 @@ fn the_input_chooses_the_primes() {
     assert_eq!(seen.len(), all);
 }
 
-/// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys (D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u with K = k1 + w1
-/// and u = b x1 x4, which are known. So c, w2 and K are the roots of one polynomial, in any order; what is on the right can be had with each.
-/// Integrated numerically, all six orders give the same outputs.
+/// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys (D + c)(D + w2)(D + K) x4 = k2 q2 (D
+/// + K) u + k1 k2 q1 u with K = k1 + w1 and u = b x1 x4, which are known. So c, w2 and K are the roots of one
+/// polynomial, in any order; what is on the right can be had with each. Integrated numerically, all six
+/// orders give the same outputs.
 #[test]
 fn three_solutions_that_give_the_same_outputs() {
     let (_, _, text) = models().into_iter().find(|m| m.0 == "hiv_latent").expect("a reference");

@@ -8,8 +8,8 @@ use crate::report::{report, table, texts};
 
 const BENCH: &str = "examples/bench-errors/scheme.toml";
 
-/// The scheme of the datasheet has the noise that `allan` finds in the record beside it, and what its README says of
-/// it is so: sigmas meet every requirement, totals do not, by the bias.
+/// The scheme of the datasheet has the noise that `allan` finds in the record beside it, and what its README
+/// says of it is so: sigmas meet every requirement, totals do not, by the bias.
 #[test]
 fn a_record_at_rest_and_a_datasheet_make_a_bench() {
     let folder = "examples/bench-datasheet";
@@ -99,8 +99,8 @@ fn the_report_has_a_budget_of_every_coefficient() {
     }
 }
 
-/// `budget.csv` has a row per line of every budget, with the numbers of the JSON; so has the table of `--format csv`,
-/// under the name of the unknown.
+/// `budget.csv` has a row per line of every budget, with the numbers of the JSON; so has the table of
+/// `--format csv`, under the name of the unknown.
 #[test]
 fn budgets_are_files_of_rows() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -132,8 +132,8 @@ fn budgets_are_files_of_rows() {
     assert_eq!(rows(&printed.stdout, ["omitted.budgets.name", "source", "contribution"]), expected);
 }
 
-/// Scheme of [`record_of_two_positions`]: under platform carry everything is determined, but for what is alike
-/// at both positions.
+/// Scheme of [`record_of_two_positions`]: under platform carry everything is determined, but for what is
+/// alike at both positions.
 const TWO: &str = "name = 'two'\ncarry = 'platform'\nlatitude_deg = 28.2\nterms = ['F']\n[simulation]\ndwell_s = 1000\n\
                    step_s = 10\naccelerometer_noise_g = 1e-6\ndrift_noise = '0'\n[[position]]\nname = 'p1'\n\
                    attitude = 'NUE'\n[[position]]\nname = 'p2'\nattitude = 'SUW'\n";
@@ -228,8 +228,8 @@ fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
     }
 }
 
-/// No answer says met where the bench uses up the margin: the prediction, the run and every unknown of it, and
-/// a calibration. A zero of 3000 ug changes D_FZ by `wU 3e-3` there, by hand: 0.02132 deg/h.
+/// No answer says met where the bench uses up the margin: the prediction, the run and every unknown of it,
+/// and a calibration. A zero of 3000 ug changes D_FZ by `wU 3e-3` there, by hand: 0.02132 deg/h.
 #[test]
 fn nothing_is_met_that_the_bench_uses_up() {
     let answer = json(&["simulate", "--scheme", BENCH, "--format", "json", "-q"]);
@@ -299,8 +299,9 @@ const FIVE: [&str; 14] = [
     "28.2",
 ];
 
-/// The bench of a run counts by the weights of the run. By hand (dense least squares with the noise and the priors of
-/// the run, in numpy): sigma of D_FY 8.298e-4 deg/h, total 0.004360, where the predicted weights give 0.00582.
+/// The bench of a run counts by the weights of the run. By hand (dense least squares with the noise and the
+/// priors of the run, in numpy): sigma of D_FY 8.298e-4 deg/h, total 0.004360, where the predicted weights
+/// give 0.00582.
 #[test]
 fn the_bench_of_a_run_counts_by_its_own_weights() {
     let arguments =
@@ -321,8 +322,8 @@ fn the_bench_of_a_run_counts_by_its_own_weights() {
     assert!((run / predicted - 1.0).abs() < 1e-6, "{run} {predicted}");
 }
 
-/// A size that has no computed effect is refused, one of an unknown is said to count nothing, and a cross-check says
-/// that it has no bench.
+/// A size that has no computed effect is refused, one of an unknown is said to count nothing, and a
+/// cross-check says that it has no bench.
 #[test]
 fn sizes_that_count_nothing_are_said() {
     let said = |arguments: &[&str]| -> String {
@@ -361,9 +362,9 @@ fn sizes_that_count_nothing_are_said() {
     }
 }
 
-/// `analyze --sensitivities` has the changes per unit of the reference table (normal equations with a Taylor step, and
-/// expm with QR; four digits), at the conditions that it states; without the option there are none, for a model it is
-/// refused.
+/// `analyze --sensitivities` has the changes per unit of the reference table (normal equations with a Taylor
+/// step, and expm with QR; four digits), at the conditions that it states; without the option there are none,
+/// for a model it is refused.
 #[test]
 fn analyze_gives_the_changes_per_unit() {
     let solve = ["--solutions", "off"];
@@ -397,8 +398,8 @@ fn analyze_gives_the_changes_per_unit() {
     assert!(refused.contains("--sensitivities"), "{refused}");
 }
 
-/// What a bench does not state has its limits beside it: families that it states, zero too, have none, and the
-/// requirement is met just below the limit that is printed and missed just above it.
+/// What a bench does not state has its limits beside it: families that it states, zero too, have none, and
+/// the requirement is met just below the limit that is printed and missed just above it.
 #[test]
 fn a_partial_bench_leaves_limits_of_the_rest() {
     let asked = |bench: &str| {

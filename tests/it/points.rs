@@ -203,9 +203,9 @@ fn one_of_several_ways_is_named() {
     }
 }
 
-/// Symmetries, combinations and remedies are those of the way in which the constraint holds where the verdicts
-/// are judged. By hand: x^2 = y^2 z^2 with s = x - y z moves nothing along x = y z, by two scalings, and x/(y z) is 1
-/// there; (x - y)(x + y - z) = 0 with s = (x - y)(1 + z) leaves z alone free along x = y.
+/// Symmetries, combinations and remedies are those of the way in which the constraint holds where the
+/// verdicts are judged. By hand: x^2 = y^2 z^2 with s = x - y z moves nothing along x = y z, by two scalings,
+/// and x/(y z) is 1 there; (x - y)(x + y - z) = 0 with s = (x - y)(1 + z) leaves z alone free along x = y.
 #[test]
 fn all_that_is_said_is_of_one_way() {
     let answer = |constraint: &str, outputs: &str, seed: u64| {
@@ -281,8 +281,8 @@ fn dependent_gradients_are_refused() {
     }
 }
 
-/// A product is zero where one of its factors is: the one that is taken does not depend on the seed, is that of the
-/// given values, is said, and verdicts are those of the model with the factor in its place.
+/// A product is zero where one of its factors is: the one that is taken does not depend on the seed, is that
+/// of the given values, is said, and verdicts are those of the model with the factor in its place.
 #[test]
 fn products_are_judged_by_the_factor_that_is_named() {
     let point = |x: f64, y: f64| format!("[simulation]\nvalues={{x={x}, y={y}}}");
@@ -342,8 +342,8 @@ fn a_vanishing_gradient_at_given_values_is_said() {
     }
 }
 
-/// The factor that is taken leaves most free, is one at which the outputs are defined, and is one alone for all
-/// experiments; a quotient of unknowns, and a product that a zero makes of everything, is none.
+/// The factor that is taken leaves most free, is one at which the outputs are defined, and is one alone for
+/// all experiments; a quotient of unknowns, and a product that a zero makes of everything, is none.
 #[test]
 fn factors_are_taken_that_can_be() {
     let answer = |text: &str| {

@@ -33,7 +33,8 @@ fn series_of_the_literature() {
     let ([beta, s], [gamma, t]) = (found(&flu, "beta"), found(&flu, "gamma"));
     assert!((beta / 2.18e-3 - 1.0).abs() < 0.03 && s < 1e-4, "{beta} +- {s}");
     assert!((gamma / 0.44 - 1.0).abs() < 0.03 && t < 0.02, "{gamma} +- {t}");
-    // R, ?SSfol: lKe -2.9196 +- 0.1709, lKa 0.5752 +- 0.1728, lCl -3.9159 +- 0.1273; 0.732 on 8 degrees of freedom
+    // R, ?SSfol: lKe -2.9196 +- 0.1709, lKa 0.5752 +- 0.1728, lCl -3.9159 +- 0.1273; 0.732 on 8 degrees of
+    // freedom
     let theo = model("theophylline", &[]);
     let of = |name| found(&theo, name)[0];
     let [ke, ka, v] = ["ke", "ka", "V"].map(of);
@@ -53,7 +54,8 @@ fn series_of_the_literature() {
     );
     let sigma = theo["outputs"][0]["sigma"].as_f64().expect("a number");
     assert!((sigma - 0.732).abs() < 1e-3, "{sigma}");
-    // B. Carpenter, Predator-prey population dynamics (2018), with priors: 0.55, 0.028, 0.80, 0.024, 34.0, 5.9; sigma 0.25
+    // B. Carpenter, Predator-prey population dynamics (2018), with priors: 0.55, 0.028, 0.80, 0.024, 34.0,
+    // 5.9; sigma 0.25
     let hares = model("hudson-bay", &[]);
     for (name, published, within) in [
         ("a", 0.55, 0.07),
@@ -102,7 +104,8 @@ fn a_record_by_hand() {
     assert!((left / 1e-3 - 1.0).abs() < 0.15 && (expected / 3e-4 - 1.0).abs() < 0.15, "{left} {expected}");
     assert_eq!(v["findings"].as_array().map(Vec::len), Some(1), "{}", v["findings"]);
     assert_eq!(v["findings"][0]["kind"], "noise");
-    // least squares with equal weights, by another program; then what is published with the method, of its own program on this record
+    // least squares with equal weights, by another program; then what is published with the method, of its
+    // own program on this record
     let plain = [33123.9, 33275.1, 32364.5, 414.42, 412.03, 414.62, 0.0034, -0.0092, 0.0214];
     let published =
         [33124.2, 33275.2, 32364.4, 414.459, 412.01, 414.649, 0.003_359_3, -0.008_906_39, 0.021_334_1];
@@ -131,7 +134,8 @@ fn a_record_by_hand() {
     }
 }
 
-/// Then its gyros, by the turns between: `cargo test --release --test it -- --ignored gyros_by_hand` (a minute in debug).
+/// Then its gyros, by the turns between: `cargo test --release --test it -- --ignored gyros_by_hand` (a
+/// minute in debug).
 #[test]
 #[ignore = "a minute"]
 fn gyros_by_hand() {
@@ -158,7 +162,8 @@ fn gyros_by_hand() {
     agrees(&v, &published, 2.0);
 }
 
-/// Prey alone are counted: the predators' number and what each eats are told only as a product, and the profile of either is flat.
+/// Prey alone are counted: the predators' number and what each eats are told only as a product, and the
+/// profile of either is flat.
 #[test]
 fn a_profile_is_flat_where_the_verdict_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -203,7 +208,8 @@ fn a_profile_is_flat_where_the_verdict_says_so() {
     assert!((4.0..16.0).contains(&rise), "three sigma are nine: {rise}");
 }
 
-/// Counts per g of imucal 2.6.0 on the whole session (`FerrarisCalibration`, K_a R_a times 9.81), and its biases in counts.
+/// Counts per g of imucal 2.6.0 on the whole session (`FerrarisCalibration`, K_a R_a times 9.81), and its
+/// biases in counts.
 const IMUCAL: [(&str, f64); 9] = [
     ("kxx", 2045.6541),
     ("kxy", 14.5705),
@@ -216,7 +222,8 @@ const IMUCAL: [(&str, f64); 9] = [
     ("kzz", 2106.4340),
 ];
 
-/// The linear map is that of imucal to a hundredth of a count per g; biases, which it takes from two positions each, within a third of what six allow.
+/// The linear map is that of imucal to a hundredth of a count per g; biases, which it takes from two
+/// positions each, within a third of what six allow.
 #[test]
 fn accelerometers_are_those_of_imucal() {
     let found = json(&[
@@ -255,8 +262,8 @@ const IMU_CALIB: [(&str, f64); 9] = [
     ("bz", 0.3444),
 ];
 
-/// Raw counts of a MEMS unit at 23 attitudes that nobody knows. The reference takes the same samples, so both differ
-/// by less than the noise allows: two sigma.
+/// Raw counts of a MEMS unit at 23 attitudes that nobody knows. The reference takes the same samples, so both
+/// differ by less than the noise allows: two sigma.
 #[test]
 fn accelerometers_are_those_of_imu_calib() {
     let folder = tempfile::tempdir().expect("a folder");

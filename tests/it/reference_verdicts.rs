@@ -71,8 +71,8 @@ fn single_position_at_pole_and_equator_and_with_azimuth() {
     assert_eq!((azimuth.rank, degree(&azimuth, "eps_y^n")), (6, Some(1)));
 }
 
-/// Whom an unknown is not told from depends on the directions that Z does not see, on no choice of them. At -90, 0, 0 (D_FY, psi_z) and
-/// (D_OY, psi_z) cannot be seen, so D_FY = 1, D_OY = -+1 cannot either.
+/// Whom an unknown is not told from depends on the directions that Z does not see, on no choice of them. At
+/// -90, 0, 0 (D_FY, psi_z) and (D_OY, psi_z) cannot be seen, so D_FY = 1, D_OY = -+1 cannot either.
 #[test]
 fn whom_an_unknown_is_not_told_from() {
     let partners = |s: &Scheme| -> BTreeMap<String, BTreeSet<String>> {

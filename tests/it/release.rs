@@ -1,4 +1,5 @@
-//! What a release needs besides a program that works: texts whose links lead somewhere, crates that can be packaged, one version.
+//! What a release needs besides a program that works: texts whose links lead somewhere, crates that can be
+//! packaged, one version.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -299,8 +299,8 @@ fn remedies_of_all_models_are_true() {
     assert!(of_models(1) > 300);
 }
 
-/// A search for symmetries that uses up its work leaves enough for the changes: all eight of this model are tried, and each
-/// that resolves something is true by a verdict of its own.
+/// A search for symmetries that uses up its work leaves enough for the changes: all eight of this model are
+/// tried, and each that resolves something is true by a verdict of its own.
 #[test]
 fn a_search_for_symmetries_leaves_work_for_changes() {
     let (_, value, text) = models().into_iter().find(|m| m.0 == "seaijrc_covid").expect("a reference model");

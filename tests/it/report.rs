@@ -78,7 +78,8 @@ pub(crate) fn statuses(page: &Html) -> Vec<Vec<[String; 3]>> {
     page.select(&parse("body > .front > .statuses > .status")).map(of).collect()
 }
 
-/// The box and the verdict of a page of one scheme or model say the same, and nothing further down the contrary.
+/// The box and the verdict of a page of one scheme or model say the same, and nothing further down the
+/// contrary.
 fn assert_status(page: &Html, verdict: &str) {
     let boxes = statuses(page);
     assert_eq!(boxes.len(), 1);

@@ -19,7 +19,8 @@ fn findings(page: &Html, title: &str) -> Vec<[String; 2]> {
     all[k].iter().map(|[what, grade, text]| [what.clone(), format!("{grade}: {text}")]).collect()
 }
 
-/// What is recommended holds by the numbers of the same page, and nothing is where schemes are not like with like.
+/// What is recommended holds by the numbers of the same page, and nothing is where schemes are not like with
+/// like.
 #[test]
 fn several_schemes_are_compared_first() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -264,8 +265,8 @@ fn knowing(model: &SystemModel, name: &str) -> SystemModel {
     out
 }
 
-/// What the box of a model recommends is tried: one unknown of a group known beforehand, each in turn, makes the others observable; where no one
-/// does, that is not said.
+/// What the box of a model recommends is tried: one unknown of a group known beforehand, each in turn, makes
+/// the others observable; where no one does, that is not said.
 #[test]
 fn a_model_says_what_to_know_beforehand() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -43,8 +43,8 @@ fn reference_verdicts() {
 proptest! {
     #![proptest_config(Config { cases: 40, rng_seed: RngSeed::Fixed(2), ..Config::default() })]
 
-    /// A rotation is what many positions on its arc are when psi^n goes on between them: the stations taken are enough,
-    /// and more do not help. Each axis is started where its turn is a change of one Euler angle.
+    /// A rotation is what many positions on its arc are when psi^n goes on between them: the stations taken
+    /// are enough, and more do not help. Each axis is started where its turn is a change of one Euler angle.
     #[test]
     fn a_rotation_is_all_positions_of_its_arc(
         [a, b, c] in prop::array::uniform3(-170i32..170),
@@ -82,8 +82,8 @@ proptest! {
         prop_assert_eq!(degrees(&whole), degrees(&sampled));
     }
 
-    /// Where a rotation ends at the attitude of what follows, no psi jumps, so that two carries say the same; and psi in
-    /// platform axes is handed on from where the rotation ended, not from where it began.
+    /// Where a rotation ends at the attitude of what follows, no psi jumps, so that two carries say the same;
+    /// and psi in platform axes is handed on from where the rotation ended, not from where it began.
     #[test]
     fn psi_is_handed_on_where_a_rotation_ends(arc in -350i32..350, b in -80i32..80, c in -170i32..170) {
         prop_assume!(arc.abs() > 1);
@@ -103,8 +103,8 @@ proptest! {
     }
 }
 
-/// The filter runs through a rotation and agrees with its own covariance, against linear and exact truth; what the exact
-/// verdicts call not observable stays at the prior.
+/// The filter runs through a rotation and agrees with its own covariance, against linear and exact truth;
+/// what the exact verdicts call not observable stays at the prior.
 #[test]
 fn a_rotation_is_simulated() {
     let scheme = scheme(&["NUE@X_p:360", "NUE@Z_p:360"], Carry::Inertial);

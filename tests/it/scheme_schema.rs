@@ -1,5 +1,5 @@
-//! The JSON Schema of scheme files against the files that are shipped: the schema says no to none of them, and to those on
-//! purpose wrong that a schema can express.
+//! The JSON Schema of scheme files against the files that are shipped: the schema says no to none of them,
+//! and to those on purpose wrong that a schema can express.
 
 use std::path::{Path, PathBuf};
 
@@ -152,7 +152,8 @@ fn the_schema_accepts_every_shipped_scheme() {
     }
 }
 
-/// What the reader refuses for its kind, its range or its key, the schema refuses too; and every key that the schema has is read.
+/// What the reader refuses for its kind, its range or its key, the schema refuses too; and every key that the
+/// schema has is read.
 #[test]
 fn schema_and_reader_agree() {
     use obsdeg_core::model::scheme_file::read;

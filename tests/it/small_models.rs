@@ -1,5 +1,5 @@
-//! Small random models: none takes more than 10 s of processor time or 1 GB of memory unless the answer refuses it and
-//! says why. A debug build has twice the time.
+//! Small random models: none takes more than 10 s of processor time or 1 GB of memory unless the answer
+//! refuses it and says why. A debug build has twice the time.
 
 use std::io::Write;
 use std::process::Command;
@@ -163,9 +163,9 @@ fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
 }
 
 /// Matrices: the output is a generating function of its first row and column in powers of the start,
-/// `A(t) = A0 (1 - t A0)^-1`, so that it holds the moments `(A0^k)[1,1]`, k = 1, 2, ... These are those of a strictly
-/// proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as many orders show
-/// them.
+/// `A(t) = A0 (1 - t A0)^-1`, so that it holds the moments `(A0^k)[1,1]`, k = 1, 2, ... These are those of a
+/// strictly proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as
+/// many orders show them.
 #[test]
 fn matrices_are_judged_within_the_limits() {
     for n in [3, 5, 10] {
@@ -193,7 +193,8 @@ fn matrices_beyond_the_limits_are_refused() {
     }
 }
 
-/// Where solutions are not counted, the sentence names the option that allows more work, and with more they are.
+/// Where solutions are not counted, the sentence names the option that allows more work, and with more they
+/// are.
 #[test]
 fn solutions_beyond_the_limit_name_their_option() {
     let text = "name = \"m\"\n[states]\nx = \"-a*x^2 + b*y\"\ny = \"a*b*x - c*y\"\n\
@@ -272,8 +273,9 @@ fn small_texts_that_ask_for_too_much_are_refused() {
     }
 }
 
-/// Models of the generator whose work was not counted once: an elimination of long polynomials, remedies of a model that is
-/// judged in many digits, and rows that lose so many digits that all of them are made anew for every row.
+/// Models of the generator whose work was not counted once: an elimination of long polynomials, remedies of a
+/// model that is judged in many digits, and rows that lose so many digits that all of them are made anew for
+/// every row.
 #[test]
 fn models_that_took_too_long_end() {
     let drawn = |seed: u64| model(&mut SplitMix64::of(seed, "small models", &["any"]));
@@ -294,8 +296,8 @@ fn models_that_took_too_long_end() {
     }
 }
 
-/// Constraints, functions and powers whose work grows faster than their text: each ends within the limits, refused with the
-/// option that allows more, or judged.
+/// Constraints, functions and powers whose work grows faster than their text: each ends within the limits,
+/// refused with the option that allows more, or judged.
 #[test]
 fn work_beside_the_rows_is_counted() {
     let states = |n: usize, rate: &str| (0..n).map(|i| format!("x{i} = \"{rate}\"\n")).collect::<String>();
@@ -314,7 +316,8 @@ fn work_beside_the_rows_is_counted() {
         let error = answered(text, &[]).expect_err(expected);
         assert!(error.contains(expected) && error.contains("a larger --work-limit allows more"), "{error}");
     }
-    // one sum of 1,200 sines: the proof that they are independent is refused, digits judge it; 1,199 directions are left
+    // one sum of 1,200 sines: the proof that they are independent is refused, digits judge it; 1,199
+    // directions are left
     let sines: Vec<String> = (0..1200).map(|i| format!("sin(x{i}*x{})", (i + 1) % 1200)).collect();
     let sines =
         format!("name = \"m\"\n[states]\n{}[outputs]\ny = \"{}\"\n", states(1200, "0"), sines.join(" + "));
@@ -332,8 +335,8 @@ fn work_beside_the_rows_is_counted() {
     assert_eq!(answer["rank_profile"], serde_json::json!([1, 2]));
 }
 
-/// Many names: each text ends within the limits. 100,000 outputs are judged, with solutions; values of 2,000 unknowns are not
-/// tried, and the sentence names the option; more unknowns than are allowed are refused.
+/// Many names: each text ends within the limits. 100,000 outputs are judged, with solutions; values of 2,000
+/// unknowns are not tried, and the sentence names the option; more unknowns than are allowed are refused.
 #[test]
 fn many_names_end_within_the_limits() {
     let names = |letter: &str, n: usize, value: &str| {

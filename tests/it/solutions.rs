@@ -1,4 +1,5 @@
-//! How many solutions an observable unknown has, against published verdicts, by hand, and by trying all points of a small field.
+//! How many solutions an observable unknown has, against published verdicts, by hand, and by trying all
+//! points of a small field.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -101,7 +102,8 @@ fn numbers_of_systems() {
     // in two experiments with the same rates all of it is swapped at once
     let again = counted(&format!("experiments = 2\n{twins}"));
     assert_eq!(numbers(&again).values().copied().collect::<Vec<_>>(), [2; 6]);
-    // a known jump of u tells them apart, and so does a constraint; one that is the same for both leaves it open
+    // a known jump of u tells them apart, and so does a constraint; one that is the same for both leaves it
+    // open
     let jump = counted(&format!("{twins}[[segment]]\n[[segment]]\ncarry = {{u = \"u + 1\"}}\n"));
     assert_eq!(numbers(&jump).values().copied().collect::<Vec<_>>(), [1; 4]);
     let constrained =
@@ -251,8 +253,9 @@ fn coefficient(terms: &mut [Product], series: &[[i64; ORDERS]], k: usize) -> i64
     sum.rem_euclid(Q)
 }
 
-/// All points of a field of 37 elements are sorted by their outputs: of an unknown with k values hardly a point has more with it,
-/// and, for k up to 3, enough have all of them (all but special ones of 1 and 2, half of 3 by the density of primes that split).
+/// All points of a field of 37 elements are sorted by their outputs: of an unknown with k values hardly a
+/// point has more with it, and, for k up to 3, enough have all of them (all but special ones of 1 and 2, half
+/// of 3 by the density of primes that split).
 #[test]
 fn counts_are_those_of_all_points_of_a_small_field() {
     let mut rng = SplitMix64::new(20);

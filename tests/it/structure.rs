@@ -233,7 +233,8 @@ fn defined_in(files: &Files, path: &[String]) -> Option<Vec<String>> {
     if defines(&files[module]) {
         return Some(module.to_vec());
     }
-    // `super::` in a module that is written out in its file may mean that file: what its module does not name is no import
+    // `super::` in a module that is written out in its file may mean that file: what its module does not name
+    // is no import
     let exports = |(at, _): (usize, &str)| identifier(&files[module][at..]) == name;
     if !files[module].match_indices(name.as_str()).any(exports) {
         return None;
@@ -269,4 +270,38 @@ fn no_files_import_each_other() {
     assert_eq!(found, Some(["a", "b/c", "a"].map(String::from).to_vec()));
     files.insert(vec!["b".into(), "c".into()], "pub struct Made;".into());
     assert_eq!(circle(&imports_of_files(&files)), None);
+}
+
+/// Most columns of a line of comment, its indentation counted; code and formulas between fences apart.
+const COLUMNS: usize = 110;
+
+/// Lines of comment that are longer than [`COLUMNS`], by their numbers.
+fn long_comments(text: &str) -> Vec<usize> {
+    let mut fenced = false;
+    let mut out = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let own = line.trim_start();
+        let Some(said) = own.strip_prefix("//") else {
+            fenced = false;
+            continue;
+        };
+        fenced ^= said.trim_start_matches(['/', '!']).trim_start().starts_with("```");
+        if !fenced && line.chars().count() > COLUMNS {
+            out.push(i + 1);
+        }
+    }
+    out
+}
+
+#[test]
+fn comments_fit_their_columns() {
+    let long = "x".repeat(COLUMNS);
+    assert_eq!(long_comments(&format!("// {long}\nlet x = 1; // {long}\n    //! {long}")), [1, 3]);
+    assert!(long_comments(&format!("/// ```\n/// {long}\n/// ```\n")).is_empty());
+    let mut found = Vec::new();
+    for file in ["crates", "tests/it"].iter().flat_map(|folder| sources(&root().join(folder))) {
+        let text = fs::read_to_string(&file).expect("a source file");
+        found.extend(long_comments(&text).iter().map(|line| format!("{}:{line}", file.display())));
+    }
+    assert!(found.is_empty(), "longer than {COLUMNS} columns: {found:#?}");
 }

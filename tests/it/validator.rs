@@ -1,5 +1,5 @@
-//! JSON Schema (draft 2020-12), of its keywords those that the program's schemas have: any other one is refused,
-//! so that nothing is accepted because it was not read.
+//! JSON Schema (draft 2020-12), of its keywords those that the program's schemas have: any other one is
+//! refused, so that nothing is accepted because it was not read.
 
 use regex::Regex;
 use serde_json::Value;

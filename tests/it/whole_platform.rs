@@ -1,5 +1,5 @@
-//! Accelerometers, torquers and mounting (section 10 of the method): the reference verdicts, a second path that shares nothing with the
-//! engine, and laws on random schemes.
+//! Accelerometers, torquers and mounting (section 10 of the method): the reference verdicts, a second path
+//! that shares nothing with the engine, and laws on random schemes.
 
 use obsdeg_core::degree::{Degrees, judge};
 use obsdeg_core::model::{
@@ -173,7 +173,8 @@ fn both_paths_agree(scheme: &Scheme) {
     }
 }
 
-/// The reference table by the second path, and sets of terms and attitudes drawn at random, with slews of 90 and 120 degrees and others.
+/// The reference table by the second path, and sets of terms and attitudes drawn at random, with slews of 90
+/// and 120 degrees and others.
 #[test]
 fn a_second_path() {
     for terms in ["F,I,O,S,K0,K1", "F,I,O,S,K0,K1,M3,K2"] {
@@ -223,7 +224,8 @@ fn turned_about(start: &str, positions: usize, rng: &mut SplitMix64) -> Scheme {
     scheme
 }
 
-/// Fewest generic positions that make all coefficients observable, and positions with slews that suffice for 33 unknowns.
+/// Fewest generic positions that make all coefficients observable, and positions with slews that suffice for
+/// 33 unknowns.
 #[test]
 fn fewest_positions() {
     let mut rng = SplitMix64::new(3);
@@ -249,8 +251,9 @@ fn fewest_positions() {
     }
 }
 
-/// Laws on random schemes: an unknown more never lowers a degree; GM with M6 hides three directions at least, GM with M3 (of which one triad
-/// defines the axes) no more than M3 alone does without them; what is seen of the relative mounting is the same in every frame.
+/// Laws on random schemes: an unknown more never lowers a degree; GM with M6 hides three directions at least,
+/// GM with M3 (of which one triad defines the axes) no more than M3 alone does without them; what is seen of
+/// the relative mounting is the same in every frame.
 #[test]
 fn laws() {
     let mut rng = SplitMix64::new(23);
@@ -329,7 +332,8 @@ fn wrong_use_has_a_reason() {
     assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
 }
 
-/// Positions that turn while Z is observed, with drifts: what turning adds to the derivatives of Z changes no verdict.
+/// Positions that turn while Z is observed, with drifts: what turning adds to the derivatives of Z changes no
+/// verdict.
 #[test]
 fn rotating_segments_by_the_second_path() {
     let all = ["F", "I", "O", "S", "II", "OO", "SS"];
@@ -355,8 +359,8 @@ fn rotating_segments_by_the_second_path() {
     }
 }
 
-/// Rotations with errors of accelerometers and torquers: psi integrated along the turn and Z sampled there determine what the exact verdict says,
-/// and no degree is below that with the drifts alone.
+/// Rotations with errors of accelerometers and torquers: psi integrated along the turn and Z sampled there
+/// determine what the exact verdict says, and no degree is below that with the drifts alone.
 #[test]
 fn courses_by_samples() {
     let all = ["F", "I", "O", "S", "II", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
@@ -407,8 +411,9 @@ fn courses_by_samples() {
     assert!(compared > 10, "{compared}");
 }
 
-/// By hand: about the vertical the gyro along it has one constant drift, D_F + GS (w + wU), so that alone does not tell its parts apart; a position
-/// before, where GS acts by wU alone, does not either as long as psi is new (reset); with psi carried the turn tells them.
+/// By hand: about the vertical the gyro along it has one constant drift, D_F + GS (w + wU), so that alone
+/// does not tell its parts apart; a position before, where GS acts by wU alone, does not either as long as
+/// psi is new (reset); with psi carried the turn tells them.
 #[test]
 fn a_torquer_about_the_vertical() {
     let scheme = |carry: Carry, attitudes: &[&str]| {

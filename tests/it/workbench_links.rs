@@ -1,5 +1,5 @@
-//! Links to the page that somebody else made: names, numbers, keys and sizes put nothing into the page, and end in a
-//! message or in a scheme.
+//! Links to the page that somebody else made: names, numbers, keys and sizes put nothing into the page, and
+//! end in a message or in a scheme.
 
 use serde_json::{Value, json};
 

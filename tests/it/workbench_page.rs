@@ -13,8 +13,8 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The page, built from what is there now; none where it was never built here (`cargo run -p obsdeg-web`, minutes of
-/// compilation for another target), or where there is no target or no browser.
+/// The page, built from what is there now; none where it was never built here (`cargo run -p obsdeg-web`,
+/// minutes of compilation for another target), or where there is no target or no browser.
 #[expect(clippy::print_stderr, reason = "a skipped test says why")]
 pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
     static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();

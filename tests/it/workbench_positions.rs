@@ -200,8 +200,8 @@ fn attitudes_are_those_of_the_engine() {
     quiet(&browser);
 }
 
-/// By a finger: a slider, the order, the view.
-/// About the axis that another position was turned about, verdicts are others at its angle, at its mirror image and half a turn from both.
+/// By a finger: a slider, the order, the view. About the axis that another position was turned about,
+/// verdicts are others at its angle, at its mirror image and half a turn from both.
 #[test]
 fn marks_are_where_positions_stand_alike() {
     let Some((mut browser, _)) = opened(1400) else { return };
@@ -311,7 +311,8 @@ fn it_keeps_up() {
         );
         least = least.min(found[0] / engine);
     }
-    // questions that another overtakes are left out, and the table is drawn in no more time than the engine takes
+    // questions that another overtakes are left out, and the table is drawn in no more time than the engine
+    // takes
     assert!(least < 3.0, "{least} times what the engine takes");
     // a crash is said, and the next question is answered
     let said = b.value("obsdeg.ask('nothing there', []).then(() => 'answered', p => p.message)");

@@ -1,4 +1,5 @@
-//! Records of 100,000 rows at two positions: how they are read, with the memory that it takes, and calibrated.
+//! Records of 100,000 rows at two positions: how they are read, with the memory that it takes, and
+//! calibrated.
 
 use std::fmt::Write;
 use std::io::Cursor;

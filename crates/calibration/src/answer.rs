@@ -324,8 +324,8 @@ pub struct Estimated {
     /// Factor on sigma that the program's prior would make, dimensionless: 1 where it does not matter; null
     /// as `prior_shift`.
     pub prior_factor: Option<f64>,
-    /// True if scheme and records determine it at small drifts, but at the drifts of these records what they leave
-    /// open bends the run, so that no sigma describes its error. `determined` is false then.
+    /// True if scheme and records determine it at small drifts, but at the drifts of these records what they
+    /// leave open bends the run, so that no sigma describes its error. `determined` is false then.
     #[serde(default)]
     pub left_open: bool,
 }
@@ -346,8 +346,8 @@ pub struct CovarianceTable {
     pub rescaled: Vec<Vec<f64>>,
 }
 
-/// A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with
-/// this answer as prior (`--prior`).
+/// A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated
+/// with this answer as prior (`--prior`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NextRun {
     /// Name of the coefficient whose requirement is missed.
@@ -356,14 +356,14 @@ pub struct NextRun {
     pub unit: String,
     /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
     pub sigma: Option<f64>,
-    /// Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds
-    /// to it.
+    /// Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench
+    /// adds to it.
     pub required_sigma: f64,
-    /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude
-    /// makes sigma smaller by 1 %.
+    /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no
+    /// attitude makes sigma smaller by 1 %.
     pub attitude: Option<String>,
-    /// Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell of the
-    /// scheme. Null as `attitude`.
+    /// Dwell in s: the shortest that meets the requirement to 1 %; if none does, 16 times the longest dwell
+    /// of the scheme. Null as `attitude`.
     pub dwell_s: Option<f64>,
     /// Sigma after this run, in the unit of `unit`, by the linear model. Null as `attitude`.
     pub sigma_then: Option<f64>,

@@ -1,5 +1,6 @@
-//! Samples taken together: over a few seconds a channel is a line, and what is measured of it at the middle is one number with the weight of all
-//! samples. Samples that no line explains (spikes) are left out and listed. Only the samples of one bin are held.
+//! Samples taken together: over a few seconds a channel is a line, and what is measured of it at the middle
+//! is one number with the weight of all samples. Samples that no line explains (spikes) are left out and
+//! listed. Only the samples of one bin are held.
 
 /// What the samples of one channel say of the middle of a bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +67,8 @@ pub struct Sample {
 
 /// Fewest samples of a line of which some may be spikes.
 pub(crate) const FEWEST: usize = 8;
-/// A spike is so many standard deviations off: of a million samples of a right record none is, but by a chance of one in five hundred.
+/// A spike is so many standard deviations off: of a million samples of a right record none is, but by a
+/// chance of one in five hundred.
 const SPIKE: f64 = 6.0;
 
 /// Takes samples together.
@@ -157,8 +159,9 @@ fn median(mut of: Vec<f64>) -> f64 {
     *of.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// A line that a part of the samples cannot move: slope (the median of those from each sample of the first half to its partner in the second; Theil 1950), level
-/// at 0, and the standard deviation about it by the median distance.
+/// A line that a part of the samples cannot move: slope (the median of those from each sample of the first
+/// half to its partner in the second; Theil 1950), level at 0, and the standard deviation about it by the
+/// median distance.
 fn resistant(points: &[(f64, f64, u64)]) -> (f64, f64, f64) {
     let half = points.len() / 2;
     let slope = median(
@@ -190,7 +193,8 @@ mod tests {
         (bins, spikes)
     }
 
-    /// Samples every 10 s are bins of their own; a line of more is its value at the middle, with the weight of all of them.
+    /// Samples every 10 s are bins of their own; a line of more is its value at the middle, with the weight
+    /// of all of them.
     #[test]
     fn alone_and_together() {
         let (alone, _) = binned((0..3).map(|i| sample(i + 2, 10.0 * i as f64, i as f64)));
@@ -205,7 +209,8 @@ mod tests {
         assert!(spikes.is_empty() && all.len() == 1);
     }
 
-    /// Two spikes in a noisy line are found at their lines and change its value by nothing that shows; the scatter is the noise.
+    /// Two spikes in a noisy line are found at their lines and change its value by nothing that shows; the
+    /// scatter is the noise.
     #[test]
     fn spikes_are_left_out() {
         let mut noise = Noise::new(3, 0);

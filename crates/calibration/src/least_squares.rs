@@ -1,14 +1,18 @@
-//! Least squares on a linearised run in square-root information form, from its end to its start: no covariance, no gain, no prior.
+//! Least squares on a linearised run in square-root information form, from its end to its start: no
+//! covariance, no gain, no prior.
 //!
-//! Rows `A d_k = b` say what the measurements from step k on know of the state there. A step `d_k = Phi d_(k-1) + G xi`, `xi` unit normals, makes of them
-//! `[A G, A Phi] [xi, d_(k-1)] = b` beside `xi = 0`; a QR factorisation parts what is said of `xi` from what is left for `d_(k-1)` (Dyer, McReynolds 1969,
-//! doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the information on the start, its last entry what no start explains;
-//! going forward again, the rows of `xi` give every state of the run with its covariance.
+//! Rows `A d_k = b` say what the measurements from step k on know of the state there. A step
+//! `d_k = Phi d_(k-1) + G xi`, `xi` unit normals, makes of them `[A G, A Phi] [xi, d_(k-1)] = b` beside
+//! `xi = 0`; a QR factorisation parts what is said of `xi` from what is left for `d_(k-1)` (Dyer, McReynolds
+//! 1969, doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the
+//! information on the start, its last entry what no start explains; going forward again, the rows of `xi`
+//! give every state of the run with its covariance.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_ekf::{EkfError, Stage};
 
-/// A run linearised along one trajectory: of every step Phi, Q and rows ([`Stage`]s of one step), a root of Q, and what the trajectory leaves of the measurements.
+/// A run linearised along one trajectory: of every step Phi, Q and rows ([`Stage`]s of one step), a root of
+/// Q, and what the trajectory leaves of the measurements.
 #[derive(Debug, Clone, Default)]
 pub struct Linearised {
     /// The steps.
@@ -167,7 +171,8 @@ impl Information {
         self.left + self.right.norm_squared()
     }
 
-    /// All states of the run, from its start on, when the start is known as `start` says; `run` is the one that this is of.
+    /// All states of the run, from its start on, when the start is known as `start` says; `run` is the one
+    /// that this is of.
     ///
     /// # Errors
     /// [`EkfError::Singular`].
@@ -264,8 +269,8 @@ impl Solution {
         &self.inverse_root * self.inverse_root.transpose()
     }
 
-    /// The covariance of two functionals where errors of the rows are `factor` times as large as they were taken for, but for those of the rows `known` (any x n):
-    /// `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
+    /// The covariance of two functionals where errors of the rows are `factor` times as large as they were
+    /// taken for, but for those of the rows `known` (any x n): `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
     pub fn covariance_with(
         &self,
         a: &[(usize, f64)],
@@ -298,7 +303,8 @@ mod tests {
 
     use super::*;
 
-    /// Errors of the data three times as large, those of what is known as they were: `A^-1 (9 J^T J + K^T K) A^-1`, where `A = J^T J + K^T K`.
+    /// Errors of the data three times as large, those of what is known as they were:
+    /// `A^-1 (9 J^T J + K^T K) A^-1`, where `A = J^T J + K^T K`.
     #[test]
     fn what_is_known_stays_as_it_is() {
         let j = DMatrix::from_fn(5, 3, |i, k| ((3 * i + k) as f64 * 1.7).sin() * 4.0);
@@ -315,7 +321,8 @@ mod tests {
         assert!((found - expected).amax() < 1e-12);
     }
 
-    /// A walk in two states with a constant, seen in part: against the normal equations of all states at once.
+    /// A walk in two states with a constant, seen in part: against the normal equations of all states at
+    /// once.
     #[test]
     fn all_states_at_once() {
         let phi = DMatrix::from_row_slice(3, 3, &[1.0, 0.3, 0.5, -0.1, 0.9, 0.0, 0.0, 0.0, 1.0]);

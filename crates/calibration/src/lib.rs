@@ -1,7 +1,9 @@
-//! Calibration: what a scheme determines, estimated from the record of its run, with how far that can be trusted.
+//! Calibration: what a scheme determines, estimated from the record of its run, with how far that can be
+//! trusted.
 //!
-//! A record ([`record`]) is taken together into bins ([`bins`]) and laid beside the timeline of its scheme ([`platform`]); the estimate is that of least
-//! squares without a prior ([`least_squares`]), of what the exact verdict calls determined; a filter is the second path to it.
+//! A record ([`record`]) is taken together into bins ([`bins`]) and laid beside the timeline of its scheme
+//! ([`platform`]); the estimate is that of least squares without a prior ([`least_squares`]), of what the
+//! exact verdict calls determined; a filter is the second path to it.
 //!
 //! A record of any system: x decays, and is measured.
 //!

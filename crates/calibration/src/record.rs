@@ -1,6 +1,8 @@
-//! Records: columns of numbers with their units in the header, from CSV or Parquet, row by row; only one row is held.
+//! Records: columns of numbers with their units in the header, from CSV or Parquet, row by row; only one row
+//! is held.
 //!
-//! A header is `name [unit]`; a name without brackets has no unit. Lines that begin with `#` are comments. An empty cell is a value that is not there.
+//! A header is `name [unit]`; a name without brackets has no unit. Lines that begin with `#` are comments. An
+//! empty cell is a value that is not there.
 
 use std::collections::HashSet;
 #[cfg(feature = "parquet")]
@@ -372,7 +374,8 @@ impl Record {
         Self::parquet(name, Box::new(ParquetFile::new(file).map_err(|e| wrong(&e))?))
     }
 
-    /// A record from a pipe, with the feature `parquet`: Parquet, which ends with its header and so is read whole, if it begins so, else CSV.
+    /// A record from a pipe, with the feature `parquet`: Parquet, which ends with its header and so is read
+    /// whole, if it begins so, else CSV.
     ///
     /// # Errors
     /// [`RecordError`].
@@ -506,7 +509,8 @@ impl Record {
         self.columns.iter().position(|c| c.name == name)
     }
 
-    /// What a number of a column is times to be in the first of `units`, which are given with what one of each is of the first.
+    /// What a number of a column is times to be in the first of `units`, which are given with what one of
+    /// each is of the first.
     ///
     /// # Errors
     /// [`RecordError::Unit`].
@@ -547,12 +551,14 @@ impl Record {
         place(&self.name, line, &self.columns[column].text)
     }
 
-    /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first wanted is the time, which must be there and
-    /// increase; it may begin anew with another label where `anew` says so.
+    /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first
+    /// wanted is the time, which must be there and increase; it may begin anew with another label where
+    /// `anew` says so.
     ///
-    /// Gives the digest by which two records are the same, the first half of SHA-256 (FIPS 180-4) in hexadecimal. It is of the `wanted` numbers alone, in the units
-    /// of the caller and row by row: neither other columns nor labels, names, comments or the kind of file are in it, so that a record to which somebody adds a
-    /// column of notes, or which he saves in another format, is still the same.
+    /// Gives the digest by which two records are the same, the first half of SHA-256 (FIPS 180-4) in
+    /// hexadecimal. It is of the `wanted` numbers alone, in the units of the caller and row by row: neither
+    /// other columns nor labels, names, comments or the kind of file are in it, so that a record to which
+    /// somebody adds a column of notes, or which he saves in another format, is still the same.
     ///
     /// # Errors
     /// [`RecordError`], and what `each` refuses.

@@ -1,4 +1,5 @@
-//! What a calibration is of, and what it rests on: so that numbers are not taken for those of another platform, and no record counts twice.
+//! What a calibration is of, and what it rests on: so that numbers are not taken for those of another
+//! platform, and no record counts twice.
 
 use obsdeg_core::model::{Carry, Geometry, Scheme};
 use obsdeg_evidence::simulation::latitude_of;

@@ -1,7 +1,9 @@
-//! Intervals at rest: where the scatter of some channels within a window about a sample, all together, is within so many times that of the beginning.
+//! Intervals at rest: where the scatter of some channels within a window about a sample, all together, is
+//! within so many times that of the beginning.
 //!
-//! D. Tedaldi, A. Pretto, E. Menegatti, *A robust and easy to implement method for IMU calibration without external equipments*, ICRA 2014,
-//! doi:10.1109/ICRA.2014.6907297, (15). Samples are held for as long as a window and a shortest interval are, not longer.
+//! D. Tedaldi, A. Pretto, E. Menegatti, *A robust and easy to implement method for IMU calibration without
+//! external equipments*, ICRA 2014, doi:10.1109/ICRA.2014.6907297, (15). Samples are held for as long as a
+//! window and a shortest interval are, not longer.
 
 use std::collections::VecDeque;
 
@@ -183,8 +185,9 @@ mod tests {
         Still { by: vec![], initial: 5.0, window: 1.0, factor: 6.0, shortest: 2.0 }
     }
 
-    /// Rest, a turn, a rest that is too short, a turn, rest: every sample comes out once, in order, and those at rest but for half a window about the turns are
-    /// of the first and the second interval. Against windows that are summed one by one.
+    /// Rest, a turn, a rest that is too short, a turn, rest: every sample comes out once, in order, and those
+    /// at rest but for half a window about the turns are of the first and the second interval. Against
+    /// windows that are summed one by one.
     #[test]
     fn rest_and_turns() {
         let mut noise = Noise::new(5, 0);

@@ -1,7 +1,7 @@
 //! Parquet files with columns compressed by zstd, whose pages are decompressed here.
 //!
-//! The `zstd` feature of the crate `parquet` needs a C compiler. So a compressed column is read as if it were not compressed,
-//! and the pages that come of it are decompressed by a decoder in Rust.
+//! The `zstd` feature of the crate `parquet` needs a C compiler. So a compressed column is read as if it were
+//! not compressed, and the pages that come of it are decompressed by a decoder in Rust.
 
 use std::io::Read;
 use std::sync::Arc;
@@ -119,7 +119,8 @@ impl<R: ChunkReader> PageReader for Pages<R> {
     }
 }
 
-/// A page with its bytes decompressed: of version 2 those behind the levels, unless it says that they are not compressed.
+/// A page with its bytes decompressed: of version 2 those behind the levels, unless it says that they are not
+/// compressed.
 fn page(mut page: Page) -> Result<Page> {
     match &mut page {
         Page::DataPage { buf, .. } | Page::DictionaryPage { buf, .. } => *buf = plain(buf, 0)?,

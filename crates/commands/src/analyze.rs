@@ -35,7 +35,8 @@ pub struct Analyze {
     #[arg(long, value_name = "K", help_heading = "Models", value_parser = whole::<u16>(ORDERS))]
     pub order: Option<u16>,
 
-    /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30 ms each) [default: 3]
+    /// Limit of the work of counting the solutions of a model: millions of products at each of two points (30
+    /// ms each) [default: 3]
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
     pub count_limit: Option<u64>,
 
@@ -55,12 +56,14 @@ pub struct Analyze {
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
     pub omitted: bool,
 
-    /// Changes of the estimates per unit of each error that a scheme does not estimate, in deg/h per ug and so on, by the weights of the record
-    /// that the scheme file states (dwell, step, noise, priors); what it does not state is chosen as compare does and said
+    /// Changes of the estimates per unit of each error that a scheme does not estimate, in deg/h per ug and
+    /// so on, by the weights of the record that the scheme file states (dwell, step, noise, priors); what it
+    /// does not state is chosen as compare does and said
     #[arg(long, help_heading = "Solutions")]
     pub sensitivities: bool,
 
-    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
+    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names
+    /// the file.
     #[arg(skip)]
     pub certificate: bool,
 }
@@ -237,7 +240,8 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
     })
 }
 
-/// The certificate of the verdicts on the one scheme or model that was read, under its name `certificate.json`.
+/// The certificate of the verdicts on the one scheme or model that was read, under its name
+/// `certificate.json`.
 ///
 /// # Errors
 /// [`Problem`] of a scheme or model that certificates do not cover.

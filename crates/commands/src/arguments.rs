@@ -71,7 +71,8 @@ impl Given {
         self
     }
 
-    /// Refuses options that are about the other kind of file than all that was read: nothing would hear of them.
+    /// Refuses options that are about the other kind of file than all that was read: nothing would hear of
+    /// them.
     ///
     /// # Errors
     /// The options, and the file that does not hear of them.
@@ -110,8 +111,8 @@ pub struct InputOptions {
     #[serde(with = "text::list")]
     pub angles: Vec<Attitude>,
 
-    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"; coefficients may have wN, wU, sqrt(2), sqrt(3), and
-    /// sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
+    /// A linear combination of unknowns to be judged too, such as "D_IX - D_IY"; coefficients may have wN,
+    /// wU, sqrt(2), sqrt(3), and sines and cosines of the scheme's angles ("sin(20 deg)", "cos(alpha)")
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     pub combination: Vec<String>,
 
@@ -125,7 +126,8 @@ pub struct InputOptions {
     #[serde(flatten)]
     pub terms: TermOptions,
 
-    /// How the platform is turned from one position to the next. Torquer errors (GS, GM, GM3) act on the way under inertial carry
+    /// How the platform is turned from one position to the next. Torquer errors (GS, GM, GM3) act on the way
+    /// under inertial carry
     #[arg(long, value_name = "PATH", help_heading = "Assumptions", value_parser = one_of(PATHS))]
     pub path: Option<Path>,
 
@@ -133,8 +135,8 @@ pub struct InputOptions {
     #[arg(long, help_heading = "Assumptions")]
     pub measured_azimuth: bool,
 
-    /// Limit of the work of a verdict on a model at a random point, in millions of operations, with half as many
-    /// bytes: what takes more is refused before it is computed (default: 600, some seconds)
+    /// Limit of the work of a verdict on a model at a random point, in millions of operations, with half as
+    /// many bytes: what takes more is refused before it is computed (default: 600, some seconds)
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(WORK))]
     pub work_limit: Option<u64>,
 
@@ -191,14 +193,16 @@ pub struct Assumptions {
 #[command(next_help_heading = "Assumptions")]
 #[serde(default)]
 pub struct TermOptions {
-    /// Unknown terms, separated by commas; or drift for eps^n of one position. Gyros: F,I,O,S,II,OO,SS,IO,IS,OS (drifts), GS (torquer
-    /// scale factor), GM (misalignment of the input axes; GM3: its lower triangle). Accelerometers: K0 (bias), K1 (scale factor), M6
-    /// (misalignment; M3: its lower triangle), K2, K3 (second and third power of the force), Kx (products of forces). Families: gyros is
-    /// F,I,O,S,GS and the misalignment, accelerometers is K0,K1,K2 and the misalignment, all is both
+    /// Unknown terms, separated by commas; or drift for eps^n of one position. Gyros:
+    /// F,I,O,S,II,OO,SS,IO,IS,OS (drifts), GS (torquer scale factor), GM (misalignment of the input axes;
+    /// GM3: its lower triangle). Accelerometers: K0 (bias), K1 (scale factor), M6 (misalignment; M3: its
+    /// lower triangle), K2, K3 (second and third power of the force), Kx (products of forces). Families:
+    /// gyros is F,I,O,S,GS and the misalignment, accelerometers is K0,K1,K2 and the misalignment, all is both
     #[arg(long, value_name = "TERMS", value_parser = listed)]
     pub terms: Option<String>,
 
-    /// With --terms: what defines the platform axes, and so which misalignments the families have (default: accelerometers); `frame` in a scheme file
+    /// With --terms: what defines the platform axes, and so which misalignments the families have (default:
+    /// accelerometers); `frame` in a scheme file
     #[arg(long, value_name = "SENSORS", value_parser = one_of(AXES))]
     pub axes: Option<DefinedBy>,
 }

@@ -47,7 +47,8 @@ pub struct Calibrate {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution is to be expected
+    /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution
+    /// is to be expected
     #[arg(long, value_name = "N", help_heading = "Models", default_value_t = STARTS, value_parser = whole::<u32>(SOME_STARTS))]
     pub starts: u32,
 
@@ -64,7 +65,8 @@ pub struct Calibrate {
     #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
     pub noise: Option<f64>,
 
-    /// Noise of a measured azimuth per sample, in deg (default: that of the scheme, or 0.001; 1e-12 to 1000 deg)
+    /// Noise of a measured azimuth per sample, in deg (default: that of the scheme, or 0.001; 1e-12 to 1000
+    /// deg)
     #[arg(long, value_name = "DEG", value_parser = within(ranges::AZIMUTH_NOISE_DEG))]
     pub azimuth_noise: Option<f64>,
 
@@ -72,7 +74,8 @@ pub struct Calibrate {
     #[arg(long)]
     pub estimate_noise: bool,
 
-    /// Samples within so many s are taken together as one measurement (default: the step of the scheme, or 10 s)
+    /// Samples within so many s are taken together as one measurement (default: the step of the scheme, or 10
+    /// s)
     #[arg(long, value_name = "S", value_parser = within(ranges::STEP_S))]
     pub step: Option<f64>,
 
@@ -80,8 +83,8 @@ pub struct Calibrate {
     #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
-    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random walk
-    /// (default: that of the scheme, or 0.01 deg/h)
+    /// Random drift with its unit: "0.01 deg/h" is a bias held for one step, "0.001 deg/sqrt(h)" a random
+    /// walk (default: that of the scheme, or 0.01 deg/h)
     #[arg(long, value_name = "NOISE")]
     pub drift_noise: Option<DriftNoise>,
 
@@ -94,7 +97,8 @@ pub struct Calibrate {
     #[arg(long, value_name = "M_S2", default_value_t = STANDARD_GRAVITY, value_parser = number_within(GRAVITY))]
     pub gravity: f64,
 
-    /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out (0.5 to 1)
+    /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out (0.5 to
+    /// 1)
     #[arg(long, value_name = "P", default_value_t = GATE, value_parser = number_within(PROBABILITY))]
     pub gate: f64,
 
@@ -327,7 +331,8 @@ impl Calibrate {
     }
 }
 
-/// A calibration before, of a scheme or a model as `kind` and `of`, the schema and the key that says what it is of.
+/// A calibration before, of a scheme or a model as `kind` and `of`, the schema and the key that says what it
+/// is of.
 fn prior<S: serde::de::DeserializeOwned>(
     source: &Source,
     kind: &str,

@@ -28,7 +28,8 @@ pub const COMMANDS: [&str; 9] =
 
 /// An answer, whatever it is of.
 pub trait Rendered: Send + Sync {
-    /// Name and version of the layout of the JSON (`obsdeg.analysis/1`); none of lists of answers and of texts.
+    /// Name and version of the layout of the JSON (`obsdeg.analysis/1`); none of lists of answers and of
+    /// texts.
     fn layout(&self) -> Option<&str>;
 
     /// What the command line prints with `--format`, byte for byte; a report is a page in any format.
@@ -65,7 +66,8 @@ pub struct Answered {
 }
 
 impl Answered {
-    /// What the command line prints with `--format json`, byte for byte; of a report the page, of a part of a search the file.
+    /// What the command line prints with `--format json`, byte for byte; of a report the page, of a part of a
+    /// search the file.
     ///
     /// # Errors
     /// What cannot be written.
@@ -206,9 +208,10 @@ pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<In
     object(request).and_then(|request| answered::<JsonOnly>(command, request, host)).map_err(in_snake_case)
 }
 
-/// Answers a command. `request` is a JSON object with its options, named as on the command line in snake case, and with its files,
-/// each a `{"name": ..., "text": ...}`: `sources` are the schemes and models; `calibrate` has `records` and `before` too, `report`
-/// `calibrations`, and `design` has `candidates_file`, `merge` and `resume`.
+/// Answers a command. `request` is a JSON object with its options, named as on the command line in snake
+/// case, and with its files, each a `{"name": ..., "text": ...}`: `sources` are the schemes and models;
+/// `calibrate` has `records` and `before` too, `report` `calibrations`, and `design` has `candidates_file`,
+/// `merge` and `resume`.
 ///
 /// # Errors
 /// What is wrong with the request; options are named in snake case.
@@ -417,7 +420,8 @@ fn position_figures(read: &[Named]) -> Vec<File> {
     files
 }
 
-/// A calibration from records that are no texts, as [`call`] gives one of texts: `request` has all but `records`.
+/// A calibration from records that are no texts, as [`call`] gives one of texts: `request` has all but
+/// `records`.
 ///
 /// # Errors
 /// What is wrong with the request or a record.

@@ -53,8 +53,8 @@ pub struct MeasurementOptions {
     #[arg(long, value_name = "G", value_parser = within(ranges::NOISE_G))]
     pub noise: Option<f64>,
 
-    /// Bias instability of the accelerometers in ug: B, a first-order Gauss-Markov process of each that goes on from position to position, as
-    /// --bias-instability of gyros (default: none; 1e-9 to 1e9 ug)
+    /// Bias instability of the accelerometers in ug: B, a first-order Gauss-Markov process of each that goes
+    /// on from position to position, as --bias-instability of gyros (default: none; 1e-9 to 1e9 ug)
     #[arg(long, value_name = "B", value_parser = within(ranges::INSTABILITY_UG))]
     pub accelerometer_instability: Option<f64>,
 
@@ -73,7 +73,8 @@ pub struct MeasurementOptions {
 
     /// Standard deviation of an unknown or family beforehand in deg, deg/h, deg/h/g, ppm, arcsec, ug:
     /// D_F=0.1, psi=0.05. It counts in sigmas, not in what is observable (default: none in predictions; in
-    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others by family: prior_sigma in the JSON; 1e-9 to 1e9)
+    /// simulated runs psi 0.1, D_F 20, D_I D_O D_S 10, others by family: prior_sigma in the JSON; 1e-9 to
+    /// 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::PRIOR))]
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,
@@ -85,8 +86,9 @@ pub struct MeasurementOptions {
     pub requirement: Vec<Assignment>,
 
     /// Bench: sizes (one sigma) of errors that the scheme does not estimate, by error or family:
-    /// K0=20,latitude=10. Units: ug (K0), ug/g^2 (K2, Kx), ug/g^3 (K3), ppm (K1, GS, earth_rate, gravity), arcsec (M, GM,
-    /// latitude, azimuth, attitude), deg/h, deg/h/g (D_F; D_I, D_O, D_S), deg/h/g^2 (D_II ... D_OS). Requirements are then judged by the total uncertainty (default: none counts; 0 to 1e9)
+    /// K0=20,latitude=10. Units: ug (K0), ug/g^2 (K2, Kx), ug/g^3 (K3), ppm (K1, GS, earth_rate, gravity),
+    /// arcsec (M, GM, latitude, azimuth, attitude), deg/h, deg/h/g (D_F; D_I, D_O, D_S), deg/h/g^2 (D_II ...
+    /// D_OS). Requirements are then judged by the total uncertainty (default: none counts; 0 to 1e9)
     #[arg(long, value_name = "NAME=X", value_delimiter = ',', value_parser = benched)]
     #[serde(with = "text::list")]
     pub bench: Vec<Assignment>,
@@ -109,8 +111,8 @@ fn benched(text: &str) -> Result<Assignment, String> {
 #[serde(default)]
 #[command(next_help_heading = "Gyro noise")]
 pub struct GyroNoiseOptions {
-    /// Angle random walk in deg/sqrt(h), one number for all gyros or X,Y,Z; without --drift-noise it is all the white drift there is
-    /// (default: none; 0, or 1e-12 to 1e6)
+    /// Angle random walk in deg/sqrt(h), one number for all gyros or X,Y,Z; without --drift-noise it is all
+    /// the white drift there is (default: none; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "N[,N,N]")]
     #[serde(with = "text")]
     pub angle_random_walk: Option<PerGyro>,
@@ -120,8 +122,8 @@ pub struct GyroNoiseOptions {
     #[serde(with = "text")]
     pub rate_random_walk: Option<PerGyro>,
 
-    /// Bias instability in deg/h, likewise: B of IEEE Std 952, a first-order Gauss-Markov state of each gyro whose Allan peak is 0.664 B
-    /// (default: none; 0, or 1e-12 to 1e6)
+    /// Bias instability in deg/h, likewise: B of IEEE Std 952, a first-order Gauss-Markov state of each gyro
+    /// whose Allan peak is 0.664 B (default: none; 0, or 1e-12 to 1e6)
     #[arg(long, value_name = "B[,B,B]")]
     #[serde(with = "text")]
     pub bias_instability: Option<PerGyro>,
@@ -162,8 +164,8 @@ pub struct ConditionOptions {
     #[arg(long, value_name = "FILTER", value_parser = one_of(FilterKind::ALL.map(|f| (f.name(), filter_words(f), f))))]
     pub filter: Option<FilterKind>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous;
-    /// 0.001 to 10000 deg/s)
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default:
+    /// instantaneous; 0.001 to 10000 deg/s)
     #[arg(long, value_name = "DEG_S", value_parser = within(ranges::SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
@@ -176,8 +178,8 @@ pub struct ConditionOptions {
     #[arg(long, value_name = "HOW", value_parser = one_of(PROPAGATIONS))]
     pub propagation: Option<Propagation>,
 
-    /// True value of an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_FX=11, D_I=5, psi=0.1 (the paper's;
-    /// -1e6 to 1e6)
+    /// True value of an unknown or family in deg, deg/h, deg/h/g, ppm, arcsec, ug: D_FX=11, D_I=5, psi=0.1
+    /// (the paper's; -1e6 to 1e6)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::VALUE))]
     #[serde(with = "text::list")]
     pub value: Vec<Assignment>,

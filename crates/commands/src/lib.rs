@@ -1,8 +1,9 @@
-//! The commands of obsdeg as functions: options and texts in, answers out. The command line, Python and a browser ask here and
-//! nowhere else, so that they give the same answers.
+//! The commands of obsdeg as functions: options and texts in, answers out. The command line, Python and a
+//! browser ask here and nowhere else, so that they give the same answers.
 //!
-//! Every command has its options as a struct, which reads itself from a command line and from JSON (the names of options in snake
-//! case), and a function. Nothing here reads files, prints, or knows who asks, but for [`Host`].
+//! Every command has its options as a struct, which reads itself from a command line and from JSON (the names
+//! of options in snake case), and a function. Nothing here reads files, prints, or knows who asks, but for
+//! [`Host`].
 //!
 //! ```
 //! use obsdeg_commands::{Host, call};

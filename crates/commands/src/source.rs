@@ -151,7 +151,8 @@ impl Source {
         self.is_json() || model_file::is_model(&self.text)
     }
 
-    /// Whether it is JSON: no TOML begins with a brace. What neither begins so nor is meant as a scheme or a model in TOML is what its name says.
+    /// Whether it is JSON: no TOML begins with a brace. What neither begins so nor is meant as a scheme or a
+    /// model in TOML is what its name says.
     fn is_json(&self) -> bool {
         let toml = || scheme_file::is_scheme(&self.text) || model_file::is_model(&self.text);
         let named = Path::new(&self.name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));

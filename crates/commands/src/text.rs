@@ -1,4 +1,5 @@
-//! Options in JSON as on the command line: what has a text there is that text, or a number that is read as its shortest text.
+//! Options in JSON as on the command line: what has a text there is that text, or a number that is read as
+//! its shortest text.
 
 use std::fmt::Display;
 use std::str::FromStr;

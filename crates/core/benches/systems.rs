@@ -14,7 +14,8 @@ fn main() {
     growth();
 }
 
-/// How the time of a chain grows: the exponent between each size and twice that (the best of three runs), where all benches are run, not some, nor tested.
+/// How the time of a chain grows: the exponent between each size and twice that (the best of three runs),
+/// where all benches are run, not some, nor tested.
 #[allow(clippy::print_stdout, reason = "what a bench is for")]
 fn growth() {
     if !std::env::args().skip(1).eq(["--bench"]) {
@@ -83,8 +84,9 @@ fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
     bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
 }
 
-/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank needs
-/// order 2n-1. With functions the last factor is sin(x_i); with related ones the other is sin(x_(i-1) - x_i).
+/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank
+/// needs order 2n-1. With functions the last factor is sin(x_i); with related ones the other is sin(x_(i-1) -
+/// x_i).
 fn chain_of_links(n: usize, functions: bool, related: bool) -> SystemModel {
     let states: Vec<String> = (0..n).map(|i| format!("\"x{i}\"")).collect();
     let rates: Vec<String> = (0..n).map(|i| format!("\"a{i}\"")).collect();

@@ -87,7 +87,8 @@ fn six_positions_of_21_unknowns(bencher: Bencher<'_, '_>, carry: Carry) {
     prepared(bencher, &of_terms(carry, "F,I,O,S,K0,K1,M3"));
 }
 
-/// Torquers, accelerometers and mounting with drifts, 33 coefficients: what `analyze` says without solutions of seven positions with slews.
+/// Torquers, accelerometers and mounting with drifts, 33 coefficients: what `analyze` says without solutions
+/// of seven positions with slews.
 #[divan::bench]
 fn self_calibration(bencher: Bencher<'_, '_>) {
     let attitudes = ["DNE", "SDE", "USE", "WSU", "WUN", "SUW", "SWD"];

@@ -4,8 +4,8 @@ use obsdeg_symbolic::WorkerError;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Mark of an answer without the solutions that need the symbolic engine, because other processes held it. The
-/// verdicts do not depend on it.
+/// Mark of an answer without the solutions that need the symbolic engine, because other processes held it.
+/// The verdicts do not depend on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EngineBusy {
     /// Time after which the wait for the engine ended, in s.

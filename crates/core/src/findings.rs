@@ -1,5 +1,5 @@
-//! What is found of a scheme: degrees, accuracy orders, sparse combinations and null vectors; exact and typed. An
-//! analysis words it, a prediction counts in it.
+//! What is found of a scheme: degrees, accuracy orders, sparse combinations and null vectors; exact and
+//! typed. An analysis words it, a prediction counts in it.
 
 use obsdeg_symbolic::Worker;
 

@@ -1,12 +1,13 @@
 //! What the records of a scheme say of errors that it does not estimate: exact classes by ranks.
 //!
-//! J are the columns of the unknowns in all samples, O those of the omitted errors, with true transition matrices over
-//! the dwells (`T`, `cos wT`, `sin wT` random in a prime field, as for the accuracy order; under reset carry derivatives
-//! at each position). In the reduced echelon form of the rows of `[J O]`, pivots leftmost:
+//! J are the columns of the unknowns in all samples, O those of the omitted errors, with true transition
+//! matrices over the dwells (`T`, `cos wT`, `sin wT` random in a prime field, as for the accuracy order;
+//! under reset carry derivatives at each position). In the reduced echelon form of the rows of `[J O]`,
+//! pivots leftmost:
 //!
 //! - column j of O is zero in every row: *no effect*;
-//! - no row that is zero in J has an entry in column j: `O_j = J v`, *silent*. The entry of v at a pivot of J is that of
-//!   its row in column j, and an unknown that J alone determines has the same entry in every v;
+//! - no row that is zero in J has an entry in column j: `O_j = J v`, *silent*. The entry of v at a pivot of J
+//!   is that of its row in column j, and an unknown that J alone determines has the same entry in every v;
 //! - otherwise *visible*.
 //!
 //! Two random fields must agree.
@@ -37,8 +38,8 @@ const MAX_COLUMNS: usize = 1000;
 pub enum OmittedClass {
     /// Error that enters no sample: every estimate is immune, whatever the weights.
     NoEffect,
-    /// Error whose effect on all samples equals that of a change of the unknowns: no record of the scheme shows
-    /// it, and estimates change by exactly that.
+    /// Error whose effect on all samples equals that of a change of the unknowns: no record of the scheme
+    /// shows it, and estimates change by exactly that.
     Silent,
     /// Error that no change of the unknowns imitates: a record shows it if it is large enough.
     Visible,
@@ -67,8 +68,8 @@ pub struct OmittedVerdict {
     /// Unknowns that a silent error changes, among those that the samples determine, by name; empty for other
     /// classes.
     pub changes: Vec<String>,
-    /// Exact changes of these unknowns, where they are numbers with roots times powers of wN and wU; null if they
-    /// are not, or for other classes.
+    /// Exact changes of these unknowns, where they are numbers with roots times powers of wN and wU; null if
+    /// they are not, or for other classes.
     pub exact: Option<Vec<ExactChange>>,
 }
 
@@ -273,9 +274,9 @@ fn reset_rows(
     blocks.iter().flat_map(|b| chain.iter().map(move |l| row_of(b, l))).collect()
 }
 
-/// Exact changes by silent errors at generic latitude, where they hold at every one: per error, per unknown; `None`
-/// for what is no number with roots times powers of the rates, depends on dwells or generic angles, or is zero in
-/// `changed` (errors x unknowns).
+/// Exact changes by silent errors at generic latitude, where they hold at every one: per error, per unknown;
+/// `None` for what is no number with roots times powers of the rates, depends on dwells or generic angles, or
+/// is zero in `changed` (errors x unknowns).
 fn exact_changes(
     platform: &Platform,
     model: &OmittedModel,

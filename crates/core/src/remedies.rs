@@ -130,8 +130,8 @@ impl<S: Scalars> Directions<S> {
         rows.saturating_mul(count)
     }
 
-    /// Products of numbers, at most, of the search for [`pairs`](Self::pairs) of one list, of candidates that give at most
-    /// this number of unknowns each.
+    /// Products of numbers, at most, of the search for [`pairs`](Self::pairs) of one list, of candidates that
+    /// give at most this number of unknowns each.
     pub(crate) fn products_of_pairs(&self, candidates: usize, known: usize, open: usize) -> u64 {
         let paired = candidates.min(MOST_PAIRED) as u64;
         let pairs = paired * paired.saturating_sub(1) / 2;

@@ -109,7 +109,8 @@ fn sigma_of_five(bencher: Bencher<'_, '_>) {
         .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
 }
 
-/// The best five of 24 in all orders, proven, without the front, on all cores; items are the sequences it stands for.
+/// The best five of 24 in all orders, proven, without the front, on all cores; items are the sequences it
+/// stands for.
 #[divan::bench(sample_count = 10)]
 fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let base = base(Carry::Inertial);
@@ -130,7 +131,8 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
     bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| search.exhaust(&symmetry, 5));
 }
 
-/// The best five of 24 in all orders by branch and bound, what it is held against sought first; items are the sequences it stands for.
+/// The best five of 24 in all orders by branch and bound, what it is held against sought first; items are the
+/// sequences it stands for.
 #[divan::bench(sample_count = 10, args = [Carry::Platform, Carry::Inertial])]
 fn best_five_of_24_pruned(bencher: Bencher<'_, '_>, carry: &Carry) {
     bencher.counter(ItemsCount::new(331_776usize)).bench(|| pruned(*carry, 5));

@@ -1,4 +1,5 @@
-//! The fewest positions that make all twelve gyro coefficients observable, and the best three that make the zero-order drifts so.
+//! The fewest positions that make all twelve gyro coefficients observable, and the best three that make the
+//! zero-order drifts so.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use obsdeg_core::model::{Carry, Scheme};

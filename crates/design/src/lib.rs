@@ -11,8 +11,8 @@
 //! # Ok::<(), obsdeg_design::design::DesignError>(())
 //! ```
 //!
-//! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information of their
-//! samples. [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
+//! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information
+//! of their samples. [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
 
 pub mod design;
 pub mod review;

@@ -1,4 +1,5 @@
-//! The bias of three gyros from sightings of two stars: the attitude is a quaternion, its error a rotation vector.
+//! The bias of three gyros from sightings of two stars: the attitude is a quaternion, its error a rotation
+//! vector.
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use std::borrow::Cow;

@@ -1,4 +1,5 @@
-//! A position seen every second but for an outage: what the filter says at the time, and what all data say afterwards.
+//! A position seen every second but for an outage: what the filter says at the time, and what all data say
+//! afterwards.
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};

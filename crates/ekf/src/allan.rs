@@ -2,10 +2,10 @@
 
 use crate::error::EkfError;
 
-/// The overlapping Allan deviation at clusters of `m` samples, in the unit of the samples: with the sums `theta_k` of the first k of N
-/// `rates`, the root of
-/// `sum (theta_(k+2m) - 2 theta_(k+m) + theta_k)^2 / (2 m^2 (N - 2m + 1))` over k = 0..=N - 2m
-/// (IEEE Std 952-1997, C.1; the estimator of Howe, Allan, Barnes 1981, doi:10.1109/FREQ.1981.200541).
+/// The overlapping Allan deviation at clusters of `m` samples, in the unit of the samples: with the sums
+/// `theta_k` of the first k of N `rates`, the root of
+/// `sum (theta_(k+2m) - 2 theta_(k+m) + theta_k)^2 / (2 m^2 (N - 2m + 1))` over k = 0..=N - 2m (IEEE Std
+/// 952-1997, C.1; the estimator of Howe, Allan, Barnes 1981, doi:10.1109/FREQ.1981.200541).
 ///
 /// ```
 /// // a ramp of one a sample: cluster means m apart differ by m

@@ -17,7 +17,8 @@ use crate::error::EkfError;
 
 /// Noises of a sensor that an Allan deviation distinguishes, in the order of [`NoiseFit::terms`].
 pub const TERMS: usize = 3;
-/// Standard deviations of a squared coefficient, as they are without this noise, from which on it is resolved.
+/// Standard deviations of a squared coefficient, as they are without this noise, from which on it is
+/// resolved.
 pub const RESOLVED: f64 = 3.0;
 /// Probability that an unresolved coefficient lies below its limit.
 pub const LIMIT: f64 = 0.95;
@@ -247,17 +248,18 @@ impl Fitting<'_> {
         all
     }
 
-    /// Squared coefficient of `k` in standard deviations, both by the weights of a fit of the other noises `kept`:
-    /// a score test of the absence of `k`. Standard deviations by its own weights grow with the coefficient, so
-    /// that one which few clusters show would never be significant. Infinite where the others fit nothing.
+    /// Squared coefficient of `k` in standard deviations, both by the weights of a fit of the other noises
+    /// `kept`: a score test of the absence of `k`. Standard deviations by its own weights grow with the
+    /// coefficient, so that one which few clusters show would never be significant. Infinite where the others
+    /// fit nothing.
     fn test(&self, kept: &[usize], k: usize) -> f64 {
         let others: Vec<usize> = kept.iter().copied().filter(|&l| l != k).collect();
         let found = self.settle(&others).and_then(|o| self.solve(kept, &o.x.map(|x| x.max(0.0))));
         found.map_or(f64::INFINITY, |f| f.x[k] / f.covariance[(k, k)].sqrt())
     }
 
-    /// Standard deviation of the squared coefficient of `k` where there are only the noises `others`, as `solved`
-    /// has them.
+    /// Standard deviation of the squared coefficient of `k` where there are only the noises `others`, as
+    /// `solved` has them.
     fn without(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
         let mut by = solved.x;
         by[k] = 0.0;
@@ -460,10 +462,11 @@ mod tests {
         assert!(flicker < 3 && unresolved == 0, "{flicker} {unresolved}");
     }
 
-    /// Limits of a random walk that a record resolves seldom or never, and of none: one of 95 % fails in at most 5 % of
-    /// all records, whatever the walk is. Of 200 at most 20 (binomial, normal approximation of 99.9 %: 10 + 3.29
-    /// sqrt(200 0.05 0.95)). Where there is no walk, one that is resolved has a probability of 1 in 740: of 200 at
-    /// most 3 (Poisson with mean 0.27, 99.98 %). Walks of 0.02 were resolved in 391 of 400 other records.
+    /// Limits of a random walk that a record resolves seldom or never, and of none: one of 95 % fails in at
+    /// most 5 % of all records, whatever the walk is. Of 200 at most 20 (binomial, normal approximation of
+    /// 99.9 %: 10 + 3.29 sqrt(200 0.05 0.95)). Where there is no walk, one that is resolved has a probability
+    /// of 1 in 740: of 200 at most 3 (Poisson with mean 0.27, 99.98 %). Walks of 0.02 were resolved in 391 of
+    /// 400 other records.
     #[test]
     fn limits_hold_as_often_as_they_say() {
         let (records, samples) = (200, 4096);

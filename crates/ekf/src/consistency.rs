@@ -24,14 +24,15 @@ pub fn chi_square_band(dof: f64, count: f64, confidence: f64) -> (f64, f64) {
     (chi.inverse_cdf(tail) / count, chi.inverse_cdf(1.0 - tail) / count)
 }
 
-/// What a chi-square variable of `dof` degrees of freedom stays below with probability `confidence`: the gate of an
-/// innovation. Infinite where `dof` is none.
+/// What a chi-square variable of `dof` degrees of freedom stays below with probability `confidence`: the gate
+/// of an innovation. Infinite where `dof` is none.
 pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
     ChiSquared::new(dof).map_or(f64::INFINITY, |chi| chi.inverse_cdf(confidence))
 }
 
-/// What a unit normal over the root of an independent chi-square per degree of freedom (of `dof`) is below with probability `confidence`: the gate of a residual
-/// whose sigma is estimated from the others (Student 1908, doi:10.1093/biomet/6.1.1). Infinite where `dof` is none.
+/// What a unit normal over the root of an independent chi-square per degree of freedom (of `dof`) is below
+/// with probability `confidence`: the gate of a residual whose sigma is estimated from the others (Student
+/// 1908, doi:10.1093/biomet/6.1.1). Infinite where `dof` is none.
 ///
 /// ```
 /// let gate = obsdeg_ekf::consistency::student_quantile(10.0, 0.975);
@@ -94,8 +95,9 @@ impl Nees {
         Ok(sum)
     }
 
-    /// The part of `e^T P^-1 e` (`e`: shape n) along directions of which P says no less than `least` of the components' own sigmas, and the number of
-    /// these directions: principal axes of the correlation matrix. Of the others a filter that is linearised in doubles knows less than it believes.
+    /// The part of `e^T P^-1 e` (`e`: shape n) along directions of which P says no less than `least` of the
+    /// components' own sigmas, and the number of these directions: principal axes of the correlation matrix.
+    /// Of the others a filter that is linearised in doubles knows less than it believes.
     ///
     /// ```
     /// use obsdeg_ekf::consistency::Nees;
@@ -171,8 +173,8 @@ pub fn ljung_box(autocorrelation: &[f64], count: usize) -> f64 {
     ljung_box_of_sequences(autocorrelation, count, 1)
 }
 
-/// The same of `sequences` independent sequences of `length` samples each, whose products are summed at every lag: each
-/// has `length - lag` of them.
+/// The same of `sequences` independent sequences of `length` samples each, whose products are summed at every
+/// lag: each has `length - lag` of them.
 ///
 /// ```
 /// use obsdeg_ekf::consistency::{ljung_box, ljung_box_of_sequences};

@@ -3,8 +3,8 @@
 //! - **Joseph**: P itself, symmetric, updated one scalar measurement at a time by
 //!   `(I - k h) P (I - k h)^T + k r k^T`, in which rounding cannot make P indefinite to first order.
 //! - **UD**: `P = U diag(d) U^T` with unit upper triangular U: Bierman's measurement update and Thornton's
-//!   time update (Bierman 1977, *Factorization Methods for Discrete Sequential Estimation*, V.3, VI.4). It holds twice the
-//!   digits and serves diffuse priors.
+//!   time update (Bierman 1977, *Factorization Methods for Discrete Sequential Estimation*, V.3, VI.4). It
+//!   holds twice the digits and serves diffuse priors.
 
 use nalgebra::DMatrix;
 
@@ -231,9 +231,9 @@ impl Covariance {
         }
     }
 
-    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d, d_q]`. States
-    /// behind the last one that changes keep their rows of U and their d; in their columns the changed rows of
-    /// `Phi U` are those of the new U, and the orthogonalisation is left with the block before them.
+    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d, d_q]`.
+    /// States behind the last one that changes keep their rows of U and their d; in their columns the changed
+    /// rows of `Phi U` are those of the new U, and the orthogonalisation is left with the block before them.
     fn propagate_ud(&mut self, phi: &Transition, noise: &ProcessNoise) {
         let n = self.n;
         let Some(last) = phi.active().iter().chain(&noise.states).max() else { return };

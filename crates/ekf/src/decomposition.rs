@@ -1,9 +1,9 @@
 //! The singular value decomposition, by one-sided Jacobi rotations.
 //!
-//! Hestenes 1958 (doi:10.1137/0106005): plane rotations from the right make the columns of A orthogonal; their lengths
-//! are then the singular values and the product of the rotations is V. Small singular values come out to their own
-//! relative precision where a column scaling is what makes A ill-conditioned (Demmel, Veselic 1992,
-//! doi:10.1137/0613074).
+//! Hestenes 1958 (doi:10.1137/0106005): plane rotations from the right make the columns of A orthogonal;
+//! their lengths are then the singular values and the product of the rotations is V. Small singular values
+//! come out to their own relative precision where a column scaling is what makes A ill-conditioned (Demmel,
+//! Veselic 1992, doi:10.1137/0613074).
 
 use nalgebra::DMatrix;
 
@@ -40,8 +40,8 @@ pub fn singular_values(a: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), Ekf
     Ok((values, v.select_columns(&order)))
 }
 
-/// Turns pairs of columns until all are orthogonal to rounding, and those of `v` alike; the column that was turned last
-/// when they never are.
+/// Turns pairs of columns until all are orthogonal to rounding, and those of `v` alike; the column that was
+/// turned last when they never are.
 fn orthogonalise(columns: &mut DMatrix<f64>, v: &mut DMatrix<f64>) -> Option<usize> {
     let tolerance = f64::EPSILON * (columns.nrows() as f64).sqrt();
     let mut turned = None;

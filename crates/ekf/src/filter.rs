@@ -10,8 +10,9 @@ use crate::manifold::Manifold;
 use crate::model::{Measurement, Motion, Process};
 use crate::transition::Transition;
 
-/// An estimate with its covariance: that of the error in local coordinates about the estimate. After an update the error
-/// is folded into the estimate (the reset of an error-state filter), so that Jacobians are taken where the estimate is.
+/// An estimate with its covariance: that of the error in local coordinates about the estimate. After an
+/// update the error is folded into the estimate (the reset of an error-state filter), so that Jacobians are
+/// taken where the estimate is.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
@@ -49,13 +50,13 @@ pub struct Filter<X = DVector<f64>> {
 /// How an update is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Most linearisations: 1 is the extended filter; more iterate by Gauss and Newton to the most probable state
-    /// (Bell, Cathey 1993, doi:10.1109/9.250476).
+    /// Most linearisations: 1 is the extended filter; more iterate by Gauss and Newton to the most probable
+    /// state (Bell, Cathey 1993, doi:10.1109/9.250476).
     pub iterations: usize,
     /// The iteration ends when no coordinate moves by more than so many of its standard deviations.
     pub tolerance: f64,
-    /// The probability with which the measurement of a right model is accepted: what is less likely is left out. `None`
-    /// accepts all.
+    /// The probability with which the measurement of a right model is accepted: what is less likely is left
+    /// out. `None` accepts all.
     pub gate: Option<f64>,
 }
 
@@ -76,8 +77,8 @@ impl Update {
 /// What one update saw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Innovation {
-    /// The innovation at the prediction, whitened: independent unit normals when the model is right (one per component
-    /// that was there).
+    /// The innovation at the prediction, whitened: independent unit normals when the model is right (one per
+    /// component that was there).
     pub whitened: Vec<f64>,
     /// Whether it was used: false where the gate left it out.
     pub accepted: bool,
@@ -88,8 +89,8 @@ pub struct Innovation {
 }
 
 impl Innovation {
-    /// The normalised innovation squared, chi-square with as many degrees of freedom as there are components when the
-    /// model is right.
+    /// The normalised innovation squared, chi-square with as many degrees of freedom as there are components
+    /// when the model is right.
     pub fn nis(&self) -> f64 {
         self.whitened.iter().map(|v| v * v).sum()
     }
@@ -117,7 +118,8 @@ impl<X: Manifold> Filter<X> {
         &self.covariance
     }
 
-    /// From `t` to `t + dt`; a gap in the measurements is a longer step, or several. Gives Phi, which a smoother wants.
+    /// From `t` to `t + dt`; a gap in the measurements is a longer step, or several. Gives Phi, which a
+    /// smoother wants.
     ///
     /// # Errors
     /// [`EkfError`] when the model gives a shape or a number that cannot be.
@@ -128,8 +130,8 @@ impl<X: Manifold> Filter<X> {
         Ok(phi)
     }
 
-    /// A jump to `x`, of which the local coordinates are `jacobian` times those before, with the noise of the jump: a
-    /// repositioning, or a part of the state that starts anew.
+    /// A jump to `x`, of which the local coordinates are `jacobian` times those before, with the noise of the
+    /// jump: a repositioning, or a part of the state that starts anew.
     ///
     /// # Errors
     /// [`EkfError`] for a wrong shape or a number that is not finite; nothing has changed then.
@@ -154,9 +156,9 @@ impl<X: Manifold> Filter<X> {
         self.update_with(m, t, &all, &Update::default())
     }
 
-    /// The update by those components of `z` (shape m) that are there, at `t`. Correlated noise is decorrelated first; then
-    /// the components are processed one by one, which is the same for a linearised model. An iteration that makes the
-    /// state less probable is damped.
+    /// The update by those components of `z` (shape m) that are there, at `t`. Correlated noise is
+    /// decorrelated first; then the components are processed one by one, which is the same for a linearised
+    /// model. An iteration that makes the state less probable is damped.
     ///
     /// # Errors
     /// [`EkfError`] for a wrong shape, a number that is not finite, or an R that is not positive definite.
@@ -283,7 +285,8 @@ fn check_state<X: Manifold>(what: &'static str, x: &X) -> Result<(), EkfError> {
     if x.is_finite() { Ok(()) } else { Err(EkfError::StateNotFinite { what }) }
 }
 
-/// The update of `p` by independent rows, one by one; gives the estimate of the error, and tells the whitened innovations.
+/// The update of `p` by independent rows, one by one; gives the estimate of the error, and tells the whitened
+/// innovations.
 fn sequential(
     p: &mut Covariance,
     rows: &DMatrix<f64>,

@@ -64,10 +64,12 @@ impl Slope {
     }
 }
 
-/// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps` equal parts.
+/// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps`
+/// equal parts.
 ///
 /// # Errors
-/// [`EkfError`] for a shape that is none of these states, before and after the step for a number that is none.
+/// [`EkfError`] for a shape that is none of these states, before and after the step for a number that is
+/// none.
 pub fn runge_kutta(
     process: &impl Process,
     t: f64,

@@ -49,8 +49,8 @@ impl Gains {
 /// from 0.
 ///
 /// # Errors
-/// [`EkfError`] for a stage that is not one of the states of `p`, or an output without noise, before anything is
-/// computed.
+/// [`EkfError`] for a stage that is not one of the states of `p`, or an output without noise, before anything
+/// is computed.
 pub fn covariance_pass(
     stages: &[Stage],
     mut p: Covariance,
@@ -141,8 +141,8 @@ pub fn state_pass(
     Ok(())
 }
 
-/// Both recursions at once, for a single run: `measure` as in [`state_pass`]; `on_step` sees the estimate, its covariance and the
-/// whitened innovations after every step.
+/// Both recursions at once, for a single run: `measure` as in [`state_pass`]; `on_step` sees the estimate,
+/// its covariance and the whitened innovations after every step.
 ///
 /// # Errors
 /// As [`covariance_pass`], and [`EkfError::Shape`] unless `x` has the states of `p`.
@@ -190,15 +190,16 @@ pub fn filter_pass(
 pub struct SmoothedStart {
     /// The correction of its prior mean (shape n).
     pub correction: Vec<f64>,
-    /// Its covariance (n x n). What the measurements leave of a prior variance is a difference: below 1e-16 of the prior variance
-    /// it is rounding.
+    /// Its covariance (n x n). What the measurements leave of a prior variance is a difference: below 1e-16
+    /// of the prior variance it is rounding.
     pub covariance: DMatrix<f64>,
     /// One per update, in order.
     pub left_out: Vec<LeftOut>,
 }
 
-/// A measurement held against what all others of its run say of it: `u/D` is what it is off by, with variance `1/D`, and `r u` with
-/// variance `r^2 D` is what the estimate from all of them leaves of it (de Jong 1989, doi:10.1080/01621459.1989.10478853).
+/// A measurement held against what all others of its run say of it: `u/D` is what it is off by, with variance
+/// `1/D`, and `r u` with variance `r^2 D` is what the estimate from all of them leaves of it (de Jong 1989,
+/// doi:10.1080/01621459.1989.10478853).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeftOut {
     /// `u`, its smoothed error over its variance.
@@ -214,10 +215,10 @@ impl LeftOut {
     }
 }
 
-/// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times what the
-/// innovations say of the start, summed backwards through the gains, and its covariance alike (Bryson, Frazier 1963; Bierman 1973,
-/// doi:10.1016/0005-1098(73)90027-2). No covariance is inverted. `whitened` holds the innovations of the run divided
-/// by their standard deviations, in order.
+/// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times
+/// what the innovations say of the start, summed backwards through the gains, and its covariance alike
+/// (Bryson, Frazier 1963; Bierman 1973, doi:10.1016/0005-1098(73)90027-2). No covariance is inverted.
+/// `whitened` holds the innovations of the run divided by their standard deviations, in order.
 ///
 /// # Errors
 /// [`EkfError::Shape`] unless stages, gains, innovations and `p0` are those of one run.

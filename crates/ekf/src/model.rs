@@ -21,19 +21,19 @@ pub trait Process {
     fn noise(&self, t: f64) -> DMatrix<f64>;
 }
 
-/// How a state of any kind moves over a step: the discrete form of a [`Process`], and the only one for a state that is no
-/// vector.
+/// How a state of any kind moves over a step: the discrete form of a [`Process`], and the only one for a
+/// state that is no vector.
 pub trait Motion<X> {
-    /// Takes `x` from `t` to `t + dt`. Says how its local coordinates move (Phi, n x n, from those about the state before to
-    /// those about the state after), and the noise of the step in the latter.
+    /// Takes `x` from `t` to `t + dt`. Says how its local coordinates move (Phi, n x n, from those about the
+    /// state before to those about the state after), and the noise of the step in the latter.
     ///
     /// # Errors
     /// [`EkfError`] when the model gives a number that is none.
     fn advance(&self, t: f64, dt: f64, x: &mut X) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError>;
 }
 
-/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`. For a state that is no vector, H is the derivative by its local
-/// coordinates.
+/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`. For a state that is no vector, H is the derivative by
+/// its local coordinates.
 pub trait Measurement<X = DVector<f64>> {
     /// The number m of outputs.
     fn outputs(&self) -> usize;

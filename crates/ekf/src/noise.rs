@@ -1,22 +1,24 @@
-//! Random errors of inertial sensors, in the terms of IEEE Std 952-1997, Annex C: white noise, a random walk, bias instability; their states
-//! and spectral densities for a filter, and their Allan variances.
+//! Random errors of inertial sensors, in the terms of IEEE Std 952-1997, Annex C: white noise, a random walk,
+//! bias instability; their states and spectral densities for a filter, and their Allan variances.
 
 use nalgebra::DMatrix;
 
 use crate::error::EkfError;
 use crate::integrate::van_loan;
 
-/// The floor of the Allan deviation of flicker noise of coefficient B, over B: `sqrt(2 ln 2/pi)` (IEEE Std 952-1997, C.1.1.3).
+/// The floor of the Allan deviation of flicker noise of coefficient B, over B: `sqrt(2 ln 2/pi)` (IEEE Std
+/// 952-1997, C.1.1.3).
 pub const FLICKER_FLOOR: f64 = 0.664_282_470_267_960_1;
-/// The largest Allan deviation of a first-order Gauss-Markov process over its standard deviation, at [`MARKOV_PEAK_AT`] correlation times:
-/// `0.437 sqrt(2)` (C.1.1.5).
+/// The largest Allan deviation of a first-order Gauss-Markov process over its standard deviation, at
+/// [`MARKOV_PEAK_AT`] correlation times: `0.437 sqrt(2)` (C.1.1.5).
 pub const MARKOV_PEAK: f64 = 0.617_364_283_144_441_4;
 /// Where it is largest, in correlation times.
 pub const MARKOV_PEAK_AT: f64 = 1.892_617_832_925_018_8;
 /// Standard gravity, in m/s^2.
 const STANDARD_GRAVITY: f64 = 9.80665;
 
-/// The random errors of one sensor. Its unit is that of what it measures: rad/s for a gyro, g for an accelerometer.
+/// The random errors of one sensor. Its unit is that of what it measures: rad/s for a gyro, g for an
+/// accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorNoise {
     /// White noise N: angle (velocity) random walk, the root of its two-sided density, in unit sqrt(s).
@@ -41,8 +43,8 @@ pub struct BiasState {
 }
 
 impl SensorNoise {
-    /// A gyro by its datasheet, in rad/s: angle random walk in deg/sqrt(h), rate random walk in deg/h/sqrt(h), bias instability in deg/h
-    /// with a correlation time in s.
+    /// A gyro by its datasheet, in rad/s: angle random walk in deg/sqrt(h), rate random walk in
+    /// deg/h/sqrt(h), bias instability in deg/h with a correlation time in s.
     ///
     /// ```
     /// let gyro = obsdeg_ekf::SensorNoise::gyro(0.001, 0.01, 0.003, 3600.0);
@@ -59,8 +61,8 @@ impl SensorNoise {
         }
     }
 
-    /// An accelerometer by its datasheet, in g: velocity random walk in m/s/sqrt(h), acceleration random walk in ug/sqrt(h), bias
-    /// instability in ug with a correlation time in s.
+    /// An accelerometer by its datasheet, in g: velocity random walk in m/s/sqrt(h), acceleration random walk
+    /// in ug/sqrt(h), bias instability in ug with a correlation time in s.
     pub fn accelerometer(velocity_walk: f64, bias_walk: f64, instability: f64, correlation_s: f64) -> Self {
         Self {
             white: velocity_walk / 60.0 / STANDARD_GRAVITY,
@@ -70,8 +72,8 @@ impl SensorNoise {
         }
     }
 
-    /// The stationary standard deviation of the Gauss-Markov process: its largest Allan deviation is the floor of the flicker noise that it
-    /// stands for, `0.617 sigma = 0.664 B`.
+    /// The stationary standard deviation of the Gauss-Markov process: its largest Allan deviation is the
+    /// floor of the flicker noise that it stands for, `0.617 sigma = 0.664 B`.
     pub fn markov_sigma(&self) -> f64 {
         self.instability * FLICKER_FLOOR / MARKOV_PEAK
     }
@@ -84,7 +86,8 @@ impl SensorNoise {
         [walk, markov].into_iter().filter(|s| s.density > 0.0).collect()
     }
 
-    /// F and the density Q of the sensor's integral (an angle, a velocity) and its bias states, in this order.
+    /// F and the density Q of the sensor's integral (an angle, a velocity) and its bias states, in this
+    /// order.
     pub fn model(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let states = self.states();
         let n = states.len() + 1;
@@ -98,8 +101,9 @@ impl SensorNoise {
         (f, q)
     }
 
-    /// Allan variance at a cluster time of `tau` s, in unit^2: `N^2/tau + K^2 tau/3`, and of the Gauss-Markov process of correlation time
-    /// T with x = tau/T `2 sigma^2/x (1 - (3 - 4 e^-x + e^-2x)/(2 x))` (C.1.1.1, C.1.1.4, C.1.1.5).
+    /// Allan variance at a cluster time of `tau` s, in unit^2: `N^2/tau + K^2 tau/3`, and of the Gauss-Markov
+    /// process of correlation time T with x = tau/T `2 sigma^2/x (1 - (3 - 4 e^-x + e^-2x)/(2 x))` (C.1.1.1,
+    /// C.1.1.4, C.1.1.5).
     pub fn allan_variance(&self, tau: f64) -> f64 {
         let x = tau / self.correlation_s;
         // the difference cancels for a small x
@@ -113,9 +117,9 @@ impl SensorNoise {
     }
 }
 
-/// `(Phi, Q_d)` of `x' = F x + w` over any `dt`: Van Loan's exponential over a part in which nothing decays by more than e, doubled by
-/// `Phi(2h) = Phi Phi`, `Q_d(2h) = Phi Q_d Phi^T + Q_d`. (The exponential alone holds `e^(-F dt)`, beyond all numbers after many correlation
-/// times.)
+/// `(Phi, Q_d)` of `x' = F x + w` over any `dt`: Van Loan's exponential over a part in which nothing decays
+/// by more than e, doubled by `Phi(2h) = Phi Phi`, `Q_d(2h) = Phi Q_d Phi^T + Q_d`. (The exponential alone
+/// holds `e^(-F dt)`, beyond all numbers after many correlation times.)
 ///
 /// # Errors
 /// [`EkfError`] as [`van_loan`].

@@ -1,4 +1,5 @@
-//! The fixed-interval smoother of Rauch, Tung and Striebel (1965, doi:10.2514/3.3166), for states of any kind.
+//! The fixed-interval smoother of Rauch, Tung and Striebel (1965, doi:10.2514/3.3166), for states of any
+//! kind.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -36,8 +36,8 @@ impl Transition {
     /// The identity but for the rows `active` (ascending), given one after the other, n numbers each.
     ///
     /// # Errors
-    /// [`EkfError`] for rows that are not ascending states of the n, a wrong count of numbers, or one that is not
-    /// finite.
+    /// [`EkfError`] for rows that are not ascending states of the n, a wrong count of numbers, or one that is
+    /// not finite.
     pub fn of_rows(n: usize, active: Vec<usize>, rows: Vec<f64>) -> Result<Self, EkfError> {
         let ascending = active.windows(2).all(|w| w[0] < w[1]);
         let last = active.last().map_or(0, |i| i + 1);

@@ -110,8 +110,8 @@ proptest! {
         prop_assert!(close(&step.phi, &phi, 1e-8) && close(&step.q, &q, 1e-8));
     }
 
-    /// A transition that changes some states only, with noise on some only: both forms against the formula, and NEES
-    /// against the inverse.
+    /// A transition that changes some states only, with noise on some only: both forms against the formula,
+    /// and NEES against the inverse.
     #[test]
     fn partial_transitions(
         e in prop::collection::vec(-1.0f64..1.0, 60),

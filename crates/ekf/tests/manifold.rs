@@ -1,5 +1,5 @@
-//! States that are no vectors, iterated updates, gates, gaps and jumps, and the smoother, each against something that is not
-//! the filter.
+//! States that are no vectors, iterated updates, gates, gaps and jumps, and the smoother, each against
+//! something that is not the filter.
 
 use std::borrow::Cow;
 
@@ -149,7 +149,8 @@ fn an_attitude_filter_is_consistent() {
     assert!((low..high).contains(&(nis / runs)), "NIS {}", nis / runs);
 }
 
-/// A reset is a change of coordinates: the covariance of the rotation vector about the new attitude, by differences.
+/// A reset is a change of coordinates: the covariance of the rotation vector about the new attitude, by
+/// differences.
 #[test]
 fn a_reset_carries_the_covariance() {
     let start = Attitude { q: UnitQuaternion::identity(), bias: Vector3::zeros() };
@@ -280,8 +281,8 @@ fn a_jump_moves_the_state_and_its_covariance() {
     assert_eq!(filter, before);
 }
 
-/// A walk in two states, the first seen: the smoother, and what innovations say of the start, against least squares on
-/// all states at once.
+/// A walk in two states, the first seen: the smoother, and what innovations say of the start, against least
+/// squares on all states at once.
 #[test]
 fn smoothers_are_least_squares_on_the_whole_interval() {
     let phi = dmatrix![1.0, 0.3; -0.1, 0.9];

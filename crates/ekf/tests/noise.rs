@@ -49,8 +49,9 @@ fn deviations(noise: &SensorNoise, dt: f64, sizes: &[usize]) -> Vec<f64> {
     sums.iter().map(|s| (s / RUNS as f64).sqrt()).collect()
 }
 
-/// White noise falls with slope -1/2, a random walk rises with 1/2, and a Gauss-Markov process is flat at its peak: between 1/1.3 and 1.3
-/// of where it is largest the slope is within 0.05 of none; every deviation is that of the closed form, within 3 %.
+/// White noise falls with slope -1/2, a random walk rises with 1/2, and a Gauss-Markov process is flat at its
+/// peak: between 1/1.3 and 1.3 of where it is largest the slope is within 0.05 of none; every deviation is
+/// that of the closed form, within 3 %.
 #[test]
 fn allan_slopes() {
     let peak = MARKOV_PEAK_AT * MARKOV.correlation_s;
@@ -84,7 +85,8 @@ fn bias_instability_as_a_gauss_markov_process() {
     for k in -40..=40 {
         assert!(at(MARKOV_PEAK_AT * 1.1f64.powi(k)) <= peak * (1.0 + 1e-12), "{k}");
     }
-    // the series for small x meets the closed form, and short of everything it is a random walk of its density
+    // the series for small x meets the closed form, and short of everything it is a random walk of its
+    // density
     assert!((at(0.009_999_999) / at(0.010_000_001) - (1.0 - 1e-7)).abs() < 2e-9);
     let density = MARKOV.states()[0].density;
     let tau = 1e-6 * MARKOV.correlation_s;
@@ -107,8 +109,8 @@ fn units() {
     assert_eq!((WHITE.states().len(), WALK.states().len(), gyro.states().len()), (0, 1, 2));
 }
 
-/// The discretisation against `Q_d = integral of e^(F s) Q e^(F^T s)`, by Simpson's rule on the closed form of the exponential, for steps from a
-/// hundredth of the correlation time to a hundred of them.
+/// The discretisation against `Q_d = integral of e^(F s) Q e^(F^T s)`, by Simpson's rule on the closed form
+/// of the exponential, for steps from a hundredth of the correlation time to a hundred of them.
 #[test]
 fn discretisation_against_quadrature() {
     let noise = SensorNoise { white: 0.3, walk: 0.1, instability: 1.5, correlation_s: 7.0 };

@@ -52,8 +52,8 @@ fn one_more_run(bencher: Bencher<'_, '_>, truth: &Truth) {
     bencher.bench(|| black_box(prepared.chunk(0, 1)));
 }
 
-/// One more run against exact truth at the paper's drifts by a filter with full attitudes: once, and linearised again along the
-/// whole run.
+/// One more run against exact truth at the paper's drifts by a filter with full attitudes: once, and
+/// linearised again along the whole run.
 #[divan::bench(args = [FilterKind::Extended, FilterKind::Iterated])]
 fn full_attitudes(bencher: Bencher<'_, '_>, filter: &FilterKind) {
     let (plan, conditions) = paper(Truth::Exact);

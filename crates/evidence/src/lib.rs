@@ -12,10 +12,11 @@
 //! # Ok::<(), obsdeg_evidence::simulation::SimulationError>(())
 //! ```
 //!
-//! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units; the exact
-//! verdicts reach it as numbers ([`prediction`]) and are held against the information of all samples, slopes over the
-//! dwell and Monte Carlo runs ([`crosscheck`]), any system's likewise ([`system`]). [`requirements`] is the one
-//! decision on sigmas; [`compare`] holds schemes side by side; [`audit`] is the paper, equation by equation.
+//! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units;
+//! the exact verdicts reach it as numbers ([`prediction`]) and are held against the information of all
+//! samples, slopes over the dwell and Monte Carlo runs ([`crosscheck`]), any system's likewise ([`system`]).
+//! [`requirements`] is the one decision on sigmas; [`compare`] holds schemes side by side; [`audit`] is the
+//! paper, equation by equation.
 
 pub mod audit;
 pub mod compare;

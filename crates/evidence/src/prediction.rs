@@ -18,12 +18,13 @@ pub struct PredictedUnknown {
     pub degree: Option<usize>,
     /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
-    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the degree where
-    /// the orders are not computed.
+    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the
+    /// degree where the orders are not computed.
     pub determined: bool,
     /// The accuracy order of its value at the end, which is what a filter shows.
     pub order_at_end: Option<usize>,
-    /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves it.
+    /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves
+    /// it.
     pub determined_at_end: bool,
     /// Unknowns that derivatives do not tell it from.
     pub partners: Vec<usize>,
@@ -61,11 +62,11 @@ pub struct Prediction {
     pub rank_profile: Vec<usize>,
     /// Whether all combinations of the basis have numbers.
     pub all_combinations: bool,
-    /// Basis of the directions that no derivative of Z sees, unknowns that are not excited left out; `None` when some have no
-    /// numbers.
+    /// Basis of the directions that no derivative of Z sees, unknowns that are not excited left out; `None`
+    /// when some have no numbers.
     pub unseen_by_derivatives: Option<Vec<Combination>>,
-    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis, except at a
-    /// pole, where others move psi as well.
+    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis,
+    /// except at a pole, where others move psi as well.
     pub null_space: Vec<Combination>,
     /// The rank with dwells: unknowns minus this is the defect of a filter.
     pub rank: usize,

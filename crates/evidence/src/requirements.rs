@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whether a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for what is no number.
+/// Whether a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for
+/// what is no number.
 pub fn meets(sigma: f64, required: f64) -> bool {
     sigma <= required
 }
@@ -20,7 +21,8 @@ pub struct Claim<'a> {
 }
 
 impl Claim<'_> {
-    /// Required over found sigma: at least 1 is met. `None` without a requirement, or without a sigma that counts.
+    /// Required over found sigma: at least 1 is met. `None` without a requirement, or without a sigma that
+    /// counts.
     pub fn margin(&self) -> Option<f64> {
         let sigma = self.sigma.ok().filter(|s| s.is_finite() && *s >= 0.0)?;
         self.required.map(|r| r / sigma).filter(|m| !m.is_nan())

@@ -1,5 +1,5 @@
-//! A rank that rounding hides: 8 cos 20 deg cos 40 deg cos 80 deg = 1, so three vectors lie in a plane. In a prime field that holds the
-//! cosines of decimal degrees the determinant is zero, not small.
+//! A rank that rounding hides: 8 cos 20 deg cos 40 deg cos 80 deg = 1, so three vectors lie in a plane. In a
+//! prime field that holds the cosines of decimal degrees the determinant is zero, not small.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use obsdeg_exact::certainty::{Claim, error_bound};

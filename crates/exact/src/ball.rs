@@ -8,9 +8,10 @@ pub use sum::BallSum;
 
 /// A real number `+-mantissa 2^(exponent - 64 N)`, known up to `error` units of its last place.
 ///
-/// Every operation bounds what it loses, so that a ball that does not hold zero is a number that is not zero. A ball
-/// that holds zero is kept as zero with that error: whether it *is* zero nobody can say from one ball, and
-/// [`Ball::radius_log2`] says below what. Midpoint-radius arithmetic (van der Hoeven 2010, "Ball arithmetic").
+/// Every operation bounds what it loses, so that a ball that does not hold zero is a number that is not zero.
+/// A ball that holds zero is kept as zero with that error: whether it *is* zero nobody can say from one ball,
+/// and [`Ball::radius_log2`] says below what. Midpoint-radius arithmetic (van der Hoeven 2010, "Ball
+/// arithmetic").
 ///
 /// ```
 /// use obsdeg_exact::Ball;
@@ -30,7 +31,8 @@ pub struct Ball<const N: usize> {
     error: f64,
 }
 
-/// Exponents beyond this are not kept: what is smaller is zero with this error, of what is larger nothing is known.
+/// Exponents beyond this are not kept: what is smaller is zero with this error, of what is larger nothing is
+/// known.
 const FAR: f64 = 1e15;
 
 /// What rounding adds to a sum of error terms at most: each is a handful of operations on doubles.
@@ -360,7 +362,8 @@ impl<const N: usize> Ball<N> {
         }
     }
 
-    /// The square root; `None` for a ball that holds what is not positive. Zero without an error has the root zero.
+    /// The square root; `None` for a ball that holds what is not positive. Zero without an error has the root
+    /// zero.
     #[inline(never)]
     pub fn sqrt(&self) -> Option<Self> {
         if self.is_exactly_zero() {
@@ -409,10 +412,12 @@ impl<const N: usize> Ball<N> {
     }
 }
 
-/// The high N limbs of a product and the limb below them; what is left out lies below a unit of the last place.
+/// The high N limbs of a product and the limb below them; what is left out lies below a unit of the last
+/// place.
 #[inline(always)]
 fn product<const N: usize>(a: &[u64; N], b: &[u64; N]) -> ([u64; N], u64) {
-    // row by row, a limb further up each; columns below N - 2 are left out and add less than N / 2^64 units of the last place
+    // row by row, a limb further up each; columns below N - 2 are left out and add less than N / 2^64 units
+    // of the last place
     let (mut out, mut below) = ([0; N], 0);
     for (i, &x) in a.iter().enumerate() {
         let mut carry = 0;
@@ -523,7 +528,8 @@ pub(crate) mod tests {
         off <= radius.clone() && off >= -radius
     }
 
-    /// Numbers of any size, some close to each other, some with few digits, some uncertain; with a number they hold.
+    /// Numbers of any size, some close to each other, some with few digits, some uncertain; with a number
+    /// they hold.
     pub(crate) fn numbers() -> impl Strategy<Value = (Ball<2>, BigRational)> {
         let places = prop_oneof![Just(0i64), -3..3i64, -140..140i64];
         let digits = prop_oneof![any::<i128>(), (-9..9i128), (i128::MAX - 3..i128::MAX)];

@@ -64,7 +64,8 @@ mod tests {
         let point = Claim { row_degree: 5, ..nothing };
         close(error_bound(&point, 1), 105.0 / TWO60);
         close(error_bound(&point, 2), (105.0 / TWO60) * (105.0 / TWO60));
-        // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61) primes; ln 2^61
+        // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61)
+        // primes; ln 2^61
         // = 42.281978...
         let ln = 42.281_978_014_156_64;
         for (order, phi) in [(4, 2.0), (24, 8.0), (360, 96.0), (1000, 400.0), (7_200, 1920.0)] {

@@ -1,8 +1,8 @@
 //! Quotients, common divisors and factors of polynomials in several variables.
 //!
 //! A greatest common divisor is interpolated from its images at points, one variable at a time (Brown 1971,
-//! doi:10.1145/321662.321664). Images in one variable first say which variables it holds at all; the others are numbers
-//! from then on. What is found is divided by before it is believed.
+//! doi:10.1145/321662.321664). Images in one variable first say which variables it holds at all; the others
+//! are numbers from then on. What is found is divided by before it is believed.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -11,7 +11,8 @@ use crate::groebner::{OverLimit, Work};
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, polynomial};
 
-/// Work of a term of a product, or of a copy: its monomial is made anew, and finds its place among the others.
+/// Work of a term of a product, or of a copy: its monomial is made anew, and finds its place among the
+/// others.
 const TERM: u64 = 4;
 /// Terms from which on a polynomial is no longer near the processor, and how much more each costs then.
 const FAR: (u64, u64) = (4096, 8);
@@ -379,8 +380,8 @@ impl Algebra {
         Ok(self.monic(&joined(&f, &parts, v)))
     }
 
-    /// Factors with their powers: those that single variables, contents along a variable and repetition show; of each
-    /// the leading coefficient is one. Not all of them need be irreducible.
+    /// Factors with their powers: those that single variables, contents along a variable and repetition show;
+    /// of each the leading coefficient is one. Not all of them need be irreducible.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -487,7 +488,8 @@ mod tests {
     }
 
     proptest! {
-        /// `gcd(a c, b c) / c` divides what `a` and `b` have in common, which is what they have at points too.
+        /// `gcd(a c, b c) / c` divides what `a` and `b` have in common, which is what they have at points
+        /// too.
         #[test]
         fn common_divisors(
             a in drawn(&Field::new(P)),
@@ -545,8 +547,8 @@ mod tests {
         assert_eq!(s.product(&sum, &sum), Err(OverLimit));
     }
 
-    /// A pass over the terms is work, also where nothing is multiplied: copies without a power that all terms share, images
-    /// along a variable, a division by a number. Dense images are as long as the power is high.
+    /// A pass over the terms is work, also where nothing is multiplied: copies without a power that all terms
+    /// share, images along a variable, a division by a number. Dense images are as long as the power is high.
     #[test]
     fn what_is_copied_is_counted() {
         let mut s = algebra(3);

@@ -214,18 +214,18 @@ impl Echelon {
             .collect()
     }
 
-    /// Per column: the others that occur with it in some null vector of minimal support (a circuit of the matroid of
-    /// the columns), in column order. They are its connected component of that matroid, whose parts are those of the
-    /// graph that joins a pivot to the free columns where its row is not zero: whatever the pivots are, the parts are
-    /// the same.
+    /// Per column: the others that occur with it in some null vector of minimal support (a circuit of the
+    /// matroid of the columns), in column order. They are its connected component of that matroid, whose
+    /// parts are those of the graph that joins a pivot to the free columns where its row is not zero:
+    /// whatever the pivots are, the parts are the same.
     pub fn companions(&self) -> Vec<Vec<usize>> {
         let pattern = |i: usize| self.row(i).iter().map(|a| *a != 0).collect::<Vec<bool>>();
         components(self.columns, self.pivots().enumerate().map(|(i, pivot)| (pivot, pattern(i))))
     }
 }
 
-/// The parts of the graph that joins the pivot of a row to the columns where the row is not zero, as the others of each
-/// column.
+/// The parts of the graph that joins the pivot of a row to the columns where the row is not zero, as the
+/// others of each column.
 pub(crate) fn components(columns: usize, rows: impl Iterator<Item = (usize, Vec<bool>)>) -> Vec<Vec<usize>> {
     let mut part: Vec<usize> = (0..columns).collect();
     for (pivot, pattern) in rows {
@@ -357,8 +357,8 @@ mod tests {
         rank
     }
 
-    /// Per column the others of all circuits through it: sets of columns that are dependent while every smaller one is
-    /// not.
+    /// Per column the others of all circuits through it: sets of columns that are dependent while every
+    /// smaller one is not.
     fn companions_by_subsets(rows: &[Vec<i64>]) -> Vec<Vec<usize>> {
         let n = rows[0].len();
         let columns = |set: usize| (0..n).filter(move |c| set >> c & 1 == 1);

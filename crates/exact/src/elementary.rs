@@ -1,8 +1,9 @@
-//! Elementary functions of balls. Every step is one of balls, so that what is left out is in the error of the result.
+//! Elementary functions of balls. Every step is one of balls, so that what is left out is in the error of the
+//! result.
 //!
-//! Sums of Taylor's series at an argument made small by halving, undone by squaring or by the double angle; inverse
-//! functions by a start in doubles and one series for the rest (Brent, Zimmermann 2010, "Modern Computer Arithmetic",
-//! chapter 4).
+//! Sums of Taylor's series at an argument made small by halving, undone by squaring or by the double angle;
+//! inverse functions by a start in doubles and one series for the rest (Brent, Zimmermann 2010, "Modern
+//! Computer Arithmetic", chapter 4).
 
 use crate::Ball;
 
@@ -113,7 +114,8 @@ impl<const N: usize> Ball<N> {
         Some(y.add(&rest))
     }
 
-    /// The angle of the point `(x, y)`, as `atan2(y, x)`; `None` on the cut (negative x-axis) and at the origin.
+    /// The angle of the point `(x, y)`, as `atan2(y, x)`; `None` on the cut (negative x-axis) and at the
+    /// origin.
     pub fn atan2(y: &Self, x: &Self) -> Option<Self> {
         if y.is_zero() && !x.is_positive() {
             return None;
@@ -177,8 +179,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Against the functions of an independent library at twice the digits: the true value is in the ball, and the
-        /// ball is narrow.
+        /// Against the functions of an independent library at twice the digits: the true value is in the
+        /// ball, and the ball is narrow.
         #[test]
         fn functions_agree_with_another_library(m in any::<i64>(), place in -70i64..-56) {
             let mut consts = Consts::new().expect("constants");

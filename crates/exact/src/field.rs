@@ -99,7 +99,8 @@ impl Field {
         self.redc(u128::from(a) * u128::from(b))
     }
 
-    /// An element that is `a b`, below `2p` but maybe not below p, for `a < 4p` and `b < 2p`: `t < 8 p^2 <= p 2^64`.
+    /// An element that is `a b`, below `2p` but maybe not below p, for `a < 4p` and `b < 2p`:
+    /// `t < 8 p^2 <= p 2^64`.
     #[inline]
     pub(crate) fn loose_product(&self, a: u64, b: u64) -> u64 {
         let t = u128::from(a) * u128::from(b);

@@ -1,7 +1,7 @@
 //! How clearly zeros and other numbers were distinguished where ranks were decided by real numbers.
 
-/// How far apart the two kinds of numbers were that decided ranks: binary logarithms, relative to the largest entry of
-/// their row.
+/// How far apart the two kinds of numbers were that decided ranks: binary logarithms, relative to the largest
+/// entry of their row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     /// The smallest that is not zero.
@@ -19,7 +19,8 @@ impl Gap {
         Self { nonzero: self.nonzero.min(other.nonzero), zero: self.zero.max(other.zero) }
     }
 
-    /// Whether the two kinds are unmistakable with so many bits: zero below half of them, and a quarter of them between the two.
+    /// Whether the two kinds are unmistakable with so many bits: zero below half of them, and a quarter of
+    /// them between the two.
     pub fn is_decisive(self, bits: i64) -> bool {
         let bits = bits as f64;
         self.zero <= -bits / 2.0 && self.zero <= self.nonzero - bits / 4.0

@@ -1,8 +1,8 @@
 //! Groebner bases in the field, and what they say of a zero-dimensional ideal.
 //!
-//! The order is by weighted degree, then reverse lexicographic. Pairs are chosen by the criteria of Gebauer and Möller
-//! (1988, doi:10.1016/S0747-7171(88)80048-8); all pairs of the lowest degree are reduced at once, as rows of one matrix
-//! (Faugère's F4, 1999, doi:10.1016/S0022-4049(99)00005-5).
+//! The order is by weighted degree, then reverse lexicographic. Pairs are chosen by the criteria of Gebauer
+//! and Möller (1988, doi:10.1016/S0747-7171(88)80048-8); all pairs of the lowest degree are reduced at once,
+//! as rows of one matrix (Faugère's F4, 1999, doi:10.1016/S0022-4049(99)00005-5).
 
 use std::cmp::Ordering;
 
@@ -14,8 +14,8 @@ use crate::{Field, SplitMix64, interrupt};
 pub struct Work {
     /// What is left.
     pub left: u64,
-    /// True once more was asked for than was left. Without it [`OverLimit`] comes from a power above 255, which no
-    /// amount of work allows.
+    /// True once more was asked for than was left. Without it [`OverLimit`] comes from a power above 255,
+    /// which no amount of work allows.
     pub used_up: bool,
 }
 
@@ -163,7 +163,8 @@ impl Table {
 
     fn compare(&self, a: u32, b: u32) -> Ordering {
         self.degree[a as usize].cmp(&self.degree[b as usize]).then_with(|| {
-            // of two monomials of one degree the one with less of the last variable in which they differ is larger
+            // of two monomials of one degree the one with less of the last variable in which they differ is
+            // larger
             self.of(b).iter().rev().cmp(self.of(a).iter().rev())
         })
     }
@@ -191,8 +192,9 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The Groebner basis of the ideal of `input`, in as many variables as there are `weights`, by at most `work`.
-    /// Where that is not enough the basis is not [complete](Self::is_complete), but all of its elements are in the ideal.
+    /// The Groebner basis of the ideal of `input`, in as many variables as there are `weights`, by at most
+    /// `work`. Where that is not enough the basis is not [complete](Self::is_complete), but all of its
+    /// elements are in the ideal.
     pub fn new(f: &Field, weights: &[u32], input: &[Polynomial], work: &mut Work) -> Self {
         let mut out = Self {
             field: *f,
@@ -275,8 +277,8 @@ impl Basis {
         (0..self.rows.len()).find(|&i| self.active[i] && self.table.divides(self.rows[i][0].0, m))
     }
 
-    /// What is left of the rows when they are reduced by the basis and by each other: rows with leading monomials that are
-    /// no multiples of those of the basis, each another.
+    /// What is left of the rows when they are reduced by the basis and by each other: rows with leading
+    /// monomials that are no multiples of those of the basis, each another.
     fn reduced(&mut self, rows: Vec<Row>, monic: bool, work: &mut Work) -> Result<Vec<Row>, OverLimit> {
         // every monomial that may occur, and the row that removes it
         let mut place: Vec<usize> = Vec::new();
@@ -411,8 +413,8 @@ impl Basis {
         Ok(rest.first().map_or_else(Polynomial::default, |r| self.polynomial(r)))
     }
 
-    /// The monomials that are no multiples of leading ones, up to `most` of them: a basis of the quotient ring. `None` when
-    /// there are more.
+    /// The monomials that are no multiples of leading ones, up to `most` of them: a basis of the quotient
+    /// ring. `None` when there are more.
     fn standard(&mut self, most: usize) -> Result<Option<Vec<u32>>, OverLimit> {
         let n = self.table.weights.len();
         let one = self.table.put(&vec![0; n]);
@@ -438,7 +440,8 @@ impl Basis {
         Ok(Some(out))
     }
 
-    /// How many solutions there are with their multiplicity: the dimension of the quotient ring, if it is at most `most`.
+    /// How many solutions there are with their multiplicity: the dimension of the quotient ring, if it is at
+    /// most `most`.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -446,7 +449,8 @@ impl Basis {
         Ok(self.standard(most)?.map(|m| m.len()))
     }
 
-    /// The minimal polynomial of an element in the quotient ring, constant term first, if its degree is at most `most`.
+    /// The minimal polynomial of an element in the quotient ring, constant term first, if its degree is at
+    /// most `most`.
     ///
     /// # Errors
     /// [`OverLimit`].

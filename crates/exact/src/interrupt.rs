@@ -1,8 +1,8 @@
 //! Ends work for which nobody waits any longer.
 //!
-//! The loops that take long call [`check`]; whoever runs them says with [`hearing`] whether they go on. An end
-//! unwinds the stack up to there, so that no result in between has to carry it. Without [`hearing`] nothing is
-//! asked, and no clock is read. No answer depends on it: there is either the whole answer or none.
+//! The loops that take long call [`check`]; whoever runs them says with [`hearing`] whether they go on. An
+//! end unwinds the stack up to there, so that no result in between has to carry it. Without [`hearing`]
+//! nothing is asked, and no clock is read. No answer depends on it: there is either the whole answer or none.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -25,8 +25,8 @@ thread_local! {
     static HEARING: Cell<Option<Hearing>> = const { Cell::new(None) };
 }
 
-/// Runs `work`, and asks `goes_on` on this thread whenever `interval` has passed, at the next [`check`]. None if it
-/// said false; panics of the work go on.
+/// Runs `work`, and asks `goes_on` on this thread whenever `interval` has passed, at the next [`check`]. None
+/// if it said false; panics of the work go on.
 pub fn hearing<T>(
     interval: Duration,
     goes_on: impl FnMut() -> bool + 'static,

@@ -19,8 +19,8 @@
 //! - [`certainty`]: the bound on the error probability;
 //! - [`interrupt`]: the end of work for which nobody waits any longer.
 //!
-//! Transcendental functions have no image in a prime field. Where they take part, the same algorithms run over real
-//! numbers of many digits with error bounds:
+//! Transcendental functions have no image in a prime field. Where they take part, the same algorithms run
+//! over real numbers of many digits with error bounds:
 //! - [`scalars`]: what a field and a row space are to these algorithms;
 //! - [`ball`]: the numbers; `elementary`: their functions;
 //! - [`reals`]: row spaces over them, in which what is zero is told by a gap.

@@ -189,8 +189,9 @@ impl Polynomial {
         out
     }
 
-    /// Number of products of coefficients, and of terms that stay as they are, in [`replaced`](Self::replaced) with a value
-    /// of this many terms: exact where no two products of monomials of the value are equal, otherwise an upper bound.
+    /// Number of products of coefficients, and of terms that stay as they are, in
+    /// [`replaced`](Self::replaced) with a value of this many terms: exact where no two products of monomials
+    /// of the value are equal, otherwise an upper bound.
     pub fn products_of_replaced(&self, v: u32, terms: usize) -> u64 {
         let (power, t) = (u64::from(self.degree_in(v)), terms as u64);
         // the power k has (k + t - 1 over k) terms; the sum of these for k < p is (p + t - 1 over t)
@@ -253,7 +254,8 @@ mod tests {
     use super::*;
 
     thread_local! {
-        /// Number of calls of [`Polynomial::put`]: one for each product of coefficients and each term that is copied.
+        /// Number of calls of [`Polynomial::put`]: one for each product of coefficients and each term that is
+        /// copied.
         pub(super) static PUT: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
     }
 
@@ -266,8 +268,8 @@ mod tests {
         (PUT.get(), counted)
     }
 
-    /// A sum of as many variables, the first of which is `x1`, and a polynomial with one term for each pair of exponents: of
-    /// `x0`, and of a variable that occurs nowhere else.
+    /// A sum of as many variables, the first of which is `x1`, and a polynomial with one term for each pair
+    /// of exponents: of `x0`, and of a variable that occurs nowhere else.
     fn sum_and_terms(terms: u32, exponents: &[u32]) -> (Polynomial, Polynomial) {
         let f = Field::new((1 << 60) + 33);
         let (mut value, mut p) = (Polynomial::default(), Polynomial::default());
@@ -279,7 +281,8 @@ mod tests {
         (value, p)
     }
 
-    /// Operations counted beforehand are those done, for sums of different variables: one power among many low ones too.
+    /// Operations counted beforehand are those done, for sums of different variables: one power among many
+    /// low ones too.
     #[test]
     fn products_of_what_is_put_in() {
         let exponents: [&[u32]; 9] =
@@ -291,7 +294,8 @@ mod tests {
                 assert_eq!(put, counted, "{terms} terms, {exponents:?}");
             }
         }
-        // by hand: 3 (1 + 3 + 6 + 10 + 15) for the powers of three terms up to the fifth, 21 and 3 for the terms themselves
+        // by hand: 3 (1 + 3 + 6 + 10 + 15) for the powers of three terms up to the fifth, 21 and 3 for the
+        // terms themselves
         let (value, p) = sum_and_terms(3, &[5, 1]);
         assert_eq!(put_and_counted(&p, &value), (3 * 35 + 21 + 3, 3 * 35 + 21 + 3));
     }

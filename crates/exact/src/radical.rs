@@ -28,7 +28,8 @@ impl Ratio {
         Self::within(field, value, BOUND)
     }
 
-    /// The rational number with numerator and denominator up to `bound` whose image is `value`, if there is one.
+    /// The rational number with numerator and denominator up to `bound` whose image is `value`, if there is
+    /// one.
     pub fn within(field: &Field, value: u64, bound: u64) -> Option<Self> {
         // half-extended Euclid (Wang 1981, doi:10.1145/800206.806398)
         let (mut r0, mut r1) = (field.modulus(), field.to_u64(value));

@@ -1,8 +1,8 @@
 //! Real numbers of `64 N` bits as a field, and row spaces over them.
 //!
-//! What differs from zero is proven to, by the error bound of its ball. That something is zero cannot be computed: it is
-//! taken to be when its ball holds zero and is narrow, and the [`Gap`] says how far apart the two kinds were. Where they
-//! were not far apart nothing is decided, and the caller takes more digits.
+//! What differs from zero is proven to, by the error bound of its ball. That something is zero cannot be
+//! computed: it is taken to be when its ball holds zero and is narrow, and the [`Gap`] says how far apart the
+//! two kinds were. Where they were not far apart nothing is decided, and the caller takes more digits.
 
 use std::cell::Cell;
 
@@ -95,12 +95,14 @@ impl<const N: usize> Scalars for Reals<N> {
 
 /// A row space over the reals in reduced row-echelon form, with a one at every pivot.
 ///
-/// Eliminating with rows that were eliminated before multiplies their errors by every small pivot on the way. So the rows that were
-/// given are kept, and with them the numbers (without errors of their own) that make the reduced ones of them, about: a new row is
-/// first reduced by the given ones, whose errors are those of the input, and what rounding leaves at the pivots, which is little, by
-/// the reduced ones. Where these have become wide they are made anew from the given ones: if `F = T G` is the
-/// identity at the pivots but for a matrix of norm d, the reduced rows differ from F by `2 d max |F|` at most
-/// (the a posteriori bound of Rump 2010, doi:10.1017/S096249291000005X). Bits are lost once for the condition of the rows then, not once for each pivot.
+/// Eliminating with rows that were eliminated before multiplies their errors by every small pivot on the way.
+/// So the rows that were given are kept, and with them the numbers (without errors of their own) that make
+/// the reduced ones of them, about: a new row is first reduced by the given ones, whose errors are those of
+/// the input, and what rounding leaves at the pivots, which is little, by the reduced ones. Where these have
+/// become wide they are made anew from the given ones: if `F = T G` is the identity at the pivots but for a
+/// matrix of norm d, the reduced rows differ from F by `2 d max |F|` at most (the a posteriori bound of Rump
+/// 2010, doi:10.1017/S096249291000005X). Bits are lost once for the condition of the rows then, not once for
+/// each pivot.
 ///
 /// ```
 /// use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace};
@@ -414,8 +416,8 @@ mod tests {
         }
     }
 
-    /// Rows that are known to 20 digits less than they have are made anew, each time from all rows given: the products are
-    /// counted, 2 * 2 * 4 for the second row and 3 * 3 * 4 for the third.
+    /// Rows that are known to 20 digits less than they have are made anew, each time from all rows given: the
+    /// products are counted, 2 * 2 * 4 for the second row and 3 * 3 * 4 for the third.
     #[test]
     fn rows_made_anew_are_counted() {
         let mut space = RealSpace::<4>::new(Reals, 4);
@@ -428,7 +430,8 @@ mod tests {
         assert_eq!((space.rank(), space.refined()), (3, 2 * 2 * 4 + 3 * 3 * 4));
     }
 
-    /// Rows `(1, x, x^2, ...)` whose pivots fall to 2^-70, eliminated in 256 bits: their products would be far below any error.
+    /// Rows `(1, x, x^2, ...)` whose pivots fall to 2^-70, eliminated in 256 bits: their products would be
+    /// far below any error.
     #[test]
     fn small_pivots_do_not_add_up() {
         let n = 20;

@@ -18,14 +18,14 @@ impl SplitMix64 {
         Self(seed)
     }
 
-    /// The stream of `seed` for one purpose and one input: it starts at the first 64 bits of SHA-256 (FIPS 180-4) of
-    /// all three.
+    /// The stream of `seed` for one purpose and one input: it starts at the first 64 bits of SHA-256 (FIPS
+    /// 180-4) of all three.
     ///
-    /// Primes drawn from a stream that does not know the input are constants that anybody can look up, and an input can
-    /// be built in which they divide what decides a rank. Here every change of the input changes the primes, so that
-    /// they cannot be aimed at: an input that is wrong with probability q takes about 1/q trials. A weaker hash would
-    /// be enough against accidents; SHA-256 is fixed by a standard, so the same input has the same primes in every
-    /// version, and nobody knows how to steer it.
+    /// Primes drawn from a stream that does not know the input are constants that anybody can look up, and an
+    /// input can be built in which they divide what decides a rank. Here every change of the input changes
+    /// the primes, so that they cannot be aimed at: an input that is wrong with probability q takes about 1/q
+    /// trials. A weaker hash would be enough against accidents; SHA-256 is fixed by a standard, so the same
+    /// input has the same primes in every version, and nobody knows how to steer it.
     ///
     /// `input` is hashed part by part, each with its length, so that parts cannot be shifted into each other.
     ///

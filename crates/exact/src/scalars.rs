@@ -91,7 +91,8 @@ pub trait RowSpace: Clone + Debug {
     fn gap(&self) -> Gap {
         Gap::OPEN
     }
-    /// Products of numbers beyond those of an elimination so far: of rows that were made anew since their errors were wide.
+    /// Products of numbers beyond those of an elimination so far: of rows that were made anew since their
+    /// errors were wide.
     fn refined(&self) -> u64 {
         0
     }

@@ -184,8 +184,9 @@ impl SeriesEchelon {
         self.order_of_series(&constants)
     }
 
-    /// A basis of the functionals c with constant coefficients (shape: columns) for which `T^d c` is in the module: the coefficients of c in the
-    /// basis `T^-v_i r_i` of what it spans must have no powers below `v_i - d`, and nothing may be left. As exact as [`Self::order`].
+    /// A basis of the functionals c with constant coefficients (shape: columns) for which `T^d c` is in the
+    /// module: the coefficients of c in the basis `T^-v_i r_i` of what it spans must have no powers below
+    /// `v_i - d`, and nothing may be left. As exact as [`Self::order`].
     pub fn constants_of_order(&self, d: usize) -> Vec<Vec<u64>> {
         let (n, f) = (self.ring.precision, &self.ring.field);
         let known = n - self.largest_valuation();

@@ -1,4 +1,5 @@
-//! Products of polynomials over a prime field by number-theoretic transforms (Pollard 1971, doi:10.1090/S0025-5718-1971-0301966-0).
+//! Products of polynomials over a prime field by number-theoretic transforms (Pollard 1971,
+//! doi:10.1090/S0025-5718-1971-0301966-0).
 
 use std::collections::HashMap;
 
@@ -21,7 +22,8 @@ const SHORT: usize = 96;
 #[derive(Debug, Clone)]
 pub struct Transform {
     f: Field,
-    /// `roots[l][j]`: the j-th power of a primitive root of order `2^(l + 1)`, for j below `2^l`; none where the field lacks the roots.
+    /// `roots[l][j]`: the j-th power of a primitive root of order `2^(l + 1)`, for j below `2^l`; none where
+    /// the field lacks the roots.
     roots: Vec<Vec<u64>>,
     /// The same of its inverse.
     inverses: Vec<Vec<u64>>,
@@ -31,7 +33,8 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// For products of two polynomials of up to `length` coefficients; fast if 2^k divides p - 1 for the first 2^k from twice the length on.
+    /// For products of two polynomials of up to `length` coefficients; fast if 2^k divides p - 1 for the
+    /// first 2^k from twice the length on.
     pub fn new(f: Field, length: usize) -> Self {
         let size = (2 * length).next_power_of_two().max(2);
         let order = size as u64;
@@ -71,8 +74,8 @@ impl Transform {
         (0..n).map(coefficient).collect()
     }
 
-    /// The first `n` coefficients of the product with each of several polynomials, which are known by a key: what is asked for with a
-    /// key again is the same polynomial.
+    /// The first `n` coefficients of the product with each of several polynomials, which are known by a key:
+    /// what is asked for with a key again is the same polynomial.
     pub fn products(&mut self, a: &[u64], factors: &[(usize, &[u64])], n: usize) -> Vec<Vec<u64>> {
         let a = &a[..a.len().min(n)];
         let size = (2 * n).next_power_of_two();

@@ -1,4 +1,5 @@
-//! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is Python.
+//! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is
+//! Python.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -39,7 +40,8 @@ impl Answer {
         self.0.passed
     }
 
-    /// Name and version of the layout of the JSON; None of several answers, of a page and of a part of a search.
+    /// Name and version of the layout of the JSON; None of several answers, of a page and of a part of a
+    /// search.
     #[getter]
     fn layout(&self) -> Option<&str> {
         self.0.answer.layout()
@@ -73,8 +75,9 @@ impl Answer {
     }
 }
 
-/// Answers a command; `request` is JSON, `progress` is called with (what, done, total, examined, best) ten times a second at most, and ends the work with
-/// the best so far where it returns False. A keyboard interrupt does too; it is raised where there is nothing so far.
+/// Answers a command; `request` is JSON, `progress` is called with (what, done, total, examined, best) ten
+/// times a second at most, and ends the work with the best so far where it returns False. A keyboard
+/// interrupt does too; it is raised where there is nothing so far.
 #[pyfunction]
 #[pyo3(signature = (command, request, progress=None))]
 fn answer(py: Python<'_>, command: &str, request: &str, progress: Option<Py<PyAny>>) -> PyResult<Answer> {
@@ -121,8 +124,8 @@ fn allan(
     })
 }
 
-/// Seconds that a command takes when it is asked so many times from Rust, its JSON written or not: what the package adds to that is measured against it
-/// (`python/benches/overhead.py`).
+/// Seconds that a command takes when it is asked so many times from Rust, its JSON written or not: what the
+/// package adds to that is measured against it (`python/benches/overhead.py`).
 #[pyfunction]
 fn seconds(py: Python<'_>, command: &str, request: &str, times: u32, written: bool) -> PyResult<f64> {
     py.detach(|| {
@@ -152,13 +155,13 @@ const PARALLEL: [(&str, bool); 6] = [
     ("simulate", false),
 ];
 
-/// The threads of parallel work, and the process that they belong to: of work that is cut short, and of work that ends
-/// by itself, which must not run beside it on one thread.
+/// The threads of parallel work, and the process that they belong to: of work that is cut short, and of work
+/// that ends by itself, which must not run beside it on one thread.
 static THREADS: [Mutex<Option<(u32, &'static ThreadPool)>>; 2] = [const { Mutex::new(None) }; 2];
 
-/// The threads of this process. A process that began as a copy of another (`fork`) has none of its threads, and
-/// waits for ever for what they are given; it has new ones here. This needs the lock of the interpreter, under which
-/// Python forks: no copy is made while the mutex is held.
+/// The threads of this process. A process that began as a copy of another (`fork`) has none of its threads,
+/// and waits for ever for what they are given; it has new ones here. This needs the lock of the interpreter,
+/// under which Python forks: no copy is made while the mutex is held.
 fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
     let failed = |why: String| PyRuntimeError::new_err(format!("no threads: {why}"));
     let mut threads = THREADS[usize::from(ends)].lock().map_err(|e| failed(e.to_string()))?;
@@ -175,8 +178,8 @@ fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
     }
 }
 
-/// Works without the lock of the interpreter. Ten times a second whoever called hears how far it is, and is asked
-/// whether a key was pressed and the work goes on.
+/// Works without the lock of the interpreter. Ten times a second whoever called hears how far it is, and is
+/// asked whether a key was pressed and the work goes on.
 fn heard(
     py: Python<'_>,
     command: &str,
@@ -233,8 +236,8 @@ fn in_this_thread(
     }
 }
 
-/// Work on all threads; this one, which may be the only one that hears of keys, asks Python. Where the work `ends` by
-/// itself it is told so, and gives what it has; else it is cut short.
+/// Work on all threads; this one, which may be the only one that hears of keys, asks Python. Where the work
+/// `ends` by itself it is told so, and gives what it has; else it is cut short.
 fn in_threads(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,

@@ -54,7 +54,8 @@ fn part(fast: f64) -> String {
 /// From this part on an error of the clock is large.
 const CLOCK: f64 = 0.1;
 
-/// Whether durations and rates tell of the same clock: a quarter of its error is what drifts that follow take of it.
+/// Whether durations and rates tell of the same clock: a quarter of its error is what drifts that follow take
+/// of it.
 pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
     let both = by_durations.zip(by_earth);
     both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
@@ -700,7 +701,8 @@ impl Answer for Calibration {
 /// The table of unknowns and combinations.
 pub(crate) const COEFFICIENTS: &str = "coefficients";
 
-/// The tables of a calibration with two more: unknowns and combinations one below the other, and the covariance.
+/// The tables of a calibration with two more: unknowns and combinations one below the other, and the
+/// covariance.
 pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceTable) -> Vec<Table> {
     let of = |name: &str| tables.iter().find(|t| t.name == name);
     // both are lists of the same objects
@@ -712,7 +714,8 @@ pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceT
     tables
 }
 
-/// The covariance of all that has an estimate, as CSV: a row and a column for each, after name, unit, estimate and sigma.
+/// The covariance of all that has an estimate, as CSV: a row and a column for each, after name, unit,
+/// estimate and sigma.
 ///
 /// # Errors
 /// [`ReportError::Csv`].

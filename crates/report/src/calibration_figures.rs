@@ -1,4 +1,5 @@
-//! Figures of a calibration: residuals by component, their Allan deviation and autocorrelation, and the estimates.
+//! Figures of a calibration: residuals by component, their Allan deviation and autocorrelation, and the
+//! estimates.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, PositionFit, ResidualSeries};
@@ -11,8 +12,8 @@ pub(crate) fn file_name(record: &str) -> &str {
     record.rsplit(['/', '\\']).next().filter(|name| !name.is_empty()).unwrap_or(record)
 }
 
-/// The figures of a calibration: residuals over time by component and record, with bands of three sigma; their Allan
-/// deviation and autocorrelation; the estimates with three sigma.
+/// The figures of a calibration: residuals over time by component and record, with bands of three sigma;
+/// their Allan deviation and autocorrelation; the estimates with three sigma.
 ///
 /// # Errors
 /// [`FigureError`].
@@ -92,7 +93,8 @@ pub(crate) fn allan_figure(series: &ResidualSeries) -> Figure {
     }
 }
 
-/// The autocorrelation of the residuals of a component, a bar per lag, with the band of independent residuals.
+/// The autocorrelation of the residuals of a component, a bar per lag, with the band of independent
+/// residuals.
 pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
     let lags = series.autocorrelation.len();
     let mut bars = vec![(0.5, 0.0)];
@@ -115,8 +117,8 @@ pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
     }
 }
 
-/// Bars of three sigma about the estimates by family: as the fit has it, as predicted, and as required. Estimates are
-/// in the names along x, since sigmas are small beside them.
+/// Bars of three sigma about the estimates by family: as the fit has it, as predicted, and as required.
+/// Estimates are in the names along x, since sigmas are small beside them.
 pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
     for e in c.quantities.iter().filter(|e| e.determined) {

@@ -138,7 +138,8 @@ fn excitation(q: &Quantity) -> String {
     q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
 }
 
-/// Predicted sigmas beside those of full attitudes, where the small-angle model does not hold at the scheme's own drifts.
+/// Predicted sigmas beside those of full attitudes, where the small-angle model does not hold at the scheme's
+/// own drifts.
 pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     let large = || schemes.iter().filter(|r| r.validity.as_ref().is_some_and(|v| !v.holds));
     let rows = large().flat_map(|r| {

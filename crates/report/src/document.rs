@@ -1,5 +1,5 @@
-//! What a result says, in no format: headings, tables, lists, formulas, pictures. Text from files is escaped where it
-//! is written.
+//! What a result says, in no format: headings, tables, lists, formulas, pictures. Text from files is escaped
+//! where it is written.
 
 use std::borrow::Cow;
 
@@ -331,8 +331,8 @@ impl Document {
 mod tests {
     use super::*;
 
-    /// One document in every format: a formula is code in Markdown, math in LaTeX and text elsewhere, a heading that is
-    /// empty is none, and columns of sentences share the line.
+    /// One document in every format: a formula is code in Markdown, math in LaTeX and text elsewhere, a
+    /// heading that is empty is none, and columns of sentences share the line.
     #[test]
     fn a_formula_in_every_format() {
         let columns = [left("what"), right("how many")];

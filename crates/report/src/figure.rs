@@ -34,7 +34,8 @@ pub(crate) enum Stroke {
     Dotted,
 }
 
-/// Colour and stroke of the `i`-th of many curves: 18 that differ, none of them black or dotted as references are.
+/// Colour and stroke of the `i`-th of many curves: 18 that differ, none of them black or dotted as references
+/// are.
 pub(crate) fn style(i: usize) -> (&'static str, Stroke) {
     const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, SKY, PURPLE, AMBER];
     let stroke = [Stroke::Solid, Stroke::Dashed, Stroke::DashDot][i / COLORS.len() % 3];
@@ -187,7 +188,8 @@ impl Figure {
     }
 }
 
-/// The ids of clips, which the library numbers through a process, numbered through the picture: it is the same whenever it is drawn.
+/// The ids of clips, which the library numbers through a process, numbered through the picture: it is the
+/// same whenever it is drawn.
 fn numbered(svg: &str) -> String {
     let mut parts = svg.split(CLIP);
     let mut out = parts.next().unwrap_or_default().to_string();
@@ -217,8 +219,8 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     numbered(&SvgBackend::new().render_scene(&scene))
 }
 
-/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange, others
-/// white to blue.
+/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange,
+/// others white to blue.
 pub(crate) fn heat(
     title: &str,
     rows: &[String],

@@ -44,7 +44,8 @@ pub(crate) fn file_name(name: &str) -> String {
 /// What the paper draws, figure 2 to figure 10.
 const PAPER: [&str; 9] = ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
 
-/// At most so many samples after the start, the last among them: the prior at the start would hide what the data say.
+/// At most so many samples after the start, the last among them: the prior at the start would hide what the
+/// data say.
 fn settled(record: &Traces, most: usize) -> Vec<usize> {
     let stride = record.time.len().div_ceil(most).max(1);
     (1..record.time.len()).filter(|k| k % stride == 0 || k + 1 == record.time.len()).collect()
@@ -105,9 +106,9 @@ fn curve(record: &Traces, i: usize) -> Figure {
     }
 }
 
-/// The error of one series (estimate minus truth) with +-3 sigma around zero, that of the linear filter on the same
-/// measurements over it, and the offset that an unknown psi leaves. The axis is that of the second half of the last
-/// position: errors before it leave the picture.
+/// The error of one series (estimate minus truth) with +-3 sigma around zero, that of the linear filter on
+/// the same measurements over it, and the offset that an unknown psi leaves. The axis is that of the second
+/// half of the last position: errors before it leave the picture.
 pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
     let (scale, unit) = (record.scales[i], &record.units[i]);
     let settled = settled(record, most);
@@ -150,8 +151,8 @@ pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
     }
 }
 
-/// The offset of an unknown that outputs determine only together with a psi: the error of that psi at the start, carried over
-/// by their combination. The paper's is D_FZ, off by `wN*psi_y(0)`.
+/// The offset of an unknown that outputs determine only together with a psi: the error of that psi at the
+/// start, carried over by their combination. The paper's is D_FZ, off by `wN*psi_y(0)`.
 fn offset(record: &Traces, i: usize) -> Option<(String, f64)> {
     if record.determined.get(i).copied().unwrap_or(true) {
         return None;
@@ -181,7 +182,8 @@ fn window(series: &Series, scale: f64) -> (f64, f64) {
     (low - air, high + air)
 }
 
-/// The name of a series, and whether it shows the prior alone; a filter with full attitudes may learn it from large angles.
+/// The name of a series, and whether it shows the prior alone; a filter with full attitudes may learn it from
+/// large angles.
 pub(crate) fn series_title(record: &Traces, i: usize) -> String {
     let determined = record.determined.get(i).copied().unwrap_or(false);
     let prior = match (determined, &record.linear) {
@@ -192,8 +194,8 @@ pub(crate) fn series_title(record: &Traces, i: usize) -> String {
     format!("{}{prior}", record.names[i])
 }
 
-/// Two figures per unknown and combination, the estimate and its error; those of all unknowns in one, and what the paper
-/// draws as figures 2 to 10, in its order.
+/// Two figures per unknown and combination, the estimate and its error; those of all unknowns in one, and
+/// what the paper draws as figures 2 to 10, in its order.
 ///
 /// # Errors
 /// [`FigureError`].
@@ -230,7 +232,8 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
     Ok(files)
 }
 
-/// Sigma against the dwell for unknowns of one unit, with a reference slope per order; the styles are those from `first` on.
+/// Sigma against the dwell for unknowns of one unit, with a reference slope per order; the styles are those
+/// from `first` on.
 pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> Figure {
     // what stays at a diffuse prior would squeeze the rest
     let any = curves.iter().any(|c| c.accuracy_order.is_some());

@@ -1,5 +1,5 @@
-//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the pointer with
-//! them.
+//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the
+//! pointer with them.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -61,7 +61,8 @@ fn environment() -> Result<Environment<'static>, ReportError> {
     Ok(environment)
 }
 
-/// The document as a part of somebody else's page: tables, lists and formulas that read without scripts and without a style of their own.
+/// The document as a part of somebody else's page: tables, lists and formulas that read without scripts and
+/// without a style of their own.
 pub(crate) fn fragment(d: &Document) -> Result<String, ReportError> {
     let blocks = listed(&d.blocks, &mut 0);
     Ok(environment()?.get_template("fragment")?.render(context! {
@@ -79,7 +80,8 @@ fn has_curves(blocks: &[Block]) -> bool {
     })
 }
 
-/// What the template needs of blocks; a fold is its beginning, what it holds, and its end. `ids` counts what links lead to.
+/// What the template needs of blocks; a fold is its beginning, what it holds, and its end. `ids` counts what
+/// links lead to.
 fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
     let mut out = Vec::new();
     for part in parts(blocks) {
@@ -172,7 +174,8 @@ pub(crate) fn mathml(latex: &str) -> Option<String> {
 /// From here on a formula of a report may break.
 const LONG: usize = 120;
 
-/// A formula longer than that before each of its plus and minus signs: browsers break lines between formulas, not in them.
+/// A formula longer than that before each of its plus and minus signs: browsers break lines between formulas,
+/// not in them.
 fn terms(latex: &str, long: usize) -> Vec<String> {
     let mut out = vec![String::new()];
     let (mut depth, mut escaped) = (0usize, false);

@@ -139,7 +139,8 @@ pub fn mathml(expression: &str) -> Option<String> {
     html::mathml(&latex::expression(expression))
 }
 
-/// A solution in an answer as MathML: its terms, each a coefficient, an observation and a station; `None` where it cannot be typeset.
+/// A solution in an answer as MathML: its terms, each a coefficient, an observation and a station; `None`
+/// where it cannot be typeset.
 pub fn solution_mathml(terms: &[[&str; 3]]) -> Option<String> {
     html::lines(&latex::solution_of(terms), 0)
 }
@@ -270,7 +271,8 @@ pub fn json(answer: &impl Answer) -> Result<String, ReportError> {
     Ok(visible::json(answer)?)
 }
 
-/// A result as a part of an HTML page, such as a notebook: tables and formulas (MathML) that read without scripts.
+/// A result as a part of an HTML page, such as a notebook: tables and formulas (MathML) that read without
+/// scripts.
 ///
 /// # Errors
 /// [`ReportError`] when the template fails.
@@ -278,7 +280,8 @@ pub fn fragment(answer: &impl Answer) -> Result<String, ReportError> {
     html::fragment(&answer.document())
 }
 
-/// A table of a result as CSV; the main one where none is named. Of a list with nothing in it nothing is written.
+/// A table of a result as CSV; the main one where none is named. Of a list with nothing in it nothing is
+/// written.
 ///
 /// # Errors
 /// [`ReportError::NoTable`], and when a serializer fails.
@@ -336,7 +339,8 @@ pub struct Origin {
     pub certificates: Vec<String>,
 }
 
-/// The files of a design review, with calibrations by name: the text first, then the pictures that it refers to, in `folder` beside it.
+/// The files of a design review, with calibrations by name: the text first, then the pictures that it refers
+/// to, in `folder` beside it.
 ///
 /// # Errors
 /// [`ReportError`].

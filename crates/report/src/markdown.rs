@@ -20,8 +20,8 @@ fn row(cells: impl Iterator<Item = String>) -> String {
     format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
-/// A formula as code between more backticks than it has in a row; the bar is escaped, since tables split at bars even
-/// in code.
+/// A formula as code between more backticks than it has in a row; the bar is escaped, since tables split at
+/// bars even in code.
 fn code(text: &str) -> String {
     if text.is_empty() {
         return String::new();

@@ -10,7 +10,8 @@ use obsdeg_evidence::simulation::omitted::{
 use crate::document::{Block, left, number, right};
 use crate::words;
 
-/// Most budgets that a document prints in full: those with the least margin, or the largest share of the bench.
+/// Most budgets that a document prints in full: those with the least margin, or the largest share of the
+/// bench.
 const BUDGETS: usize = 3;
 /// Lines of a budget, and silent errors, that an answer prints; a report and the JSON have all.
 const LINES: usize = 6;
@@ -93,7 +94,8 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
     out
 }
 
-/// The blocks of a report: the families, and the budgets of all unknowns but psi in full, the least margin first.
+/// The blocks of a report: the families, and the budgets of all unknowns but psi in full, the least margin
+/// first.
 pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
     let alone = OmittedEffects { budgets: Vec::new(), ..of.clone() };
     let budgets = of.budgets.iter().filter(|b| !b.unknown.starts_with("psi"));
@@ -148,8 +150,8 @@ pub(crate) fn advised(a: &Advice) -> String {
     )
 }
 
-/// Uncertainty budget of one unknown in the form of the GUM, with its total; lines beyond `most`, and those of less
-/// than [`LEAST`] percent, together in one line.
+/// Uncertainty budget of one unknown in the form of the GUM, with its total; lines beyond `most`, and those
+/// of less than [`LEAST`] percent, together in one line.
 fn budget(b: &Budget, whose: &str, most: usize) -> Block {
     let columns = [
         left("source"),
@@ -193,8 +195,8 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
     Block::table(heading, columns, rows)
 }
 
-/// Budgets that are printed: the largest totals over requirement first, then those in which the samples have the
-/// smallest share.
+/// Budgets that are printed: the largest totals over requirement first, then those in which the samples have
+/// the smallest share.
 fn printed(budgets: &[Budget]) -> Vec<&Budget> {
     let over = |b: &Budget| b.requirement.map_or(0.0, |r| b.total / r);
     let share = |b: &Budget| {
@@ -270,8 +272,8 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
     all.into_iter().take(shown).map(|(_, line)| line).chain(more).collect()
 }
 
-/// The sentences of the first lines: what the bench does not count, and which sizes of errors that it does not state
-/// would use up a margin.
+/// The sentences of the first lines: what the bench does not count, and which sizes of errors that it does
+/// not state would use up a margin.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
     let estimated = of.estimated.join(", ");
     let not_counted = || format!("Of the bench, {estimated} is estimated: its size does not count.");
@@ -304,7 +306,8 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
     Some(stated.into_iter().chain([met]).collect::<Vec<_>>().join(" "))
 }
 
-/// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a coefficient.
+/// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a
+/// coefficient.
 pub(crate) fn silent(of: &Omitted) -> String {
     if of.silent.is_empty() {
         return String::new();
@@ -356,7 +359,8 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     out
 }
 
-/// Estimate with suspected errors among the unknowns; a range where others of the same residuals change it otherwise.
+/// Estimate with suspected errors among the unknowns; a range where others of the same residuals change it
+/// otherwise.
 fn change(c: &SuspectedChange, others: usize, with: &str) -> String {
     let (unknown, unit, estimate) = (&c.unknown, &c.unit, number(c.estimate));
     let [lowest, highest] = [c.lowest, c.highest].map(number);

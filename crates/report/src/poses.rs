@@ -1,7 +1,9 @@
-//! Pictures of positions: the platform's axes, g and the earth rate at each, in an axonometric view of North, Up, East.
+//! Pictures of positions: the platform's axes, g and the earth rate at each, in an axonometric view of North,
+//! Up, East.
 //!
-//! Of right-handed axes North, Up, East the picture shows North to the right, Up upwards and East towards the reader, turned by [`AZIMUTH_DEG`] about
-//! Up and seen from [`ELEVATION_DEG`] above: `right = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the
+//! Of right-handed axes North, Up, East the picture shows North to the right, Up upwards and East towards the
+//! reader, turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above:
+//! `right = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the
 //! reader `u sin h + near cos h`.
 
 use std::fmt::Write;
@@ -23,7 +25,8 @@ const HEIGHT: f64 = 232.0;
 const LINE: f64 = 14.0;
 /// One, in pixels.
 const UNIT: f64 = 70.0;
-/// A vector of n on the sheet, in pixels from the origin (right, down), and how far it points towards the reader.
+/// A vector of n on the sheet, in pixels from the origin (right, down), and how far it points towards the
+/// reader.
 fn seen([n, u, e]: [f64; 3]) -> ([f64; 2], f64) {
     let ((sa, ca), (sh, ch)) = (AZIMUTH_DEG.to_radians().sin_cos(), ELEVATION_DEG.to_radians().sin_cos());
     let near = n * sa + e * ca;
@@ -49,7 +52,8 @@ fn axes(c: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|j| std::array::from_fn(|i| component(c[i][j])))
 }
 
-/// An arrow from the origin with its name beyond the tip; an axis that points away from the reader is dashed, one along the line of sight a ring.
+/// An arrow from the origin with its name beyond the tip; an axis that points away from the reader is dashed,
+/// one along the line of sight a ring.
 fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
     let ([x, y], towards) = seen(v);
     let length = x.hypot(y);
@@ -226,7 +230,8 @@ pub(crate) fn caption(poses: &[Pose], latitude_deg: f64, by_default: bool) -> St
     )
 }
 
-/// The positions of a scheme as one picture, `positions.svg`: axes, g and earth rate at each, and the turns between them.
+/// The positions of a scheme as one picture, `positions.svg`: axes, g and earth rate at each, and the turns
+/// between them.
 pub fn position_figure(scheme: &Scheme) -> File {
     let latitude_deg = latitude_of(scheme).map_or(0.0, |l| l.degrees());
     File::new("positions.svg", panels(&scheme.poses(), latitude_deg).svg())
@@ -271,7 +276,8 @@ mod tests {
             .collect()
     }
 
-    /// Platform axis `j` in n: a passive matrix Mx(a) turns what it multiplies by -a about x, and so for y and z.
+    /// Platform axis `j` in n: a passive matrix Mx(a) turns what it multiplies by -a about x, and so for y
+    /// and z.
     fn by_quaternions(angles_deg: [f64; 3], j: usize) -> [f64; 3] {
         let about = |k: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(k, -angles_deg[k].to_radians()));
         (about(0) * about(1) * about(2) * Vector3::ith(j, 1.0)).into()

@@ -324,8 +324,8 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Changes that are made together, in the imperative: `add a position NWU and one USE`. Lines are alternatives,
-/// so that none numbers the positions it adds.
+/// Changes that are made together, in the imperative: `add a position NWU and one USE`. Lines are
+/// alternatives, so that none numbers the positions it adds.
 fn changes(list: &[Change]) -> String {
     let mut before = "";
     let mut one = |c: &Change| {

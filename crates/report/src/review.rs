@@ -26,8 +26,8 @@ use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
     values that the scheme states (of several calibrations those of the last); what is not determined has the values of the scheme.";
 
-/// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections; of several the comparison first, and
-/// every part folded below it.
+/// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections;
+/// of several the comparison first, and every part folded below it.
 pub(crate) fn document(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],

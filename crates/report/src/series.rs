@@ -60,8 +60,9 @@ pub fn series_csv(record: &Traces) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(header).chain(rows))
 }
 
-/// The same as Parquet (snappy). Its metadata say what it belongs to: `obsdeg.version`, `obsdeg.seed`, `obsdeg.units` (JSON, unit by
-/// column) and `obsdeg.summary_sha256`, the digest of the summary of the run as JSON, which holds all its conditions.
+/// The same as Parquet (snappy). Its metadata say what it belongs to: `obsdeg.version`, `obsdeg.seed`,
+/// `obsdeg.units` (JSON, unit by column) and `obsdeg.summary_sha256`, the digest of the summary of the run as
+/// JSON, which holds all its conditions.
 ///
 /// # Errors
 /// [`ReportError::Parquet`], [`ReportError::Json`].

@@ -159,7 +159,8 @@ fn linear(e: &Estimate) -> Option<Vec<String>> {
     Some(vec![e.name.clone(), e.unit.clone(), own, sigma, error, format!("{:.2}", l.error / l.sigma)])
 }
 
-/// Outcome of an unknown; of one whose sigma alone meets its requirement and whose total with the bench does not, that.
+/// Outcome of an unknown; of one whose sigma alone meets its requirement and whose total with the bench does
+/// not, that.
 fn outcome(e: &Estimate) -> &'static str {
     match (e.outcome, e.required_sigma) {
         (Outcome::Converging, Some(required)) if e.sigma <= required => "missed by the bench",

@@ -27,8 +27,8 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
     }
 }
 
-/// What verdicts rest on, in a sentence. Real numbers give no probability: a number that is not zero is proven to be so, one that holds
-/// zero is taken to be.
+/// What verdicts rest on, in a sentence. Real numbers give no probability: a number that is not zero is
+/// proven to be so, one that holds zero is taken to be.
 fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
         (Some(bound), _) => {

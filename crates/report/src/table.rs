@@ -81,7 +81,8 @@ fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell
 /// Columns whose words are graded.
 const GRADED: [&str; 4] = ["status", "verdict", "outcome", "finding"];
 
-/// A mark without width that stands for a colour, its code, and the words that have it; what they say is never said by colour alone.
+/// A mark without width that stands for a colour, its code, and the words that have it; what they say is
+/// never said by colour alone.
 const COLOURS: [(char, &str, &[&str]); 3] = [
     ('\u{2062}', "\u{1b}[32m", &["observable", "agree", "agrees", "ok", "met", "consistent"]),
     (

@@ -1,4 +1,5 @@
-//! The tables of an answer: the lists of objects in its JSON, one row each, under the names that they have there.
+//! The tables of an answer: the lists of objects in its JSON, one row each, under the names that they have
+//! there.
 
 use serde_json::{Map, Value};
 
@@ -9,8 +10,8 @@ pub struct Table {
     pub name: String,
     /// The way to each field of the objects: `solution.text`.
     pub columns: Vec<String>,
-    /// Texts in the order of the columns: numbers with all their digits, nothing for what is missing, lists of words and numbers with
-    /// semicolons between them.
+    /// Texts in the order of the columns: numbers with all their digits, nothing for what is missing, lists
+    /// of words and numbers with semicolons between them.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -48,8 +49,8 @@ pub(crate) fn is_empty_list(answer: &Value, path: &str) -> bool {
     answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty))
 }
 
-/// The tables of an answer: its own fields, then every list of objects in it, however deep. A list within a list has the name of the
-/// object that it belongs to in its first column.
+/// The tables of an answer: its own fields, then every list of objects in it, however deep. A list within a
+/// list has the name of the object that it belongs to in its first column.
 pub(crate) fn of_json(answer: &Value) -> Vec<Table> {
     let mut out = Vec::new();
     if let Value::Object(fields) = answer {

@@ -1,4 +1,5 @@
-//! A picture as a PDF of one page, for LaTeX: outlines, lines and colours of the SVG, nothing turned into pixels.
+//! A picture as a PDF of one page, for LaTeX: outlines, lines and colours of the SVG, nothing turned into
+//! pixels.
 
 use pdf_writer::types::{ColorSpaceOperand, LineCapStyle, LineJoinStyle};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref};

@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-/// The text on one line, with everything in it that is not text written out, as in `\u{1b}`: control characters, which
-/// move the cursor of a terminal, colour it or ring its bell, and are not allowed in pictures and pages; marks that
-/// turn the direction of writing, so that a text reads otherwise than it is; what is no character. Line breaks and tabs
-/// become blanks.
+/// The text on one line, with everything in it that is not text written out, as in `\u{1b}`: control
+/// characters, which move the cursor of a terminal, colour it or ring its bell, and are not allowed in
+/// pictures and pages; marks that turn the direction of writing, so that a text reads otherwise than it is;
+/// what is no character. Line breaks and tabs become blanks.
 ///
 /// ```
 /// use obsdeg_report::visible;

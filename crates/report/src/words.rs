@@ -30,7 +30,8 @@ pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, comput
     }
 }
 
-/// What the dwell makes of a degree, where it is something else; empty where the accuracy order is the degree.
+/// What the dwell makes of a degree, where it is something else; empty where the accuracy order is the
+/// degree.
 pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usize>) -> String {
     match (degree, order) {
         _ if !a.has_accuracy_orders => String::new(),
@@ -118,7 +119,8 @@ struct Change<'a> {
     names: Vec<(&'a str, Vec<&'a str>)>,
 }
 
-/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike together.
+/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike
+/// together.
 fn differences(all: &[Difference]) -> String {
     let mut groups: Vec<Change<'_>> = Vec::new();
     for d in all {
@@ -408,8 +410,8 @@ pub(crate) fn null_vector(v: &[Component]) -> String {
     format!("{}{turned}", v.iter().map(part).collect::<Vec<_>>().join(", "))
 }
 
-/// Whether a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd part: what a rotation of the platform
-/// axes does to them.
+/// Whether a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd
+/// part: what a rotation of the platform axes does to them.
 fn rotates_the_axes(v: &[Component]) -> bool {
     let number = |name: &str| {
         let found = v.iter().find(|c| c.name == name);
@@ -473,7 +475,8 @@ pub(crate) fn outcome(o: Outcome) -> &'static str {
 /// The columns of [`estimate`].
 pub(crate) const ESTIMATE: [&str; 6] = ["degree", "truth", "estimate", "error", "sigma", "in sigma"];
 
-/// The degree of an unknown, its true value, its estimate, the error and sigma of that, and the error in sigma.
+/// The degree of an unknown, its true value, its estimate, the error and sigma of that, and the error in
+/// sigma.
 pub(crate) fn estimate(d: Option<usize>, values: [f64; 4], in_sigma: f64) -> [String; 6] {
     let [truth, estimate, error, sigma] = values.map(number);
     [degree(d), truth, estimate, error, sigma, format!("{in_sigma:.2}")]

@@ -127,9 +127,9 @@ impl Drop for Running {
     }
 }
 
-/// A worker that starts with the first request; from then on no other has its turn until this one rests. After work
-/// beyond its limit it starts afresh with the next one; after any other failure of the process it stays down and
-/// repeats the reason.
+/// A worker that starts with the first request; from then on no other has its turn until this one rests.
+/// After work beyond its limit it starts afresh with the next one; after any other failure of the process it
+/// stays down and repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
     /// Time that may still be spent on waiting for others.
@@ -414,7 +414,8 @@ mod tests {
             assert_eq!(worker.ask(&request()), Err(WorkerError::Busy { seconds: 1 }));
         }
         assert!(start.elapsed() >= Duration::from_secs(1) && start.elapsed() < Duration::from_secs(30));
-        // what was waited for the first turn is gone for the second; the wait is counted from when it is heard of
+        // what was waited for the first turn is gone for the second; the wait is counted from when it is
+        // heard of
         let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo 'obsdeg:\"over_limit\"'";
         let mut worker = scripted(turn);
         (worker.config.wait, worker.patience) = (Duration::from_secs(1000), Duration::from_secs(1000));

@@ -4,8 +4,8 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
-/// The lock file, opened but not locked. It is created if need be, never through a symbolic link, and never anything
-/// but a regular file of this user: in a folder for all users a name may have been taken by another.
+/// The lock file, opened but not locked. It is created if need be, never through a symbolic link, and never
+/// anything but a regular file of this user: in a folder for all users a name may have been taken by another.
 ///
 /// # Errors
 /// What the system says, or what the file is.
@@ -31,8 +31,8 @@ pub fn open(path: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Waits for the lock, as long as it takes; `waiting` is called before, if it is held by another process. The lock
-/// lasts until the file is closed: the system does that at the end of the process, however it ends.
+/// Waits for the lock, as long as it takes; `waiting` is called before, if it is held by another process. The
+/// lock lasts until the file is closed: the system does that at the end of the process, however it ends.
 ///
 /// # Errors
 /// What the system says.

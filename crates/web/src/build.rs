@@ -130,8 +130,9 @@ fn packed(bytes: &[u8]) -> Result<Vec<u8>, BuildError> {
     write().map_err(|reason| BuildError::File { path: "packing".into(), reason })
 }
 
-/// Bytes as characters, five for four (base64 takes five and a third): four bytes are a number, least significant first, its digits to the base 85
-/// likewise, from `(` on without the backslash. The length stands before them.
+/// Bytes as characters, five for four (base64 takes five and a third): four bytes are a number, least
+/// significant first, its digits to the base 85 likewise, from `(` on without the backslash. The length
+/// stands before them.
 fn as_text(bytes: &[u8]) -> String {
     let mut out = format!("{} ", bytes.len());
     for chunk in bytes.chunks(4) {

@@ -50,13 +50,15 @@ pub fn toml_as_json(text: &str) -> String {
     .to_string()
 }
 
-/// An expression of an answer, such as `1/2 [ Z1@p1 + wU*psi_y ]`, as MathML; empty where it cannot be typeset.
+/// An expression of an answer, such as `1/2 [ Z1@p1 + wU*psi_y ]`, as MathML; empty where it cannot be
+/// typeset.
 #[wasm_bindgen]
 pub fn mathml(expression: &str) -> String {
     obsdeg_report::mathml(expression).unwrap_or_default()
 }
 
-/// A solution of an answer as MathML: its terms as JSON, `[{"coefficient", "observation", "station"}]`; empty where it cannot be typeset.
+/// A solution of an answer as MathML: its terms as JSON, `[{"coefficient", "observation", "station"}]`; empty
+/// where it cannot be typeset.
 #[wasm_bindgen]
 pub fn solution_mathml(terms: &str) -> String {
     let terms: Vec<Value> = serde_json::from_str(terms).unwrap_or_default();

@@ -5,8 +5,8 @@ use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_exact::SplitMix64;
 
-/// A scheme drawn at random: carries, latitudes with poles and equator, terms, one to eight positions; `near` has two positions or a
-/// latitude that hardly differ from another.
+/// A scheme drawn at random: carries, latitudes with poles and equator, terms, one to eight positions; `near`
+/// has two positions or a latitude that hardly differ from another.
 pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     let mut rng = SplitMix64::new(seed);
     let mut pick = |n: usize| rng.below(n as u64) as usize;
@@ -46,7 +46,8 @@ pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     scheme
 }
 
-/// The same positions and conditions with any of the terms of the whole platform, and a path where torquer errors act on it.
+/// The same positions and conditions with any of the terms of the whole platform, and a path where torquer
+/// errors act on it.
 fn drawn_whole(seed: u64) -> Scheme {
     let mut rng = SplitMix64::new(seed ^ 0x7768_6f6c_6500);
     let mut scheme = drawn(seed, false);
@@ -97,7 +98,8 @@ fn schemes_drawn_at_random_agree() {
 #[test]
 fn whole_platforms_drawn_at_random_agree() {
     sweep(2000..2012, 20, drawn_whole);
-    // a torquer error that is in psi^n after a turn, and that nothing sees: rounding leaves nothing of it in psi at the end
+    // a torquer error that is in psi^n after a turn, and that nothing sees: rounding leaves nothing of it in
+    // psi at the end
     sweep(2162..2163, 20, drawn_whole);
 }
 

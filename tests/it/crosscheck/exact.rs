@@ -26,10 +26,11 @@ fn values(name: &str, value: f64) -> Vec<Assignment> {
     vec![Assignment { name: name.into(), value }]
 }
 
-/// ANEES and NIS of many runs against exact truth at the paper's drifts. The iterated filter is what it believes; one that goes
-/// through the run once is not, since it linearised the first steps before it knew the drifts, nor is the linear one. With
-/// p1 p2 the most probable run alone has an ANEES of 16.5 under inertial carry: what is left open bends by more than what is known.
-/// Six odd attitudes under platform carry need shorter runs to begin with.
+/// ANEES and NIS of many runs against exact truth at the paper's drifts. The iterated filter is what it
+/// believes; one that goes through the run once is not, since it linearised the first steps before it knew
+/// the drifts, nor is the linear one. With p1 p2 the most probable run alone has an ANEES of 16.5 under
+/// inertial carry: what is left open bends by more than what is known. Six odd attitudes under platform carry
+/// need shorter runs to begin with.
 #[test]
 fn the_iterated_filter_is_what_it_believes() {
     iterated_is_what_it_believes(30, 12);
@@ -41,7 +42,8 @@ fn the_iterated_filter_is_what_it_believes_in_200_runs() {
     iterated_is_what_it_believes(200, 50);
 }
 
-/// `runs` of the iterated filter (half as many of six odd attitudes), `others` of the extended and of the linear one.
+/// `runs` of the iterated filter (half as many of six odd attitudes), `others` of the extended and of the
+/// linear one.
 fn iterated_is_what_it_believes(runs: usize, others: usize) {
     const SIX: [&str; 6] = ["0,0,0", "180,0,0", "90,0,0", "-90,0,0", "0,0,90", "0,0,-90"];
     let carries = [Carry::Platform, Carry::Inertial];
@@ -59,7 +61,8 @@ fn iterated_is_what_it_believes(runs: usize, others: usize) {
     }
 }
 
-/// A platform without drifts is not run with others, though the prior allows for them: the filter is chosen by the truth that is run.
+/// A platform without drifts is not run with others, though the prior allows for them: the filter is chosen
+/// by the truth that is run.
 #[test]
 fn the_truth_is_that_of_the_scheme() {
     let still =
@@ -68,7 +71,8 @@ fn the_truth_is_that_of_the_scheme() {
     assert!(filter == FilterKind::Linear && anees.pass && nis.pass, "{anees:?} {nis:?}");
 }
 
-/// The drift noise of a slew is that of as many steps as it would have, in the truth as in the filter, whatever the step.
+/// The drift noise of a slew is that of as many steps as it would have, in the truth as in the filter,
+/// whatever the step.
 #[test]
 fn slews_have_the_noise_that_the_filter_allows_for() {
     let conditions = Conditions {
@@ -118,8 +122,8 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);
 }
 
-/// Drifts, torquers, accelerometers and mounting: the filter with full attitudes on exact truth, which integrates them all, is what it
-/// believes to be.
+/// Drifts, torquers, accelerometers and mounting: the filter with full attitudes on exact truth, which
+/// integrates them all, is what it believes to be.
 #[test]
 fn the_whole_platform_is_consistent() {
     whole_platform_is_consistent(12);

@@ -104,8 +104,9 @@ fn a_filter_without_an_unknown() {
     assert!(c.orders.measured < c.orders.of && c.quantities.iter().any(|q| q.modelled));
 }
 
-/// One position: the best variance of psi_z, eps_x and eps_y, when what their solution needs is unknown and the rest of the
-/// drift is known, is 1, 12 and 720 times sigma^2 dt / T^(2k+1) (over wN^2 for eps_y, which enters psi_z'' by wN).
+/// One position: the best variance of psi_z, eps_x and eps_y, when what their solution needs is unknown and
+/// the rest of the drift is known, is 1, 12 and 720 times sigma^2 dt / T^(2k+1) (over wN^2 for eps_y, which
+/// enters psi_z'' by wN).
 #[test]
 fn variance_constants_of_a_single_position() {
     let single = Scheme { unknowns: Unknowns::Drift, ..scheme(&["0,0,0"], Carry::Platform) };
@@ -182,8 +183,8 @@ fn psi_of_one_position() {
     assert!(!check(&paper(Carry::Reset), &conditions, other).passed);
 }
 
-/// At the pole, drift that nobody sees turns psi during the dwell: what derivatives see is lost at the start (slope) or at the end
-/// (inflation), and directions move psi as well. The filter agrees with all of it.
+/// At the pole, drift that nobody sees turns psi during the dwell: what derivatives see is lost at the start
+/// (slope) or at the end (inflation), and directions move psi as well. The filter agrees with all of it.
 #[test]
 fn at_the_pole_the_dwell_takes_away() {
     let at_the_pole =
@@ -205,7 +206,8 @@ fn at_the_pole_the_dwell_takes_away() {
     );
 }
 
-/// The control at another latitude is far from the scheme's: at 89.9999 degrees a filter at the pole is hardly wrong.
+/// The control at another latitude is far from the scheme's: at 89.9999 degrees a filter at the pole is
+/// hardly wrong.
 #[test]
 fn the_control_is_at_a_latitude_far_away() {
     for (latitude, control) in
@@ -223,8 +225,8 @@ fn the_control_is_at_a_latitude_far_away() {
     }
 }
 
-/// Of white innovations the probability is even: 500 times ten runs of 20 samples, whose longest lag has half as many products. The mean of
-/// 500 even numbers is 0.5 +- 0.013, and one in a hundred is below 0.01.
+/// Of white innovations the probability is even: 500 times ten runs of 20 samples, whose longest lag has half
+/// as many products. The mean of 500 even numbers is 0.5 +- 0.013, and one in a hundred is below 0.01.
 #[test]
 fn whiteness_of_right_filters_is_even() {
     let conditions = Conditions { dwell_s: 100.0, ..Conditions::default() };
@@ -272,7 +274,8 @@ fn threads_do_not_change_the_sums() {
 
 proptest! {
     #![proptest_config(Config { cases: 24, rng_seed: RngSeed::Fixed(1), ..Config::default() })]
-    /// Random schemes of whole degrees (the same ones each time: one in three hundred right filters leaves a band of 99.9 %): model evidence a, b, c and the ranking agree with the exact verdicts.
+    /// Random schemes of whole degrees (the same ones each time: one in three hundred right filters leaves a
+    /// band of 99.9 %): model evidence a, b, c and the ranking agree with the exact verdicts.
     #[test]
     fn random_schemes_agree(
         angles in prop::collection::vec(prop::array::uniform3(-18i32..18), 1..6),
@@ -288,7 +291,8 @@ proptest! {
     }
 }
 
-/// Noise, step and dwell only scale what the samples say: slopes, inflation and null vectors are theirs, not those of a prior.
+/// Noise, step and dwell only scale what the samples say: slopes, inflation and null vectors are theirs, not
+/// those of a prior.
 #[test]
 fn evidence_does_not_depend_on_noise_and_steps() {
     let usual = right(&paper(Carry::Platform));
@@ -325,8 +329,8 @@ fn evidence_does_not_depend_on_noise_and_steps() {
     }
 }
 
-/// Valid schemes always get an answer. (One of the first has coefficients that never separate, at a latitude and dwells that used to
-/// end in a pivot of nothing.)
+/// Valid schemes always get an answer. (One of the first has coefficients that never separate, at a latitude
+/// and dwells that used to end in a pivot of nothing.)
 #[test]
 fn every_valid_scheme_is_answered() {
     let mut first = scheme(&["0,0,180", "180,180,0", "0,-90,180", "90,180,-90", "0,90,0"], Carry::Platform);
@@ -376,8 +380,8 @@ fn the_only_position_is_not_dropped() {
     assert!(refused.to_string().contains("only position"), "{refused}");
 }
 
-/// What doubles at dwells of a platform do not show, many digits at short dwells do: positions that hardly differ, and a latitude close to
-/// the pole.
+/// What doubles at dwells of a platform do not show, many digits at short dwells do: positions that hardly
+/// differ, and a latitude close to the pole.
 #[test]
 fn what_doubles_do_not_show_is_resolved() {
     let at = |latitude: &str, attitudes: &[&str], carry| Scheme {
@@ -402,8 +406,8 @@ fn what_doubles_do_not_show_is_resolved() {
     }
 }
 
-/// What is not resolvable is counted, and no disagreement: the filter's prior is none beside a direction that is seen through a turn of
-/// 1e-9 degrees.
+/// What is not resolvable is counted, and no disagreement: the filter's prior is none beside a direction that
+/// is seen through a turn of 1e-9 degrees.
 #[test]
 fn what_is_not_resolvable_is_no_disagreement() {
     let s = scheme(&["40,-6,155", "-22,12,45", "140,136,109", "40,-6,155.000000001"], Carry::Platform);

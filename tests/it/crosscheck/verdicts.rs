@@ -20,7 +20,8 @@ fn held(prediction: &Prediction, scheme: &Scheme) -> CrossCheck {
     crosscheck_against(prediction, scheme, &Conditions::default(), &options, &|_| true).expect("checked")
 }
 
-/// Every wrong word of a verdict is caught: one field after the other is changed, of the first unknown of every kind.
+/// Every wrong word of a verdict is caught: one field after the other is changed, of the first unknown of
+/// every kind.
 #[test]
 fn wrong_verdicts_are_caught() {
     wrong_words_are_caught(false);
@@ -207,8 +208,8 @@ fn wrong_words_are_caught(on_every_unknown: bool) {
     }
 }
 
-/// The verdicts on another carry, another mounting (signs of S_i: two at a time, since axes stay right-handed), other angles and another
-/// latitude are caught.
+/// The verdicts on another carry, another mounting (signs of S_i: two at a time, since axes stay
+/// right-handed), other angles and another latitude are caught.
 #[test]
 fn verdicts_on_something_else_are_caught() {
     let s = scheme(&["0,0,0", "90,0,0", "0,90,0"], Carry::Platform);

@@ -1,5 +1,6 @@
-//! Sigmas of the cardinal attitudes with slews between them, from the equations alone: nothing of the program is used. Attitudes are
-//! integer matrices, slews turn in n, the drift model is (22), (23), (27), (28) of the paper.
+//! Sigmas of the cardinal attitudes with slews between them, from the equations alone: nothing of the program
+//! is used. Attitudes are integer matrices, slews turn in n, the drift model is (22), (23), (27), (28) of the
+//! paper.
 
 type Matrix = [[f64; 3]; 3];
 
@@ -177,7 +178,8 @@ impl Brute {
         x
     }
 
-    /// The sigma of every coefficient in deg/h (per g): attitudes in order, `ways[i]` which way from i to i + 1.
+    /// The sigma of every coefficient in deg/h (per g): attitudes in order, `ways[i]` which way from i to i +
+    /// 1.
     pub(crate) fn sigmas(&self, sequence: &[usize], ways: &[usize]) -> [f64; 12] {
         let mut root = [[0.0; N]; N];
         for (i, row) in root.iter_mut().enumerate() {

@@ -1,4 +1,5 @@
-//! Bounds on the best of all schemes: against exhaustion with an information matrix written from the equations.
+//! Bounds on the best of all schemes: against exhaustion with an information matrix written from the
+//! equations.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 use obsdeg_core::model::settings::Assignment;
@@ -70,10 +71,11 @@ pub(super) struct Oracle {
     dwell: [SMatrix<f64, 6, 6>; 2],
     attitudes: Vec<Matrix3<f64>>,
     terms: String,
-    /// What is known beforehand of psi (platform axes, rad) and of every coefficient (deg/h): sigmas, infinite where nothing is.
+    /// What is known beforehand of psi (platform axes, rad) and of every coefficient (deg/h): sigmas,
+    /// infinite where nothing is.
     prior: (f64, Vec<f64>),
-    /// Of every candidate: the diagonal of the information where psi is known, the information where it is not; the
-    /// covariance of psi at its end where the coefficients are known, and how they move it.
+    /// Of every candidate: the diagonal of the information where psi is known, the information where it is
+    /// not; the covariance of psi at its end where the coefficients are known, and how they move it.
     positions: Vec<Option<OfPosition>>,
     /// What is smaller of a scaled matrix is rounding.
     least: f64,
@@ -82,7 +84,8 @@ pub(super) struct Oracle {
 type OfPosition = (DVector<f64>, DMatrix<f64>, DMatrix<f64>, DMatrix<f64>);
 
 impl Oracle {
-    /// Attitudes at a latitude (deg) with a dwell and a step (s) and a noise (g); nothing is known beforehand.
+    /// Attitudes at a latitude (deg) with a dwell and a step (s) and a noise (g); nothing is known
+    /// beforehand.
     pub(super) fn new(
         (latitude, dwell, step, noise): (f64, f64, f64, f64),
         degrees: &[[f64; 3]],
@@ -135,8 +138,8 @@ impl Oracle {
         self
     }
 
-    /// The covariance of all coefficients (deg/h) of some positions, and what of each position's psi (platform axes, rad) is
-    /// not known; `None` where it is singular.
+    /// The covariance of all coefficients (deg/h) of some positions, and what of each position's psi
+    /// (platform axes, rad) is not known; `None` where it is singular.
     fn covariance(&self, scheme: &[(usize, f64)]) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let m = 3 * self.terms.len();
         let (mut information, mut whole) = (DMatrix::zeros(m, m), DVector::<f64>::zeros(m));
@@ -210,8 +213,9 @@ fn multisets(n: usize, k: usize, chosen: &mut Vec<usize>, f: &mut dyn FnMut(&[us
     }
 }
 
-/// No scheme of any of 80 random tasks (that have one) is below the bound: every criterion, odd noise and dwells, few candidates and
-/// unlike ones, coefficients that do not count, requirements on psi. The bound is no trifle either.
+/// No scheme of any of 80 random tasks (that have one) is below the bound: every criterion, odd noise and
+/// dwells, few candidates and unlike ones, coefficients that do not count, requirements on psi. The bound is
+/// no trifle either.
 #[test]
 fn no_scheme_is_below_the_bound() {
     no_scheme_of_tasks_is_below_the_bound(16);
@@ -317,7 +321,8 @@ fn no_scheme_of_tasks_is_below_the_bound(tasks: usize) {
         assert!(bound.attained >= bound.value * (1.0 - 1e-9), "task {task}: {bound:?}");
         assert!((bound.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         if best.is_finite() {
-            // the weights are the best ones: their criterion is the bound, but for tasks that are hardly determined
+            // the weights are the best ones: their criterion is the bound, but for tasks that are hardly
+            // determined
             loose += usize::from(bound.attained > bound.value * (1.0 + 1e-5));
             held += 1;
             close += usize::from(bound.value > 0.8 * best);
@@ -338,7 +343,8 @@ fn of_d(positions: usize, candidates: Candidates, restarts: u64) -> Design {
     designed(Carry::Reset, &options)
 }
 
-/// Geometric-mean sigmas of twelve coefficients, 28.2 deg N, 1000 s, 1e-5 g: computed elsewhere by other means.
+/// Geometric-mean sigmas of twelve coefficients, 28.2 deg N, 1000 s, 1e-5 g: computed elsewhere by other
+/// means.
 #[test]
 fn cardinal_attitudes_cost_a_factor_at_twelve_positions() {
     cardinal_attitudes_cost(&[(12, 0.00141, 0.00078, 0.00075)]);
@@ -350,7 +356,8 @@ fn cardinal_attitudes_cost_a_factor_at_nine_and_24_positions() {
     cardinal_attitudes_cost(&[(9, 0.00174, 0.00169, 0.00086), (24, 0.00100, 0.00053, 0.00053)]);
 }
 
-/// Per number of positions: what is found of the cardinal attitudes, of a grid of 45 degrees, and the bound of the grid.
+/// Per number of positions: what is found of the cardinal attitudes, of a grid of 45 degrees, and the bound
+/// of the grid.
 fn cardinal_attitudes_cost(known: &[(usize, f64, f64, f64)]) {
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
     for &(k, cardinal, of_grid, bound) in known {
@@ -410,7 +417,8 @@ fn exhaustion_agrees_with_the_bound() {
     assert!(found.search.expect("a search").certificate.is_none());
 }
 
-/// Over all attitudes: the bound holds for odd attitudes too, is near what weights reach, and cardinal attitudes are 1.8 times worse.
+/// Over all attitudes: the bound holds for odd attitudes too, is near what weights reach, and cardinal
+/// attitudes are 1.8 times worse.
 #[test]
 fn all_attitudes_have_a_bound() {
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
@@ -464,8 +472,8 @@ fn free_attitudes_are_found_at_nine_and_24_positions() {
     }
 }
 
-/// Free attitudes as a command: what is found is near the bound over all, readable, and what rounding costs is said; other
-/// carries are refused.
+/// Free attitudes as a command: what is found is near the bound over all, readable, and what rounding costs
+/// is said; other carries are refused.
 #[test]
 fn free_attitudes_are_found() {
     let free = |step: i64| free_of(12, step);

@@ -80,7 +80,8 @@ fn an_interrupted_program_ends_with_130() {
     assert_eq!(code, Some(130));
 }
 
-/// The winner's file is a scheme that `analyze` accepts and that has the sigma promised; wrong arguments are named.
+/// The winner's file is a scheme that `analyze` accepts and that has the sigma promised; wrong arguments are
+/// named.
 #[test]
 fn the_winner_is_a_scheme_file() {
     let place = tempfile::tempdir().expect("a folder");
@@ -116,7 +117,8 @@ fn the_winner_is_a_scheme_file() {
     let (promised, kept) = (promised.as_f64().expect("a number"), kept.as_f64().expect("a number"));
     assert!((promised / kept - 1.0).abs() < 1e-6, "{promised} {kept}");
     assert!(run(&["analyze", "--scheme", &winner, "--solutions", "off"]).status.success());
-    // half turns about an axis and about a diagonal, either way, are in the file: what the commands make of it is what was found
+    // half turns about an axis and about a diagonal, either way, are in the file: what the commands make of
+    // it is what was found
     let two = place.path().join("two.toml").display().to_string();
     for (attitudes, axes) in [
         (["NUE", "NDW"], ["about = \"N\", angle_deg = 180", "about = \"N\", angle_deg = -180"]),
@@ -227,7 +229,8 @@ fn without_parts(answer: &str) -> serde_json::Value {
     answer
 }
 
-/// Parts are files; together they give what the command gives, and what is wrong with one is said with its name.
+/// Parts are files; together they give what the command gives, and what is wrong with one is said with its
+/// name.
 #[test]
 fn parts_are_files() {
     let place = tempfile::tempdir().expect("a folder");

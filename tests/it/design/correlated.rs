@@ -1,5 +1,5 @@
-//! Noise of Z that is correlated, in the criterion: against least squares with the covariance of all samples, written from the equations, and
-//! against a filter that has the biases of the accelerometers as states.
+//! Noise of Z that is correlated, in the criterion: against least squares with the covariance of all samples,
+//! written from the equations, and against a filter that has the biases of the accelerometers as states.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SMatrix};
 use obsdeg_core::model::settings::Assignment;
@@ -106,8 +106,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     psi.chain(inverse.row_iter().skip(psis).map(|r| r.norm())).collect()
 }
 
-/// Sequences drawn at random, all carries, correlation times from one sample to a whole run and beyond, instability from nothing to a hundred
-/// times the white noise.
+/// Sequences drawn at random, all carries, correlation times from one sample to a whole run and beyond,
+/// instability from nothing to a hundred times the white noise.
 #[test]
 fn sigmas_are_those_of_least_squares_with_all_correlations() {
     let mut rng = SplitMix64::new(37);
@@ -162,7 +162,8 @@ fn sigmas_are_those_of_least_squares_with_all_correlations() {
     assert!(compared > 200 && differs > 5, "{compared} {differs}");
 }
 
-/// Errors of accelerometers among the unknowns, slews that take time, priors: against a filter with the biases as states.
+/// Errors of accelerometers among the unknowns, slews that take time, priors: against a filter with the
+/// biases as states.
 #[test]
 fn sigmas_are_those_of_a_filter_with_biases() {
     let candidates = Candidates::grid(45_000_000_000).expect("a grid");
@@ -212,8 +213,8 @@ fn sigmas_are_those_of_a_filter_with_biases() {
     }
 }
 
-/// What is designed is the best of all sequences by least squares, order counted under every carry; the winner's file has the noise, its run the
-/// sigma; bounds on sums of information are not said.
+/// What is designed is the best of all sequences by least squares, order counted under every carry; the
+/// winner's file has the noise, its run the sigma; bounds on sums of information are not said.
 #[test]
 fn designs_count_correlated_noise() {
     let degrees = [[0.0, 0.0, 0.0], [90.0, 0.0, 90.0], [20.0, -40.0, 70.0], [110.0, 15.0, -35.0]];

@@ -1,4 +1,5 @@
-//! The total time divided among positions: by the information of all samples, computed from the scheme by the plan of a simulation.
+//! The total time divided among positions: by the information of all samples, computed from the scheme by the
+//! plan of a simulation.
 
 use obsdeg_core::model::{Carry, Dwell, Scheme};
 use obsdeg_design::design::{CriterionName, DesignOptions, design, scheme_found};
@@ -22,8 +23,9 @@ fn value(scheme: &Scheme, tens: &[usize], conditions: &Conditions, criterion: Cr
     }
 }
 
-/// Better than equal dwells in the same time, as good as it says, and no better by a step moved from any position to any other; where the
-/// criterion is smooth and no dwell is given up (under reset carry some are, for one long dwell is worth more than two), a step is worth the same everywhere.
+/// Better than equal dwells in the same time, as good as it says, and no better by a step moved from any
+/// position to any other; where the criterion is smooth and no dwell is given up (under reset carry some are,
+/// for one long dwell is worth more than two), a step is worth the same everywhere.
 #[test]
 fn time_is_divided_as_well_as_can_be() {
     let step = Conditions { dwell_s: 200.0, ..super::quiet() };

@@ -19,7 +19,8 @@ fn degrees(text: &str) -> [f64; 3] {
     angles.try_into().expect("three angles")
 }
 
-/// Designs with free and with cardinal attitudes of one task, and what tells its criterion from the equations.
+/// Designs with free and with cardinal attitudes of one task, and what tells its criterion from the
+/// equations.
 struct Both {
     terms: &'static str,
     criterion: Criterion,
@@ -91,7 +92,8 @@ impl Both {
         oracle.weighed(&scheme, &counting, &self.criterion)
     }
 
-    /// Whether what is printed could be told from the equations: of the best scheme, the finer one, and the weights.
+    /// Whether what is printed could be told from the equations: of the best scheme, the finer one, and the
+    /// weights.
     fn check(&self, step: f64) -> [bool; 3] {
         let (first, cardinal) = (&self.free.found[0], &self.cardinal.found[0]);
         let task = format!("{} {:?} {first:?}", self.terms, self.criterion);
@@ -202,7 +204,8 @@ fn thirty_tasks_are_never_worse() {
     free_attitudes_are_never_worse(tasks);
 }
 
-/// Six positions of twelve coefficients, where those of the weights alone are worse than the cardinal attitudes by 41 %.
+/// Six positions of twelve coefficients, where those of the weights alone are worse than the cardinal
+/// attitudes by 41 %.
 #[test]
 fn six_free_positions_are_better_than_six_cardinal_ones() {
     let free = |step: i64| {
@@ -216,7 +219,8 @@ fn six_free_positions_are_better_than_six_cardinal_ones() {
     assert!(five < 0.95 * cardinal && hundredths < 0.95 * cardinal, "{five} {hundredths} {cardinal}");
 }
 
-/// What is called an image is one: a turn of the platform axes makes the one scheme of the other, by their matrices; what is not, is none.
+/// What is called an image is one: a turn of the platform axes makes the one scheme of the other, by their
+/// matrices; what is not, is none.
 #[test]
 fn images_are_turns_of_the_axes() {
     let options = DesignOptions { keep: 40, ..options(Some(4)) };

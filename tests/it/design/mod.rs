@@ -1,4 +1,5 @@
-//! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes of it.
+//! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes
+//! of it.
 
 mod brute;
 mod certificate;

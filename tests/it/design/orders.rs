@@ -1,4 +1,5 @@
-//! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random tasks, one by one.
+//! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random
+//! tasks, one by one.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme, c_n_f64, cardinal, parse_attitude};
@@ -45,7 +46,8 @@ struct Task {
 const NAMES: [&str; 12] =
     ["D_FX", "D_FY", "D_FZ", "D_IX", "D_IY", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SX", "D_SY", "D_SZ"];
 
-/// Four to six candidates, two to four positions, any carry, coefficients that some of them determine (mostly), and any constraints.
+/// Four to six candidates, two to four positions, any carry, coefficients that some of them determine
+/// (mostly), and any constraints.
 fn task(seed: u64) -> Task {
     let mut rng = SplitMix64::new(seed ^ 0x0bd3_7a5c);
     let rng = &mut rng;
@@ -152,7 +154,8 @@ fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
     let (reached, _) = t.options.candidates.clone().within(&t.base.gimbals);
     let mut candidates = Candidates::default();
     for (name, attitude) in reached.names.iter().zip(&reached.attitudes) {
-        // Euler angles that are not alike may be the same attitude: only cardinals are repeated here, and they have names
+        // Euler angles that are not alike may be the same attitude: only cardinals are repeated here, and
+        // they have names
         if !candidates.names.contains(name) {
             candidates.add(attitude.clone());
         }
@@ -375,7 +378,8 @@ fn searches_order_as_brute_force(tasks: usize) {
             let all = judged(&t);
             let found = design(&t.base, &t.conditions, &t.options, &on);
             hold_exhaustion(seed, &t, &all, &found);
-            // exchange is not sure to find the best, but what it finds is what it seems, and never better than the best
+            // exchange is not sure to find the best, but what it finds is what it seems, and never better
+            // than the best
             let search = Search {
                 rows: &all.rows,
                 walks: false,
@@ -414,7 +418,8 @@ fn searches_order_as_brute_force(tasks: usize) {
     );
 }
 
-/// Branch and bound keeps what exhaustion keeps: schemes, front and ties, whatever is asked for; and it does leave sequences out.
+/// Branch and bound keeps what exhaustion keeps: schemes, front and ties, whatever is asked for; and it does
+/// leave sequences out.
 #[test]
 fn what_a_bound_leaves_out_is_not_missed() {
     bounds_miss_nothing(80);
@@ -467,7 +472,8 @@ fn bounds_miss_nothing(tasks: u64) {
     assert!(found as u64 * 8 > tasks * 3 && excluded * 2 > tasks * 25, "{found} {excluded}");
 }
 
-/// Six candidates of which five positions do, within turns of a quarter: with six, repeating one costs no turn.
+/// Six candidates of which five positions do, within turns of a quarter: with six, repeating one costs no
+/// turn.
 #[test]
 fn a_position_more_is_never_impossible_when_repeating_costs_nothing() {
     let mut candidates = Candidates::default();

@@ -1,5 +1,5 @@
-//! Parts of a search that were edited at random: each is refused, or merges to the bytes of the whole. Some edits
-//! leave the digest as it was; others compute it again, and then every block is searched again.
+//! Parts of a search that were edited at random: each is refused, or merges to the bytes of the whole. Some
+//! edits leave the digest as it was; others compute it again, and then every block is searched again.
 
 use obsdeg_commands::{Designed, Host, Search, SearchFiles, Source, design as command};
 use obsdeg_design::design::Part;

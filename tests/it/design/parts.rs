@@ -1,4 +1,5 @@
-//! Exhaustive searches in parts: put together they are the whole, byte for byte; what does not belong is refused by name.
+//! Exhaustive searches in parts: put together they are the whole, byte for byte; what does not belong is
+//! refused by name.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

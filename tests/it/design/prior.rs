@@ -1,5 +1,5 @@
-//! What is known beforehand counts in the criterion: against the information of all samples and that prior, by the plan of a simulation, and the
-//! filter's own run.
+//! What is known beforehand counts in the criterion: against the information of all samples and that prior,
+//! by the plan of a simulation, and the filter's own run.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
@@ -53,7 +53,8 @@ fn by_samples(scheme: &Scheme, conditions: &Conditions) -> Vec<(String, f64)> {
     plan.platform.names().iter().cloned().zip(sigmas.iter().zip(units).map(|(s, u)| s / u)).collect()
 }
 
-/// Sigmas of sequences drawn at random, of coefficients and psi, priors of any width and uneven among axes, factors on those of drifts.
+/// Sigmas of sequences drawn at random, of coefficients and psi, priors of any width and uneven among axes,
+/// factors on those of drifts.
 #[test]
 fn sigmas_are_those_of_all_samples_and_the_prior() {
     let candidates = odd();
@@ -117,8 +118,8 @@ fn sigmas_are_those_of_all_samples_and_the_prior() {
     assert!(compared > 300 && told == 24, "{compared} {told}");
 }
 
-/// What a design promises is what the filter of a run believes at its end, and what it finds is the best of all sequences by the samples; the
-/// front, refinement and dwells know of the prior too.
+/// What a design promises is what the filter of a run believes at its end, and what it finds is the best of
+/// all sequences by the samples; the front, refinement and dwells know of the prior too.
 #[test]
 fn designs_count_the_prior() {
     let candidates = odd();
@@ -191,7 +192,8 @@ fn designs_count_the_prior() {
     }
 }
 
-/// Over all attitudes: no set of attitudes drawn at random is below the bound, and priors of psi that differ by axis have none.
+/// Over all attitudes: no set of attitudes drawn at random is below the bound, and priors of psi that differ
+/// by axis have none.
 #[test]
 fn all_attitudes_have_a_bound_with_a_prior() {
     let like = Scheme { unknowns: "F,I".parse().expect("terms"), ..base(Carry::Reset) };

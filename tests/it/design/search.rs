@@ -63,8 +63,8 @@ fn sets_are_judged_as_schemes_are() {
     }
 }
 
-/// Reference: over random full-rank five-sets the worst sigma runs from 0.039 over a median of 0.068 to 0.10 deg/h; the optimum
-/// is proven by exhaustion over all orders; twelve positions in the same time reach 0.018.
+/// Reference: over random full-rank five-sets the worst sigma runs from 0.039 over a median of 0.068 to 0.10
+/// deg/h; the optimum is proven by exhaustion over all orders; twelve positions in the same time reach 0.018.
 #[test]
 fn the_best_of_five_and_of_twelve() {
     let candidates = Candidates::cardinals();
@@ -97,8 +97,8 @@ fn the_best_of_five_and_of_twelve() {
     assert!(twelve.search.is_some_and(|s| !s.proven) && worst(&twelve.found[0]) <= 0.018);
 }
 
-/// Exhaustion over some of the candidates, against every sequence evaluated by itself, repeated positions included; with and
-/// without a symmetry.
+/// Exhaustion over some of the candidates, against every sequence evaluated by itself, repeated positions
+/// included; with and without a symmetry.
 #[test]
 fn exhaustion_finds_the_best() {
     let all = Candidates::cardinals();
@@ -145,8 +145,8 @@ fn exhaustion_finds_the_best() {
     }
 }
 
-/// Turning the platform axes renames coefficients: every image of a sequence has the same criterion, when all coefficients count
-/// alike; a requirement of one of them breaks that.
+/// Turning the platform axes renames coefficients: every image of a sequence has the same criterion, when all
+/// coefficients count alike; a requirement of one of them breaks that.
 #[test]
 fn turned_schemes_are_equally_good() {
     let candidates = Candidates::cardinals();
@@ -201,8 +201,8 @@ fn threads_and_interruption() {
     assert!(impossible.expect_err("none").to_string().contains("3 of these candidates"));
 }
 
-/// What takes minutes hears at once that it is to stop: the search for the fewest positions, ways between many candidates, exchange by
-/// a slow criterion, exhaustion.
+/// What takes minutes hears at once that it is to stop: the search for the fewest positions, ways between
+/// many candidates, exchange by a slow criterion, exhaustion.
 #[test]
 fn long_searches_hear_of_an_interruption() {
     let grid = |deg: i64| Candidates::grid(deg * 1_000_000_000).expect("a grid");
@@ -241,8 +241,9 @@ fn nothing_is_proven_by_chance() {
     let found = designed(Carry::Inertial, &DesignOptions { candidates, ..options(None) });
     assert_eq!((found.minimum.positions, found.minimum.proven), (Some(5), true));
     assert!(found.error_bound < 1e-12 && found.primes > 2, "{found:?}");
-    // each set is excluded by a rank of at most 15 rows modulo a prime that is 1 modulo 360e9; there are about 2^60 over
-    // phi(360e9) ln 2^61 = 9.6e10 * 42.3 of 61 bits, and a minor of 15 rows of 16 bits is divisible by at most 15 * 16 / 60
+    // each set is excluded by a rank of at most 15 rows modulo a prime that is 1 modulo 360e9; there are
+    // about 2^60 over phi(360e9) ln 2^61 = 9.6e10 * 42.3 of 61 bits, and a minor of 15 rows of 16 bits is
+    // divisible by at most 15 * 16 / 60
     let one = 15.0 * 16.0 / 60.0 / (2f64.powi(60) / (9.6e10 * 42.28));
     let sets = 2024.0 + 10626.0;
     assert!(
@@ -270,7 +271,8 @@ fn constraints_are_kept() {
     assert!(free.front.is_sorted_by(|a, b| a.total_s < b.total_s && a.value > b.value));
     // every dwell is there: what slews alone determine does not push out what the exact verdict knows
     assert!(free.front.iter().any(|f| f.total_s < 1400.0) && free.front.iter().any(|f| f.total_s > 20_000.0));
-    // without the D_I everything may have degree 1 (six positions), and is found before what has a smaller sigma
+    // without the D_I everything may have degree 1 (six positions), and is found before what has a smaller
+    // sigma
     let some = ["D_F", "D_O", "D_S"].map(String::from).to_vec();
     let six = DesignOptions { required: some.clone(), ..options(Some(6)) };
     let mut few = Candidates::default();
@@ -316,8 +318,8 @@ fn grids_gimbals_and_refinement() {
     assert!((worst_sigma / worst(refined) - 1.0).abs() < 1e-5, "{worst_sigma} {refined:?}");
 }
 
-/// All 24^k sequences, with both directions of half turns, by an evaluation of their own: none is better than what the search
-/// calls proven, and as many as it says are as good.
+/// All 24^k sequences, with both directions of half turns, by an evaluation of their own: none is better than
+/// what the search calls proven, and as many as it says are as good.
 #[test]
 fn no_sequence_with_slews_is_better_than_the_proven() {
     let candidates = Candidates::cardinals();

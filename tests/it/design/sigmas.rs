@@ -84,8 +84,8 @@ fn criteria_are_those_of_the_covariance() {
     }
 }
 
-/// psi has a requirement like everything else: the sigma that a search holds against it is that of a comparison, and what is found is the best
-/// of all sequences, judged one by one by comparisons.
+/// psi has a requirement like everything else: the sigma that a search holds against it is that of a
+/// comparison, and what is found is the best of all sequences, judged one by one by comparisons.
 #[test]
 fn requirements_on_psi_count() {
     let mut candidates = Candidates::default();
@@ -199,7 +199,8 @@ fn psi_decides(seen: &[Vec<(String, Option<f64>)>], worst: &[f64], asked: &dyn F
     })
 }
 
-/// Coefficients that do not count are estimated all the same: their sigma may be infinite, the others' are those of the batch.
+/// Coefficients that do not count are estimated all the same: their sigma may be infinite, the others' are
+/// those of the batch.
 #[test]
 fn what_is_not_required_may_be_lost() {
     let candidates = Candidates::cardinals();

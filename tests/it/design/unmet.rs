@@ -1,4 +1,5 @@
-//! `--meet` where no scheme meets every requirement: what is told would do does, by other searches and by other commands.
+//! `--meet` where no scheme meets every requirement: what is told would do does, by other searches and by
+//! other commands.
 
 use crate::program::{json, run, stderr};
 

@@ -136,7 +136,8 @@ fn the_best_is_the_best_of_all() {
     assert!((best / least - 1.0).abs() < 1e-5, "{best} {least}");
 }
 
-/// Walks, on which torquer errors act: what is found is observable, and has the sigmas that a comparison gives it, half turns and all.
+/// Walks, on which torquer errors act: what is found is observable, and has the sigmas that a comparison
+/// gives it, half turns and all.
 #[test]
 fn walks_by_sigma() {
     let like = whole("F,GS,GM,K0,K1,M3", Carry::Inertial);
@@ -169,8 +170,8 @@ fn walks_by_sigma() {
     assert!(refused(&conditions, odd).contains("found candidate 20,-40,70"));
 }
 
-/// What turns of the platform axes make of each other is as good: the best of all sequences is that of those that are searched, and as many are
-/// as good.
+/// What turns of the platform axes make of each other is as good: the best of all sequences is that of those
+/// that are searched, and as many are as good.
 #[test]
 fn turned_schemes_are_equally_good() {
     let candidates = Candidates::cardinals();

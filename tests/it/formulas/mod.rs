@@ -1,5 +1,6 @@
-//! Every printed formula is read back, from text, JSON and LaTeX, and evaluated on derivatives of Z that are simulated from the
-//! equations alone. Nothing here but the printing under test comes from the engine: readers, motion and values are the test's own.
+//! Every printed formula is read back, from text, JSON and LaTeX, and evaluated on derivatives of Z that are
+//! simulated from the equations alone. Nothing here but the printing under test comes from the engine:
+//! readers, motion and values are the test's own.
 
 mod draw;
 mod platform;
@@ -23,7 +24,8 @@ use self::value::Value;
 
 /// Exact coefficients, relative to the sum of the magnitudes that are added up.
 const EXACT: f64 = 1e-9;
-/// Coefficients that are printed with six digits and decimals: 5e-6 each, and those of a combination on the left as well.
+/// Coefficients that are printed with six digits and decimals: 5e-6 each, and those of a combination on the
+/// left as well.
 const SIX_DIGITS: f64 = 1.1e-5;
 /// Whatever cancels: absolute, for unknowns of about one.
 const SIX_PLACES: f64 = 1e-4;
@@ -274,7 +276,8 @@ fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &
     }
 }
 
-/// Combinations that are asked for may have roots, decimals, sines and cosines in them, with and without the engine.
+/// Combinations that are asked for may have roots, decimals, sines and cosines in them, with and without the
+/// engine.
 fn asked(mut worker: Option<&mut Worker>) {
     for (angles, asked) in [
         (
@@ -352,7 +355,8 @@ fn combinations_can_be_read() {
             if draw.terms == "drift" {
                 continue;
             }
-            // with the unknowns up to each degree, and those before, they span what is observable, and none is too many
+            // with the unknowns up to each degree, and those before, they span what is observable, and none
+            // is too many
             let case = draw.case();
             let functional = |text: &str| -> Vec<f64> {
                 let part = |q: &Quantity| {

@@ -1,5 +1,6 @@
-//! The platform simulated from the equations alone, in floating point and in platform axes: (1)-(6) of the paper, the passive
-//! Euler matrices, the carries, and Taylor coefficients of everything at one moment by their own recursion.
+//! The platform simulated from the equations alone, in floating point and in platform axes: (1)-(6) of the
+//! paper, the passive Euler matrices, the carries, and Taylor coefficients of everything at one moment by
+//! their own recursion.
 
 use std::collections::HashMap;
 

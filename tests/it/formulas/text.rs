@@ -1,7 +1,7 @@
 //! A reader of formulas as text, written from the notation alone.
 //!
-//! `+ - * / ^`, brackets of both kinds, a blank that multiplies, `sin cos sqrt`, `20 deg`, and names such as `psi_x@1`,
-//! `eps_y^n`, `Z3''@p1`, `Z1'@"about X"[45 deg]`. A sign stands only before a term.
+//! `+ - * / ^`, brackets of both kinds, a blank that multiplies, `sin cos sqrt`, `20 deg`, and names such as
+//! `psi_x@1`, `eps_y^n`, `Z3''@p1`, `Z1'@"about X"[45 deg]`. A sign stands only before a term.
 
 use super::value::{Names, Value};
 

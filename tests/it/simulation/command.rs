@@ -4,7 +4,8 @@ use sha2::{Digest, Sha256};
 
 use super::*;
 
-/// What is known from the prior only says on whose: of the paper's case D_FZ - wN psi_y is seen, neither of them alone.
+/// What is known from the prior only says on whose: of the paper's case D_FZ - wN psi_y is seen, neither of
+/// them alone.
 #[test]
 fn what_rests_on_a_prior_says_on_whose() {
     let s = simulated(Carry::Platform, &Conditions::default());
@@ -55,8 +56,8 @@ fn the_papers_run_word_by_word() {
     });
 }
 
-/// The folder: a figure per unknown as SVG and PNG, all of them in one, CSV and Parquet with the same numbers, the same
-/// bytes each time, and nothing overwritten unless asked.
+/// The folder: a figure per unknown as SVG and PNG, all of them in one, CSV and Parquet with the same
+/// numbers, the same bytes each time, and nothing overwritten unless asked.
 #[test]
 fn the_folder_of_a_run() {
     let place = tempfile::tempdir().expect("a folder");
@@ -105,7 +106,8 @@ fn the_folder_of_a_run() {
             .collect();
         assert!(places[0].is_some() && places.is_sorted(), "in the paper's order: {places:?}");
     }
-    // the paper's offset of D_FZ: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023 deg/h, which the estimate leaves out
+    // the paper's offset of D_FZ: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023 deg/h, which the estimate
+    // leaves out
     let offset = -15.041_067 * 28.2f64.to_radians().cos() * 0.1f64.to_radians();
     let label = format!("wN*(error of psi_y at t = 0) = {offset:.5} deg/h");
     let errors: Vec<&str> = (written.iter())

@@ -48,8 +48,8 @@ fn sigma(conditions: &Conditions, dwell: f64) -> f64 {
     found[3].to_degrees() * 3600.0
 }
 
-/// Exact observations: sigma^2 = K N coth(K T/N), whose floor is within 5 % at 1.530 N/K. In deg and h: N = 0.006, K = 0.06 give
-/// sqrt(K N) = 0.01897 deg/h and 0.1530 h.
+/// Exact observations: sigma^2 = K N coth(K T/N), whose floor is within 5 % at 1.530 N/K. In deg and h: N =
+/// 0.006, K = 0.06 give sqrt(K N) = 0.01897 deg/h and 0.1530 h.
 #[test]
 fn angle_and_rate_random_walk() {
     let (n, k) = (0.006f64, 0.06f64);
@@ -65,7 +65,8 @@ fn angle_and_rate_random_walk() {
     assert!((dwell / (0.1530 * 3600.0) - 1.0).abs() < 0.05, "{dwell}");
 }
 
-/// No angle random walk: sigma^2 = K^(3/2) R^(1/4) sqrt 2 (sinh a cosh a + sin a cos a)/(sinh^2 a - sin^2 a), a = sqrt(K) R^(-1/4) T/sqrt 2.
+/// No angle random walk: sigma^2 = K^(3/2) R^(1/4) sqrt 2 (sinh a cosh a + sin a cos a)/(sinh^2 a - sin^2 a),
+/// a = sqrt(K) R^(-1/4) T/sqrt 2.
 #[test]
 fn rate_random_walk_and_white_observations() {
     let conditions = with(0.0, 0.1, 3e-5);
@@ -94,7 +95,8 @@ fn rate_random_walk_and_white_observations() {
     assert!((dwell / low - 1.0).abs() < 0.05, "{dwell} {low}");
 }
 
-/// No rate random walk: sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau))) with tau = sqrt(R)/N falls on, and there is no floor.
+/// No rate random walk: sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau))) with tau = sqrt(R)/N falls on, and there is
+/// no floor.
 #[test]
 fn angle_random_walk_alone_has_no_floor() {
     let conditions = with(0.001, 0.0, 1e-5);
@@ -121,8 +123,9 @@ fn angle_random_walk_alone_has_no_floor() {
     assert_eq!((long.reached, long.dwell_s), (Some(Reached::AtTheShortest), None));
 }
 
-/// Two positions turned about the North at the equator, psi carried inertially: `psi_x' = D_FX -+ D_SX + b + w`. Sigmas of D_FX and D_SX by generalised least
-/// squares with the covariance of all samples written out: N^2 min(s, t), K^2 s^2 (3t - s)/6 for s <= t, and the noise of Z.
+/// Two positions turned about the North at the equator, psi carried inertially:
+/// `psi_x' = D_FX -+ D_SX + b + w`. Sigmas of D_FX and D_SX by generalised least squares with the covariance
+/// of all samples written out: N^2 min(s, t), K^2 s^2 (3t - s)/6 for s <= t, and the noise of Z.
 #[test]
 fn two_positions_against_generalised_least_squares() {
     let scheme = Scheme {
@@ -162,8 +165,9 @@ fn two_positions_against_generalised_least_squares() {
     }
 }
 
-/// Without random drift worth the name these sigmas are those of the information of all samples: no prior shows through, however unlike the unknowns, and samples that
-/// are taken together say what they say alone within 0.5 %.
+/// Without random drift worth the name these sigmas are those of the information of all samples: no prior
+/// shows through, however unlike the unknowns, and samples that are taken together say what they say alone
+/// within 0.5 %.
 #[test]
 fn without_drift_it_is_the_information() {
     for (attitudes, carry) in [
@@ -198,7 +202,8 @@ fn without_drift_it_is_the_information() {
     }
 }
 
-/// Both commands show it, in every format, where the gyros have noise, and only there; what samples do not determine has none.
+/// Both commands show it, in every format, where the gyros have noise, and only there; what samples do not
+/// determine has none.
 #[test]
 fn simulate_and_compare_show_the_floor() {
     let place = tempfile::tempdir().expect("a folder");

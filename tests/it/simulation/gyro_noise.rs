@@ -1,4 +1,5 @@
-//! Random drift of the gyros as states: the discretisation, Monte Carlo consistency, what a file and options say.
+//! Random drift of the gyros as states: the discretisation, Monte Carlo consistency, what a file and options
+//! say.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use obsdeg_core::model::settings::{FilterKind, Settings, Truth};
@@ -30,8 +31,9 @@ fn c_c_n([alpha, beta, gamma]: [f64; 3]) -> Matrix3<f64> {
         * Matrix3::new(cg, sg, 0.0, -sg, cg, 0.0, 0.0, 0.0, 1.0)
 }
 
-/// Phi and Q of psi and the five biases of [`datasheet`] in a step at a position and of a turning one, against a Runge-Kutta integration of `Phi' = F Phi`,
-/// `Q' = F Q + Q F^T + N` with F and N written here: psi in n, then the biases X: K, B; Y: K; Z: B.
+/// Phi and Q of psi and the five biases of [`datasheet`] in a step at a position and of a turning one,
+/// against a Runge-Kutta integration of `Phi' = F Phi`, `Q' = F Q + Q F^T + N` with F and N written here: psi
+/// in n, then the biases X: K, B; Y: K; Z: B.
 #[test]
 fn steps_of_the_biases_against_integration() {
     type States = SMatrix<f64, 7, 7>;
@@ -130,8 +132,9 @@ fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme) -> Vec<S
     prepared.statistics(&prepared.run(200, &|_| true))
 }
 
-/// With the states in filter and truth ANEES and NIS lie in their bands of 99.9 %; with the noise in the truth only both are far above. Linear truth, exact truth
-/// (drifts small enough for the linear filter), slews and a turning segment.
+/// With the states in filter and truth ANEES and NIS lie in their bands of 99.9 %; with the noise in the
+/// truth only both are far above. Linear truth, exact truth (drifts small enough for the linear filter),
+/// slews and a turning segment.
 #[test]
 fn monte_carlo_with_the_states_in_filter_and_truth() {
     let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
@@ -196,7 +199,8 @@ fn monte_carlo_with_biases_of_the_accelerometers() {
         let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
         assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
     }
-    // a filter with full attitudes has the same sigmas where psi and drifts are small, and its innovations are what it believes
+    // a filter with full attitudes has the same sigmas where psi and drifts are small, and its innovations
+    // are what it believes
     let small = Conditions {
         values: [exact.values.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat(),
         ..slews(&exact)
@@ -243,7 +247,8 @@ fn noise_of_one_gyro_is_about_its_input_axis() {
     }
 }
 
-/// An angle random walk replaces the random drift unless both are given in one place; what is not given stays.
+/// An angle random walk replaces the random drift unless both are given in one place; what is not given
+/// stays.
 #[test]
 fn conditions_by_file_and_options() {
     let walk = Settings { angle_random_walk_deg_sqrt_h: Some(PerGyro::all(0.002)), ..Settings::default() };

@@ -53,8 +53,8 @@ fn the_papers_run() {
     assert!(s.consistency.consistent);
 }
 
-/// What the samples do not determine is never reached, nor converging, however small its prior makes sigma: in the answer, in every
-/// format and in the figures.
+/// What the samples do not determine is never reached, nor converging, however small its prior makes sigma:
+/// in the answer, in every format and in the figures.
 #[test]
 fn what_is_not_observable_is_known_from_the_prior_only() {
     // a prior that meets every requirement by itself
@@ -127,8 +127,8 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
     assert_eq!(["D_FZ", "psi_y", "D_OX", "D_FX", "psi_x"].map(title), [true, true, true, false, false]);
 }
 
-/// At the pole, drift about the vertical that nobody sees turns psi: psi_z is seen at the start and lost at the end, psi_y of the
-/// start is never known although a derivative of order 0 shows it.
+/// At the pole, drift about the vertical that nobody sees turns psi: psi_z is seen at the start and lost at
+/// the end, psi_y of the start is never known although a derivative of order 0 shows it.
 #[test]
 fn psi_at_the_end_is_what_a_run_shows() {
     let pole =
@@ -173,7 +173,8 @@ fn consistency_takes_all_errors_together() {
     }
 }
 
-/// A bias held for one step is another noise with other steps: the density says so, and whoever changes the step alone is warned.
+/// A bias held for one step is another noise with other steps: the density says so, and whoever changes the
+/// step alone is warned.
 #[test]
 fn random_drift_has_a_density() {
     let of = |settings: &[Settings]| {
@@ -374,8 +375,8 @@ fn runge_kutta_and_the_exponential_agree() {
     }
 }
 
-/// The noise of a drift held over a step is that of `(integral of exp(W t)) eps`, however long the step: here the integral is taken by
-/// Simpson's rule on the closed form of a rotation.
+/// The noise of a drift held over a step is that of `(integral of exp(W t)) eps`, however long the step: here
+/// the integral is taken by Simpson's rule on the closed form of a rotation.
 #[test]
 fn held_drift_noise_of_any_step() {
     for dt in [1.0, 10.0, 3000.0, 50_000.0] {
@@ -433,7 +434,8 @@ fn held_drift_noise_of_any_step() {
     }
 }
 
-/// Exact truths take as many integration steps as their drifts need, and those that need too many are refused.
+/// Exact truths take as many integration steps as their drifts need, and those that need too many are
+/// refused.
 #[test]
 fn large_drifts_of_an_exact_truth() {
     let large = |d: f64| Conditions {
@@ -498,8 +500,9 @@ fn what_cannot_be_simulated_is_refused_by_name() {
 
 const P1P2: [&str; 5] = ["simulate", "--angles", "0,0,0", "--angles", "180,0,0"];
 
-/// With slews of finite duration the exact verdict, of repositioning at once, does not say what samples determine: psi moves by drifts of
-/// its own meanwhile. The sigmas are from an independent computation without priors (information with the slews integrated).
+/// With slews of finite duration the exact verdict, of repositioning at once, does not say what samples
+/// determine: psi moves by drifts of its own meanwhile. The sigmas are from an independent computation
+/// without priors (information with the slews integrated).
 #[test]
 fn with_slews_the_samples_decide() {
     let outcome = |arguments: &[&str]| {

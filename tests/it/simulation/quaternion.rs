@@ -1,5 +1,5 @@
-//! The extended filter against one that is written here from the equations of the method alone: attitude as a quaternion, the
-//! drift of every gyro spelt out, Jacobians by differences, the covariance as a full matrix.
+//! The extended filter against one that is written here from the equations of the method alone: attitude as a
+//! quaternion, the drift of every gyro spelt out, Jacobians by differences, the covariance as a full matrix.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use obsdeg_core::model::Carry;
@@ -42,7 +42,8 @@ fn drift(d: &[f64], g: &Vector3<f64>) -> Vector3<f64> {
     )
 }
 
-/// One step at a position whose computed attitude is `c`: the platform turns at the commanded rate and its drift.
+/// One step at a position whose computed attitude is `c`: the platform turns at the commanded rate and its
+/// drift.
 fn step(c: &Matrix3<f64>, dt: f64, x: &State) -> State {
     let command = c.transpose() * earth();
     let slope = |q: &nalgebra::Quaternion<f64>| {
@@ -142,7 +143,8 @@ fn an_independent_filter_has_the_same_estimates() {
         let mut k = 0;
         for (i, c_now) in c.iter().enumerate() {
             if i > 0 {
-                // instantaneous: the platform turns by what is commanded, in its own axes (inertial), or C_c^p goes on
+                // instantaneous: the platform turns by what is commanded, in its own axes (inertial), or
+                // C_c^p goes on
                 let turn = match carry {
                     Carry::Inertial => Matrix3::identity(),
                     _ => c_now * c[i - 1].transpose(),

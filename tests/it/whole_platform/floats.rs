@@ -1,5 +1,5 @@
-//! A second path: rows in floating point, written from the equations in n, slews integrated step by step. It takes nothing of the engine
-//! but the list of terms.
+//! A second path: rows in floating point, written from the equations in n, slews integrated step by step. It
+//! takes nothing of the engine but the list of terms.
 
 use std::ops::{Add, Mul};
 
@@ -42,8 +42,8 @@ fn dot(a: &[Jet; 3], b: &[f64; 3]) -> Jet {
     (0..3).map(|i| a[i] * constant(b[i])).fold(constant(0.0), Add::add)
 }
 
-/// `(axis, value)` in c of one unit of every coefficient of a term, for gravity g, torqued rate w and specific force f in c: drift first,
-/// error of the accelerometers second.
+/// `(axis, value)` in c of one unit of every coefficient of a term, for gravity g, torqued rate w and
+/// specific force f in c: drift first, error of the accelerometers second.
 fn unit_effects(term: &str, g: &[Jet; 3], w: &[Jet; 3], f: &[Jet; 3]) -> Vec<(usize, Jet, Jet)> {
     let zero = constant(0.0);
     let mut out = Vec::new();
@@ -79,7 +79,8 @@ fn unit_effects(term: &str, g: &[Jet; 3], w: &[Jet; 3], f: &[Jet; 3]) -> Vec<(us
     out
 }
 
-/// `(eps^n, a^n)` per unit of every coefficient at the attitude `c` (rows in n), torqued with the rate `w` in c.
+/// `(eps^n, a^n)` per unit of every coefficient at the attitude `c` (rows in n), torqued with the rate `w` in
+/// c.
 fn columns(terms: &[&str], c: &[[Jet; 3]; 3], w: &[Jet; 3]) -> [Vec<[Jet; 3]>; 2] {
     let in_c = |v: [f64; 3]| -> [Jet; 3] { std::array::from_fn(|j| dot(&[c[0][j], c[1][j], c[2][j]], &v)) };
     let (g, f) = (in_c([0.0, -1.0, 0.0]), in_c([0.0, 1.0, 0.0]));
@@ -137,8 +138,8 @@ pub(super) struct Leg {
     pub(super) rotation: Option<Turn>,
 }
 
-/// What the torquers leave in psi^n in a turn: psi^n' = C(t) E(u) k by Gauss's rule of five points in parts of a tenth of a radian
-/// (error below 1e-16).
+/// What the torquers leave in psi^n in a turn: psi^n' = C(t) E(u) k by Gauss's rule of five points in parts
+/// of a tenth of a radian (error below 1e-16).
 fn left_by(terms: &[&str], from: &M, (u, angle): Turn) -> Vec<[f64; 3]> {
     let outer = 5.0 + 2.0 * (10.0f64 / 7.0).sqrt();
     let inner = 5.0 - 2.0 * (10.0f64 / 7.0).sqrt();
@@ -173,7 +174,8 @@ const ARC: usize = 23;
 /// Rates of the earth, and of turning: any will do.
 const RATES: [f64; 3] = [0.63, 0.41, 0.77];
 
-/// psi^n in the unknowns (3 x n) where a leg begins: `psi` is what it was at the end of the leg before, whose attitude is `end`.
+/// psi^n in the unknowns (3 x n) where a leg begins: `psi` is what it was at the end of the leg before, whose
+/// attitude is `end`.
 fn begins(
     terms: &[&str],
     carry: Carry,
@@ -204,8 +206,8 @@ fn left_behind(psi: &[Vec<f64>; 3], left: &[[f64; 3]], first: usize) -> [Vec<f64
     })
 }
 
-/// The rank of all that is seen, and of each unknown whether it is determined: where a leg turns, Z is sampled along the turn and psi is
-/// integrated (Runge and Kutta, fourth order).
+/// The rank of all that is seen, and of each unknown whether it is determined: where a leg turns, Z is
+/// sampled along the turn and psi is integrated (Runge and Kutta, fourth order).
 pub(super) fn sampled(terms: &[&str], legs: &[Leg], carry: Carry) -> (usize, Vec<bool>) {
     const SAMPLES: usize = 48;
     const STEPS: usize = 40;
@@ -288,8 +290,9 @@ pub(super) fn sampled(terms: &[&str], legs: &[Leg], carry: Carry) -> (usize, Vec
     (all, determined)
 }
 
-/// Ranks of V_0, V_1, V_2, and of each unknown the smallest order whose span holds it. Where a position turns, the derivatives of Z in
-/// time are taken as the attitude, gravity and the torqued rate (that of the turn added) change, at many attitudes of the arc.
+/// Ranks of V_0, V_1, V_2, and of each unknown the smallest order whose span holds it. Where a position
+/// turns, the derivatives of Z in time are taken as the attitude, gravity and the torqued rate (that of the
+/// turn added) change, at many attitudes of the arc.
 pub(super) fn judge(terms: &[&str], legs: &[Leg], carry: Carry) -> (Vec<usize>, Vec<Option<usize>>) {
     let [w_n, w_u, rate] = RATES;
     let one = turning(&legs[0].attitude, &[0.0; 3], 0.0);

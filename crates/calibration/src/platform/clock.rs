@@ -49,8 +49,9 @@ pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
     out
 }
 
-/// How much faster the clock of a record runs than that of the scheme, as a part, where its positions begin and end, at `stays`, as they would by such a clock and not by
-/// a right one; `between` two samples there are so many s. Positions that begin late or end early all alike are no matter.
+/// How much faster the clock of a record runs than that of the scheme, as a part, where its positions begin
+/// and end, at `stays`, as they would by such a clock and not by a right one; `between` two samples there are
+/// so many s. Positions that begin late or end early all alike are no matter.
 pub(crate) fn by_durations(stays: &[(f64, f64)], between: f64, plan: &Plan) -> Option<f64> {
     let bounds = bounds(plan);
     let each = bounds.iter().zip(stays);

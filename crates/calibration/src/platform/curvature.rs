@@ -1,16 +1,18 @@
-//! Curvature of an estimate: the test of the linear model of its covariance, and mean and covariance without it.
+//! Curvature of an estimate: the test of the linear model of its covariance, and mean and covariance without
+//! it.
 //!
-//! Unknowns that a prior alone determines may be far from their estimates, and bend into the others: drifts times
-//! angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
+//! Unknowns that a prior alone determines may be far from their estimates, and bend into the others: drifts
+//! times angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
 //! longest axes a of the posterior. Below one the covariance of the linear model holds. Above, mean and
 //! covariance are those of many estimates, each from data and priors with errors drawn anew (randomise, then
 //! optimise; Bardsley, Solonen, Haario, Laine 2014, doi:10.1137/140964023).
 //!
-//! Beyond `MOST`, where another minimum is nearly as low, or where repeated estimates do not settle, no covariance
-//! describes the errors, and all estimates are left open. Nothing is wrong with such a record: with the priors it
-//! says too little at these drifts. That some estimates could stand was tried, by the shift that the difference from
-//! the linear model makes to each and by how repeated estimates scatter: of 20 records of p1 p2 at three times
-//! the paper's drifts one had 14 estimates that moved by no quarter of a sigma and were off by 160 together.
+//! Beyond `MOST`, where another minimum is nearly as low, or where repeated estimates do not settle, no
+//! covariance describes the errors, and all estimates are left open. Nothing is wrong with such a record:
+//! with the priors it says too little at these drifts. That some estimates could stand was tried, by the
+//! shift that the difference from the linear model makes to each and by how repeated estimates scatter: of 20
+//! records of p1 p2 at three times the paper's drifts one had 14 estimates that moved by no quarter of a
+//! sigma and were off by 160 together.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::Manifold;

@@ -1,5 +1,5 @@
-//! Whether an estimate can be believed: what is left of every measurement, by position, component and time; the filter as a second path; what single positions and
-//! the prior are worth.
+//! Whether an estimate can be believed: what is left of every measurement, by position, component and time;
+//! the filter as a second path; what single positions and the prior are worth.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
@@ -201,7 +201,8 @@ struct Asked {
     left_open: bool,
     /// On the unknowns, in SI.
     terms: Vec<(usize, f64)>,
-    /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the scheme.
+    /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the
+    /// scheme.
     local: Vec<(usize, f64)>,
     planned: Vec<(usize, f64)>,
 }
@@ -599,7 +600,8 @@ impl Parts<'_> {
         out
     }
 
-    /// How far a measurement that was left out is from the estimate: from its neighbours of the same position and channel that count.
+    /// How far a measurement that was left out is from the estimate: from its neighbours of the same position
+    /// and channel that count.
     fn off(&self, run: &super::run::Run, key: &Key, value: f64) -> f64 {
         let near = run.measured().filter(|(k, ..)| {
             k.position == key.position && k.channel == key.channel && run.counts[k.bin][k.channel]

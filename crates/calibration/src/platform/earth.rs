@@ -1,7 +1,9 @@
 //! Whether the clock of a record is right, by the rates of the earth and of turns.
 //!
-//! A clock that runs fast by a part `e` makes every rate of a record smaller by that part. Rates of drift are unknown, so of them nothing shows; the rate of the earth is
-//! known, and shows where psi is large enough for `w x psi` to matter, or where torquers are unknown that are driven with it; those of turns show by the drift meanwhile.
+//! A clock that runs fast by a part `e` makes every rate of a record smaller by that part. Rates of drift are
+//! unknown, so of them nothing shows; the rate of the earth is known, and shows where psi is large enough for
+//! `w x psi` to matter, or where torquers are unknown that are driven with it; those of turns show by the
+//! drift meanwhile.
 
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
@@ -16,7 +18,8 @@ use crate::least_squares::Information;
 
 /// By this part the rates are moved to see what that does.
 const MOVED: f64 = 0.005;
-/// With a larger sigma the clock may be off by all that it goes (three sigma), which the parabola at rates so near does not reach.
+/// With a larger sigma the clock may be off by all that it goes (three sigma), which the parabola at rates so
+/// near does not reach.
 const LARGEST: f64 = 1.0 / 3.0;
 /// Fall of the sum of squares (3.3 sigma squared), and the least part that a clock is off, from which on the
 /// parabola is held against an estimate by that clock.
@@ -24,8 +27,9 @@ const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
 
 impl Parts<'_> {
-    /// The part by which the clock of run `r` is fast, by the rates of the earth and of turns that fit its measurements best when all unknowns follow: of the sum of
-    /// squares at three rates, the lowest point of a parabola; `None` where they are nearly the same.
+    /// The part by which the clock of run `r` is fast, by the rates of the earth and of turns that fit its
+    /// measurements best when all unknowns follow: of the sum of squares at three rates, the lowest point of
+    /// a parabola; `None` where they are nearly the same.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is none.
@@ -63,7 +67,8 @@ impl Parts<'_> {
         Ok(Some(found))
     }
 
-    /// A run and its conditions where the earth and the platform turn `1 + by` times as fast as in the scheme.
+    /// A run and its conditions where the earth and the platform turn `1 + by` times as fast as in the
+    /// scheme.
     fn at_rate(&self, own: &Run, reading: &Reading, by: f64) -> Result<(Conditions, Run), CalibrationError> {
         let rate = |rate: &mut Option<f64>| rate.iter_mut().for_each(|rate| *rate *= 1.0 + by);
         let (mut scheme, mut conditions) = (self.scheme.clone(), self.problem.conditions.clone());
@@ -78,8 +83,8 @@ impl Parts<'_> {
     }
 
     /// True if the estimate settles with run `r` by the clock that was found, and its sum of squares is below
-    /// `most`. A parabola at rates so near says nothing of a clock that is far off where the unknowns bend. A clock
-    /// by which turns do not fit between two samples cannot be tried, and is taken as it was found.
+    /// `most`. A parabola at rates so near says nothing of a clock that is far off where the unknowns bend. A
+    /// clock by which turns do not fit between two samples cannot be tried, and is taken as it was found.
     fn fits_at(&self, r: usize, reading: &Reading, found: &ClockByEarth, most: f64) -> bool {
         let own = self.problem;
         let Ok((conditions, run)) = self.at_rate(&own.runs[r], reading, -found.fast) else { return true };

@@ -20,7 +20,8 @@ use crate::least_squares::{Information, Linearised, Rows, Solution};
 
 /// Most linearisations.
 const PASSES: usize = 40;
-/// The iteration has settled when it moves by less than this, in standard deviations of any combination as the fit has them.
+/// The iteration has settled when it moves by less than this, in standard deviations of any combination as
+/// the fit has them.
 const SETTLED: f64 = 1e-4;
 /// It has settled, too, where no step leads further down and the last is less than this.
 const NEARLY: f64 = 0.02;
@@ -67,9 +68,9 @@ pub(crate) struct Unknowns {
 }
 
 impl Unknowns {
-    /// Unknowns of runs of one platform, with `psi` states of their own before `coefficients` common ones, and `biases`
-    /// of their own behind; `prior` and `first` are of one run, `null` its directions that nothing
-    /// determines, `stated` says of which states a prior is stated.
+    /// Unknowns of runs of one platform, with `psi` states of their own before `coefficients` common ones,
+    /// and `biases` of their own behind; `prior` and `first` are of one run, `null` its directions that
+    /// nothing determines, `stated` says of which states a prior is stated.
     pub(crate) fn new(
         runs: usize,
         [psi, coefficients, biases]: [usize; 3],

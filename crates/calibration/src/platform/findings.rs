@@ -177,8 +177,9 @@ fn cells(run: &Run) -> Vec<Finding> {
     out
 }
 
-/// What is wrong with the clock of a record: the rate of the earth says so where it is beyond chance, sigmas as the fit has them. Where it says that the clock is
-/// right, positions were held longer or shorter than in the scheme, which is no matter.
+/// What is wrong with the clock of a record: the rate of the earth says so where it is beyond chance, sigmas
+/// as the fit has them. Where it says that the clock is right, positions were held longer or shorter than in
+/// the scheme, which is no matter.
 fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
     let most = chi_square_quantile(1.0, 1.0 - (1.0 - STRICT) / c.records.len() as f64).sqrt();
     let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());

@@ -1,5 +1,6 @@
-//! What the specific force says of a record before anything is estimated: whether its numbers are of the units in the header, whether it points at every position where
-//! the scheme has it, and where a position begins and ends.
+//! What the specific force says of a record before anything is estimated: whether its numbers are of the
+//! units in the header, whether it points at every position where the scheme has it, and where a position
+//! begins and ends.
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::apply;
@@ -34,13 +35,15 @@ const MOST: usize = 50;
 const ALONE: usize = 8;
 /// Fewest pieces of a position in which a turn is sought.
 const FEWEST: usize = 20;
-/// From a piece to the next a platform that is held moves by no more than this, in deg, so much more in deg/s (a hundred deg/h), and so many times what noise makes of it.
+/// From a piece to the next a platform that is held moves by no more than this, in deg, so much more in deg/s
+/// (a hundred deg/h), and so many times what noise makes of it.
 const HELD_DEG: f64 = 0.3;
 const DRIFTS_DEG_S: f64 = 0.03;
 const NOISE: f64 = 8.0;
 /// So many samples that are far from one g are looked at one by one.
 const SUSPECTS: usize = 64;
-/// A sample is within this of those beside it, in g, or within this of the attitude of the scheme where there are none.
+/// A sample is within this of those beside it, in g, or within this of the attitude of the scheme where there
+/// are none.
 const BESIDE: f64 = 0.03;
 const ALONG: f64 = 0.35;
 /// Of normal errors: sigma over the median of their sizes, and sigma of a median over that of a mean.
@@ -164,8 +167,8 @@ impl Forces {
         self.pieces[position].retain(|piece| piece.lines != lines);
     }
 
-    /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a median, by what is known of the samples and by how its
-    /// pieces scatter, whichever is greater.
+    /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a
+    /// median, by what is known of the samples and by how its pieces scatter, whichever is greater.
     pub(crate) fn lengths(&self) -> Vec<Option<Length>> {
         let mut out = vec![None; self.pieces.len()];
         for (p, _, force) in self.usual() {
@@ -194,8 +197,9 @@ impl Forces {
         self.usual().map(off).max_by(|a, b| a.3.total_cmp(&b.3))
     }
 
-    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units` with what one of each is in g, those of the other kind (forces
-    /// or increments of velocity) for whole columns.
+    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units`
+    /// with what one of each is in g, those of the other kind (forces or increments of velocity) for whole
+    /// columns.
     pub(crate) fn check_units(
         &self,
         record: &str,
@@ -287,8 +291,8 @@ impl Forces {
             let own = off(p);
             let nearest = (0..names.len()).map(off).fold(f64::INFINITY, f64::min);
             moves += moved;
-            // from the middle of a half to that of the next drift makes half of both moves, and turns are short
-            // beside positions: twice that is the furthest
+            // from the middle of a half to that of the next drift makes half of both moves, and turns are
+            // short beside positions: twice that is the furthest
             let about = before.map(|(_, by)| by + moved);
             let held = about.map_or(f64::INFINITY, |by| JUMP_DEG + MOVES * by);
             let reach = about.map_or(JUMP_DEG + REACH * moves, |by| JUMP_DEG + by);
@@ -314,7 +318,8 @@ impl Forces {
         Ok(())
     }
 
-    /// The axes by which every position is where the scheme has it, where others in the place of these do that in one way only.
+    /// The axes by which every position is where the scheme has it, where others in the place of these do
+    /// that in one way only.
     fn other_axes(&self, attitudes: &[Matrix3<f64>]) -> Option<String> {
         const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         let all: Vec<(usize, [f64; 3])> = self.usual().map(|(p, _, force)| (p, force)).collect();
@@ -338,8 +343,9 @@ impl Forces {
         ))
     }
 
-    /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is an outlier where bins have so many that it is left out of
-    /// them, unless other positions have one too. `timeline` says when positions begin and end, where that is all there is.
+    /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is
+    /// an outlier where bins have so many that it is left out of them, unless other positions have one too.
+    /// `timeline` says when positions begin and end, where that is all there is.
     pub(crate) fn check_ends(
         &self,
         record: &str,
@@ -395,7 +401,8 @@ impl Forces {
 }
 
 impl Forces {
-    /// How the turns of the record lie beside those of the timeline: by a clock that is fast or slow, or all as late.
+    /// How the turns of the record lie beside those of the timeline: by a clock that is fast or slow, or all
+    /// as late.
     fn clock(&self, all: &[(usize, [f64; 3], [usize; 2])], bounds: &[(f64, f64)]) -> Option<String> {
         let mut between: f64 = 0.0;
         let mut middle = |a: &Piece, b: &Piece| {
@@ -430,7 +437,8 @@ impl Forces {
     }
 }
 
-/// How many pieces at the beginning and at the end are away from where the position goes on steadily from the piece that is nearest to its usual `force`.
+/// How many pieces at the beginning and at the end are away from where the position goes on steadily from the
+/// piece that is nearest to its usual `force`.
 fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
     let off = |x: &Piece| angle(&x.force, force);
     let nearest = (0..pieces.len()).min_by(|a, b| off(&pieces[*a]).total_cmp(&off(&pieces[*b])));
@@ -458,8 +466,8 @@ fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
     [run(&mut pieces[..start].iter().rev()), run(&mut pieces[start + 1..].iter())]
 }
 
-/// The columns whose numbers are of another unit, and that: with it all these forces are `right`. Of several ways that with the fewest columns, then that with lengths
-/// nearest to one g.
+/// The columns whose numbers are of another unit, and that: with it all these forces are `right`. Of several
+/// ways that with the fewest columns, then that with lengths nearest to one g.
 fn other_units(
     all: &[[f64; 3]],
     own: &[ForceColumn; 3],

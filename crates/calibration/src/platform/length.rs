@@ -1,7 +1,9 @@
-//! Why the specific force of a record is not one g long: all axes alike (scale, gravity), one axis (its scale, its zero), or neither.
+//! Why the specific force of a record is not one g long: all axes alike (scale, gravity), one axis (its
+//! scale, its zero), or neither.
 //!
-//! An output `f_i = (1 + s) t_i + b` of a force `t` that is one g long makes `|f|^2 - 1 = (1 - (1 + s)^-2) f_i^2` of a scale error s alone, and `2 b f_i - b^2` of a
-//! zero b alone: straight lines over `f_i^2` and `f_i` of the positions.
+//! An output `f_i = (1 + s) t_i + b` of a force `t` that is one g long makes
+//! `|f|^2 - 1 = (1 - (1 + s)^-2) f_i^2` of a scale error s alone, and `2 b f_i - b^2` of a zero b alone:
+//! straight lines over `f_i^2` and `f_i` of the positions.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::consistency::chi_square_band;

@@ -1,4 +1,5 @@
-//! The minimum that is reported: first by multiple shooting, then the lowest of those about an estimate that bends.
+//! The minimum that is reported: first by multiple shooting, then the lowest of those about an estimate that
+//! bends.
 
 use nalgebra::DVector;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
@@ -25,8 +26,8 @@ const RIVAL: f64 = 14.0;
 const APART: f64 = 5.0;
 
 impl Problem<'_> {
-    /// The estimate from `x`: where `first` is true from the start by multiple shooting (from `x` itself, too, if
-    /// that does not settle or fits poorly), and the lowest of the minima about it.
+    /// The estimate from `x`: where `first` is true from the start by multiple shooting (from `x` itself,
+    /// too, if that does not settle or fits poorly), and the lowest of the minima about it.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
@@ -58,10 +59,10 @@ impl Problem<'_> {
         }
     }
 
-    /// The lowest of the minima about an estimate that bends; others nearly as low are counted as rivals. A bent sum
-    /// of squares has several minima, and the first that is found need not be the most probable one. Where the
-    /// scheme leaves directions undetermined, such a minimum may be far from the most probable one and not bent
-    /// itself, so minima are sought from the priors there too.
+    /// The lowest of the minima about an estimate that bends; others nearly as low are counted as rivals. A
+    /// bent sum of squares has several minima, and the first that is found need not be the most probable one.
+    /// Where the scheme leaves directions undetermined, such a minimum may be far from the most probable one
+    /// and not bent itself, so minima are sought from the priors there too.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.

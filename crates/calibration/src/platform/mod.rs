@@ -260,8 +260,9 @@ fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> 
     if records.is_empty() { Err(CalibrationError::NoRecord) } else { Ok(()) }
 }
 
-/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and slews. `going` hears now and then how far it is; where
-/// it says no while a record is read there is none, later the estimate is where the iteration is then, and a finding.
+/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and
+/// slews. `going` hears now and then how far it is; where it says no while a record is read there is none,
+/// later the estimate is where the iteration is then, and a finding.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -450,7 +451,8 @@ fn gate(probability: f64, of: usize) -> f64 {
     chi_square_quantile(1.0, 1.0 - (1.0 - probability) / of.max(1) as f64).sqrt()
 }
 
-/// Rows of what a calibration before says of the coefficients and their combinations, with unit errors, and their names.
+/// Rows of what a calibration before says of the coefficients and their combinations, with unit errors, and
+/// their names.
 type Known = ((DMatrix<f64>, DVector<f64>), Vec<String>);
 
 fn known(

@@ -1,9 +1,9 @@
 //! Further runs that would bring a coefficient to its requirement, each computed.
 //!
-//! A run is a dwell at one attitude, calibrated with this answer as knowledge of the coefficients and a psi of
-//! its own. Attitudes are the 24 cardinal ones and those of the scheme. Sigmas are those of the linear model with
-//! all coefficients zero, with the noise and the random drift of this answer, by samples as dense as its records
-//! have them.
+//! A run is a dwell at one attitude, calibrated with this answer as knowledge of the coefficients and a psi
+//! of its own. Attitudes are the 24 cardinal ones and those of the scheme. Sigmas are those of the linear
+//! model with all coefficients zero, with the noise and the random drift of this answer, by samples as dense
+//! as its records have them.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Dwell, Euler, Position, Scheme, cardinal, cardinal_name, cardinal_names};
@@ -45,8 +45,9 @@ struct Further<'p, 'a> {
 }
 
 impl Parts<'_> {
-    /// For every requirement that is missed: the attitude of a further run that brings the coefficient closest
-    /// to it, and the dwell that meets it. `bench` has what a bench adds by name, which no run makes smaller.
+    /// For every requirement that is missed: the attitude of a further run that brings the coefficient
+    /// closest to it, and the dwell that meets it. `bench` has what a bench adds by name, which no run makes
+    /// smaller.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.

@@ -1,4 +1,5 @@
-//! A record of a platform: which columns it has, at which position every sample was taken, and bins of them in n.
+//! A record of a platform: which columns it has, at which position every sample was taken, and bins of them
+//! in n.
 
 use std::cmp::Ordering;
 
@@ -19,10 +20,12 @@ use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{Detector, Told};
 
-/// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second squared).
+/// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second
+/// squared).
 const FORCES: [(&str, Option<f64>); 4] =
     [("g", Some(1.0)), ("mg", Some(1e-3)), ("ug", Some(1e-6)), ("m/s^2", None)];
-/// Units of the increments of velocity over the time since the sample before, and what they are of m/s: their quotient is the mean of the force meanwhile.
+/// Units of the increments of velocity over the time since the sample before, and what they are of m/s: their
+/// quotient is the mean of the force meanwhile.
 const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
 /// An interval so many times as long as the one before is a gap, in which increments may be lost.
 const GAP: f64 = 1.5;
@@ -176,7 +179,8 @@ impl Reading {
     }
 }
 
-/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations of the three, gimbal angles, temperature.
+/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations
+/// of the three, gimbal angles, temperature.
 struct Layout {
     observed: Observed,
     /// The columns of the force, where these are what is observed.
@@ -321,7 +325,8 @@ impl Layout {
         out.into_iter().map(|(c, n)| (columns[c].clone(), n)).collect()
     }
 
-    /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known over which time they are.
+    /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known
+    /// over which time they are.
     fn divide(&self, numbers: &mut [Option<f64>], dt: Option<f64>) {
         let first = if self.azimuth { 5 } else { 4 };
         let sigmas = if self.sigmas { first..first + 3 } else { 0..0 };
@@ -357,7 +362,8 @@ impl Layout {
         Some(((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees())
     }
 
-    /// Their standard deviations where the record has them: those of platform axes turned, without their correlation.
+    /// Their standard deviations where the record has them: those of platform axes turned, without their
+    /// correlation.
     fn sigmas_in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
         let first = if self.azimuth { 5 } else { 4 };
         let own = self.sigmas.then(|| [n[first], n[first + 1], n[first + 2]])?;
@@ -721,7 +727,8 @@ impl Taking<'_> {
     }
 }
 
-/// Refuses times in another unit than that of the header: all positions then last so many times as long as the scheme has them.
+/// Refuses times in another unit than that of the header: all positions then last so many times as long as
+/// the scheme has them.
 fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) -> Result<(), Box<Mistaken>> {
     let dwells: Vec<f64> = bounds(plan).iter().map(|(from, to)| to - from).collect();
     let lasts: Vec<f64> = reading.stays.iter().map(|(from, to)| to - from).collect();
@@ -762,7 +769,8 @@ pub(crate) fn channel_name(component: usize) -> String {
     if component == AZIMUTH { "Za".into() } else { format!("Z{component}") }
 }
 
-/// Reads `record` beside the timeline of `plan`, into bins of at most `bin_s`; `sigmas` are about those of a sample, by channel.
+/// Reads `record` beside the timeline of `plan`, into bins of at most `bin_s`; `sigmas` are about those of a
+/// sample, by channel.
 ///
 /// # Errors
 /// [`CalibrationError`].

@@ -90,8 +90,8 @@ impl Problem<'_> {
         self.runs.iter().enumerate().map(of).collect()
     }
 
-    /// True if an inconsistent fit becomes consistent when run `r` begins elsewhere within one interval between
-    /// rows.
+    /// True if an inconsistent fit becomes consistent when run `r` begins elsewhere within one interval
+    /// between rows.
     ///
     /// # Errors
     /// As [`Self::offset`].

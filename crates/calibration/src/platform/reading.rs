@@ -44,13 +44,15 @@ pub struct RecordRead {
     pub span_s: (f64, f64),
     /// What says where each sample was taken.
     pub positions_by: PositionsBy,
-    /// Time of the record, in s, that is 0 of the timeline: the start of the scheme, or of its first row at a position where only rows say when positions begin.
+    /// Time of the record, in s, that is 0 of the timeline: the start of the scheme, or of its first row at a
+    /// position where only rows say when positions begin.
     pub origin_s: f64,
     /// Earliest and latest such time, in s, where the labels leave it open; `calibrate` estimates it.
     pub origin_open_s: Option<(f64, f64)>,
     /// Positions of the scheme.
     pub positions: Vec<PositionRead>,
-    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies between.
+    /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies
+    /// between.
     pub gaps: Vec<Gap>,
     /// Number of empty cells at positions, by column.
     pub empty_cells: Vec<EmptyCells>,
@@ -58,7 +60,8 @@ pub struct RecordRead {
     pub left_out: Vec<CellRead>,
     /// Mean length of the specific force, in g; null where the record has none.
     pub force_g: Option<f64>,
-    /// Largest angle between the gimbals and the attitudes of the scheme, in deg; null where the record has no gimbal angles.
+    /// Largest angle between the gimbals and the attitudes of the scheme, in deg; null where the record has
+    /// no gimbal angles.
     pub gimbals_deg: Option<f64>,
 }
 

@@ -26,7 +26,8 @@ impl Parts<'_> {
         (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
     }
 
-    /// How the residuals of a channel go with the temperature, position by position: what is fixed to the platform changes its sign in n.
+    /// How the residuals of a channel go with the temperature, position by position: what is fixed to the
+    /// platform changes its sign in n.
     pub(super) fn warmth(&self, run: usize, channel: usize) -> Option<Warmth> {
         let reading = &self.problem.runs[run].reading;
         let places: Vec<(usize, usize)> = self.problem.runs[run].bins.iter().flatten().copied().collect();

@@ -1,4 +1,5 @@
-//! The record of one run on its own timeline: the scheme with the times of the record, linearised along a trajectory.
+//! The record of one run on its own timeline: the scheme with the times of the record, linearised along a
+//! trajectory.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
@@ -36,7 +37,8 @@ pub(crate) struct Key {
     pub channel: usize,
 }
 
-/// The conditions of an estimate: random drift is a density, since the bins of a record are as long as they are.
+/// The conditions of an estimate: random drift is a density, since the bins of a record are as long as they
+/// are.
 pub(crate) fn conditions(of: &Conditions) -> Conditions {
     let density = of.drift_noise.density_deg_sqrt_h(of.drift_noise_step_s);
     Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
@@ -60,7 +62,8 @@ fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
 }
 
 impl Run {
-    /// Lays a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as the record says.
+    /// Lays a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as
+    /// the record says.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -76,13 +79,15 @@ impl Run {
         let slews = slews(planned);
         let slew_s = |p: usize| slews[p];
         if reading.by == By::Static {
-            // a window is no longer at rest before and behind a turn alike: the turn is in the middle of the gap
+            // a window is no longer at rest before and behind a turn alike: the turn is in the middle of the
+            // gap
             for p in 1..stays.len() {
                 stays[p - 1].1 += ((stays[p].0 - stays[p - 1].1 - slew_s(p)) / 2.0).max(0.0);
             }
         }
         if matches!(reading.by, By::Label | By::Static) {
-            // the platform leaves a position after its last sample, and what of a gap is no slew is spent at the next
+            // the platform leaves a position after its last sample, and what of a gap is no slew is spent at
+            // the next
             let mut left = 0.0;
             for (p, position) in own.positions.iter_mut().enumerate() {
                 let turned = slew_s(p);

@@ -206,8 +206,8 @@ mod tests {
         PlatformState::of_unknowns(&x, run.plan.constants())
     }
 
-    /// Largest difference of the rows of a run and the differences of its own prediction, over the largest row of the
-    /// same unknown.
+    /// Largest difference of the rows of a run and the differences of its own prediction, over the largest
+    /// row of the same unknown.
     fn gap(terms: &str) -> f64 {
         let (run, conditions, sigmas) = run(terms);
         let x = far(&run);
@@ -243,8 +243,9 @@ mod tests {
         worst
     }
 
-    /// The rows of a run, dwells and slews, are the derivatives of its own prediction by the start, at drifts of 13 deg/h
-    /// and a psi of 10 deg. Differences of 1e-9 rad/s and 1e-5 rad are cut off at 1e-10 and have rounding of 1e-10.
+    /// The rows of a run, dwells and slews, are the derivatives of its own prediction by the start, at drifts
+    /// of 13 deg/h and a psi of 10 deg. Differences of 1e-9 rad/s and 1e-5 rad are cut off at 1e-10 and have
+    /// rounding of 1e-10.
     #[test]
     fn rows_are_derivatives_of_the_prediction_far_from_zero() {
         for terms in ["F,I,O,S", "all"] {

@@ -1,8 +1,9 @@
 //! Suspects: errors that the scheme does not estimate and that would explain what the fit leaves.
 //!
-//! Residuals and the column of every omitted error go through the same filter, whose start says nothing: its whitened
-//! innovations are residuals from which every change of the unknowns is taken out, with the random drift of the run.
-//! Columns are those of small angles at the attitudes of the scheme. Of several records each has unknowns of its own.
+//! Residuals and the column of every omitted error go through the same filter, whose start says nothing: its
+//! whitened innovations are residuals from which every change of the unknowns is taken out, with the random
+//! drift of the run. Columns are those of small angles at the attitudes of the scheme. Of several records
+//! each has unknowns of its own.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::Assignment;
@@ -27,9 +28,9 @@ const WIDE: f64 = 1e4;
 /// Most estimates whose change is listed.
 const CHANGES: usize = 3;
 
-/// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme shows;
-/// beside them what a bench adds to the sigma of every coefficient, by name in its shown unit (root of the sum of
-/// squares), by the weights of the first record.
+/// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme
+/// shows; beside them what a bench adds to the sigma of every coefficient, by name in its shown unit (root of
+/// the sum of squares), by the weights of the first record.
 ///
 /// # Errors
 /// [`CalibrationError`] for a number that is not finite.

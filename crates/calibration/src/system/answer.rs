@@ -161,8 +161,8 @@ pub struct OutputFit {
     pub whiteness_probability: Option<f64>,
 }
 
-/// Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there add up to
-/// the number of starts.
+/// Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there
+/// add up to the number of starts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct OtherStarts {
     /// Number of starts that led to other solutions that fit nearly as well.

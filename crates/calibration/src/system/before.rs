@@ -10,8 +10,9 @@ use crate::answer::CovarianceTable;
 /// The variance of what a constraint of the calibration before held, as a part of all variances: rounding.
 const HELD: f64 = 1e-14;
 
-/// Rows and values of what `table` says of the free unknowns `names` of `problem`, with unit errors. Where the constraints of the model bind what was held before, only what
-/// it says along them counts: they hold by themselves, and are not straight.
+/// Rows and values of what `table` says of the free unknowns `names` of `problem`, with unit errors. Where
+/// the constraints of the model bind what was held before, only what it says along them counts: they hold by
+/// themselves, and are not straight.
 pub(super) fn said_before(
     table: &CovarianceTable,
     names: &[&str],

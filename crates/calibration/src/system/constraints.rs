@@ -1,4 +1,5 @@
-//! What constraints leave of the unknowns: values at which they hold, and the directions in which these may still go.
+//! What constraints leave of the unknowns: values at which they hold, and the directions in which these may
+//! still go.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 use obsdeg_ekf::EkfError;
@@ -8,7 +9,8 @@ use super::fit::{Problem, size};
 
 /// Steps back to where constraints hold.
 const BACK: usize = 30;
-/// A constraint holds where what is left of it is this part of the terms in it; rounding may leave more, not as much as `ROUGHLY`.
+/// A constraint holds where what is left of it is this part of the terms in it; rounding may leave more, not
+/// as much as `ROUGHLY`.
 const HOLDS: f64 = 1e-15;
 const ROUGHLY: f64 = 1e-10;
 /// Constraints say the same where their rows, of unit length, have singular values below.
@@ -22,7 +24,8 @@ struct Left {
     over: DVector<f64>,
     /// The same as distances along `rows`.
     far: DVector<f64>,
-    /// Their derivatives (constraints x free unknowns) by the unknowns in parts of their sizes, of unit length; zero where all in them is known.
+    /// Their derivatives (constraints x free unknowns) by the unknowns in parts of their sizes, of unit
+    /// length; zero where all in them is known.
     rows: DMatrix<f64>,
     /// The terms in them.
     terms: Vec<f64>,
@@ -53,7 +56,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Values near `x` at which the constraints hold, by steps that are least in parts of the unknowns; the unknown `fixed` stays.
+    /// Values near `x` at which the constraints hold, by steps that are least in parts of the unknowns; the
+    /// unknown `fixed` stays.
     ///
     /// # Errors
     /// The number of the constraint of which most is left.
@@ -77,8 +81,8 @@ impl Problem<'_> {
         if over.iter().all(|c| *c <= ROUGHLY) { Ok(x) } else { Err(over.imax()) }
     }
 
-    /// The directions (free unknowns x any) in which constraints leave the unknowns free at `x`, orthonormal in parts of their sizes; the unknown
-    /// `fixed` counts as free.
+    /// The directions (free unknowns x any) in which constraints leave the unknowns free at `x`, orthonormal
+    /// in parts of their sizes; the unknown `fixed` counts as free.
     pub(super) fn ways(
         &self,
         base: &DVector<f64>,
@@ -88,12 +92,14 @@ impl Problem<'_> {
         Ok(bound_and_free(&self.left(base, x, fixed).rows)?.1)
     }
 
-    /// The rows of the constraints at `x` (constraints x free unknowns), of unit length, by the unknowns in parts of their sizes.
+    /// The rows of the constraints at `x` (constraints x free unknowns), of unit length, by the unknowns in
+    /// parts of their sizes.
     pub(super) fn bounds(&self, base: &DVector<f64>, x: &DVector<f64>) -> DMatrix<f64> {
         self.left(base, x, None).rows
     }
 
-    /// A constraint whose slope vanishes at `x`, as that of a square does where it is zero: it says nothing there.
+    /// A constraint whose slope vanishes at `x`, as that of a square does where it is zero: it says nothing
+    /// there.
     pub(super) fn flat(&self, base: &DVector<f64>, x: &DVector<f64>) -> Option<usize> {
         let here = self.left(base, x, None).terms;
         // somewhere near, as far in no two unknowns

@@ -304,7 +304,8 @@ fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
     out
 }
 
-/// The mean of some rows, with the standard deviations of all means: those of independent samples. Inputs of the interval before are those of `before`.
+/// The mean of some rows, with the standard deviations of all means: those of independent samples. Inputs of
+/// the interval before are those of `before`.
 fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();
@@ -336,7 +337,8 @@ fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data 
     }
 }
 
-/// The ways from each interval to the next, a run each: the samples between them, then the means of the next, where outputs are measured.
+/// The ways from each interval to the next, a run each: the samples between them, then the means of the next,
+/// where outputs are measured.
 fn ways(rows: &[Data], intervals: &[Range<usize>], inputs: &[(usize, From)]) -> Vec<Data> {
     let mut out = Vec::new();
     for (run, pair) in intervals.windows(2).enumerate() {

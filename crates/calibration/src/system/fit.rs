@@ -193,7 +193,8 @@ pub(super) fn size(x: f64) -> f64 {
     x.abs().max(1e-3)
 }
 
-/// The step from `at`, pulled by `pull` per size of an unknown, as far as constraints leave a way: the root of the solution is by these ways.
+/// The step from `at`, pulled by `pull` per size of an unknown, as far as constraints leave a way: the root
+/// of the solution is by these ways.
 pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
     let mut ways = at.ways.clone();
     ways.row_iter_mut().zip(x.iter()).for_each(|(mut row, x)| row.scale_mut(size(*x)));

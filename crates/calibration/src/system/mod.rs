@@ -1,4 +1,5 @@
-//! Any system calibrated from data: Gauss and Newton with the Jacobians of the model's own graph, from several starts.
+//! Any system calibrated from data: Gauss and Newton with the Jacobians of the model's own graph, from
+//! several starts.
 
 mod answer;
 mod before;
@@ -365,8 +366,8 @@ impl<'a> Calibrating<'a> {
         })
     }
 
-    /// Products and sums of what is not determined alone that the model determines: as text, with the degree, their values at `x` and their derivatives by the unknowns
-    /// `names`. Those of known starts are none.
+    /// Products and sums of what is not determined alone that the model determines: as text, with the degree,
+    /// their values at `x` and their derivatives by the unknowns `names`. Those of known starts are none.
     fn invariants(
         &self,
         judged: &Judgement,

@@ -64,8 +64,9 @@ impl Calibrating<'_> {
         (0..self.model.outputs.len()).map(of).collect()
     }
 
-    /// Measurements that the others do not explain: residuals studentised without the measurement itself (Cook, Weisberg 1982, 2.2.1), so that one that is far off
-    /// does not hide in the sigma that it makes. Where sigmas are given, only what is far off by these as well.
+    /// Measurements that the others do not explain: residuals studentised without the measurement itself
+    /// (Cook, Weisberg 1982, 2.2.1), so that one that is far off does not hide in the sigma that it makes.
+    /// Where sigmas are given, only what is far off by these as well.
     pub(super) fn outliers(&self, residuals: &[SystemResidual], outputs: &[OutputFit]) -> Vec<SystemFinding> {
         let normal = student_gate(f64::INFINITY, residuals.len());
         let of = |r: &SystemResidual| {
@@ -80,7 +81,8 @@ impl Calibrating<'_> {
         residuals.iter().filter_map(of).collect()
     }
 
-    /// Chi-square and degrees of freedom of the measurements that say how large the noise of an output is: its own where that is estimated, else all whose noise is given.
+    /// Chi-square and degrees of freedom of the measurements that say how large the noise of an output is:
+    /// its own where that is estimated, else all whose noise is given.
     fn group(&self, output: usize, outputs: &[OutputFit]) -> (f64, f64) {
         let own = |j: &usize| if self.estimated[output] { *j == output } else { !self.estimated[*j] };
         let some = (0..outputs.len()).filter(own);
@@ -104,7 +106,8 @@ impl Calibrating<'_> {
     }
 }
 
-/// Beyond what no right residual of so many is, but with a probability of one in a thousand, where sigma is that of others with `free` degrees of freedom.
+/// Beyond what no right residual of so many is, but with a probability of one in a thousand, where sigma is
+/// that of others with `free` degrees of freedom.
 fn student_gate(free: f64, of: usize) -> f64 {
     let each = (1.0 - STRICT) / of.max(1) as f64;
     match free.is_finite() {

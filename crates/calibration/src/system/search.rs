@@ -10,7 +10,8 @@ use crate::least_squares::Solution;
 
 /// Two solutions are one when all that is determined differs by less, in sigma.
 const SAME: f64 = 1e-2;
-/// A solution is listed beside the best when its sum of squares is not larger by more, in units of what is left per degree of freedom.
+/// A solution is listed beside the best when its sum of squares is not larger by more, in units of what is
+/// left per degree of freedom.
 const NEAR: f64 = 25.0;
 /// How far starts are from each other: standard deviation of their logarithm.
 const SPREAD: f64 = 1.5;
@@ -34,8 +35,8 @@ fn apart<'a>(ends: &'a [Settled], counts: &dyn Fn(usize) -> bool) -> Vec<(&'a Se
     out
 }
 
-/// Whether no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w - 2) < w + 1/2 (C. G. E. Boender, A. H. G. Rinnooy Kan,
-/// Math. Programming 37, 1987, doi:10.1007/BF02591684).
+/// Whether no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w -
+/// 2) < w + 1/2 (C. G. E. Boender, A. H. G. Rinnooy Kan, Math. Programming 37, 1987, doi:10.1007/BF02591684).
 fn enough(found: usize, starts: usize) -> bool {
     let (w, n) = (found as f64, starts as f64);
     n > w + 2.0 && w * (n - 1.0) / (n - w - 2.0) < w + 0.5
@@ -62,8 +63,8 @@ impl Calibrating<'_> {
             .collect()
     }
 
-    /// Iterates from `starts` until there have been enough; `counts` says which unknowns tell solutions apart. Where they ended, how many there were, and why the first
-    /// failed that did.
+    /// Iterates from `starts` until there have been enough; `counts` says which unknowns tell solutions
+    /// apart. Where they ended, how many there were, and why the first failed that did.
     pub(super) fn search(
         &mut self,
         starts: &[DVector<f64>],
@@ -92,8 +93,8 @@ impl Calibrating<'_> {
         (ends, tried, first_error)
     }
 
-    /// Solutions apart from the best that fit nearly as well, how many starts led to the best, and what became of
-    /// the others but those that failed.
+    /// Solutions apart from the best that fit nearly as well, how many starts led to the best, and what
+    /// became of the others but those that failed.
     pub(super) fn others(
         &mut self,
         ends: &[Settled],

@@ -123,9 +123,9 @@ impl Case {
     }
 }
 
-/// Widths of the box that an answer states of what the data leave open: the answer holds for truths within it. What
-/// an open unknown bends into the others grows with its square (D_OY of p1 p2 at 35 deg/h/g, 3.5 times its box: 12
-/// sigmas of errors).
+/// Widths of the box that an answer states of what the data leave open: the answer holds for truths within
+/// it. What an open unknown bends into the others grows with its square (D_OY of p1 p2 at 35 deg/h/g, 3.5
+/// times its box: 12 sigmas of errors).
 const BOX: f64 = 2.0;
 
 /// True if the truth of an unknown that the data leave open is farther than [`BOX`] from its box.
@@ -143,8 +143,8 @@ fn truth(bench: &Bench, name: &str) -> Option<f64> {
     }
 }
 
-/// True values of the combinations of a scheme in the units of the answer, by their expressions: their terms, which
-/// have all digits, times the true values of unknowns.
+/// True values of the combinations of a scheme in the units of the answer, by their expressions: their terms,
+/// which have all digits, times the true values of unknowns.
 fn combinations(
     of: &obsdeg_core::model::Scheme,
     conditions: &Conditions,
@@ -232,9 +232,9 @@ fn run(case: &Case, seeds: std::ops::Range<u64>) -> Outcome {
 }
 
 /// The demands on every case, by so many records: each gives an answer, none ends unsettled, false alarms are
-/// at most 1 % (one record in any case), and the sum of the NEES of answers without a finding is in its 99.9 %
-/// band (not above it where an answer states a box). Estimates that are left open, and truths outside a box, are not
-/// in it: their numbers are printed. Each case is printed.
+/// at most 1 % (one record in any case), and the sum of the NEES of answers without a finding is in its 99.9
+/// % band (not above it where an answer states a box). Estimates that are left open, and truths outside a
+/// box, are not in it: their numbers are printed. Each case is printed.
 fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
     let mut wrong = Vec::new();
     for case in cases().iter().filter(|c| only(c)) {

@@ -49,7 +49,8 @@ fn of(list: &[SystemEstimated], name: &str) -> (f64, f64, f64) {
     (u.estimate.expect(name), u.sigma.expect(name), u.sigma_rescaled.expect(name))
 }
 
-/// A direction of unit length, as two unknowns beside a constraint and as an angle: the same estimates, sigmas and degrees of freedom, from wherever it starts.
+/// A direction of unit length, as two unknowns beside a constraint and as an angle: the same estimates,
+/// sigmas and degrees of freedom, from wherever it starts.
 #[test]
 fn constraints_are_an_unknown_less() {
     let text = turned(0..40);
@@ -96,7 +97,8 @@ fn as_an_angle(bound: &str, text: &str) {
     assert!((c * c + s * s - 1.0).abs() < 1e-12, "{c} {s}");
 }
 
-/// Two weights of which the sum is known, far smaller than one and known far better than that: weighed apart and together, in closed form.
+/// Two weights of which the sum is known, far smaller than one and known far better than that: weighed apart
+/// and together, in closed form.
 #[test]
 fn a_sum_that_is_known() {
     let mut normal = normals(3);
@@ -197,7 +199,8 @@ fn experiments_do_not_count_twice() {
     assert!((sigma("p") / sigma("q") - 1.0).abs() < 1e-9 && (sigma("x@1") / sigma("v@1") - 1.0).abs() < 1e-9);
 }
 
-/// A profile along a circle: chi-square at values of an unknown is that of the angle there, all else following; another solution beyond the end of the circle.
+/// A profile along a circle: chi-square at values of an unknown is that of the angle there, all else
+/// following; another solution beyond the end of the circle.
 #[test]
 fn profiles_and_other_solutions_keep_to_constraints() {
     let mut normal = normals(41);
@@ -227,7 +230,8 @@ fn profiles_and_other_solutions_keep_to_constraints() {
     assert!((other.values[0] + cos).abs() < 1e-6 && (other.values[1] - s).abs() < 1e-6, "{other:?}");
 }
 
-/// Half of the data, then the other half with what the first said: as all at once, and as with an angle; what holds by a constraint is no news to a model without.
+/// Half of the data, then the other half with what the first said: as all at once, and as with an angle; what
+/// holds by a constraint is no news to a model without.
 #[test]
 fn what_was_known_before_keeps_to_constraints() {
     let (first, second) = (turned(0..5), turned(5..40));
@@ -254,7 +258,8 @@ fn what_was_known_before_keeps_to_constraints() {
     assert!(e.contains("the prior calibration knows k, c, s as constraints make them"), "{e}");
 }
 
-/// Three that hang together by two constraints, known before in part: rows of constraints are not what they say of these alone.
+/// Three that hang together by two constraints, known before in part: rows of constraints are not what they
+/// say of these alone.
 #[test]
 fn what_was_known_of_some_is_as_it_was() {
     let mut normal = normals(51);

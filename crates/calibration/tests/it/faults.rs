@@ -1,4 +1,5 @@
-//! Records that are not what they say they are: each is refused by name. And what an estimate says of itself, against other ways to it.
+//! Records that are not what they say they are: each is refused by name. And what an estimate says of itself,
+//! against other ways to it.
 
 use nalgebra::DMatrix;
 use obsdeg_calibration::answer::{Finding, ForceError};
@@ -38,7 +39,8 @@ fn scaled(samples: &[Sample], units: [&str; 4], by: [f64; 4]) -> String {
         .collect()
 }
 
-/// Numbers of another unit than the header has are told from errors of scale, column by column; with the right unit the record is right.
+/// Numbers of another unit than the header has are told from errors of scale, column by column; with the
+/// right unit the record is right.
 #[test]
 fn units_are_named() {
     const G: f64 = 9.80665;
@@ -72,7 +74,8 @@ fn units_are_named() {
     }
 }
 
-/// One axis of the specific force that is too long, or off its zero, is named with its figure; another gravity is not taken for it, nor two axes for one.
+/// One axis of the specific force that is too long, or off its zero, is named with its figure; another
+/// gravity is not taken for it, nor two axes for one.
 #[test]
 fn an_axis_is_named() {
     let found = |k0: [f64; 3], k1: [f64; 3], scale: f64| {
@@ -131,7 +134,8 @@ fn clock_of(c: &Calibration) -> Option<(Option<f64>, Option<f64>)> {
     })
 }
 
-/// A clock that is off by a part is told by when positions begin and end, and by the earth; positions that were held longer by a right clock are not taken for one.
+/// A clock that is off by a part is told by when positions begin and end, and by the earth; positions that
+/// were held longer by a right clock are not taken for one.
 #[test]
 fn a_clock_is_named() {
     let slower = bench().drift.map(|d| d.map(|x| 0.1 * x));
@@ -219,7 +223,8 @@ fn a_clock_shows_in_the_timeline() {
     );
 }
 
-/// A cell, or a row, of another unit than the others is named with its line and column, however dense the rows are.
+/// A cell, or a row, of another unit than the others is named with its line and column, however dense the
+/// rows are.
 #[test]
 fn a_cell_of_another_unit_is_named() {
     const G: f64 = 9.80665;
@@ -267,7 +272,8 @@ fn a_cell_of_another_unit_is_named() {
     );
 }
 
-/// A record of pulses: counts of increments of velocity over the time since the row before, with a weight, by sums of a force that is sampled eight times as often.
+/// A record of pulses: counts of increments of velocity over the time since the row before, with a weight, by
+/// sums of a force that is sampled eight times as often.
 fn pulses(bench: &Bench, weight: f64) -> (String, String) {
     const G: f64 = 9.80665;
     let fine = bench.record();
@@ -292,7 +298,8 @@ fn pulses(bench: &Bench, weight: f64) -> (String, String) {
     (counts, format!("t [s],position,fx [m/s],fy [m/s],fz [m/s]\n{mean}"))
 }
 
-/// Increments of velocity over the time between samples are mean forces in the middle; the estimate is what the bench had, and that of the forces.
+/// Increments of velocity over the time between samples are mean forces in the middle; the estimate is what
+/// the bench had, and that of the forces.
 #[test]
 fn pulses_are_mean_forces() {
     // noise of a sum of eight is that of a sample over the root of eight
@@ -426,7 +433,8 @@ fn no_record_is_refused() {
     }
 }
 
-/// No record counts twice: neither beside itself, nor behind a calibration that rests on it, however long ago.
+/// No record counts twice: neither beside itself, nor behind a calibration that rests on it, however long
+/// ago.
 #[test]
 fn a_record_counts_once() {
     let [a, b, c] = [1, 2, 3].map(|seed| csv(&Bench { seed, ..bench() }.record()));
@@ -474,7 +482,8 @@ fn moved(bench: &Bench, k: usize, by: f64) -> Bench {
     out
 }
 
-/// The sigma that is predicted is that of least squares on the samples of the record, with derivatives by differences of the simulator's quaternions.
+/// The sigma that is predicted is that of least squares on the samples of the record, with derivatives by
+/// differences of the simulator's quaternions.
 #[test]
 fn what_is_predicted() {
     for step_s in [10.0, 2.0] {
@@ -505,10 +514,10 @@ fn what_is_predicted() {
     }
 }
 
-/// Two positions with drifts of the paper's size: what is left open bends into sigmas, by a factor that is said. The
-/// oracle is a calibration with as many unknowns known as the records leave directions open, at the first estimates:
-/// its sigmas are smaller by that factor. The open coefficients of the bench are their first estimates, zero, so that
-/// both calibrations end with the same attitudes.
+/// Two positions with drifts of the paper's size: what is left open bends into sigmas, by a factor that is
+/// said. The oracle is a calibration with as many unknowns known as the records leave directions open, at the
+/// first estimates: its sigmas are smaller by that factor. The open coefficients of the bench are their first
+/// estimates, zero, so that both calibrations end with the same attitudes.
 #[test]
 fn what_is_held_is_said() {
     // the first record that does not leave all open

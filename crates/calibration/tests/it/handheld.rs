@@ -1,4 +1,5 @@
-//! A unit in the hand, whose record is written from its equations: are its errors found, and are the sigmas right?
+//! A unit in the hand, whose record is written from its equations: are its errors found, and are the sigmas
+//! right?
 
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Before, SystemCalibration, SystemOptions, calibrate_system};
@@ -49,7 +50,8 @@ fn solved(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// Rests of 2 s (35 s at first) and turns of 1.5 s at rates that rise and fall, at 100 Hz; the force is turned by Rodrigues' formula in steps of a millisecond.
+/// Rests of 2 s (35 s at first) and turns of 1.5 s at rates that rise and fall, at 100 Hz; the force is
+/// turned by Rodrigues' formula in steps of a millisecond.
 fn record(rests: usize, seed: u64) -> String {
     let mut random = SplitMix64::new(seed);
     let mut uniform = move || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
@@ -114,7 +116,8 @@ fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibrat
         .expect("calibrated")
 }
 
-/// Accelerometers by the length of the force, gyros by the turns between, what is known of the first as a prior of the second.
+/// Accelerometers by the length of the force, gyros by the turns between, what is known of the first as a
+/// prior of the second.
 #[test]
 fn errors_of_a_unit_in_the_hand() {
     let text = record(16, 7);

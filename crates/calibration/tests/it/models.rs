@@ -1,4 +1,5 @@
-//! Small models whose answer is known by other means: closed formulas of least squares, the same model without what cannot be told apart.
+//! Small models whose answer is known by other means: closed formulas of least squares, the same model
+//! without what cannot be told apart.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::record::Record;
@@ -81,7 +82,8 @@ fn a_spike_does_not_hide_in_its_own_sigma() {
     assert_eq!((c.outputs[0].outlier_gate, c.outputs[0].degrees_of_freedom.round()), (None, 1.0));
 }
 
-/// A scale and a start that are only told as a product: the product is what the start is where the scale is one.
+/// A scale and a start that are only told as a product: the product is what the start is where the scale is
+/// one.
 #[test]
 fn what_is_not_told_apart_has_its_product() {
     let mut normal = normals(8);
@@ -113,7 +115,8 @@ fn what_is_not_told_apart_has_its_product() {
     assert!(own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16, "{:?}", own.starts);
 }
 
-/// Times and columns in another unit than the model's are converted, or refused with both; what one model knows is no news to itself.
+/// Times and columns in another unit than the model's are converted, or refused with both; what one model
+/// knows is no news to itself.
 #[test]
 fn units_of_models() {
     let mut normal = normals(9);
@@ -157,7 +160,8 @@ fn units_of_models() {
 
 const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n[outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\ncarry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
 
-/// Doses at times that the record says: what is left of the first is unknown, the volume follows from the jumps of the next, whose sizes are known.
+/// Doses at times that the record says: what is left of the first is unknown, the volume follows from the
+/// jumps of the next, whose sizes are known.
 #[test]
 fn segments_begin_with_their_first_rows() {
     let (start, k, v, jumps) = (70.0, 0.13, 12.0, [(6.0, 100.0), (11.5, 50.0)]);
@@ -223,7 +227,8 @@ fn segments_begin_with_their_first_rows() {
     }
 }
 
-/// Two patients with doses of their own times and amounts at first, and one volume: rows of one among those of the other, or behind them.
+/// Two patients with doses of their own times and amounts at first, and one volume: rows of one among those
+/// of the other, or behind them.
 #[test]
 fn experiments_have_segments_of_their_own() {
     let (k, v) = (0.13, 12.0);

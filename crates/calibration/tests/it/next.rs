@@ -1,5 +1,5 @@
-//! Further runs: the one that would meet a requirement is computed, and a run that is made so meets it; a prior counts
-//! once, however many records there are.
+//! Further runs: the one that would meet a requirement is computed, and a run that is made so meets it; a
+//! prior counts once, however many records there are.
 
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, Options, calibrate};
@@ -47,9 +47,9 @@ fn sigma(c: &Calibration, name: &str) -> f64 {
     own.sigma.expect("determined")
 }
 
-/// Sigmas that are required are a part of those of the record. Each run that is said to meet one is simulated, by the
-/// simulator of the tests, and calibrated with the first: sigma is the one that was said, within the part by which
-/// attitudes and the fit's factor differ, and estimates are right.
+/// Sigmas that are required are a part of those of the record. Each run that is said to meet one is
+/// simulated, by the simulator of the tests, and calibrated with the first: sigma is the one that was said,
+/// within the part by which attitudes and the fit's factor differ, and estimates are right.
 #[test]
 fn a_run_as_it_is_said_meets_the_requirement() {
     let first = bench(41);
@@ -92,13 +92,14 @@ fn what_no_run_meets_is_said() {
     assert!(n.sigma_then.is_some_and(|s| s > 1e-9 && s < sigma(&c, "D_FX")), "{n:?}");
 }
 
-/// Priors that a scheme states are in the first calibration; the second, with the first as prior, does not count them
-/// again: it is the calibration of both records at once.
+/// Priors that a scheme states are in the first calibration; the second, with the first as prior, does not
+/// count them again: it is the calibration of both records at once.
 #[test]
 fn a_prior_counts_once() {
     let (first, second) = (bench(44), bench(45));
     let free = calibrated(&first, &[], false, None);
-    // as wide as the sigmas, so that counting it twice shows: by sqrt(3/4) in one and sqrt(2/3) in two records
+    // as wide as the sigmas, so that counting it twice shows: by sqrt(3/4) in one and sqrt(2/3) in two
+    // records
     let prior = [("D_FY", sigma(&free, "D_FY")), ("D_IX", sigma(&free, "D_IX"))];
     let a = calibrated(&first, &prior, true, None);
     let one_by_one = calibrated(&second, &prior, true, Some(&a));

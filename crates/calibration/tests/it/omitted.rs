@@ -1,4 +1,5 @@
-//! Records with an error in their truth that the scheme does not estimate: is it named, and what is said without one?
+//! Records with an error in their truth that the scheme does not estimate: is it named, and what is said
+//! without one?
 
 use obsdeg_calibration::answer::Finding;
 use obsdeg_calibration::{Calibration, Options, calibrate, record::Record};
@@ -38,8 +39,8 @@ fn calibrated(bench: &Bench) -> Calibration {
         .expect("calibrated")
 }
 
-/// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band, D_IZ is many sigmas off, and the
-/// score test names the error and what D_IZ is with it.
+/// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band, D_IZ is many sigmas off, and
+/// the score test names the error and what D_IZ is with it.
 #[test]
 fn an_accelerometer_zero_is_named() {
     let c = calibrated(&five(15.0, 3));
@@ -62,8 +63,8 @@ fn an_accelerometer_zero_is_named() {
     assert!(!c.consistent);
 }
 
-/// Members of a group explain the residuals equally and change the estimates in other ways: a range holds what the
-/// estimate is with the true one, which is not the one named first.
+/// Members of a group explain the residuals equally and change the estimates in other ways: a range holds
+/// what the estimate is with the true one, which is not the one named first.
 #[test]
 fn a_group_changes_estimates_by_a_range() {
     let (mut ranges, mut others) = (0, 0);

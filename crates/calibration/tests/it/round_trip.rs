@@ -224,7 +224,8 @@ fn twelve() -> Vec<(&'static str, [f64; 3], f64)> {
     six().positions.into_iter().chain(more).collect()
 }
 
-/// Two positions, nothing told of D_FZ and psi_y but together: no numbers of their own, one of the combination that is what the bench had.
+/// Two positions, nothing told of D_FZ and psi_y but together: no numbers of their own, one of the
+/// combination that is what the bench had.
 #[test]
 fn what_is_not_told_apart_has_no_estimate() {
     let bench = Bench { seed: 4, drift: [[1.1, 1.2, 1.3], [0.5; 3], [0.5; 3], [0.5; 3]], ..Bench::default() };
@@ -240,7 +241,8 @@ fn what_is_not_told_apart_has_no_estimate() {
     let (estimate, sigma) = (both.estimate.expect("there"), both.sigma.expect("there"));
     // under inertial carry: D_SZ + a*psi_y
     assert!(both.name.contains("D_SZ"), "{}", both.name);
-    // D_SZ 0.5 and wN psi_y 0.023 deg/h: what nothing determines is held within ten times its prior, and bends into the combination
+    // D_SZ 0.5 and wN psi_y 0.023 deg/h: what nothing determines is held within ten times its prior, and
+    // bends into the combination
     assert!((estimate - 0.523).abs() < 3.0 * sigma && sigma < 0.5, "{both:?}");
     // with other priors it is the same but for that, which sigma holds
     let mut other = conditions(&bench);
@@ -365,7 +367,8 @@ pub(crate) fn with_recording(
     calibrate(&scheme, &conditions(bench), vec![record], &Options::default(), &|_| true)
 }
 
-/// Without labels and late, by the intervals at rest: the estimate is that by labels but for a part of sigma; other schemes are refused.
+/// Without labels and late, by the intervals at rest: the estimate is that by labels but for a part of sigma;
+/// other schemes are refused.
 #[test]
 fn positions_are_found() {
     let bench = quick(11);
@@ -460,7 +463,8 @@ fn columns_of_all_kinds() {
     assert!(c.findings.iter().any(warm), "{:?}", c.findings);
 }
 
-/// Noise that nobody knows is estimated, component by component; then it is consistent, and sigmas are those of who knows it.
+/// Noise that nobody knows is estimated, component by component; then it is consistent, and sigmas are those
+/// of who knows it.
 #[test]
 fn noise_is_estimated() {
     let bench = Bench { noise_g: 3e-5, ..real(14) };
@@ -487,10 +491,10 @@ fn noise_is_estimated() {
     }
 }
 
-/// Two positions at the drifts of the paper, where psi grows to degrees: what nothing determines is in a box about
-/// the first estimate, 0 or twice the truth. Both estimates of what is determined are right. To first order they differ
-/// by at most their part of sigma that comes from the box, times the distance of the two boxes in widths of the box
-/// (Cauchy and Schwarz); a quarter of sigma is left to what is of second order.
+/// Two positions at the drifts of the paper, where psi grows to degrees: what nothing determines is in a box
+/// about the first estimate, 0 or twice the truth. Both estimates of what is determined are right. To first
+/// order they differ by at most their part of sigma that comes from the box, times the distance of the two
+/// boxes in widths of the box (Cauchy and Schwarz); a quarter of sigma is left to what is of second order.
 #[test]
 fn what_is_held_bends_little() {
     const OPEN: [&str; 7] = ["D_IX", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SY", "D_SZ"];
@@ -552,7 +556,8 @@ fn runs_are_held_against_each_other() {
     );
 }
 
-/// An interrupt while a record is read leaves nothing; later it leaves the iteration where it is, and says so.
+/// An interrupt while a record is read leaves nothing; later it leaves the iteration where it is, and says
+/// so.
 #[test]
 fn an_interrupt_leaves_what_there_is() {
     let bench = Bench { step_s: 0.2, ..quick(13) };

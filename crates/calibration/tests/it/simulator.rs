@@ -1,5 +1,7 @@
-//! Records by other mathematics than the estimator's: the attitude is a quaternion that is turned by what the gyros let through, the force is exact, noise is white and
-//! Gauss-Markov, outputs are quantised, samples are dropped. Written from the equations of the platform; nothing of the program is used but a generator of numbers.
+//! Records by other mathematics than the estimator's: the attitude is a quaternion that is turned by what the
+//! gyros let through, the force is exact, noise is white and Gauss-Markov, outputs are quantised, samples are
+//! dropped. Written from the equations of the platform; nothing of the program is used but a generator of
+//! numbers.
 
 use obsdeg_exact::SplitMix64;
 
@@ -37,9 +39,11 @@ pub(crate) struct Bench {
     pub(crate) drift: [Vector; 4],
     /// K0 (g), K1, K2 (1/g) of the accelerometers.
     pub(crate) accelerometers: [Vector; 3],
-    /// What the output of each accelerometer has of the force along each platform axis besides its own, in rad.
+    /// What the output of each accelerometer has of the force along each platform axis besides its own, in
+    /// rad.
     pub(crate) mounting: [Vector; 3],
-    /// What each gyro is torqued too fast by, as a part of the rate commanded about each platform axis: scale factors, and misalignments in rad.
+    /// What each gyro is torqued too fast by, as a part of the rate commanded about each platform axis: scale
+    /// factors, and misalignments in rad.
     pub(crate) torquer: [Vector; 3],
     /// White noise of a sample, in g.
     pub(crate) noise_g: f64,
@@ -117,7 +121,8 @@ pub(crate) fn turned(q: &Quaternion, v: &Vector) -> Vector {
     [out[1], out[2], out[3]]
 }
 
-/// The passive turns Mx(alpha) My(beta) Mz(gamma) as one quaternion from c to n: a passive turn by an angle is an active one by its negative.
+/// The passive turns Mx(alpha) My(beta) Mz(gamma) as one quaternion from c to n: a passive turn by an angle
+/// is an active one by its negative.
 pub(crate) fn attitude(angles_deg: &Vector) -> Quaternion {
     let [a, b, c] = angles_deg.map(f64::to_radians);
     let about = |axis: usize, angle: f64| {
@@ -223,7 +228,8 @@ impl Bench {
         out
     }
 
-    /// Turns platform and computed platform, in short parts: the gyros hold the platform at the commanded rate, with their drift.
+    /// Turns platform and computed platform, in short parts: the gyros hold the platform at the commanded
+    /// rate, with their drift.
     #[allow(clippy::too_many_arguments, reason = "one step of everything that moves")]
     fn advance(
         &self,

@@ -55,15 +55,15 @@ pub struct Analysis {
     pub null_space: Vec<Vec<Component>>,
     /// Verdicts under the other carries, where they differ.
     pub carries: Vec<CarryReport>,
-    /// Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where none are
-    /// computed (rotating segments, the drift as unknown, very many columns).
+    /// Exact classes of the errors that the scheme does not estimate; null with `--omitted off` and where
+    /// none are computed (rotating segments, the drift as unknown, very many columns).
     pub omitted: Option<OmittedVerdicts>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
     /// Conditions on generic angles under which a verdict changes; null if they were not computed.
     pub degenerate_loci: Option<Vec<Locus>>,
-    /// Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if it has
-    /// all that one equation describes.
+    /// Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if
+    /// it has all that one equation describes.
     pub degenerate_loci_incomplete: Option<String>,
     /// Formulas of Z and its derivatives, position by position; null if not asked for.
     pub formulas: Option<Vec<Formula>>,

@@ -236,7 +236,8 @@ fn has_sum(text: &str) -> bool {
     false
 }
 
-/// The parts of a product and quotient outside of all brackets: `(above, below)`, brackets around a product below taken off.
+/// The parts of a product and quotient outside of all brackets: `(above, below)`, brackets around a product
+/// below taken off.
 fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
     let (mut above, mut below) = (Vec::new(), Vec::new());
     let (mut depth, mut start, mut under) = (0, 0, false);
@@ -257,8 +258,8 @@ fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
     (above, below)
 }
 
-/// Factors as one text with one bar, so that no reader takes for below what is above: `wU*w@p1/(2*wN)`. A number in front keeps its own:
-/// `1/2*wU`.
+/// Factors as one text with one bar, so that no reader takes for below what is above: `wU*w@p1/(2*wN)`. A
+/// number in front keeps its own: `1/2*wU`.
 pub(crate) fn product(factors: &[String]) -> String {
     let text = factors.join("*");
     let (mut above, below) = bars(&text);
@@ -273,8 +274,8 @@ pub(crate) fn product(factors: &[String]) -> String {
     }
 }
 
-/// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution that nearly cancel are as
-/// certain as others.
+/// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution
+/// that nearly cancel are as certain as others.
 pub(crate) fn decimal(x: f64) -> String {
     if x == 0.0 {
         return "0".into();

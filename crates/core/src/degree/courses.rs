@@ -1,17 +1,22 @@
 //! Degrees where the platform turns steadily and not only drifts are unknown.
 //!
-//! Drifts alone are judged at attitudes of an arc. With errors of accelerometers or torquers that would say too much: at a steady rate w the drift
-//! integrates to `(D/w) sin(w t)` beside `K0 sin(w t)`, and to `D t` beside `GS w t`. Here psi moves while the platform turns:
+//! Drifts alone are judged at attitudes of an arc. With errors of accelerometers or torquers that would say
+//! too much: at a steady rate w the drift integrates to `(D/w) sin(w t)` beside `K0 sin(w t)`, and to `D t`
+//! beside `GS w t`. Here psi moves while the platform turns:
 //!
-//! `psi' = F psi + eps(w t)`, `Z^(k) = H F^k psi + sum_{j<k} H F^(k-1-j) eps^(j) + a^(k)`, `eps = C E(g, omega_c) D`, `a = C A(f) K`,
+//! `psi' = F psi + eps(w t)`, `Z^(k) = H F^k psi + sum_{j<k} H F^(k-1-j) eps^(j) + a^(k)`,
+//! `eps = C E(g, omega_c) D`, `a = C A(f) K`,
 //!
-//! with `omega_c` the earth rate and the rate of turning in c. Times are measured in a unit T: a rotation by phi at the rate c/T takes `phi T/c`. The
-//! rows `T^k Z^(k)` where it begins generate all of its samples over `K[[T]]`: they are trigonometric polynomials of degree m and powers of time,
-//! whose equation of order `2m + 4` has one as its leading coefficient. With the rows `T^k H F^k S_i` of positions they generate a module L. A functional c
-//! has degree k if `T^k c` is in L, k the smallest: at positions that is the order of the derivative, and what has accumulated while the
-//! platform turned counts by its power of time. Rates c are random: verdicts hold at almost all rates.
+//! with `omega_c` the earth rate and the rate of turning in c. Times are measured in a unit T: a rotation by
+//! phi at the rate c/T takes `phi T/c`. The rows `T^k Z^(k)` where it begins generate all of its samples over
+//! `K[[T]]`: they are trigonometric polynomials of degree m and powers of time, whose equation of order
+//! `2m + 4` has one as its leading coefficient. With the rows `T^k H F^k S_i` of positions they generate a
+//! module L. A functional c has degree k if `T^k c` is in L, k the smallest: at positions that is the order
+//! of the derivative, and what has accumulated while the platform turned counts by its power of time. Rates c
+//! are random: verdicts hold at almost all rates.
 //!
-//! What is determined at one rate alone (`GS + D/w` as a number) is in no `V_k` but the last, which is the span of the rows at a random T.
+//! What is determined at one rate alone (`GS + D/w` as a number) is in no `V_k` but the last, which is the
+//! span of the rows at a random T.
 
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
@@ -27,20 +32,21 @@ use crate::model::platform::{
 };
 use crate::model::ring::Ring;
 
-/// The order of the equation that the course of Z solves: `exp(i j angle)` with |j| up to m, the turn of the earth (three, one of them the
-/// constant again), and what is constant accumulates.
+/// The order of the equation that the course of Z solves: `exp(i j angle)` with |j| up to m, the turn of the
+/// earth (three, one of them the constant again), and what is constant accumulates.
 pub(super) const fn orders(harmonics: usize) -> usize {
     2 * harmonics + 4
 }
 
-/// What a rotation adds to the degree of a row in the random values. Cleared of the denominators `w` (m times, and that of its duration), `W^2`,
-/// `1 + W^2 e^2`, `T` and `j^2 w^2 - W^2 T^2` (j up to m, degree 4), with numerators no higher than these, and m more powers of w and T in derivatives.
+/// What a rotation adds to the degree of a row in the random values. Cleared of the denominators `w` (m
+/// times, and that of its duration), `W^2`, `1 + W^2 e^2`, `T` and `j^2 w^2 - W^2 T^2` (j up to m, degree 4),
+/// with numerators no higher than these, and m more powers of w and T in derivatives.
 pub(super) const fn degree(harmonics: usize) -> usize {
     2 * (5 * harmonics + 9) + orders(harmonics)
 }
 
-/// And to its bits: these factors, `3m + 6` in all, have a norm of `1 + m^2` at most, derivatives are multiplied by up to `m^k`, and the angle has
-/// a denominator of its own, up to 180e9.
+/// And to its bits: these factors, `3m + 6` in all, have a norm of `1 + m^2` at most, derivatives are
+/// multiplied by up to `m^k`, and the angle has a denominator of its own, up to 180e9.
 pub(super) fn bits(harmonics: usize) -> f64 {
     let m = harmonics as f64;
     (3.0 * m + 6.0) * (1.0 + m * m).log2() + orders(harmonics) as f64 * m.log2() + 38.0
@@ -92,8 +98,8 @@ pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<E
     (degrees, stairs)
 }
 
-/// How psi moves in a rotation: `exp(F t)` over all of it, its integral over the time in units of T, and `(i j c - F T)^-1` for the harmonics
-/// j = -m..=m but 0.
+/// How psi moves in a rotation: `exp(F t)` over all of it, its integral over the time in units of T, and
+/// `(i j c - F T)^-1` for the harmonics j = -m..=m but 0.
 struct Motion<E> {
     phi: Matrix3<E>,
     integral: Matrix3<E>,
@@ -263,7 +269,8 @@ fn psi_dynamics(field: &Field, w_n: u64, w_u: u64) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| local[i][j]))
 }
 
-/// Trigonometric polynomials of an angle with coefficients in a field: of `exp(i j angle)` for j in `-degree..=degree`.
+/// Trigonometric polynomials of an angle with coefficients in a field: of `exp(i j angle)` for j in
+/// `-degree..=degree`.
 struct Harmonics<'a> {
     field: &'a Field,
     degree: usize,
@@ -400,7 +407,8 @@ impl<'a> Turning<'a> {
                     let a = f.dot(0, (0..3).map(|r| (local[PSI_EPS + r], errors[order][r][c])));
                     *slot = ring.add(slot, &ring.lift(a));
                     for j in 0..order {
-                        // T^(k-1-j) H F^(k-1-j) of eps^(j), of which the part of the earth and of g has one T more
+                        // T^(k-1-j) H F^(k-1-j) of eps^(j), of which the part of the earth and of g has one T
+                        // more
                         let k = order - 1 - j;
                         for (power, x) in
                             [(k, dot(&functional[k], &turned[j])), (k + 1, dot(&functional[k], &drift[j]))]
@@ -417,8 +425,9 @@ impl<'a> Turning<'a> {
         out
     }
 
-    /// `psi^n` at the end of the rotation. With `eps = sum E_j exp(i j angle)` it is `exp(F t)` of what it was, the integral of that times
-    /// `E_0`, and `R_j exp(i j angle) - exp(F t) R_j` times `E_j`, `R_j = (i j c - F T)^-1`.
+    /// `psi^n` at the end of the rotation. With `eps = sum E_j exp(i j angle)` it is `exp(F t)` of what it
+    /// was, the integral of that times `E_0`, and `R_j exp(i j angle) - exp(F t) R_j` times `E_j`,
+    /// `R_j = (i j c - F T)^-1`.
     fn moved<R: LiftField>(
         &self,
         ring: &R,

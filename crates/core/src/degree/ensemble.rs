@@ -95,9 +95,10 @@ pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>
     (degrees, stairs)
 }
 
-/// The size of the claim (see [`obsdeg_exact::certainty`]): a row is a row of `H F^k`, of degree k in
-/// the rates, times `S_i`, whose entries are products of at most six sines and cosines per factor, and of `C_c^n`. Torqued rates make it
-/// one more in the rates, and what torquer errors add in turns is of degree one in pi.
+/// The size of the claim (see [`obsdeg_exact::certainty`]): a row is a row of `H F^k`, of degree k in the
+/// rates, times `S_i`, whose entries are products of at most six sines and cosines per factor, and of
+/// `C_c^n`. Torqued rates make it one more in the rates, and what torquer errors add in turns is of degree
+/// one in pi.
 fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     let scheme = platform.scheme();
     let generic = !scheme.generic_names().is_empty();
@@ -111,7 +112,8 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
         if scheme.by_course() { scheme.positions.iter().filter(|p| p.rotation.is_some()).count() } else { 0 };
     let harmonics = platform.errors().harmonics();
     let turning_bits = rotations as f64 * courses::bits(harmonics);
-    // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
+    // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most
+    // sqrt(15) together, with margin
     let bits = 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0;
     Claim {
         unknowns,
@@ -125,8 +127,9 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     }
 }
 
-/// What turns add to the bits of a row: a turn is `C J E(u)`, of products of at most six entries of `C_c^n`, with denominators 2^3 each and the
-/// cube of that of a root, and of an angle with a denominator of its own; every turn adds one.
+/// What turns add to the bits of a row: a turn is `C J E(u)`, of products of at most six entries of `C_c^n`,
+/// with denominators 2^3 each and the cube of that of a root, and of an angle with a denominator of its own;
+/// every turn adds one.
 fn torquer_bits(platform: &Platform) -> f64 {
     let steps: Vec<_> = platform.paths().iter().flatten().collect();
     let half_turn = 180_000_000_000u64;
@@ -151,7 +154,8 @@ mod tests {
         claim(&platform, &verdicts.degrees, verdicts.values[0].roots().order)
     }
 
-    /// By hand: p1 p2 has 15 unknowns and the rank profile 2 6 8, so three orders, each with a rank and 15 memberships.
+    /// By hand: p1 p2 has 15 unknowns and the rank profile 2 6 8, so three orders, each with a rank and 15
+    /// memberships.
     #[test]
     fn what_is_claimed() {
         let p1_p2 = Claim { unknowns: 15, decisions: 48, order: 24, row_degree: 3, row_bits: 16.0 };

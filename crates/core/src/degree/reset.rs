@@ -1,6 +1,6 @@
-//! The degrees of a scheme under reset carry, position by position: psi of a position occurs in its rows alone, so it
-//! is eliminated there, and what is left concerns the coefficients. The whole staircase holds a matrix of all unknowns
-//! by all unknowns instead.
+//! The degrees of a scheme under reset carry, position by position: psi of a position occurs in its rows
+//! alone, so it is eliminated there, and what is left concerns the coefficients. The whole staircase holds a
+//! matrix of all unknowns by all unknowns instead.
 
 use obsdeg_exact::Echelon;
 
@@ -92,7 +92,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
-        /// Two ways to the same verdicts: cardinal and other attitudes, rotating segments, any terms and latitudes.
+        /// Two ways to the same verdicts: cardinal and other attitudes, rotating segments, any terms and
+        /// latitudes.
         #[test]
         fn position_by_position_is_all_at_once(
             places in prop::collection::vec(prop::array::uniform3(-4i32..=4), 1..7),

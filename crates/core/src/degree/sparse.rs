@@ -91,8 +91,8 @@ mod tests {
         assert!(span.contains(&row([5, -5, 1, 2])));
     }
 
-    /// By hand: two orders for each of eight shifts of a few columns, one shift of many; in each every row meets every
-    /// row before it, in all columns.
+    /// By hand: two orders for each of eight shifts of a few columns, one shift of many; in each every row
+    /// meets every row before it, in all columns.
     #[test]
     fn products_by_hand() {
         assert_eq!(products_of_short_vectors(3, 10), 16 * 3 * 3 * 10);

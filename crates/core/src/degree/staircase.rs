@@ -49,9 +49,9 @@ pub fn climb<R: DerivativeRows>(
     degrees
 }
 
-/// For every unknown those that it cannot be told from: the others of the null vectors of minimal support that it is
-/// in. It depends on the null space alone, on no basis of it, and is mutual; an observable unknown and one that is not
-/// excited have none.
+/// For every unknown those that it cannot be told from: the others of the null vectors of minimal support
+/// that it is in. It depends on the null space alone, on no basis of it, and is mutual; an observable unknown
+/// and one that is not excited have none.
 pub fn partners(unknowns: usize, stairs: &[Echelon]) -> Vec<Vec<usize>> {
     stairs.last().map_or_else(|| vec![Vec::new(); unknowns], Echelon::companions)
 }

@@ -1,7 +1,7 @@
 //! Arithmetic expressions, and their values in a prime field and in floating point.
 //!
-//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are held in a list, operands before what is
-//! made of them, so that nothing walks a tree as deep as a file is long.
+//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are held in a
+//! list, operands before what is made of them, so that nothing walks a tree as deep as a file is long.
 
 use std::ops::Range;
 
@@ -234,12 +234,12 @@ impl Expression {
     }
 }
 
-/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots of
-/// integers, exponents integers.
+/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots
+/// of integers, exponents integers.
 ///
 /// # Errors
-/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for other
-/// functions and exponents.
+/// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for
+/// other functions and exponents.
 pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
     let syntax = |i: usize, expected| ExpressionError::Syntax {
         expected,
@@ -338,7 +338,8 @@ pub fn from_i128(f: &Field, x: i128) -> u64 {
     if x < 0 { f.neg(image) } else { image }
 }
 
-/// The constants that every model knows unless it gives the name another meaning: `pi`, and a degree in radians.
+/// The constants that every model knows unless it gives the name another meaning: `pi`, and a degree in
+/// radians.
 pub fn constant(name: &str) -> Option<f64> {
     match name {
         "pi" => Some(std::f64::consts::PI),
@@ -347,7 +348,8 @@ pub fn constant(name: &str) -> Option<f64> {
     }
 }
 
-/// The value of an expression in floating point, with the names' values from `at`: NaN for a name that it does not know.
+/// The value of an expression in floating point, with the names' values from `at`: NaN for a name that it
+/// does not know.
 pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     let mut values: Vec<f64> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {
@@ -373,8 +375,8 @@ pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     values.last().copied().unwrap_or(f64::NAN)
 }
 
-/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends: `latitude`,
-/// `latitude_deg`.
+/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends:
+/// `latitude`, `latitude_deg`.
 pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {
         let b: Vec<char> = b.chars().collect();
@@ -402,7 +404,8 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         .map(|(_, _, k)| k.clone())
 }
 
-/// What could have been meant by `name`: the nearest of the known names, or which there are (the first of very many).
+/// What could have been meant by `name`: the nearest of the known names, or which there are (the first of
+/// very many).
 pub(crate) fn among(name: &str, known: &[String]) -> String {
     match nearest(name, known) {
         Some(near) => format!("did you mean `{near}`?"),

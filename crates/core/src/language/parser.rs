@@ -271,7 +271,8 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     Ok(Value { shape, entries, start })
 }
 
-/// `atan2(y, x)`, the angle of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, off the negative x-axis, where it jumps.
+/// `atan2(y, x)`, the angle of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, off the negative
+/// x-axis, where it jumps.
 fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Value> {
     let [Value { shape: Shape::SCALAR, entries: y, .. }, Value { shape: Shape::SCALAR, entries: x, .. }] =
         arguments

@@ -1,7 +1,8 @@
-//! Vectors, matrices and quaternions in expressions: every operation on them becomes operations on their components as it is read, so that
-//! what comes out are expressions of scalars.
+//! Vectors, matrices and quaternions in expressions: every operation on them becomes operations on their
+//! components as it is read, so that what comes out are expressions of scalars.
 //!
-//! A vector is a column. Quaternions are vectors of four, (w, x, y, z) with Hamilton's product; `R(q)` turns as `v -> q v q*` does where
+//! A vector is a column. Quaternions are vectors of four, (w, x, y, z) with Hamilton's product; `R(q)` turns
+//! as `v -> q v q*` does where
 //! |q| = 1, and is |q|^2 times that elsewhere: it is polynomial in q.
 
 use std::fmt;

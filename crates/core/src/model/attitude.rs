@@ -58,8 +58,8 @@ pub struct Turned {
     pub angle: Angle,
 }
 
-/// `C_c^n` of Euler angles, then turned: `C exp([a x] t)` about a platform axis, `exp([b x] t) C` about a geographic
-/// one; `exp([a x] t)` is the transpose of the passive elementary matrix.
+/// `C_c^n` of Euler angles, then turned: `C exp([a x] t)` about a platform axis, `exp([b x] t) C` about a
+/// geographic one; `exp([a x] t)` is the transpose of the passive elementary matrix.
 pub(crate) fn c_n<R: Ring>(
     ring: &R,
     euler: &Euler,

@@ -5,8 +5,9 @@ use obsdeg_exact::SplitMix64;
 use super::scheme::Scheme;
 
 impl Scheme {
-    /// The stream of `seed` for one purpose and this scheme ([`SplitMix64::of`]). Everything takes part but what moves
-    /// no verdict: the names and descriptions, the numbers of a simulation, requirements and gimbals.
+    /// The stream of `seed` for one purpose and this scheme ([`SplitMix64::of`]). Everything takes part but
+    /// what moves no verdict: the names and descriptions, the numbers of a simulation, requirements and
+    /// gimbals.
     pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
         SplitMix64::of(seed, purpose, &self.canonical())
     }

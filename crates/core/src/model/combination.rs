@@ -85,8 +85,8 @@ impl At<'_> {
     }
 }
 
-/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of its parts
-/// at random values.
+/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of
+/// its parts at random values.
 pub(crate) fn row_of(
     expression: &Expression,
     names: &Names<'_>,
@@ -125,8 +125,8 @@ pub(crate) fn row_of(
     if linear { Ok(row) } else { Err(not_linear()) }
 }
 
-/// Refuses a combination that is zero, whatever the unknowns and the rates are: `row` is its row at rates that were
-/// drawn.
+/// Refuses a combination that is zero, whatever the unknowns and the rates are: `row` is its row at rates
+/// that were drawn.
 pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), ExpressionError> {
     if row.iter().any(|x| *x != 0) {
         return Ok(());
@@ -138,7 +138,8 @@ pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), Expre
     })
 }
 
-/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are known.
+/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are
+/// known.
 pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionError> {
     let parsed = parse(text)?;
     let mut rng = SplitMix64::of(1, "combination", &[text]);

@@ -31,8 +31,8 @@ impl Dwell {
     /// The dwell of the paper's positions, 1000 s.
     pub const PAPER: Self = Self { nanoseconds: 1_000_000_000_000 };
 
-    /// The dwell of so many seconds, to 1e-9 s. Sweeps go beyond what is admitted for a scheme: `None` outside 1e-9 to
-    /// 1e9 s.
+    /// The dwell of so many seconds, to 1e-9 s. Sweeps go beyond what is admitted for a scheme: `None`
+    /// outside 1e-9 to 1e9 s.
     pub fn from_seconds(seconds: f64) -> Option<Self> {
         let nanoseconds = (seconds * 1e9).round();
         (1.0..=1e18).contains(&nanoseconds).then_some(Self { nanoseconds: nanoseconds as u64 })

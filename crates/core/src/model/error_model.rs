@@ -1,4 +1,5 @@
-//! How unknown coefficients enter: the drift of the gyros and the errors of the accelerometers at any attitude.
+//! How unknown coefficients enter: the drift of the gyros and the errors of the accelerometers at any
+//! attitude.
 
 use super::attitude::{Matrix3, unit};
 use super::geometry::SignedAxis;
@@ -26,15 +27,16 @@ impl ErrorModel {
         &self.terms
     }
 
-    /// While the platform turns about one axis, drifts and errors of the accelerometers in n are trigonometric polynomials of the angle of this
-    /// degree: one for `C_c^n`, one for each component that a coefficient multiplies.
+    /// While the platform turns about one axis, drifts and errors of the accelerometers in n are
+    /// trigonometric polynomials of the angle of this degree: one for `C_c^n`, one for each component that a
+    /// coefficient multiplies.
     pub fn harmonics(&self) -> usize {
         1 + self.terms.iter().map(|t| t.factors.len()).max().unwrap_or(0)
     }
 
     /// The rows of `eps^n = C E D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
-    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are torqued, in c; it is asked for
-    /// where a torquer error is unknown.
+    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are
+    /// torqued, in c; it is asked for where a torquer error is unknown.
     pub fn drift_rows<R: Ring>(
         &self,
         ring: &R,
@@ -51,14 +53,15 @@ impl ErrorModel {
         self.rows(ring, c, of)
     }
 
-    /// The rows of the error of the accelerometers in `Z^n` at any attitude `C`, with the specific force `f = C^T (0,1,0)`: three rows, one
-    /// column per coefficient.
+    /// The rows of the error of the accelerometers in `Z^n` at any attitude `C`, with the specific force
+    /// `f = C^T (0,1,0)`: three rows, one column per coefficient.
     pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
         let f = c[1].clone();
         self.rows(ring, c, |source| (source == Source::Force).then_some(&f))
     }
 
-    /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per coefficient.
+    /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per
+    /// coefficient.
     pub fn accelerometer_columns<R: Ring>(&self, ring: &R, f: &[R::Element; 3]) -> Columns<R::Element> {
         self.rows(ring, &unit(ring), |source| (source == Source::Force).then_some(f))
     }
@@ -68,8 +71,8 @@ impl ErrorModel {
         self.rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
     }
 
-    /// One column per coefficient, in n: along the input axis, times the components of what the term is a function of (3); zero where `of`
-    /// says nothing of it.
+    /// One column per coefficient, in n: along the input axis, times the components of what the term is a
+    /// function of (3); zero where `of` says nothing of it.
     fn rows<'a, R: Ring>(
         &self,
         ring: &R,

@@ -184,7 +184,8 @@ impl Geometry {
         [self.X, self.Y, self.Z]
     }
 
-    /// Checks that every gyro is right-handed and that the three input axes of gyros and of accelerometers differ.
+    /// Checks that every gyro is right-handed and that the three input axes of gyros and of accelerometers
+    /// differ.
     ///
     /// # Errors
     /// [`GeometryError`] naming the sensor.

@@ -1,11 +1,11 @@
 //! The gimbals: which turns about which axis, how far each turns, and the gimbal angles of an attitude.
 //!
-//! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first factor acts on geographic
-//! components: a change of alpha turns everything inside about North, an axis fixed to the base, so alpha is
-//! the *outer* gimbal. Its last factor acts on platform components: a change of gamma turns the platform
-//! alone, about Z_p, so gamma is the *inner* gimbal. Beta turns the *middle* gimbal about the axis `Mx(alpha)
-//! e_y`, which the outer gimbal carries along and the inner one does not move: Up where alpha = 0. The
-//! matrices are passive: a positive angle turns the platform left-handed about these axes.
+//! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first factor
+//! acts on geographic components: a change of alpha turns everything inside about North, an axis fixed to the
+//! base, so alpha is the *outer* gimbal. Its last factor acts on platform components: a change of gamma turns
+//! the platform alone, about Z_p, so gamma is the *inner* gimbal. Beta turns the *middle* gimbal about the
+//! axis `Mx(alpha) e_y`, which the outer gimbal carries along and the inner one does not move: Up where alpha
+//! = 0. The matrices are passive: a positive angle turns the platform left-handed about these axes.
 
 use std::fmt;
 
@@ -195,8 +195,8 @@ impl Gimbals {
             .any(|angles| (0..3).all(|k| within(angles[k], limit(k))))
     }
 
-    /// The name and attitude of a position, or of a point of a rotating segment (every degree of it is looked at), that
-    /// the gimbals do not reach.
+    /// The name and attitude of a position, or of a point of a rotating segment (every degree of it is looked
+    /// at), that the gimbals do not reach.
     pub fn beyond(&self, position: &Position) -> Option<(String, String)> {
         let name = || position.name.clone();
         if !self.reach(&position.angles) {

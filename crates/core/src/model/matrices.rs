@@ -1,4 +1,5 @@
-//! The platform's matrices in numbers: F, H and `S_i` of (8) and (9), for readers who build a filter or check by hand.
+//! The platform's matrices in numbers: F, H and `S_i` of (8) and (9), for readers who build a filter or check
+//! by hand.
 
 use nalgebra::DMatrix;
 
@@ -8,8 +9,8 @@ use super::scheme::{Scheme, SchemeError};
 use super::slew::W_IE;
 
 /// The linear model of a scheme: `l' = F l`, `Z = H l` at every position, and `l = S_i x` at the start of
-/// position i, where x holds the unknowns of the scheme and l the local ones of a position: psi^n (rad), the drift
-/// eps^n (rad/s) and, where errors of the accelerometers are unknown, these (g).
+/// position i, where x holds the unknowns of the scheme and l the local ones of a position: psi^n (rad), the
+/// drift eps^n (rad/s) and, where errors of the accelerometers are unknown, these (g).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformMatrices {
     /// Names of the unknowns x, in the order of the columns of every `S_i`.
@@ -19,7 +20,8 @@ pub struct PlatformMatrices {
     /// H of (9), one row per observed component: Z1, Z3, with errors of the accelerometers Z1, Z2, Z3, then a
     /// measured azimuth if there is one; Z in rad (or g).
     pub h: DMatrix<f64>,
-    /// `S_i` of every position, in order; psi in rad, coefficients in rad/s, rad/s/g, and in g for accelerometers.
+    /// `S_i` of every position, in order; psi in rad, coefficients in rad/s, rad/s/g, and in g for
+    /// accelerometers.
     pub s: Vec<DMatrix<f64>>,
 }
 
@@ -51,8 +53,8 @@ pub enum MatricesError {
     },
 }
 
-/// F, H and `S_i` of a scheme at the rates `[wN, wU]` of the earth in rad/s, see [`earth_rates`]; the latitude of the
-/// scheme itself is not asked. Turns between positions take no time here.
+/// F, H and `S_i` of a scheme at the rates `[wN, wU]` of the earth in rad/s, see [`earth_rates`]; the
+/// latitude of the scheme itself is not asked. Turns between positions take no time here.
 ///
 /// Source: (8), (9) of Ding, Cai, Huang, J. NUDT 39(1), 2017; `S_i` by the carry of the scheme.
 ///

@@ -1,14 +1,17 @@
-//! Errors of a bench that are not among the unknowns of a scheme: the other terms of the error model, and errors of
-//! the site and of the stated attitudes. Each is one column beside those of the unknowns.
+//! Errors of a bench that are not among the unknowns of a scheme: the other terms of the error model, and
+//! errors of the site and of the stated attitudes. Each is one column beside those of the unknowns.
 //!
-//! A column says what one unit (SI) of the error adds to the truth, in n: to `psi^n` while a position lasts, to the
-//! drift `eps^n`, and to the output `Z^n`. Errors of the site are *value of the scheme minus true value*. Psi turns by
-//! the difference of the rate with which the platform is torqued (from the stated values) and the true rate:
+//! A column says what one unit (SI) of the error adds to the truth, in n: to `psi^n` while a position lasts,
+//! to the drift `eps^n`, and to the output `Z^n`. Errors of the site are *value of the scheme minus true
+//! value*. Psi turns by the difference of the rate with which the platform is torqued (from the stated
+//! values) and the true rate:
 //!
 //! - latitude: `d omega_ie/dL = (-wU, wN, 0)`, a drift in rad/s per rad;
-//! - azimuth of the North reference: the rate of a frame turned about the vertical, `(0, 1, 0) x omega_ie = (0, 0, -wN)`;
+//! - azimuth of the North reference: the rate of a frame turned about the vertical,
+//!   `(0, 1, 0) x omega_ie = (0, 0, -wN)`;
 //! - magnitude of the earth rate: `(wN, wU, 0)` per part of it;
-//! - magnitude of gravity (true minus stated): the vertical component of the specific force, `(0, 1, 0)` in Z;
+//! - magnitude of gravity (true minus stated): the vertical component of the specific force, `(0, 1, 0)` in
+//!   Z;
 //! - attitude of one position: `psi^n` is `C e_k` larger while the position lasts, axis k of the platform.
 
 use super::attitude::{Matrix3, product};
@@ -68,8 +71,8 @@ pub struct OmittedModel {
     turning: Option<Scheme>,
 }
 
-/// Terms of the error model that `unknowns` leaves out. A lower triangle among the unknowns makes the rest of its
-/// matrix the definition of the platform axes, which is no error.
+/// Terms of the error model that `unknowns` leaves out. A lower triangle among the unknowns makes the rest of
+/// its matrix the definition of the platform axes, which is no error.
 fn omitted_families(unknowns: &Unknowns) -> Vec<Term> {
     let has = |term: Term| unknowns.terms().contains(&term);
     let defined = |whole: Term, triangle: Term| has(whole) || has(triangle);
@@ -113,8 +116,8 @@ impl OmittedModel {
         &self.terms
     }
 
-    /// Scheme whose turns torquer errors act on: the given one, with a torquer error among its unknowns. `None` where
-    /// no turn is stated or psi^n is not carried, so that torquers act at the earth rate alone.
+    /// Scheme whose turns torquer errors act on: the given one, with a torquer error among its unknowns.
+    /// `None` where no turn is stated or psi^n is not carried, so that torquers act at the earth rate alone.
     pub fn turning(&self) -> Option<&Scheme> {
         self.turning.as_ref()
     }
@@ -132,8 +135,8 @@ impl OmittedModel {
         })
     }
 
-    /// Drift `eps^n` (3 x terms) where `C_c^n` is `c`, the rate of torquing in c is `rate`, the earth rate `earth`
-    /// (North, Up).
+    /// Drift `eps^n` (3 x terms) where `C_c^n` is `c`, the rate of torquing in c is `rate`, the earth rate
+    /// `earth` (North, Up).
     pub fn drift_rows<R: Ring>(
         &self,
         ring: &R,
@@ -170,8 +173,8 @@ impl OmittedModel {
         out
     }
 
-    /// What the turns that lead to station `i` leave in psi^n (3 x terms), as in section 10 of the method; `None`
-    /// where no turn does.
+    /// What the turns that lead to station `i` leave in psi^n (3 x terms), as in section 10 of the method;
+    /// `None` where no turn does.
     pub fn turned<R: Ring>(&self, point: &Point<R>, i: usize) -> Option<Columns<R::Element>> {
         let ring = &point.ring;
         let mut sum: Option<Columns<R::Element>> = None;
@@ -191,8 +194,8 @@ impl OmittedModel {
         sum
     }
 
-    /// `S_i` of every station with one more column per term behind those of the unknowns. `point` has the turns of
-    /// [`Self::turning`].
+    /// `S_i` of every station with one more column per term behind those of the unknowns. `point` has the
+    /// turns of [`Self::turning`].
     pub fn blocks<R: Ring>(&self, platform: &Platform, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         let (n, m) = (platform.names().len(), self.terms.len());

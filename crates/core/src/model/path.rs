@@ -1,8 +1,9 @@
 //! The way from one position to the next, exactly: turns whose axes and angles have images in a prime field.
 //!
-//! A torquer error acts while the platform turns, so what a slew leaves in psi depends on its path: a turn by `phi` about the unit vector `u`
-//! of c adds `C_c^n(from) J E(u)` to `psi^n`, `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`, which is the integral of
-//! `exp([u x] t)` from 0 to `phi` (fast against the earth rate).
+//! A torquer error acts while the platform turns, so what a slew leaves in psi depends on its path: a turn by
+//! `phi` about the unit vector `u` of c adds `C_c^n(from) J E(u)` to `psi^n`,
+//! `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`, which is the integral of `exp([u x] t)`
+//! from 0 to `phi` (fast against the earth rate).
 
 use std::fmt;
 use std::str::FromStr;
@@ -44,7 +45,8 @@ impl Path {
 }
 
 impl Path {
-    /// The turns of the gimbals from one position to the next; `None` for generic angles, and where a rotation has left the Euler angles.
+    /// The turns of the gimbals from one position to the next; `None` for generic angles, and where a
+    /// rotation has left the Euler angles.
     pub fn gimbals(from: &Position, to: &Position) -> Option<Vec<PathStep>> {
         if from.rotation.is_some() {
             return None;
@@ -138,8 +140,8 @@ pub enum PathStep {
         /// Right-handed.
         angle: Angle,
     },
-    /// About the middle gimbal axis, on the platform at the attitude of these Euler angles: `Mz(gamma)^T e_y`, against the hands of the passive
-    /// matrices.
+    /// About the middle gimbal axis, on the platform at the attitude of these Euler angles:
+    /// `Mz(gamma)^T e_y`, against the hands of the passive matrices.
     Middle {
         /// gamma.
         gamma: Angle,
@@ -282,8 +284,8 @@ impl PathStep {
         TurnAt { axis, cos_sin: self.angle().turn().cos_sin_f64(), angle: phi }
     }
 
-    /// In a prime field where pi has the image `pi`; `None` when the axis has none, or the turn is not what the floating-point one
-    /// seemed to be: `to` is the attitude after it.
+    /// In a prime field where pi has the image `pi`; `None` when the axis has none, or the turn is not what
+    /// the floating-point one seemed to be: `to` is the attitude after it.
     pub(super) fn at_field(
         &self,
         roots: &RootField,
@@ -328,8 +330,8 @@ fn into_c<R: Ring>(ring: &R, c: &Matrix3<R::Element>, v: &[R::Element; 3]) -> [R
     std::array::from_fn(|j| ring.dot((0..3).map(|i| (&c[i][j], &v[i]))))
 }
 
-/// The axis in c of the turn from one attitude to another by an angle of the given cosine and sine, which has the direction `about` in
-/// floating point; `None` when the angle is another, or the axis has no image.
+/// The axis in c of the turn from one attitude to another by an angle of the given cosine and sine, which has
+/// the direction `about` in floating point; `None` when the angle is another, or the axis has no image.
 fn direct(
     roots: &RootField,
     from: &Matrix3<u64>,

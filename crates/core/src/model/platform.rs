@@ -50,7 +50,8 @@ pub struct Point<R: Ring> {
 pub struct Block<E> {
     /// The columns (unknowns of the scheme) that occur: psi, then the coefficients.
     pub columns: Vec<usize>,
-    /// One row per local unknown, one entry per column listed; the last three are empty where no error of the accelerometers is unknown.
+    /// One row per local unknown, one entry per column listed; the last three are empty where no error of the
+    /// accelerometers is unknown.
     pub rows: [Box<[E]>; LOCAL],
 }
 
@@ -140,8 +141,8 @@ impl Platform {
         &self.paths
     }
 
-    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi block depends on the carry;
-    /// section 10: torquer errors add to psi^n in every turn).
+    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi
+    /// block depends on the carry; section 10: torquer errors add to psi^n in every turn).
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
@@ -153,7 +154,8 @@ impl Platform {
         }
         let first_d = self.names.len() - self.coefficients();
         let accelerometers = self.observed().accelerometers;
-        // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation ended
+        // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation
+        // ended
         let mut psi_block = &point.attitudes[0];
         let mut composed;
         let mut handed_on: Option<Matrix3<R::Element>> = None;
@@ -249,7 +251,8 @@ impl Platform {
         &self.errors
     }
 
-    /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift itself.
+    /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift
+    /// itself.
     pub fn error_terms(&self) -> &[ErrorTerm] {
         self.errors.terms()
     }
@@ -273,8 +276,8 @@ pub fn local_dynamics<R: Ring>(ring: &R, w_n: &R::Element, w_u: &R::Element) -> 
     f
 }
 
-/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)` and the error of the accelerometers if it is unknown: the components (1, 3, with that error 2, and
-/// [`AZIMUTH`] for a measured `psi_y^n`) with their rows.
+/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)` and the error of the accelerometers if it is unknown: the
+/// components (1, 3, with that error 2, and [`AZIMUTH`] for a measured `psi_y^n`) with their rows.
 pub fn local_output<R: Ring>(ring: &R, observed: Observed) -> Vec<(usize, [R::Element; LOCAL])> {
     let unit = |j: usize, value: R::Element| {
         let mut row: [R::Element; LOCAL] = std::array::from_fn(|_| ring.zero());
@@ -381,8 +384,8 @@ impl RandomValues {
         self.generic.iter_mut().find(|(n, _)| n == name).map(|(_, z)| *z = minus_one).is_some()
     }
 
-    /// `(cos, sin)` of an angle in a conjugate of the field. The imaginary unit may have gone to its negative there: then
-    /// exp(i angle) at a fixed tangent is inverted.
+    /// `(cos, sin)` of an angle in a conjugate of the field. The imaginary unit may have gone to its negative
+    /// there: then exp(i angle) at a fixed tangent is inverted.
     pub fn angle_cos_sin(&self, roots: &RootField, angle: &Angle) -> (u64, u64) {
         let f = roots.field;
         let flip = roots.imaginary_unit() != self.roots.imaginary_unit();
@@ -475,8 +478,8 @@ impl RandomValues {
     }
 }
 
-/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an attitude, and ends at another where it
-/// is the only one; `arrives` says whether a way ends where it should.
+/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an
+/// attitude, and ends at another where it is the only one; `arrives` says whether a way ends where it should.
 ///
 /// # Errors
 /// The index of the first position whose way `at` does not know, or that does not lead there.

@@ -18,7 +18,8 @@ pub struct Pose {
     pub attitude: Option<Matrix3<f64>>,
     /// How the platform turns while Z is observed, as in `X_p:90`.
     pub rotation: Option<String>,
-    /// How it is reached; `None` for the first position, between generic angles, and where no turn as the scheme states it leads there.
+    /// How it is reached; `None` for the first position, between generic angles, and where no turn as the
+    /// scheme states it leads there.
     pub way: Option<Way>,
 }
 
@@ -112,8 +113,8 @@ mod tests {
         assert_eq!(poses("", &astray)[1].way, None);
     }
 
-    /// Gimbal by gimbal the turns end at the attitude: alpha about N, beta about the middle axis, gamma about Z_p, each against the hands of the
-    /// passive matrices.
+    /// Gimbal by gimbal the turns end at the attitude: alpha about N, beta about the middle axis, gamma about
+    /// Z_p, each against the hands of the passive matrices.
     #[test]
     fn the_turns_of_gimbals_lead_there() {
         let found = poses("path = 'gimbals'", &["angles_deg = [10, 25, 40]", "angles_deg = [130, -50, 70]"]);

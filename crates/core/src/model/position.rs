@@ -189,7 +189,8 @@ impl Position {
 }
 
 impl Position {
-    /// Is reached the shortest way, with the rate that it says: for a scheme in which it is reached from another attitude.
+    /// Is reached the shortest way, with the rate that it says: for a scheme in which it is reached from
+    /// another attitude.
     pub fn take_shortest_way(&mut self) {
         let rate_deg_s = self.slew.as_ref().and_then(|s| s.rate_deg_s);
         self.slew = rate_deg_s.map(|rate| SlewTo { rate_deg_s: Some(rate), ..SlewTo::default() });

@@ -1,5 +1,5 @@
-//! Which numbers are admitted: generous physical ranges, the same for files, options and the library. Within them
-//! squares and products stay far from the ends of what a double holds.
+//! Which numbers are admitted: generous physical ranges, the same for files, options and the library. Within
+//! them squares and products stay far from the ends of what a double holds.
 
 use std::fmt;
 

@@ -1,4 +1,5 @@
-//! What a file says of the records of its runs: what columns are called, their units, and how the intervals at rest are found.
+//! What a file says of the records of its runs: what columns are called, their units, and how the intervals
+//! at rest are found.
 
 use std::collections::BTreeMap;
 
@@ -23,8 +24,9 @@ pub struct Recording {
     pub missing: Vec<f64>,
 }
 
-/// Intervals at rest are where the scatter within a window about each sample, all columns together, is within so many times that of the beginning of the
-/// record. (D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014, doi:10.1109/ICRA.2014.6907297.)
+/// Intervals at rest are where the scatter within a window about each sample, all columns together, is within
+/// so many times that of the beginning of the record. (D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014,
+/// doi:10.1109/ICRA.2014.6907297.)
 #[derive(Debug, Clone, PartialEq)]
 pub struct Still {
     /// The known inputs of a model whose scatter decides; of a scheme the forces.

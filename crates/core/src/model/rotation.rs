@@ -123,8 +123,8 @@ impl FromStr for SlewAxis {
 pub struct SlewTo {
     /// The rate in deg/s; `None`: that of the conditions.
     pub rate_deg_s: Option<f64>,
-    /// About this axis; `None`: the shortest way, half turns about the axis in n (North, Up, East) whose first
-    /// component that is not zero is positive.
+    /// About this axis; `None`: the shortest way, half turns about the axis in n (North, Up, East) whose
+    /// first component that is not zero is positive.
     pub axis: Option<SlewAxis>,
     /// By this angle, right-handed; `None`: the shorter way about the axis, half turns right-handed.
     pub angle: Option<Angle>,

@@ -243,9 +243,11 @@ pub enum SchemeError {
 
 /// A turn in 1e-9 degrees.
 const FULL_TURN: i64 = 360_000_000_000;
-/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of them.
+/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of
+/// them.
 const STATION_STEPS: i64 = 8;
-/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would say too little.
+/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would
+/// say too little.
 const _: () = {
     let mut term = 0;
     while term < Term::ALL.len() {
@@ -419,7 +421,8 @@ impl Scheme {
         self.simulation.slew_rate_deg_s.is_some() || self.positions.iter().any(own)
     }
 
-    /// The scheme without a position; the one behind it is reached from another attitude then, the shortest way.
+    /// The scheme without a position; the one behind it is reached from another attitude then, the shortest
+    /// way.
     pub fn without_position(&self, index: usize) -> Self {
         let mut rest = self.clone();
         rest.positions =
@@ -445,7 +448,8 @@ impl Scheme {
         self.positions.iter().any(|p| p.rotation.is_some())
     }
 
-    /// Whether rotations are judged by the course of Z while they go on, not at attitudes of the arc: where not only drifts are unknown.
+    /// Whether rotations are judged by the course of Z while they go on, not at attitudes of the arc: where
+    /// not only drifts are unknown.
     pub fn by_course(&self) -> bool {
         self.rotates() && (self.unknowns.have(Source::Rate) || self.unknowns.have(Source::Force))
     }
@@ -461,10 +465,11 @@ impl Scheme {
         terms.map(|(_, effect)| effect).collect::<Vec<_>>().into()
     }
 
-    /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric polynomials of its
-    /// angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for each component of g^c): any
-    /// 2m+1 different angles of the arc span what all of it spans. The end is added, where psi is handed on. Of a rotation that is judged by its
-    /// course both ends are there, and no row is taken at them.
+    /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric
+    /// polynomials of its angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for
+    /// each component of g^c): any 2m+1 different angles of the arc span what all of it spans. The end is
+    /// added, where psi is handed on. Of a rotation that is judged by its course both ends are there, and no
+    /// row is taken at them.
     pub fn stations(&self) -> Vec<Station<'_>> {
         let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0);
         let course = self.by_course();

@@ -1,4 +1,5 @@
-//! What a scheme says of a run: steps, noise, true values, priors, requirements. All in the units of the report.
+//! What a scheme says of a run: steps, noise, true values, priors, requirements. All in the units of the
+//! report.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -92,8 +93,8 @@ impl DriftNoise {
         }
     }
 
-    /// Its density in deg/sqrt(h) (angle random walk) with steps of `dt` seconds: a bias held for one step turns by
-    /// `x dt`, and independent steps add up in squares.
+    /// Its density in deg/sqrt(h) (angle random walk) with steps of `dt` seconds: a bias held for one step
+    /// turns by `x dt`, and independent steps add up in squares.
     pub fn density_deg_sqrt_h(self, dt: f64) -> f64 {
         match self {
             Self::OneStep(x) => x * (dt / 3600.0).sqrt(),
@@ -359,7 +360,8 @@ pub(crate) fn meant(name: &str) -> String {
     }
 }
 
-/// What could have been meant by `name` among the `names` of unknowns and their families: the nearest, or all there is (the first of very many).
+/// What could have been meant by `name` among the `names` of unknowns and their families: the nearest, or all
+/// there is (the first of very many).
 pub fn known(names: &[String], name: &str) -> String {
     let mut families: Vec<String> = families().collect();
     families.dedup();

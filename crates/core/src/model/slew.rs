@@ -65,13 +65,14 @@ pub fn cross(v: &[f64; 3]) -> Matrix3<f64> {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
-/// Turns that differ by less are one, in rad: rounding leaves 1e-15, angles of nine decimals are 1.7e-11 apart.
+/// Turns that differ by less are one, in rad: rounding leaves 1e-15, angles of nine decimals are 1.7e-11
+/// apart.
 const SAME: f64 = 1e-12;
 /// A component of an axis that counts for the sense of a half turn.
 const COMPONENT: f64 = 1e-6;
 
-/// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. Of the two vectors of a half turn the one whose
-/// first component that is not zero is positive.
+/// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. Of the two vectors of a
+/// half turn the one whose first component that is not zero is positive.
 pub fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     let sine = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]].map(|x| x / 2.0);
     let length = norm(&sine);
@@ -139,9 +140,10 @@ impl Slew {
         Self { from: *from, rate: vector.map(|x| x / duration_s), duration_s }
     }
 
-    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn. Without an axis it is the shortest
-    /// way; of two shortest ways, half turns, the one about the axis in n (North, Up, East) whose first component that is not zero is
-    /// positive. So `from -> from P`, `to -> to P`, a turn of the platform axes, leaves the turn in n as it is.
+    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn. Without
+    /// an axis it is the shortest way; of two shortest ways, half turns, the one about the axis in n (North,
+    /// Up, East) whose first component that is not zero is positive. So `from -> from P`, `to -> to P`, a
+    /// turn of the platform axes, leaves the turn in n as it is.
     ///
     /// # Errors
     /// [`NoWay`] when a turn about its axis, or by its angle, does not lead there.
@@ -227,7 +229,8 @@ mod tests {
         }
     }
 
-    /// Half turns in n are the same for every turn of the platform axes, and go about the axis that the rule says.
+    /// Half turns in n are the same for every turn of the platform axes, and go about the axis that the rule
+    /// says.
     #[test]
     fn half_turns_are_chosen_in_n() {
         let names = crate::model::attitude::cardinal_names();
@@ -266,7 +269,8 @@ mod tests {
     }
 
     proptest! {
-        /// Short of half a turn, by as little as the last of nine decimals, the shorter way is taken; at it, the rule.
+        /// Short of half a turn, by as little as the last of nine decimals, the shorter way is taken; at it,
+        /// the rule.
         #[test]
         fn close_to_half_a_turn(v in prop::array::uniform3(-1f64..1.0), short in 1e-11f64..1e-3) {
             prop_assume!(norm(&v) > 0.1 && v[0].abs() > 1e-3);

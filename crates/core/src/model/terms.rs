@@ -34,7 +34,8 @@ pub enum Term {
     K0,
     /// Accelerometer scale factor: the specific force along the input axis.
     K1,
-    /// Misalignment of the input axes: the specific force along the input axes of the other two accelerometers.
+    /// Misalignment of the input axes: the specific force along the input axes of the other two
+    /// accelerometers.
     M6,
     /// Lower triangle of M6: the accelerometers define the platform axes.
     M3,
@@ -57,7 +58,8 @@ pub enum Source {
     Force,
 }
 
-/// How one unknown coefficient enters: along the input axis of its sensor, times components of what it is a function of.
+/// How one unknown coefficient enters: along the input axis of its sensor, times components of what it is a
+/// function of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ErrorTerm {
     /// The input axis of the gyro or accelerometer.
@@ -391,8 +393,8 @@ impl Default for Unknowns {
 }
 
 impl Unknowns {
-    /// A comma-separated list of terms such as `F,I,O,S` and families (`gyros`, `accelerometers`, `all`), or `drift`; `frame` says
-    /// which misalignments there are.
+    /// A comma-separated list of terms such as `F,I,O,S` and families (`gyros`, `accelerometers`, `all`), or
+    /// `drift`; `frame` says which misalignments there are.
     ///
     /// # Errors
     /// [`TermError`].

@@ -134,7 +134,8 @@ impl Solver<'_> {
     }
 }
 
-/// (8) and (9) as text, with names for the local unknowns and then for the derivatives of `eps^n`, which changes while the platform turns.
+/// (8) and (9) as text, with names for the local unknowns and then for the derivatives of `eps^n`, which
+/// changes while the platform turns.
 pub(crate) fn dynamics_text(
     w_n: &str,
     w_u: &str,

@@ -65,9 +65,10 @@ fn lead(platform: &Platform, support: &[usize]) -> usize {
     support.iter().find(constant).copied().unwrap_or(support[0])
 }
 
-/// A basis of the staircase beyond single unknowns: for every degree k, combinations that together with the unknowns of
-/// degree up to k and the combinations before span `V_k`. Sparse combinations of unknowns with coefficients that a
-/// person can read come first; what these leave is spanned by `psi^n` and `eps^n` at single positions.
+/// A basis of the staircase beyond single unknowns: for every degree k, combinations that together with the
+/// unknowns of degree up to k and the combinations before span `V_k`. Sparse combinations of unknowns with
+/// coefficients that a person can read come first; what these leave is spanned by `psi^n` and `eps^n` at
+/// single positions.
 pub(crate) fn combinations(
     platform: &Platform,
     verdicts: &Verdicts,

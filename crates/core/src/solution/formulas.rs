@@ -40,8 +40,8 @@ pub(crate) enum FormulasError {
     Engine(WorkerError),
 }
 
-/// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every position in the unknowns; where
-/// the platform turns `eps^n'` too.
+/// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every position
+/// in the unknowns; where the platform turns `eps^n'` too.
 ///
 /// # Errors
 /// [`FormulasError`].

@@ -6,7 +6,8 @@ use crate::language::{Expression, Node};
 const DEGREE: usize = 200;
 /// Intervals looked at before the rest counts as not resolved.
 const INTERVALS: usize = 1_000;
-/// Where one half of a turn is cut from the other, in t: no tangent of anybody's angle, so that no root lies at an end.
+/// Where one half of a turn is cut from the other, in t: no tangent of anybody's angle, so that no root lies
+/// at an end.
 const CUT: f64 = 1.037_128_492_311_7;
 /// A root is known to this, in rad.
 const WIDTH: f64 = 1e-8;
@@ -36,13 +37,13 @@ impl Rounded {
 pub(super) struct Roots {
     /// In degrees from 0 to 360, rising.
     pub(super) deg: Vec<f64>,
-    /// Whether these are certainly all; otherwise rounding, the degree, or roots very close together left some
-    /// undecided.
+    /// Whether these are certainly all; otherwise rounding, the degree, or roots very close together left
+    /// some undecided.
     pub(super) all: bool,
 }
 
-/// The coefficients of a polynomial in one name, lowest first, with the values of the others from `at`; `None` for what
-/// is no polynomial.
+/// The coefficients of a polynomial in one name, lowest first, with the values of the others from `at`;
+/// `None` for what is no polynomial.
 pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64) -> Option<Vec<Rounded>> {
     // each with the sum of the magnitudes that it is made of
     let mut values: Vec<Vec<(f64, f64)>> = Vec::with_capacity(e.nodes.len());
@@ -112,12 +113,12 @@ pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64)
     last.iter().all(|x| x.1.is_finite()).then(|| rounded.collect())
 }
 
-/// The angles in 0..360 degrees at which `sum c_k tan(angle/2)^k` vanishes, but for 180, where the tangent is infinite;
-/// `None` for the zero polynomial.
+/// The angles in 0..360 degrees at which `sum c_k tan(angle/2)^k` vanishes, but for 180, where the tangent is
+/// infinite; `None` for the zero polynomial.
 ///
-/// On `0..CUT` in t and in 1/t, both signs, the polynomial is written in Bernstein's basis: by Descartes' rule it has
-/// no root where all coefficients have one sign, and one where they change it once; other intervals are halved by de
-/// Casteljau's construction. A coefficient that its rounding exceeds has no sign.
+/// On `0..CUT` in t and in 1/t, both signs, the polynomial is written in Bernstein's basis: by Descartes'
+/// rule it has no root where all coefficients have one sign, and one where they change it once; other
+/// intervals are halved by de Casteljau's construction. A coefficient that its rounding exceeds has no sign.
 pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
     let zero = |c: &Rounded| c.value == 0.0 && c.error == 0.0;
     let used = coefficients.iter().rposition(|c| !zero(c))?;

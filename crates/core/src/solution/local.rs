@@ -100,8 +100,9 @@ pub(crate) fn local_observables(zeros: RateZeros, observed: Observed) -> Vec<Loc
     without_zeros(out, zeros)
 }
 
-/// The same where Z has an error of the accelerometers, a: `psi_z + a_x`, `a_y`, `psi_x - a_z`; `eps_x - wU psi_z`, then
-/// `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z` away from the poles; with a measured azimuth `psi_y`, and the last two in Z' and Za'.
+/// The same where Z has an error of the accelerometers, a: `psi_z + a_x`, `a_y`, `psi_x - a_z`;
+/// `eps_x - wU psi_z`, then `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z` away from the poles; with a
+/// measured azimuth `psi_y`, and the last two in Z' and Za'.
 fn with_accelerometers(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
     const UNIT: Rates = [0, 0];
     let observable = |order, row: &[(usize, i64, Rates)], solution: &[ZTerm]| LocalObservable {

@@ -1,6 +1,6 @@
-//! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies, and however
-//! strongly a reader thinks it does, the formula means the same: a quotient before one stands in brackets, unless it is
-//! a number.
+//! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies,
+//! and however strongly a reader thinks it does, the formula means the same: a quotient before one stands in
+//! brackets, unless it is a number.
 
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -14,7 +14,8 @@ use crate::model::ring::{Float, ManyDigits, Real, Ring, Text};
 pub(crate) struct Problem {
     /// Number of unknowns.
     pub unknowns: usize,
-    /// One equation per row: the unknowns that occur with the places of their coefficients, and its right side.
+    /// One equation per row: the unknowns that occur with the places of their coefficients, and its right
+    /// side.
     pub equations: Vec<(Vec<(usize, Place)>, Right)>,
     /// The outputs: the unknowns themselves, or sums of places times unknowns.
     pub outputs: Outputs,
@@ -56,8 +57,9 @@ pub(crate) enum Outputs {
     Sums(Vec<Vec<Place>>),
 }
 
-/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with `sum_i z_i rows[i] = sum_j
-/// y_j motion_j` over some unknowns `y_j` of the solution, given with their rows of minus the motion.
+/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with
+/// `sum_i z_i rows[i] = sum_j y_j motion_j` over some unknowns `y_j` of the solution, given with their rows
+/// of minus the motion.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Motion {
     /// Independent rows that span it.
@@ -75,8 +77,8 @@ fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
 const CERTAIN: f64 = 1e-9;
 
 impl Problem {
-    /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique).
-    /// The right sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
+    /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique). The right
+    /// sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
     pub(crate) fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
         let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), Right::Target(c));
         let mut equations: Vec<_> = (0..columns).map(equation).collect();
@@ -178,8 +180,9 @@ impl Problem {
         self.outputs_of(&ring, table, x).iter().map(ManyDigits::to_f64).collect()
     }
 
-    /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the right side, when the rounding of
-    /// the table alone may move a value by more than [`CERTAIN`] of the largest, or anything is not finite.
+    /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the right side,
+    /// when the rounding of the table alone may move a value by more than [`CERTAIN`] of the largest, or
+    /// anything is not finite.
     pub(crate) fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
         let m = self.equations.len();
         let mut a = DMatrix::zeros(m, self.unknowns);

@@ -38,7 +38,8 @@ pub(crate) struct Requested {
     pub verdict: Verdict,
 }
 
-/// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are looked at.
+/// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are
+/// looked at.
 pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -114,8 +115,8 @@ fn terms_of(
         .collect()
 }
 
-/// The coefficient of an unknown as text in the symbols of the formulas, at rates one: the expression where this
-/// unknown is one and the others are zero. It has been evaluated before, so nothing in it fails.
+/// The coefficient of an unknown as text in the symbols of the formulas, at rates one: the expression where
+/// this unknown is one and the others are zero. It has been evaluated before, so nothing in it fails.
 fn text_of(expression: &Expression, names: &Names<'_>, unknown: &str) -> String {
     let mut values: Vec<String> = Vec::with_capacity(expression.nodes.len());
     let integer = |i: usize| expression.integer_at(i);

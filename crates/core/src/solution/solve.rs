@@ -27,7 +27,8 @@ const RESIDUAL: f64 = 1e-9;
 pub enum FoundBy {
     /// Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in two prime fields.
     PrimeFields,
-    /// Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are the same.
+    /// Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are the
+    /// same.
     SymbolicEngine,
     /// Decimals from floating-point arithmetic.
     FloatingPoint,
@@ -109,7 +110,8 @@ pub(super) struct Key {
     pub(super) station: usize,
 }
 
-/// What enters a term: an unknown of the problem, times a factor, times an entry of a derivative of `C_c^n` by the angle of the turn.
+/// What enters a term: an unknown of the problem, times a factor, times an entry of a derivative of `C_c^n`
+/// by the angle of the turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contribution {
     pub(super) unknown: usize,
@@ -129,8 +131,8 @@ pub(super) struct Used {
 }
 
 impl Solver<'_> {
-    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is replaced by its row, at
-    /// rest or turning, in all tables; terms with decimals in floating point.
+    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
+    /// replaced by its row, at rest or turning, in all tables; terms with decimals in floating point.
     fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
             return self.holds_in_floats(terms, functional).unwrap_or(false);
@@ -275,8 +277,9 @@ impl Solver<'_> {
         Ok(Solved { terms, found_by, verification })
     }
 
-    /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and rates of the amounts, in
-    /// rows of the rotation itself up to order one. `None` when these do not span it, which they always do.
+    /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and
+    /// rates of the amounts, in rows of the rotation itself up to order one. `None` when these do not span
+    /// it, which they always do.
     fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<Motion>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;

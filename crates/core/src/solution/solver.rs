@@ -130,7 +130,8 @@ impl<'a> Solver<'a> {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }
 
-    /// Number of sparse combinations that are not listed, because their coefficients were not found, or in decimals alone.
+    /// Number of sparse combinations that are not listed, because their coefficients were not found, or in
+    /// decimals alone.
     pub(crate) fn left_out(&self) -> usize {
         self.left_out
     }
@@ -219,8 +220,8 @@ impl<'a> Solver<'a> {
         self.tables_at_the_rates().chain([(0, &self.tables.other_rates)])
     }
 
-    /// The exponents of the rates and the images of the numbers of some values, given as vectors in the order of `all_tables`, as
-    /// the images are.
+    /// The exponents of the rates and the images of the numbers of some values, given as vectors in the order
+    /// of `all_tables`, as the images are.
     pub(super) fn split_rates(&self, values: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;

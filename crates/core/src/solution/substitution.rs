@@ -49,8 +49,8 @@ impl<'a, R: Ring> Substitution<'a, R> {
         }
     }
 
-    /// The sum of the terms as a functional of the unknowns; `coefficients` hold the rates of the earth and of turning,
-    /// and `turning` is the rate at which a position turns.
+    /// The sum of the terms as a functional of the unknowns; `coefficients` hold the rates of the earth and
+    /// of turning, and `turning` is the rate at which a position turns.
     pub(super) fn sum(
         &self,
         terms: &[Term],
@@ -94,7 +94,8 @@ impl<'a, R: Ring> Substitution<'a, R> {
         if self.frame == Frame::N || term.azimuth {
             return in_n(if term.azimuth { AZIMUTH } else { term.component }, term.order);
         }
-        // Z^c = C_n^c Z^n, and C_n^c changes where the platform turns: sum of binomials times (w^j d^j C_n^c) Z^n^(k-j)
+        // Z^c = C_n^c Z^n, and C_n^c changes where the platform turns: sum of binomials times (w^j d^j C_n^c)
+        // Z^n^(k-j)
         let c = &self.point.attitudes[term.station];
         let turned = self.stations[term.station].turned.as_ref();
         let mut out: [R::Element; MOVING] = std::array::from_fn(|_| ring.zero());

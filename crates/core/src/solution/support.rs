@@ -45,8 +45,8 @@ pub(crate) fn short_support(
     best.map(|(_, _, used)| used)
 }
 
-/// The first independent rows of an order up to that with which `target` is in their span. Most targets are in the span
-/// of a few rows out of many columns, so the columns grow with the rows that are looked at.
+/// The first independent rows of an order up to that with which `target` is in their span. Most targets are
+/// in the span of a few rows out of many columns, so the columns grow with the rows that are looked at.
 fn spanning(field: Field, rows: &[Vec<u64>], order: &[usize], target: &[u64]) -> Vec<usize> {
     let mut looked_at = 16.min(order.len());
     loop {

@@ -1,4 +1,5 @@
-//! The rows that solutions are made of: the local observables of every position, in two fields, four embeddings each.
+//! The rows that solutions are made of: the local observables of every position, in two fields, four
+//! embeddings each.
 
 use obsdeg_exact::RootField;
 use obsdeg_exact::radical::embeddings;
@@ -14,8 +15,9 @@ use crate::model::platform::{RandomValues, Sample};
 pub(crate) struct Table {
     /// Field and embedding.
     pub sample: Sample,
-    /// One row per station and local observable, station by station; then, if the scheme rotates, one per station of
-    /// [`motion_rows`]. Where rotations are judged by their course, the bases of `V_0, V_1, ...` instead.
+    /// One row per station and local observable, station by station; then, if the scheme rotates, one per
+    /// station of [`motion_rows`]. Where rotations are judged by their course, the bases of `V_0, V_1, ...`
+    /// instead.
     pub rows: Vec<Vec<u64>>,
 }
 

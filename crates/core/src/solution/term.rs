@@ -2,7 +2,8 @@
 
 use crate::degree::coefficient::Coefficient;
 
-/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns there.
+/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns
+/// there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// Index of the station.

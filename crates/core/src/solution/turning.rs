@@ -1,7 +1,9 @@
-//! What a turning platform adds to derivatives of Z: those of `C_c^n` and of `eps^n` by the angle of the turn.
+//! What a turning platform adds to derivatives of Z: those of `C_c^n` and of `eps^n` by the angle of the
+//! turn.
 //!
-//! While the platform turns at the rate w, `eps^n` changes with its attitude, so that `Z''` holds `w d eps^n/d angle`
-//! beside what it holds at rest; and `Z` in platform axes is `C_n^c Z^n` with a `C_n^c` that changes as well.
+//! While the platform turns at the rate w, `eps^n` changes with its attitude, so that `Z''` holds
+//! `w d eps^n/d angle` beside what it holds at rest; and `Z` in platform axes is `C_n^c Z^n` with a `C_n^c`
+//! that changes as well.
 
 use crate::model::Platform;
 use crate::model::attitude::{Matrix3, product};
@@ -35,8 +37,8 @@ impl<R: Ring> Ring for Dual<'_, R> {
     }
 }
 
-/// The derivative of the given order of `C_c^n` by the angle of a turn about `axis`: `C' = C [a x]` about a platform
-/// axis a, `C' = [b x] C` about a geographic axis b.
+/// The derivative of the given order of `C_c^n` by the angle of a turn about `axis`: `C' = C [a x]` about a
+/// platform axis a, `C' = [b x] C` about a geographic axis b.
 pub(crate) fn attitude_derivative<R: Ring>(
     ring: &R,
     c: &Matrix3<R::Element>,
@@ -52,7 +54,8 @@ pub(crate) fn attitude_derivative<R: Ring>(
     })
 }
 
-/// `d eps^n/d angle`: three rows, one column per coefficient. Where the platform turns no torquer error is unknown.
+/// `d eps^n/d angle`: three rows, one column per coefficient. Where the platform turns no torquer error is
+/// unknown.
 pub(crate) fn drift_derivative<R: Ring>(
     platform: &Platform,
     ring: &R,
@@ -67,8 +70,8 @@ pub(crate) fn drift_derivative<R: Ring>(
     rows.map(|row| row.into_iter().map(|[_, slope]| slope).collect())
 }
 
-/// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform stands. `Z1''`
-/// is the only second derivative that solutions use (16).
+/// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform
+/// stands. `Z1''` is the only second derivative that solutions use (16).
 pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
     if !platform.scheme().rotates() || platform.scheme().by_course() {
         return Vec::new();

@@ -1,8 +1,9 @@
 //! Addition theorems: functions of sums and multiples of arguments, written by functions of the parts.
 //!
-//! `exp(2x + y)` is `exp(x)^2 exp(y)`, `cos(a - b)` is `cos a cos b + sin a sin b`, and a quarter turn more exchanges sine and cosine. What is
-//! left are functions of arguments without such relations, whose values may then be independent (`independent`). Arguments are compared as
-//! polynomials with rational coefficients in slots, and in nodes that are none, so nothing rests on a random point.
+//! `exp(2x + y)` is `exp(x)^2 exp(y)`, `cos(a - b)` is `cos a cos b + sin a sin b`, and a quarter turn more
+//! exchanges sine and cosine. What is left are functions of arguments without such relations, whose values
+//! may then be independent (`independent`). Arguments are compared as polynomials with rational coefficients
+//! in slots, and in nodes that are none, so nothing rests on a random point.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -41,8 +42,8 @@ struct Family {
     parts: HashMap<usize, Parts>,
 }
 
-/// The same system with every function of a sum or a multiple of other arguments written by functions of these; `None` where there is
-/// none, or where multiples are large.
+/// The same system with every function of a sum or a multiple of other arguments written by functions of
+/// these; `None` where there is none, or where multiples are large.
 pub(super) fn written_apart(compiled: &Compiled) -> Option<Compiled> {
     let families = [false, true].map(|real| family(&compiled.dag, real));
     let [circular, real] = &families;
@@ -80,7 +81,8 @@ fn is_function_of_sums(function: Function) -> bool {
     matches!(function, Sin | Cos | Tan | Exp | Tanh)
 }
 
-/// The arguments of exp and tanh, or of sin, cos and tan: which are kept, and how the others are made of them.
+/// The arguments of exp and tanh, or of sin, cos and tan: which are kept, and how the others are made of
+/// them.
 fn family(dag: &Dag, real: bool) -> Family {
     let mut out = Family::default();
     // kept arguments, reduced: the leading monomial, the polynomial, and what it is of the kept ones
@@ -134,8 +136,8 @@ fn family(dag: &Dag, real: bool) -> Family {
     out
 }
 
-/// Takes reduced polynomials off `rest` as far as their leading monomials are there; what was taken, by kept arguments. `None` beyond
-/// small numbers.
+/// Takes reduced polynomials off `rest` as far as their leading monomials are there; what was taken, by kept
+/// arguments. `None` beyond small numbers.
 fn reduce(rest: &mut Polynomial, reduced: &[(Monomial, Polynomial, Vec<Ratio>)]) -> Option<Vec<Ratio>> {
     let mut made = vec![(0, 1); reduced.len()];
     for (leading, polynomial, row) in reduced {
@@ -295,7 +297,8 @@ mod tests {
     use crate::system::work::{Work, WorkLimit};
     use obsdeg_exact::{Reals, SplitMix64};
 
-    /// Rewritten graphs have the values they had, in 256 bits at a random point, and no two functions of related arguments.
+    /// Rewritten graphs have the values they had, in 256 bits at a random point, and no two functions of
+    /// related arguments.
     #[test]
     fn values_stay_what_they_are() {
         for (output, functions) in [

@@ -1,11 +1,12 @@
-//! Derivative rows without a lane per unknown in every node: the differentials of `h, L_f h, L_f^2 h, ...` along the trajectory, carried
-//! backwards through the graph.
+//! Derivative rows without a lane per unknown in every node: the differentials of `h, L_f h, L_f^2 h, ...`
+//! along the trajectory, carried backwards through the graph.
 //!
-//! With `d(L_f^k h) = sum_s w_s dx_s` over states and unknown constants, `w_s` series in time, the next one is
-//! `w_s' + sum_r w_r d(f_r)/dx_s`: a derivative, and one sweep through the graph against its direction (Hermann, Krener 1977,
-//! doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order k is the value at the start, k! times that of
-//! the Taylor coefficient. For orders below K series of length K - k are enough. So n unknowns and n orders take
-//! n^2 numbers in memory instead of n^3, and n^2 products of series, n^3 log n operations where these are transformed.
+//! With `d(L_f^k h) = sum_s w_s dx_s` over states and unknown constants, `w_s` series in time, the next one
+//! is `w_s' + sum_r w_r d(f_r)/dx_s`: a derivative, and one sweep through the graph against its direction
+//! (Hermann, Krener 1977, doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order
+//! k is the value at the start, k! times that of the Taylor coefficient. For orders below K series of length
+//! K - k are enough. So n unknowns and n orders take n^2 numbers in memory instead of n^3, and n^2 products
+//! of series, n^3 log n operations where these are transformed.
 
 use std::cell::RefCell;
 
@@ -257,7 +258,8 @@ impl<'a, S: Values> Adjoint<'a, S> {
         }
     }
 
-    /// The first `n` coefficients of the products of a series with others, each with a key of its own; what is constant is a series of one.
+    /// The first `n` coefficients of the products of a series with others, each with a key of its own; what
+    /// is constant is a series of one.
     fn products(&self, w: &[S::Element], factors: &[(usize, &[S::Element])], n: usize) -> Vec<Series<S>> {
         let f = &self.f;
         if factors.iter().all(|(_, b)| b.len() > 1) {

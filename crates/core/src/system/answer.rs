@@ -52,14 +52,15 @@ pub struct SystemAnalysis {
     pub time: Option<String>,
     /// Equations that hold at the start; their differentials count as rows of order 0.
     pub constraints: Vec<String>,
-    /// Factors that stand for those of these equations that are products: verdicts are those where they are zero.
+    /// Factors that stand for those of these equations that are products: verdicts are those where they are
+    /// zero.
     pub constraint_factors: Vec<ConstraintFactor>,
     /// Combinations of unknowns that the model asks for.
     pub combinations: Vec<SystemCombination>,
     /// Number of independent directions that change no output.
     pub unobservable_directions: usize,
-    /// Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on the
-    /// order only if `rests_on_bound`.
+    /// Scalings, translations and polynomials among the unobservable directions, exactly; up to the bound on
+    /// the order only if `rests_on_bound`.
     pub symmetries: Vec<SymmetryReport>,
     /// Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was
     /// found describes it.
@@ -211,10 +212,11 @@ pub struct SystemOptions {
     pub seed: u64,
     /// Whether solving expressions and the number of solutions are wanted.
     pub solutions: bool,
-    /// How much work counting solutions may take: millions of products of two coefficients, at each of two points.
+    /// How much work counting solutions may take: millions of products of two coefficients, at each of two
+    /// points.
     pub count_limit: u64,
-    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by themselves, else 2n+4, and at
-    /// least 60 without arbitrary inputs.
+    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by
+    /// themselves, else 2n+4, and at least 60 without arbitrary inputs.
     pub order: Option<usize>,
 }
 
@@ -265,7 +267,8 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     Ok(out)
 }
 
-/// The output that a state is, or the derivative of such a state that it is, if it is nothing else: `y`, `y'`, `y''`.
+/// The output that a state is, or the derivative of such a state that it is, if it is nothing else: `y`,
+/// `y'`, `y''`.
 fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Option<String> {
     if model.experiments > 1 || !model.segments.is_empty() || !matches!(unknown.role, Role::State(_)) {
         return None;

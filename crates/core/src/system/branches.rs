@@ -19,8 +19,8 @@ pub struct BranchSide {
     pub condition: String,
     /// True if the argument depends on the time.
     pub of_time: bool,
-    /// True if the file gives the value of the argument at the start: known starts and constants, and no second
-    /// segment.
+    /// True if the file gives the value of the argument at the start: known starts and constants, and no
+    /// second segment.
     pub given: bool,
 }
 
@@ -32,8 +32,8 @@ fn varies(compiled: &Compiled, slot: usize) -> bool {
     }
 }
 
-/// True if the value of a node at the start of the first segment is given: it depends on states with given starts
-/// and on given constants alone.
+/// True if the value of a node at the start of the first segment is given: it depends on states with given
+/// starts and on given constants alone.
 fn is_given(compiled: &Compiled, node: usize) -> bool {
     slots_of(&compiled.dag, node).into_iter().all(|s| match compiled.roles[s] {
         Role::State(i) => compiled.starts[i].is_some_and(|start| !open(compiled, start)),

@@ -1,8 +1,9 @@
 //! Random points at which the constraints of a model hold, in a prime field (in real numbers: `newton`).
 //!
-//! Constraints are solved block by block. A block is all that hold no value left to choose but those of one of them; all of its constraints but one
-//! must be linear in the values that are solved for. So they leave a line, and on it the last one is a polynomial in one unknown, of which
-//! a root in the field is drawn: as for `|q| = 1`, or the six conditions of a rotation matrix.
+//! Constraints are solved block by block. A block is all that hold no value left to choose but those of one
+//! of them; all of its constraints but one must be linear in the values that are solved for. So they leave a
+//! line, and on it the last one is a polynomial in one unknown, of which a root in the field is drawn: as for
+//! `|q| = 1`, or the six conditions of a rotation matrix.
 
 use std::collections::BTreeSet;
 
@@ -22,9 +23,9 @@ const TRIES: usize = 60;
 const TRIES_OF_POINTS: usize = 4;
 /// Highest degree of a constraint on a line.
 const MAX_DEGREE: usize = 400;
-/// Operations of a root of a polynomial and of its interpolation, for the square of its degree: powers modulo the
-/// polynomial up to the prime, 61 squares of it and as many products by halves, each with its remainder, and a division of
-/// two numbers for every pair of points.
+/// Operations of a root of a polynomial and of its interpolation, for the square of its degree: powers modulo
+/// the polynomial up to the prime, 61 squares of it and as many products by halves, each with its remainder,
+/// and a division of two numbers for every pair of points.
 const PER_SQUARE: u64 = 512;
 
 /// A constraint that is a product, and the factor that was taken for it.
@@ -36,8 +37,8 @@ pub struct ConstraintFactor {
     pub factor: String,
     /// Other factors of the constraint, by which it could hold as well.
     pub others: Vec<String>,
-    /// True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is the
-    /// first with a real point at which the others are not zero, unknowns alone last.
+    /// True if the factor is the one that is zero at the values under `[simulation.values]`; otherwise it is
+    /// the first with a real point at which the others are not zero, unknowns alone last.
     pub given: bool,
 }
 
@@ -128,8 +129,8 @@ impl Constraint<'_> {
         out[self.node]
     }
 
-    /// The coefficients of the numerator in some slots, then what is without them; `None` where it is not linear, as a random second
-    /// difference shows.
+    /// The coefficients of the numerator in some slots, then what is without them; `None` where it is not
+    /// linear, as a random second difference shows.
     fn linear(&self, slots: &[usize], values: &[u64], rng: &mut SplitMix64) -> Option<Vec<u64>> {
         let f = self.f;
         if self.degree(slots).1 > 0 {
@@ -156,7 +157,8 @@ impl Constraint<'_> {
     }
 }
 
-/// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero: a random solution.
+/// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero:
+/// a random solution.
 ///
 /// # Errors
 /// [`NotHeld`]: the constraint that could not be solved, or that the work is beyond its limit.

@@ -1,9 +1,9 @@
 //! The unknowns of a rational system, one after the other, by elimination over a prime field.
 //!
-//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative is the
-//! next equation. Then parameters and signals are left, at any time; these equations and their derivatives are linear
-//! in the products of parameters that occur, and elimination over rational functions of the signals shows which
-//! parameters stand alone.
+//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative
+//! is the next equation. Then parameters and signals are left, at any time; these equations and their
+//! derivatives are linear in the products of parameters that occur, and elimination over rational functions
+//! of the signals shows which parameters stand alone.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -266,8 +266,8 @@ impl Elimination<'_> {
         Ok(rest)
     }
 
-    /// Finds the parameters that stand alone in the relations, at the lowest order. Beyond its degree a parameter
-    /// counts as known at first, since others may be solved by it, and then as open.
+    /// Finds the parameters that stand alone in the relations, at the lowest order. Beyond its degree a
+    /// parameter counts as known at first, since others may be solved by it, and then as open.
     fn parameters(&mut self, relations: Vec<Equation>) -> Result<(), OverLimit> {
         let system = self.system;
         let (degrees, beyond) = (&system.degrees[system.states.len()..], system.beyond);
@@ -316,8 +316,8 @@ impl Elimination<'_> {
         Ok(())
     }
 
-    /// The expression with what is not observable, but found once a free parameter is given, replaced: the free one
-    /// goes with it.
+    /// The expression with what is not observable, but found once a free parameter is given, replaced: the
+    /// free one goes with it.
     fn without_unobservable(&mut self, value: &Fraction) -> Result<Fraction, OverLimit> {
         let n = self.system.states.len();
         let mut out = value.clone();
@@ -329,7 +329,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Reduces the equations as linear ones in the products of the open parameters; parameters that stand alone.
+    /// Reduces the equations as linear ones in the products of the open parameters; parameters that stand
+    /// alone.
     fn standing_alone(
         &mut self,
         pool: &[Polynomial],
@@ -393,8 +394,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Whether an expression holds no unknown of a higher degree than its own, and no derivative of an order too far
-    /// beyond that.
+    /// Whether an expression holds no unknown of a higher degree than its own, and no derivative of an order
+    /// too far beyond that.
     fn is_solution(&self, unknown: usize, e: &Fraction) -> bool {
         let Some(degree) = self.system.degrees[unknown] else { return false };
         let variables = self.system.states.iter().chain(&self.system.parameters);

@@ -48,7 +48,8 @@ impl Values for Field {
     }
 
     /// Nothing in a prime field knows the value of a function. Where values are independent of each other
-    /// (`independent`) any element serves, the same one for the same argument; those of one argument belong together.
+    /// (`independent`) any element serves, the same one for the same argument; those of one argument belong
+    /// together.
     fn function(&self, function: Function, x: &u64) -> Option<u64> {
         let (f, one) = (self, Field::one(self));
         let exponential = || any(f, 1, *x);
@@ -175,7 +176,8 @@ impl<const N: usize> Values for Reals<N> {
         (!x.is_zero()).then(|| x.is_positive())
     }
 
-    /// A rational number of 60 bits: of the first attempts in (1/4, 5/4); then of either sign, the larger the later.
+    /// A rational number of 60 bits: of the first attempts in (1/4, 5/4); then of either sign, the larger the
+    /// later.
     fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Ball<N> {
         let digits = Ball::from_i64((rng.next_u64() >> 4) as i64).shifted(-60);
         let size = digits.add(&Ball::from_i64(1).shifted(-2));

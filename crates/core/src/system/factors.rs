@@ -1,4 +1,5 @@
-//! Constraints that are products: one of their factors is zero, and verdicts are those where the same one always is.
+//! Constraints that are products: one of their factors is zero, and verdicts are those where the same one
+//! always is.
 
 use std::collections::HashMap;
 
@@ -36,11 +37,11 @@ struct Product {
 }
 
 impl SystemModel {
-    /// The same with one factor in the place of each constraint that is a product. Of the choices whose factors have
-    /// a real point together with all other constraints, at which the model is defined: factors that are zero at the
-    /// values of the file before all others, then those at whose point no other factor is zero, then factors
-    /// that are no unknown alone (by x = 0 a model loses more than by y = z), then the first as written. Unchanged
-    /// where there is no product, or no such point was found.
+    /// The same with one factor in the place of each constraint that is a product. Of the choices whose
+    /// factors have a real point together with all other constraints, at which the model is defined: factors
+    /// that are zero at the values of the file before all others, then those at whose point no other factor
+    /// is zero, then factors that are no unknown alone (by x = 0 a model loses more than by y = z), then the
+    /// first as written. Unchanged where there is no product, or no such point was found.
     pub(super) fn by_one_factor(self) -> Self {
         let all = self.constraints.iter().enumerate();
         let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
@@ -94,8 +95,8 @@ impl SystemModel {
         });
     }
 
-    /// Number of factors that are zero at a real point at which the constraints hold and the model is defined; `None`
-    /// where none was found.
+    /// Number of factors that are zero at a real point at which the constraints hold and the model is
+    /// defined; `None` where none was found.
     fn zero_at_point(&self, factors: &[&Factor], spent: &mut Spent) -> Option<usize> {
         let mut model = self.clone();
         model.work_limit = model.work_limit.within(OPERATIONS - spent.operations);
@@ -112,8 +113,8 @@ impl SystemModel {
         Some(factors.iter().filter(is_zero).count())
     }
 
-    /// The only factor that is zero at the values under `[simulation.values]`, where these are complete, in all
-    /// experiments; `None` of a product whose factors are zero in different experiments.
+    /// The only factor that is zero at the values under `[simulation.values]`, where these are complete, in
+    /// all experiments; `None` of a product whose factors are zero in different experiments.
     fn zero_at_given(&self, factors: &[Factor]) -> Option<Option<usize>> {
         let zero = |experiment: usize| {
             let value = |name: &str| self.simulation.value(name, experiment).unwrap_or(f64::NAN);

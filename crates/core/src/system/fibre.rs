@@ -1,15 +1,17 @@
 //! How many solutions there are for an unknown: the values it takes among all points with the same outputs.
 //!
-//! At a random point of a prime field the Taylor coefficients of the outputs are numbers. That they are these numbers is
-//! a system of polynomial equations in the unknowns and the coefficients of the states; an unknown that a symmetry moves
-//! keeps its value (nothing observable depends on it). A Groebner basis says how many values each observable unknown has
-//! over the algebraic closure: the degree of its minimal polynomial in the quotient ring.
+//! At a random point of a prime field the Taylor coefficients of the outputs are numbers. That they are these
+//! numbers is a system of polynomial equations in the unknowns and the coefficients of the states; an unknown
+//! that a symmetry moves keeps its value (nothing observable depends on it). A Groebner basis says how many
+//! values each observable unknown has over the algebraic closure: the degree of its minimal polynomial in the
+//! quotient ring.
 //!
-//! Which order is enough: let `L_k` be the field that the derivatives up to order k generate. If rank grows last at order
-//! h, `y^(h+1)` is algebraic over `L_h`; differentiating its minimal polynomial gives `y^(h+2)` in `L_(h+1)`, and so on: `L_(h+1)` holds
-//! all derivatives (the argument of Hong, Ovchinnikov, Pogudin, Yap 2020, doi:10.1002/cpa.21921). It needs a derivation
-//! of the unknowns, hence one segment, a generic start and no arbitrary input; elsewhere one solution is one, and more may
-//! become fewer. Orders beyond h+1 change nothing but make the equations easier to solve.
+//! Which order is enough: let `L_k` be the field that the derivatives up to order k generate. If rank grows
+//! last at order h, `y^(h+1)` is algebraic over `L_h`; differentiating its minimal polynomial gives `y^(h+2)`
+//! in `L_(h+1)`, and so on: `L_(h+1)` holds all derivatives (the argument of Hong, Ovchinnikov, Pogudin, Yap
+//! 2020, doi:10.1002/cpa.21921). It needs a derivation of the unknowns, hence one segment, a generic start
+//! and no arbitrary input; elsewhere one solution is one, and more may become fewer. Orders beyond h+1 change
+//! nothing but make the equations easier to solve.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +25,8 @@ use super::model::{Compiled, Role, SystemModel};
 use super::rows::{Layout, SystemRows, Unknown};
 use super::work;
 
-/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are decided.
+/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are
+/// decided.
 const BEYOND: usize = 3;
 /// Most solutions that are counted.
 const SOLUTIONS: usize = 64;
@@ -89,9 +92,9 @@ impl From<OverLimit> for NotCounted {
 /// The number of values of an unknown, or why it is not decided.
 pub(super) type Count = Result<usize, NotCounted>;
 
-/// The number of values that every unknown takes, in the order of the layout, as two random points in the two fields agree;
-/// with derivatives of the outputs up to the order that comes with it. At most `limit` products a point. What is not
-/// observable has no number.
+/// The number of values that every unknown takes, in the order of the layout, as two random points in the two
+/// fields agree; with derivatives of the outputs up to the order that comes with it. At most `limit` products
+/// a point. What is not observable has no number.
 pub(super) fn values_taken(
     model: &SystemModel,
     compiled: &Compiled,
@@ -348,8 +351,8 @@ pub(super) fn reached(
     out
 }
 
-/// How many derivatives of the outputs it takes until a state is in them at all, plus [`STATE`]: coefficients of a state weigh as
-/// much as the products that they are solved from.
+/// How many derivatives of the outputs it takes until a state is in them at all, plus [`STATE`]: coefficients
+/// of a state weigh as much as the products that they are solved from.
 fn state_weights(compiled: &Compiled) -> Vec<u32> {
     let mut weights = vec![0; compiled.rates(0).len()];
     let experiments = 0..compiled.experiments.len();

@@ -6,14 +6,15 @@ use obsdeg_exact::groebner::OverLimit;
 use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Ratio, gcd};
 
-/// Largest numerator and denominator of a coefficient. There are fewer such fractions than elements of the field, but not many
-/// fewer: whatever is recovered is checked in a second field.
+/// Largest numerator and denominator of a coefficient. There are fewer such fractions than elements of the
+/// field, but not many fewer: whatever is recovered is checked in a second field.
 const BOUND: u64 = 1 << 29;
 
 /// Terms with integer coefficients that share no divisor, the leading one positive and first.
 type Terms = Vec<(Monomial, i64)>;
 
-/// An expression in the names of its variables; `None` where it is zero in a denominator, or a coefficient is too large.
+/// An expression in the names of its variables; `None` where it is zero in a denominator, or a coefficient is
+/// too large.
 ///
 /// # Errors
 /// [`OverLimit`].

@@ -24,7 +24,8 @@ impl Dag {
         Some(self.quotient(pi, half_turn))
     }
 
-    /// The node as a small rational number, if it is one: made of numbers, and of constants whose values are known (`definite`).
+    /// The node as a small rational number, if it is one: made of numbers, and of constants whose values are
+    /// known (`definite`).
     pub(super) fn rational(&self, node: usize) -> Option<(i64, i64)> {
         // operands come before what is made of them
         let mut found: HashMap<usize, (i64, i64)> = HashMap::new();

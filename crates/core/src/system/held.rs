@@ -162,8 +162,9 @@ pub(super) fn distinct(nodes: &[usize]) -> Vec<usize> {
     nodes.iter().enumerate().filter_map(first).collect()
 }
 
-/// A list that begins with another of its entries at each attempt. Newton's steps follow the first constraints with
-/// independent gradients; where only others are independent at the point, these must come first.
+/// A list that begins with another of its entries at each attempt. Newton's steps follow the first
+/// constraints with independent gradients; where only others are independent at the point, these must come
+/// first.
 pub(super) fn turned(mut nodes: Vec<usize>, attempt: usize) -> Vec<usize> {
     let turn = attempt % nodes.len().max(1);
     nodes.rotate_left(turn);

@@ -1,17 +1,19 @@
-//! Functions whose values are independent of each other at a generic point: then random values stand for them, and prime
-//! fields decide as they do for rational models.
+//! Functions whose values are independent of each other at a generic point: then random values stand for
+//! them, and prime fields decide as they do for rational models.
 //!
-//! Let `u_1 .. u_m` be what exp and tanh are taken of, and the logarithms; let `v_1 .. v_l` be what sin, cos and tan are taken of, and
-//! the arc tangents. If no combination of the `u` with rational coefficients, not all zero, is constant, and none of the `v`, then
-//! all `exp u_i`, `exp(i v_j)`, logarithms and arc tangents together are algebraically independent over the rational functions of
-//! the unknowns: Ax's theorem (Ax 1971, doi:10.2307/1970774: the transcendence degree of `(w, exp w)` is at least the
-//! number of independent `w` plus the rank of their differentials), applied to the `u`, the `i v` and generic multiples of all variables, by
-//! induction over functions of functions. So a point with random values of the functions is a generic point, and the degree of every
-//! minor in these values is bounded as for any other variable (crates/README.md, *Certainty*).
+//! Let `u_1 .. u_m` be what exp and tanh are taken of, and the logarithms; let `v_1 .. v_l` be what sin, cos
+//! and tan are taken of, and the arc tangents. If no combination of the `u` with rational coefficients, not
+//! all zero, is constant, and none of the `v`, then all `exp u_i`, `exp(i v_j)`, logarithms and arc tangents
+//! together are algebraically independent over the rational functions of the unknowns: Ax's theorem (Ax 1971,
+//! doi:10.2307/1970774: the transcendence degree of `(w, exp w)` is at least the number of independent `w`
+//! plus the rank of their differentials), applied to the `u`, the `i v` and generic multiples of all
+//! variables, by induction over functions of functions. So a point with random values of the functions is a
+//! generic point, and the degree of every minor in these values is bounded as for any other variable
+//! (crates/README.md, *Certainty*).
 //!
-//! That no combination is constant is proven by the rank of their gradients, side by side at random points of a prime field: a rank modulo a
-//! prime is never too large. Where it is not full, or an argument is special (a given start or value, the time, a jump), nothing is
-//! said here, and real numbers of many digits decide.
+//! That no combination is constant is proven by the rank of their gradients, side by side at random points of
+//! a prime field: a rank modulo a prime is never too large. Where it is not full, or an argument is special
+//! (a given start or value, the time, a jump), nothing is said here, and real numbers of many digits decide.
 
 use std::collections::BTreeSet;
 
@@ -29,7 +31,8 @@ use crate::language::Function;
 /// Most points at which gradients are taken.
 const POINTS: usize = 32;
 
-/// What a function is to the argument above: with exponentials of the argument, or a logarithm itself; real or imaginary.
+/// What a function is to the argument above: with exponentials of the argument, or a logarithm itself; real
+/// or imaginary.
 fn family(function: Function) -> Option<(bool, bool)> {
     match function {
         Function::Exp | Function::Tanh => Some((false, true)),
@@ -40,7 +43,8 @@ fn family(function: Function) -> Option<(bool, bool)> {
     }
 }
 
-/// How many functions take part, if their values are proven to be independent, and there is a real point at which all are defined.
+/// How many functions take part, if their values are proven to be independent, and there is a real point at
+/// which all are defined.
 pub(super) fn independent_functions(
     model: &SystemModel,
     compiled: &Compiled,
@@ -128,8 +132,8 @@ fn functions(compiled: &Compiled) -> Vec<(usize, Function, usize)> {
     out
 }
 
-/// Whether what an argument depends on is at a generic value wherever a run or a segment begins, and the same in all of them; or
-/// a number that never changes.
+/// Whether what an argument depends on is at a generic value wherever a run or a segment begins, and the same
+/// in all of them; or a number that never changes.
 fn is_generic(model: &SystemModel, role: Role) -> bool {
     let changes = |name: &str| model.segments.iter().any(|s| s.constants.iter().any(|c| c.0 == name));
     let jumps = |name: &str| model.segments.iter().any(|s| s.carry.iter().any(|c| c.0 == name));
@@ -145,7 +149,8 @@ fn is_generic(model: &SystemModel, role: Role) -> bool {
     }
 }
 
-/// Whether no combination of these nodes is constant: their gradients by all that is generic, at some points side by side, have full rank.
+/// Whether no combination of these nodes is constant: their gradients by all that is generic, at some points
+/// side by side, have full rank.
 fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &mut SplitMix64) -> bool {
     let compiled = maker.compiled;
     let roots: Vec<usize> = nodes.iter().map(|n| n.1).collect();

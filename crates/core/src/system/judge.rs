@@ -52,12 +52,13 @@ pub struct Judgement {
     pub span: Option<Echelon>,
     /// The two prime fields of a rational model.
     pub fields: Option<[Field; 2]>,
-    /// Functions whose values are proven to be independent of each other, so that random ones stand for them; `None` where true values
-    /// were taken.
+    /// Functions whose values are proven to be independent of each other, so that random ones stand for them;
+    /// `None` where true values were taken.
     pub independent_functions: Option<usize>,
     /// Operations of the verdicts, at all points that were drawn.
     pub work: u64,
-    /// What is not observable would be so only beyond the bound on the order: it is not proven that there is nothing.
+    /// What is not observable would be so only beyond the bound on the order: it is not proven that there is
+    /// nothing.
     pub rests_on_bound: bool,
     /// Sides of the branches of abs and sign at the two points.
     pub sides: Vec<BranchSide>,
@@ -72,7 +73,8 @@ pub enum SystemCertainty {
     Digits(ByDigits),
 }
 
-/// How clear ranks were that real numbers decided. Decimal logarithms, relative to the largest entry of a row.
+/// How clear ranks were that real numbers decided. Decimal logarithms, relative to the largest entry of a
+/// row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByDigits {
     /// Decimal digits of the numbers at the first point and at the second.
@@ -176,8 +178,8 @@ impl<S: Values> At<S> {
     }
 }
 
-/// Climbs the staircase of a system at a random point of a field, and adds the operations to those that were `spent`,
-/// whether or not there is a verdict.
+/// Climbs the staircase of a system at a random point of a field, and adds the operations to those that were
+/// `spent`, whether or not there is a verdict.
 pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -302,8 +304,9 @@ fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singu
     }
 }
 
-/// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one modulo two
-/// primes, and so one with functions whose values are independent; any other in many digits. `bound` overrides the highest order.
+/// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one
+/// modulo two primes, and so one with functions whose values are independent; any other in many digits.
+/// `bound` overrides the highest order.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -311,8 +314,8 @@ pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Jud
     judge_compiled(model, &model.compile()?, seed, bound)
 }
 
-/// Judges a change of a judged model, on the same sides of abs and sign where it has as many. Adds the operations
-/// at all points to those that were `spent`, whether or not there is a verdict.
+/// Judges a change of a judged model, on the same sides of abs and sign where it has as many. Adds the
+/// operations at all points to those that were `spent`, whether or not there is a verdict.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -609,11 +612,12 @@ impl Judgement {
     }
 }
 
-/// What the error bound depends on: the degree and the coefficients of the polynomials that decide a rank (derivation:
-/// crates/README.md, *Certainty*).
+/// What the error bound depends on: the degree and the coefficients of the polynomials that decide a rank
+/// (derivation: crates/README.md, *Certainty*).
 ///
-/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k` grows by at most
-/// `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative and two products make of them.
+/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k`
+/// grows by at most `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative
+/// and two products make of them.
 fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
@@ -644,8 +648,9 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
     let bits = top_bits + (orders + 1.0) * step + n.max(1.0).log2();
     Claim {
         unknowns: layout.unknowns.len(),
-        // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here and at a generic point; that no
-        // unit vector comes an order early (if the ranks are right none comes late), and no column or entry of the last basis is zero by chance
+        // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here
+        // and at a generic point; that no unit vector comes an order early (if the ranks are right none comes
+        // late), and no column or entry of the last basis is zero by chance
         decisions: ATTEMPTS
             * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
                 + 2 * layout.unknowns.len()
@@ -690,8 +695,8 @@ fn times(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
     (x.0 + y.0, x.1 + y.1)
 }
 
-/// The derivatives in time of the variables that stand for functions: `E' = E u'` of exp and tanh, `(1 + t^2)/2 u'` for `t = tan(u/2)` of sin,
-/// cos and tan, `weight u'` of a logarithm and an arc tangent.
+/// The derivatives in time of the variables that stand for functions: `E' = E u'` of exp and tanh,
+/// `(1 + t^2)/2 u'` for `t = tan(u/2)` of sin, cos and tan, `weight u'` of a logarithm and an arc tangent.
 fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec<Fraction> {
     // derivatives of all nodes; a jet of an input is a variable
     let mut rates: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
@@ -726,7 +731,8 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
     out
 }
 
-/// Every node of a graph as a quotient of polynomials in the slots and in one variable for each function, over the integers.
+/// Every node of a graph as a quotient of polynomials in the slots and in one variable for each function,
+/// over the integers.
 fn fractions(dag: &Dag) -> Vec<Fraction> {
     let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {

@@ -174,7 +174,8 @@ pub struct SystemModel {
     pub own: Vec<Experiment>,
     /// Segments; none: one, as the model says.
     pub segments: Vec<Segment>,
-    /// What is zero at the start of every experiment: expressions of states, parameters and constants, with the equation as their text.
+    /// What is zero at the start of every experiment: expressions of states, parameters and constants, with
+    /// the equation as their text.
     pub constraints: Vec<PlacedExpression>,
     /// Factors that stand for constraints that are products.
     pub factors: Vec<ConstraintFactor>,
@@ -420,7 +421,8 @@ impl SystemModel {
         own.map_or(kind, |u| &u.1)
     }
 
-    /// A known constant in an experiment (counted from 0), before the first segment changes it: its own formula if it has one.
+    /// A known constant in an experiment (counted from 0), before the first segment changes it: its own
+    /// formula if it has one.
     pub fn constant_formula(&self, experiment: usize, i: usize) -> Option<&PlacedExpression> {
         let (named, constant) = &self.constants[i];
         let own = self.own.get(experiment).and_then(|e| e.constants.iter().find(|c| c.0 == named.name));
@@ -468,7 +470,8 @@ impl SystemModel {
     /// The graph of the system.
     ///
     /// # Errors
-    /// [`ModelError`] for names that are not known, are given twice or are taken, and for what is never defined.
+    /// [`ModelError`] for names that are not known, are given twice or are taken, and for what is never
+    /// defined.
     pub fn compile(&self) -> Result<Compiled, ModelError> {
         self.check()?;
         let found = self.states.len() + self.parameters.len();

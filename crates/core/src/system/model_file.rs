@@ -501,7 +501,8 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     Ok(model.by_one_factor())
 }
 
-/// Where keys stand in a text: the line that a key begins, or its place in an inline table, of the first part of the text.
+/// Where keys stand in a text: the line that a key begins, or its place in an inline table, of the first part
+/// of the text.
 struct Places<'t> {
     lines: HashMap<&'t str, usize>,
     inline: HashMap<&'t str, usize>,
@@ -543,8 +544,8 @@ impl<'t> Places<'t> {
 mod tests {
     use super::*;
 
-    /// The order of parameters in a file is that of its lines or of its inline table, by keys of every kind; the time for many
-    /// does not grow with their square.
+    /// The order of parameters in a file is that of its lines or of its inline table, by keys of every kind;
+    /// the time for many does not grow with their square.
     #[test]
     fn parameters_keep_the_order_of_the_file() {
         let order = |parameters: &str| {

@@ -10,7 +10,8 @@ use super::work::{Step, Work, product};
 /// Steps of Newton's method from one start: near a point they double the digits.
 const STEPS: usize = 80;
 /// Steps in a row that gain less than two bits each, near a point: at one whose gradients are independent
-/// none does. So many that what is left of the constraints falls far below what it is where they hold nowhere.
+/// none does. So many that what is left of the constraints falls far below what it is where they hold
+/// nowhere.
 const SLOW: usize = 40;
 /// Bits by which the residual after them is below one over the fourth power of the size of the point.
 const DEEP: f64 = 24.0;
@@ -28,8 +29,8 @@ const FAR: f64 = 0.5;
 const GAIN: f64 = 0.2;
 /// Relative residual, as a power of two, below which a constraint holds at values of double precision.
 const HELD: f64 = -40.0;
-/// Change of a constraint where its point changes by its size, relative to its terms and as a power of two, below
-/// which its gradient vanishes there.
+/// Change of a constraint where its point changes by its size, relative to its terms and as a power of two,
+/// below which its gradient vanishes there.
 const VANISHES: f64 = -16.0;
 /// Bits by which a step may be longer than the point is far from zero.
 const LONGEST: f64 = 6.0;
@@ -92,7 +93,8 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Constraints and their derivatives at a point; `None` where one is not defined, or beyond the limit of work.
+    /// Constraints and their derivatives at a point; `None` where one is not defined, or beyond the limit of
+    /// work.
     fn linear<const N: usize>(&self, values: &[Ball<N>]) -> Option<Linear<N>> {
         let signal = |s: usize| Signal::Constant {
             value: values[s],
@@ -294,7 +296,8 @@ pub(super) fn hold_by_newton<const N: usize>(
         if length <= far - Ball::<N>::BITS as f64 + 8.0 {
             return Err(failed(nowhere));
         }
-        // near a point where gradients depend on each other steps shrink by a constant factor, and so do both sides
+        // near a point where gradients depend on each other steps shrink by a constant factor, and so do both
+        // sides
         let stays = linear.far > FAR && linear.far > far_before - GAIN / 2.0 && linear.shift < NEAR;
         slow = if (linear.off < NEAR || stays) && length < SHORT && length > before - 2.0 {
             slow + 1
@@ -304,7 +307,8 @@ pub(super) fn hold_by_newton<const N: usize>(
         if slow == 0 {
             from = (linear.residual, far);
         }
-        // towards a point residuals fall by more than a bit a step; away from all points they stay, or the point does not
+        // towards a point residuals fall by more than a bit a step; away from all points they stay, or the
+        // point does not
         let settles = from.0 - linear.residual >= SLOW as f64 && far < from.1 + 1.0;
         // and fall below what far values leave of a sum that is nowhere zero
         let settles = settles && linear.residual < -4.0 * far - DEEP;

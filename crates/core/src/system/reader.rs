@@ -1,4 +1,5 @@
-//! What the keys and texts of a model file say: sizes of vectors, expressions of any shape, their order of use.
+//! What the keys and texts of a model file say: sizes of vectors, expressions of any shape, their order of
+//! use.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
@@ -135,7 +136,8 @@ impl Reader<'_> {
         ModelError { what, message, span: Some(span) }
     }
 
-    /// An expression of any shape; its text is as written for a number, its contents for a string, and one for each entry in a list.
+    /// An expression of any shape; its text is as written for a number, its contents for a string, and one
+    /// for each entry in a list.
     pub(super) fn formulas(
         &self,
         what: &str,

@@ -39,8 +39,8 @@ enum Found {
 /// constraints that follow from the others there.
 ///
 /// # Errors
-/// [`ModelError`] where the signs of both sides contradict, where constraints hold only where gradients depend
-/// on each other, where no point was found, and where the search is beyond the limit of work.
+/// [`ModelError`] where the signs of both sides contradict, where constraints hold only where gradients
+/// depend on each other, where no point was found, and where the search is beyond the limit of work.
 pub(super) fn real_point(
     model: &SystemModel,
     compiled: &Compiled,

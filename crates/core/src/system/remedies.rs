@@ -44,8 +44,8 @@ struct Search<'a> {
     out: Remedies,
 }
 
-/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work stand
-/// at the head of this file.
+/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work
+/// stand at the head of this file.
 pub(super) fn remedies(
     model: &SystemModel,
     compiled: &Compiled,
@@ -197,7 +197,8 @@ impl Search<'_> {
         }
     }
 
-    /// Counts products of numbers before they are formed; false where they take more operations than are left.
+    /// Counts products of numbers before they are formed; false where they take more operations than are
+    /// left.
     fn spend<S: Values>(&mut self, products: u64) -> bool {
         let operations = products.saturating_mul(product::<S::Element>());
         let enough = operations <= self.left;
@@ -239,9 +240,9 @@ impl Search<'_> {
         if self.ended { "; a larger --work-limit allows more" } else { "" }
     }
 
-    /// True if a changed model may have been judged where the model was: constraints that hold in several ways
-    /// are judged in one. k columns that are left out lower a rank by less than k, since none is observable;
-    /// an output adds to it.
+    /// True if a changed model may have been judged where the model was: constraints that hold in several
+    /// ways are judged in one. k columns that are left out lower a rank by less than k, since none is
+    /// observable; an output adds to it.
     fn is_of_same_part(&self, judged: &Judgement, changes: &[Change]) -> bool {
         let rank = |judged: &Judgement| judged.findings.degrees.rank();
         let (before, after) = (rank(self.judged), rank(judged));
@@ -251,15 +252,16 @@ impl Search<'_> {
             || after + left_out.saturating_sub(1) >= before && (outputs || after <= before)
     }
 
-    /// Judges the model with some changes, and enters what they resolve; `None` where that takes more operations than are
-    /// left.
+    /// Judges the model with some changes, and enters what they resolve; `None` where that takes more
+    /// operations than are left.
     fn judge(&mut self, changes: Vec<Change>) -> Option<Vec<usize>> {
         if self.left < self.judged.work {
             self.ended = true;
             return None;
         }
         let mut model = changed(self.model, &changes);
-        // a point more than is left, where that is little: the memory that is allowed goes with the operations
+        // a point more than is left, where that is little: the memory that is allowed goes with the
+        // operations
         let most = self.left.max(self.judged.work.saturating_mul(8));
         model.work_limit = self.model.work_limit.within(most);
         // given values add nothing beyond the last order of the model itself

@@ -13,7 +13,8 @@ use crate::degree::rows::DerivativeRows;
 
 /// Orders that are followed where no end is proven, at least.
 const ORDERS: usize = 60;
-/// Rows are computed backwards where there are so many lanes for each output: with fewer there are few orders, and lanes are faster.
+/// Rows are computed backwards where there are so many lanes for each output: with fewer there are few
+/// orders, and lanes are faster.
 const LONG: usize = 48;
 /// And from so many lanes on anyway, for the memory.
 const MANY: usize = 256;
@@ -42,8 +43,8 @@ pub struct Layout {
     pub closed: bool,
     /// Number of constraints that follow from the others where these hold.
     pub dependent: usize,
-    /// Signs of the arguments of abs and sign that points should have, those of the first one: verdicts are of
-    /// one side. `None` before the first point.
+    /// Signs of the arguments of abs and sign that points should have, those of the first one: verdicts are
+    /// of one side. `None` before the first point.
     pub(super) sides: Option<Signs>,
 }
 
@@ -127,8 +128,8 @@ enum End {
     Stagnation,
     /// No rank beyond this one is possible: it is that at a generic point.
     Rank(usize),
-    /// Nothing moves: the rows are `C A^k`, and by Cayley and Hamilton those of this order are the last that can add
-    /// anything.
+    /// Nothing moves: the rows are `C A^k`, and by Cayley and Hamilton those of this order are the last that
+    /// can add anything.
     Order(usize),
     /// Nothing is known.
     Open,
@@ -188,8 +189,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         self.compiled.roles.iter().position(|r| *r == role)
     }
 
-    /// Random values of all that is not given; lanes of states as the layout has them, or counted through where every
-    /// state is one.
+    /// Random values of all that is not given; lanes of states as the layout has them, or counted through
+    /// where every state is one.
     fn draw(
         &self,
         experiment: usize,
@@ -232,7 +233,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         Ok(Point { signals, initial, seed: rng.next_u64(), experiment })
     }
 
-    /// Values of all slots at a start: those that are given, random ones of all else. `None` where a given one is not defined.
+    /// Values of all slots at a start: those that are given, random ones of all else. `None` where a given
+    /// one is not defined.
     pub(super) fn values(&self, rng: &mut SplitMix64, attempt: usize) -> Option<Vec<S::Element>> {
         let f = &self.field;
         let random =
@@ -356,9 +358,10 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
     }
 
-    /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an unknown, the time is
-    /// anything, and the first order that adds nothing is the last; seen through the derivatives of the run's states by
-    /// the unknowns. A minor that is not zero at the run's own point is not zero there either.
+    /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an
+    /// unknown, the time is anything, and the first order that adds nothing is the last; seen through the
+    /// derivatives of the run's states by the unknowns. A minor that is not zero at the run's own point is
+    /// not zero there either.
     fn generic_rank(
         &self,
         point: &Point<S>,

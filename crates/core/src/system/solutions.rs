@@ -1,9 +1,9 @@
-//! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that are solved
-//! with fewer.
+//! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that
+//! are solved with fewer.
 //!
-//! Elimination over the first prime field finds them (`elimination`), with integers recovered from it (`formula`). Every
-//! expression is then evaluated at random points of both prime fields, where it must give the unknown's value, and only
-//! what holds is shown.
+//! Elimination over the first prime field finds them (`elimination`), with integers recovered from it
+//! (`formula`). Every expression is then evaluated at random points of both prime fields, where it must give
+//! the unknown's value, and only what holds is shown.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,8 @@ use crate::language::{Environment, Names, evaluate, parse_with};
 const UNKNOWNS: usize = 30;
 /// Highest order.
 const ORDER: usize = 16;
-/// Orders beyond its degree to which an expression may go: there what has finitely many solutions may have one.
+/// Orders beyond its degree to which an expression may go: there what has finitely many solutions may have
+/// one.
 const BEYOND: usize = 2;
 /// Longest expression that is kept.
 const KEPT: usize = 50_000;
@@ -76,13 +77,13 @@ pub(super) enum NoExpressions {
 pub(super) struct Expression {
     /// In the names of the model.
     pub(super) text: String,
-    /// Every unknown in it is known to have one solution, or has such an expression itself; in the end they rest on outputs,
-    /// inputs and constants: there is one solution.
+    /// Every unknown in it is known to have one solution, or has such an expression itself; in the end they
+    /// rest on outputs, inputs and constants: there is one solution.
     pub(super) unique: bool,
 }
 
-/// Expressions for the unknowns, in the order of the layout, and why there are none, or some are missing; `single`
-/// says of which it is known otherwise that they have one solution.
+/// Expressions for the unknowns, in the order of the layout, and why there are none, or some are missing;
+/// `single` says of which it is known otherwise that they have one solution.
 pub(super) fn solutions(
     model: &SystemModel,
     compiled: &Compiled,
@@ -254,7 +255,8 @@ fn rests_on(
     expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect()
 }
 
-/// Drops what is no solution: an expression that holds its own unknown, itself or in those of the unknowns in it.
+/// Drops what is no solution: an expression that holds its own unknown, itself or in those of the unknowns in
+/// it.
 fn drop_circles(rests_on: &mut [Option<BTreeSet<usize>>]) {
     for lane in 0..rests_on.len() {
         let (mut seen, mut left) = (BTreeSet::new(), vec![lane]);

@@ -1,5 +1,5 @@
-//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output sees, at
-//! any point.
+//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output
+//! sees, at any point.
 
 use obsdeg_exact::{Reals, RowSpace};
 
@@ -50,8 +50,9 @@ pub struct Invariant {
 /// The factors of a product, and its rational coefficient.
 pub(crate) type PolynomialTerm = (Vec<usize>, (i64, i64));
 
-/// A direction whose components are polynomials in the unknowns and the known constants: `(unknown, [(factors,
-/// coefficient)])`; a factor is an unknown or a known constant (counted on behind the unknowns).
+/// A direction whose components are polynomials in the unknowns and the known constants:
+/// `(unknown, [(factors, coefficient)])`; a factor is an unknown or a known constant (counted on behind the
+/// unknowns).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PolynomialDirection {
     /// Of every unknown that it moves.
@@ -65,7 +66,8 @@ pub struct Symmetries {
     pub found: Vec<Symmetry>,
     /// Directions beyond these that are polynomials in the unknowns: turns, for instance.
     pub polynomial: Vec<PolynomialDirection>,
-    /// What each direction beyond all of these moves: of unobservable directions among unknowns that are excited.
+    /// What each direction beyond all of these moves: of unobservable directions among unknowns that are
+    /// excited.
     pub unexplained: Vec<Vec<usize>>,
     /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<Invariant>,
@@ -75,8 +77,8 @@ pub struct Symmetries {
     pub(super) work: u64,
 }
 
-/// Operations that a search for symmetries may still take: all points together as many as one verdict, and all searches
-/// for short vectors as many again.
+/// Operations that a search for symmetries may still take: all points together as many as one verdict, and
+/// all searches for short vectors as many again.
 struct Budget {
     limit: WorkLimit,
     /// Operations that the changes that are tried afterwards may need.
@@ -99,15 +101,16 @@ impl Budget {
         !self.over
     }
 
-    /// Puts a row into a space, and counts what that took beyond an elimination; false if it is beyond the limit.
+    /// Puts a row into a space, and counts what that took beyond an elimination; false if it is beyond the
+    /// limit.
     fn insert<S: Values>(&mut self, space: &mut S::Space, row: &[S::Element]) -> bool {
         let before = space.refined();
         space.insert(row);
         self.spend((space.refined() - before).saturating_mul(product::<S::Element>()))
     }
 
-    /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where they are beyond
-    /// the limit. `from` is the space that the rows are from.
+    /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where
+    /// they are beyond the limit. `from` is the space that the rows are from.
     fn short_vectors<S: Values>(
         &mut self,
         f: &S,
@@ -163,7 +166,8 @@ fn integers(v: &[(i64, i64)]) -> Vec<i64> {
     scaled.iter().map(|x| x / divisor).collect()
 }
 
-/// The symmetries of a judged model: of a rational one in a prime field, of one with functions in many digits.
+/// The symmetries of a judged model: of a rational one in a prime field, of one with functions in many
+/// digits.
 ///
 /// # Errors
 /// [`ModelError`] when a point cannot be had.
@@ -328,8 +332,9 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
 /// A verdict at one more random point, for rows of this many columns; none once the work is used up.
 type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<At<S>>, ModelError> + 'a;
 
-/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known constants: a
-/// linear system for the a_ij from rows at several points, which `draw` makes as long as work is left.
+/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known
+/// constants: a linear system for the a_ij from rows at several points, which `draw` makes as long as work is
+/// left.
 fn directions<S: Values>(
     f: &S,
     moved: &[usize],
@@ -382,8 +387,8 @@ fn directions<S: Values>(
     Ok(out)
 }
 
-/// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they are
-/// observable.
+/// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they
+/// are observable.
 fn invariants<S: Values>(
     f: &S,
     n: usize,

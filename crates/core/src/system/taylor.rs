@@ -1,8 +1,9 @@
-//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a dual lane
-//! each), in any field.
+//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a
+//! dual lane each), in any field.
 //!
-//! A node has lanes only for what it can depend on (a weight of a function none at all: of `dF = weight du` its values are
-//! enough), and orders are kept only where a later one needs them: as a factor of a product of two that change.
+//! A node has lanes only for what it can depend on (a weight of a function none at all: of `dF = weight du`
+//! its values are enough), and orders are kept only where a later one needs them: as a factor of a product of
+//! two that change.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -121,8 +122,8 @@ pub(crate) struct Taylor<'a, S: Values> {
 }
 
 impl<'a, S: Values> Taylor<'a, S> {
-    /// The series at order 0 of the nodes `roots` and what they are made of: `initial` gives every state's start (by
-    /// slot). Rates take part when `moving`. Without lanes these are the values alone.
+    /// The series at order 0 of the nodes `roots` and what they are made of: `initial` gives every state's
+    /// start (by slot). Rates take part when `moving`. Without lanes these are the values alone.
     ///
     /// # Errors
     /// [`Singular`] when the point is none, or where its values and gradients are beyond the limit of `work`.
@@ -205,8 +206,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         both.into_iter().flatten()
     }
 
-    /// Marks what takes part. The derivative of a function of known constants is nowhere used: at the ends of its range it
-    /// need not exist.
+    /// Marks what takes part. The derivative of a function of known constants is nowhere used: at the ends of
+    /// its range it need not exist.
     fn need(&mut self, roots: &[usize], moving: bool) {
         let mut left = roots.to_vec();
         while let Some(i) = left.pop() {
@@ -419,7 +420,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(())
     }
 
-    /// Writes the sums (times a factor) as the duals of order k, with what is added to single lanes, and clears them.
+    /// Writes the sums (times a factor) as the duals of order k, with what is added to single lanes, and
+    /// clears them.
     fn store(
         &mut self,
         i: usize,
@@ -464,8 +466,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.values[a].get(k).copied().unwrap_or(self.f.zero())
     }
 
-    /// The derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty when it is zero. Of orders before
-    /// the last, only those that are needed again are there.
+    /// The derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty when it is zero. Of
+    /// orders before the last, only those that are needed again are there.
     pub(crate) fn dual(&self, a: usize, k: usize) -> &[S::Element] {
         if k > 0 && self.constant[a] {
             return &[];
@@ -533,8 +535,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         })
     }
 
-    /// Products and sums of the next order, by lanes: those that do not grow with it, and those for each order
-    /// before it; and the numbers of nodes that take part, and of products of two series among them.
+    /// Products and sums of the next order, by lanes: those that do not grow with it, and those for each
+    /// order before it; and the numbers of nodes that take part, and of products of two series among them.
     pub(super) fn operations(&self) -> [u64; 4] {
         let mut out = [0u64; 4];
         for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {

@@ -11,7 +11,8 @@ use crate::language::Function;
 pub(crate) enum NotHeld {
     /// This constraint could not be solved.
     Constraint(usize),
-    /// Only points were found at which the gradients of the constraints depend on each other, this one among them.
+    /// Only points were found at which the gradients of the constraints depend on each other, this one among
+    /// them.
     Dependent(usize),
     /// The work is beyond its limit.
     Refused,
@@ -48,7 +49,8 @@ pub(crate) trait Values: Scalars {
 
     /// For series of this length.
     fn plan(&self, length: usize) -> Self::Plan;
-    /// The first `n` coefficients of the product of a series with each of several, which are known to the plan by their keys.
+    /// The first `n` coefficients of the product of a series with each of several, which are known to the
+    /// plan by their keys.
     fn products(
         &self,
         plan: &mut Self::Plan,
@@ -71,7 +73,8 @@ pub(crate) trait Values: Scalars {
     fn near(&self, x: f64, bits: i64, rng: &mut SplitMix64) -> Option<Self::Element>;
     /// A random Taylor coefficient of a generic signal.
     fn coefficient(&self, rng: &mut SplitMix64) -> Self::Element;
-    /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero.
+    /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are
+    /// zero.
     ///
     /// # Errors
     /// The constraint that could not be solved, or that the work is beyond its limit.

@@ -11,8 +11,8 @@ const UNIT: u64 = 1_000_000;
 const PER_BYTE: u64 = 2;
 /// Series that are held for every operation of a model, backwards.
 const HELD: u64 = 4;
-/// Operations of the three transforms of a product with two factors, for each point and each halving: half of them
-/// multiply and take two sums, which count as one and a half.
+/// Operations of the three transforms of a product with two factors, for each point and each halving: half of
+/// them multiply and take two sums, which count as one and a half.
 const TRANSFORM: (u64, u64) = (9, 4);
 
 /// Operations that cost as much as what a series keeps of an operation, whether or not it takes part.
@@ -151,7 +151,8 @@ pub(super) struct Cost {
     pub(super) nodes: u64,
     /// Number of those that multiply or divide two series.
     pub(super) products: u64,
-    /// Series of the rows that are computed backwards, output by output; none where they are computed forwards.
+    /// Series of the rows that are computed backwards, output by output; none where they are computed
+    /// forwards.
     pub(super) backwards: Option<Sweeps>,
     /// Number of outputs.
     pub(super) outputs: u64,
@@ -273,7 +274,8 @@ mod tests {
     fn operations_by_hand() {
         assert_eq!(cost(None).operations(3), 10 + 6 * 4 + 2 * 7 * 7);
         assert_eq!(cost(None).operations(0), 10 + 6 + 2 * 7 * 2);
-        // two sweeps with series of 9 and 8: 5 sums of as many, 3 products of 81 and 64 terms; values of orders 4 to 9
+        // two sweeps with series of 9 and 8: 5 sums of as many, 3 products of 81 and 64 terms; values of
+        // orders 4 to 9
         let sweeps = Sweeps { longest: 9, count: 2, values: [4, 10] };
         let values = 3 * (5 + 6 + 7 + 8 + 9 + 10);
         let elimination = 2 * 7 * 7;

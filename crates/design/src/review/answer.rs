@@ -151,8 +151,8 @@ pub struct Alternatives {
     pub kept: Option<Minimum>,
     /// The fewest cardinal attitudes that make every coefficient observable.
     pub all: Option<Minimum>,
-    /// Schemes of `front_positions` cardinal attitudes that none found beats in both total time and the largest sigma
-    /// of these.
+    /// Schemes of `front_positions` cardinal attitudes that none found beats in both total time and the
+    /// largest sigma of these.
     pub front: Vec<Found>,
     /// Their number of positions.
     pub front_positions: usize,

@@ -1,4 +1,5 @@
-//! All that a design review of torquing schemes needs, gathered: verdicts, predictions, evidence, alternatives.
+//! All that a design review of torquing schemes needs, gathered: verdicts, predictions, evidence,
+//! alternatives.
 
 pub(crate) mod answer;
 
@@ -69,8 +70,8 @@ pub enum ReviewError {
     Interrupted,
 }
 
-/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says whether to go
-/// on.
+/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says
+/// whether to go on.
 ///
 /// # Errors
 /// [`ReviewError`].
@@ -285,7 +286,8 @@ fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, 
     Ok(Sweep::of(factors.map(at).collect::<Result<_, SimulationError>>()?))
 }
 
-/// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal attitudes.
+/// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal
+/// attitudes.
 fn alternatives(scheme: &Scheme, conditions: &Conditions, analysis: &Analysis, seed: u64) -> Alternatives {
     let mut out = Alternatives::default();
     // beside predictions, which have no prior and white noise of Z

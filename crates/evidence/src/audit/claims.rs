@@ -111,8 +111,8 @@ fn common_mode(seed: u64) -> Result<CommonMode, AnalysisError> {
 }
 
 /// Whether nothing that one position shows moves along psi^n = (0,1,0), eps^n = (0,0,wN), and the zero-order
-/// coefficients make this drift at every attitude: then psi, which it turns, is not observable at one position,
-/// whatever its attitude.
+/// coefficients make this drift at every attitude: then psi, which it turns, is not observable at one
+/// position, whatever its attitude.
 fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
     let platform = Platform::new(generic(1, carry))?;
     for sample in samples(&platform, seed)? {
@@ -120,7 +120,8 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
         let block = &platform.blocks(&sample.point)[0];
         let mut direction = vec![0; platform.names().len()];
         for axis in 0..3 {
-            // C_n^c takes (0,1,0) and (0,0,wN) into platform axes; psi is in the first three columns whatever its name
+            // C_n^c takes (0,1,0) and (0,0,wN) into platform axes; psi is in the first three columns whatever
+            // its name
             direction[axis] = c[1][axis];
             direction[column(&platform, ["D_FX", "D_FY", "D_FZ"][axis])] = f.mul(w_n, c[2][axis]);
         }

@@ -1,4 +1,5 @@
-//! The numbered equations from (6) on, as printed, compared with the model at random points of random prime fields.
+//! The numbered equations from (6) on, as printed, compared with the model at random points of random prime
+//! fields.
 
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::degree::EnsembleError;
@@ -56,9 +57,9 @@ impl Environment for At {
 }
 
 /// The model at a random point of a random field, under names for the formulas of the paper:
-/// `psi_x psi_y psi_z` and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in
-/// c, `Z1 Z3` with `p`, `pp` for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n; `t q h` are random
-/// numbers, `rx ry rz` a random rate.
+/// `psi_x psi_y psi_z` and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in c,
+/// `Z1 Z3` with `p`, `pp` for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n; `t q h` are
+/// random numbers, `rx ry rz` a random rate.
 pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
     let angles = parse_attitude(attitude)
         .unwrap_or_else(|_| std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0)));
@@ -119,8 +120,8 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
     })
 }
 
-/// Whether something holds at random points of random fields, at the attitude given (`alpha,beta,gamma` for a random
-/// one).
+/// Whether something holds at random points of random fields, at the attitude given (`alpha,beta,gamma` for a
+/// random one).
 pub(super) fn everywhere(
     attitude: &str,
     seed: u64,

@@ -1,5 +1,5 @@
-//! The equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random prime
-//! fields.
+//! The equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random
+//! prime fields.
 
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::model::{GYROS, Matrix3, SignedAxis, elementary, product};
@@ -44,8 +44,8 @@ fn identity(f: &Field) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { f.one() } else { 0 }))
 }
 
-/// Whether a polynomial of degree two in a small quantity has no terms of degree 0 and 1: whether it is `h^2` times its
-/// value at 1 at the random size h of the point.
+/// Whether a polynomial of degree two in a small quantity has no terms of degree 0 and 1: whether it is `h^2`
+/// times its value at 1 at the random size h of the point.
 fn of_second_order(at: &At, polynomial: impl Fn(u64) -> Matrix3<u64>) -> Result<bool, AnalysisError> {
     let (f, h) = (&at.field, at.value("h")?);
     let zero = [[0; 3]; 3];
@@ -62,8 +62,8 @@ const EPS: [&str; 3] = ["cx", "cy", "cz"];
 const GRAVITY: [&str; 3] = ["gx", "gy", "gz"];
 const RATES: [&str; 3] = ["wN", "wU", "0"];
 
-/// Whether the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with `omega_c`
-/// has, in the first order of psi and eps, the derivative of psi that (2) says.
+/// Whether the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with
+/// `omega_c` has, in the first order of psi and eps, the derivative of psi that (2) says.
 fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
@@ -98,8 +98,8 @@ fn right_handed([i, o, s]: &Mounting) -> bool {
     [at(0), at(1), at(2)] == s.vector()
 }
 
-/// The mountings of a gyro with which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28); eps
-/// counted positive about +I or about -I.
+/// The mountings of a gyro with which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28);
+/// eps counted positive about +I or about -I.
 fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<Vec<Mounting>, AnalysisError> {
     let mut fitting: Vec<Mounting> = mountings().collect();
     everywhere(ANY, seed, |at| {
@@ -168,7 +168,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     Ok([three, line("(4)", "the g-sensitive terms multiply a = C_n^c (-g^n) = -g^c", finding, reason)])
 }
 
-/// The derivative of eps in c while c turns with `rate` against n: the first-order terms take `g^c' = g^c x rate`.
+/// The derivative of eps in c while c turns with `rate` against n: the first-order terms take
+/// `g^c' = g^c x rate`.
 fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
@@ -184,8 +185,8 @@ fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     ])
 }
 
-/// Which of the eight choices of passive and active elementary matrices give (20) and (24); bit k set: axis k is
-/// active.
+/// Which of the eight choices of passive and active elementary matrices give (20) and (24); bit k set: axis k
+/// is active.
 fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
     let mut right = Vec::new();
     for active in 0..8usize {

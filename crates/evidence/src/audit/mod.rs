@@ -1,8 +1,8 @@
 //! The paper against the algebra: every numbered equation and claim, recomputed.
 //!
-//! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with the model
-//! as identities in random prime fields; claims about degrees are judged by the engine, those of section 3.3 by the
-//! filter under the conditions of section 3.1. What is not covered is a line of its own.
+//! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with
+//! the model as identities in random prime fields; claims about degrees are judged by the engine, those of
+//! section 3.3 by the filter under the conditions of section 3.1. What is not covered is a line of its own.
 
 mod claims;
 mod equations;
@@ -139,7 +139,8 @@ fn finding(holds: bool) -> Finding {
 mod tests {
     use super::*;
 
-    /// What the paper says, line by line: the slips, the conditions, what is not covered, and that the rest agrees, whatever the seed.
+    /// What the paper says, line by line: the slips, the conditions, what is not covered, and that the rest
+    /// agrees, whatever the seed.
     #[test]
     fn the_findings_are_these() {
         use Finding::{Conditional, Disagree, NotCovered};
@@ -193,8 +194,8 @@ mod tests {
         assert_eq!(numbers.collect::<Vec<_>>(), (1..=28).collect::<Vec<_>>());
     }
 
-    /// What the reasons say in numbers, by hand: wN psi_y(0) at 28.2 degrees, the fewest positions of the reference verdicts, the accuracy
-    /// orders, the mounting of the paper.
+    /// What the reasons say in numbers, by hand: wN psi_y(0) at 28.2 degrees, the fewest positions of the
+    /// reference verdicts, the accuracy orders, the mounting of the paper.
     #[test]
     fn the_reasons_say_these_numbers() {
         let audit = audit(1).expect("computed");

@@ -1,7 +1,8 @@
 //! What section 3.3 says of its figures, judged by the filter under the conditions of section 3.1.
 //!
-//! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are read from
-//! such a run, made with the gains for the noise of the paper; sigma says how far one run lies from it.
+//! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are
+//! read from such a run, made with the gains for the noise of the paper; sigma says how far one run lies from
+//! it.
 
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
@@ -62,8 +63,8 @@ impl Mean {
         first..end
     }
 
-    /// How many seconds into a segment error and sigma of `name` are within 1 % of its true value at the start, and
-    /// stay so.
+    /// How many seconds into a segment error and sigma of `name` are within 1 % of its true value at the
+    /// start, and stay so.
     fn settled(&self, name: &str, segment: usize) -> Option<f64> {
         let (series, _) = self.series(name)?;
         let within = WITHIN * series.truth[0].abs();
@@ -308,8 +309,8 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
 mod tests {
     use super::*;
 
-    /// The run without noise is the mean of runs with it: their average lies within four of its standard deviations,
-    /// and the average of another carry does not.
+    /// The run without noise is the mean of runs with it: their average lies within four of its standard
+    /// deviations, and the average of another carry does not.
     #[test]
     fn the_error_without_noise_is_the_mean() {
         const RUNS: u64 = 40;
@@ -359,8 +360,8 @@ mod tests {
                     assert_eq!(mean.settled(name, segment), expected, "{carry}: {name} {segment}");
                 }
             }
-            // and by hand: noise of Z of one sample is 0.6 % of psi(0), a first-order coefficient is not told in
-            // segment 1
+            // and by hand: noise of Z of one sample is 0.6 % of psi(0), a first-order coefficient is not told
+            // in segment 1
             assert_eq!((mean.settled("psi_x", 0), mean.settled("D_FX", 0)), (Some(10.0), None));
         }
     }

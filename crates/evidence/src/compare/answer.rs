@@ -110,10 +110,11 @@ pub struct Quantity {
     pub sigma_extended: Option<f64>,
     /// Largest sigma allowed, in the unit of `unit`; null if none is required.
     pub requirement: Option<f64>,
-    /// Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a sigma.
+    /// Total uncertainty with the errors of the bench, in the unit of `unit`; null without a bench or a
+    /// sigma.
     pub total: Option<f64>,
-    /// Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is no
-    /// requirement or no sigma.
+    /// Requirement over sigma (total uncertainty with a bench), dimensionless: met from 1; null if there is
+    /// no requirement or no sigma.
     pub margin: Option<f64>,
     /// Factors by which the unknown enters the drift, position by position, dimensionless: products of
     /// components of g (1 for D_F), root mean square over the arc of a rotating segment. Empty for psi.

@@ -1,5 +1,5 @@
-//! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what the
-//! assumptions are worth.
+//! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what
+//! the assumptions are worth.
 
 pub(crate) mod answer;
 
@@ -38,7 +38,8 @@ pub struct Entry {
     pub conditions: Conditions,
 }
 
-/// Refuses, before anything is computed, a scheme that is too large under one of the carries that are looked at.
+/// Refuses, before anything is computed, a scheme that is too large under one of the carries that are looked
+/// at.
 ///
 /// # Errors
 /// [`SimulationError::ComparedUnknowns`].
@@ -89,7 +90,8 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
 }
 
 /// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions
-/// that are stated, with a bench its total uncertainty; `None` where neither samples nor stated priors bound it.
+/// that are stated, with a bench its total uncertainty; `None` where neither samples nor stated priors bound
+/// it.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -203,9 +205,9 @@ fn quantities(
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
 }
 
-/// Per position and coefficient: the length of its column of `eps^n = C E D` or of the error of the accelerometers at a position, its root
-/// mean square over the arc of a rotating segment (the columns of C are orthonormal, so this is the product of components of g, f, or of the
-/// earth rate).
+/// Per position and coefficient: the length of its column of `eps^n = C E D` or of the error of the
+/// accelerometers at a position, its root mean square over the arc of a rotating segment (the columns of C
+/// are orthonormal, so this is the product of components of g, f, or of the earth rate).
 fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
     let (plan, platform) = (&judged.plan, &judged.plan.platform);
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
@@ -234,8 +236,8 @@ fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
     platform.scheme().positions.iter().enumerate().map(of).collect()
 }
 
-/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five degrees,
-/// which is exact to 1e-10 for the squares of second-order terms.
+/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five
+/// degrees, which is exact to 1e-10 for the squares of second-order terms.
 fn quadrature(arc: f64) -> Vec<(f64, f64)> {
     const PART: f64 = std::f64::consts::PI / 36.0;
     const MOST: f64 = 10_000.0;

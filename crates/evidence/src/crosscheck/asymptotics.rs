@@ -7,8 +7,8 @@ use super::precise::{self, Between, Digits, Functional, Seen};
 
 /// Digits that are tried in turn.
 const BITS: [usize; 2] = [1024, 2048];
-/// Dwells of the first position, in 1/w_ie: 2^-133 is 9e-41. Angles and latitudes are whole 1e-9 degrees, 2e-11 rad, so that what
-/// hardly differs still differs by far more.
+/// Dwells of the first position, in 1/w_ie: 2^-133 is 9e-41. Angles and latitudes are whole 1e-9 degrees,
+/// 2e-11 rad, so that what hardly differs still differs by far more.
 const DWELLS: [i32; 3] = [-133, -140, -147];
 /// How far slopes between neighbouring dwells may differ.
 const SETTLED: f64 = 0.01;
@@ -51,7 +51,8 @@ pub(super) struct Question {
     pub(super) at_end: bool,
 }
 
-/// Relative errors of rounded coefficients, at most and at least: where the difference matters, nothing is resolvable.
+/// Relative errors of rounded coefficients, at most and at least: where the difference matters, nothing is
+/// resolvable.
 pub(super) const ROUNDED: [f64; 2] = [1e-7, 1e-12];
 
 /// What samples show as the dwell goes to zero.

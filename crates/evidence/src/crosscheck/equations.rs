@@ -1,5 +1,5 @@
-//! The model that verdicts and linear filter share, against equations that are written a second time: those of direction
-//! cosines, linearised at zero. A sign that is wrong in (2), (6) or in the carry shows here.
+//! The model that verdicts and linear filter share, against equations that are written a second time: those
+//! of direction cosines, linearised at zero. A sign that is wrong in (2), (6) or in the carry shows here.
 
 use obsdeg_ekf::{Measurement, Motion, Update};
 
@@ -13,8 +13,9 @@ use crate::simulation::state::PlatformState;
 /// Relative difference that is rounding and the order of the integration.
 const LIMIT: f64 = 1e-7;
 
-/// The largest difference of Phi and H of any step, each column in units of its largest entry; `None` where the unknowns are
-/// the drift itself, for which there are no such equations, and where torquer errors act in turns at once, which full attitudes do not have.
+/// The largest difference of Phi and H of any step, each column in units of its largest entry; `None` where
+/// the unknowns are the drift itself, for which there are no such equations, and where torquer errors act in
+/// turns at once, which full attitudes do not have.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when a number is none.

@@ -1,9 +1,9 @@
 //! The exact verdicts against a filter: two independent paths, item by item.
 //!
-//! a. the slope of sigma against the dwell is -(accuracy order + 1/2); b. a larger prior leaves what is observable as
-//! it is; the directions that Z does not see are those of the information; c. the filter's covariance is the inverse
-//! information; d. errors and innovations are what the filter believes; e. predicted and measured orders rank alike; f.
-//! filters that are wrong on purpose are found out.
+//! a. the slope of sigma against the dwell is -(accuracy order + 1/2); b. a larger prior leaves what is
+//! observable as it is; the directions that Z does not see are those of the information; c. the filter's
+//! covariance is the inverse information; d. errors and innovations are what the filter believes; e.
+//! predicted and measured orders rank alike; f. filters that are wrong on purpose are found out.
 
 pub(crate) mod answer;
 mod asymptotics;
@@ -141,7 +141,8 @@ pub fn crosscheck(
     against(&prediction, &truth, scheme, conditions, options, progress)
 }
 
-/// Holds `prediction`, whatever says so, on `scheme` against a filter, as [`crosscheck`] does with that of the exact engine.
+/// Holds `prediction`, whatever says so, on `scheme` against a filter, as [`crosscheck`] does with that of
+/// the exact engine.
 ///
 /// # Errors
 /// [`SimulationError`]; `Interrupted` when `progress` wants no more.
@@ -298,7 +299,8 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
         // NaN stays
         let difference =
             (0..n * n).map(relative).fold(0.0, |a: f64, b| if b <= a || a.is_nan() { a } else { b });
-        // the digits of P that rounding takes, step by step, are those of the largest variance, the prior's, beside the smallest
+        // the digits of P that rounding takes, step by step, are those of the largest variance, the prior's,
+        // beside the smallest
         let coarse = form == Form::Joseph && wider * f64::EPSILON * steps as f64 > limit / 10.0;
         let outcome = match difference <= limit {
             true => Agreement::Agrees,
@@ -315,7 +317,8 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
     Ok(out)
 }
 
-/// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last; against the `errors` of runs.
+/// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last; against
+/// the `errors` of runs.
 fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f64]) -> Ranking {
     const LAST: i64 = 1000;
     let unknowns = prediction.unknowns.iter();
@@ -335,9 +338,9 @@ fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f
     }
 }
 
-/// Evidence f: filters with another carry, at another latitude, without a position, against the truth of the linear model:
-/// what large drifts do to a linear filter would hide the rest. Repositioning is instantaneous, since a filter
-/// that does not know of a position does not know of a slew either.
+/// Evidence f: filters with another carry, at another latitude, without a position, against the truth of the
+/// linear model: what large drifts do to a linear filter would hide the rest. Repositioning is instantaneous,
+/// since a filter that does not know of a position does not know of a slew either.
 fn controls(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -353,7 +356,8 @@ fn controls(
     let far = elsewhere.map_or(0.0, |l| (l.degrees() - latitude).abs());
     let apart = |i: usize, j: usize| angle_deg(&truth.attitudes[i], &truth.attitudes[j]);
     let positions = 1..scheme.positions.len();
-    // platform and inertial carry differ by how the platform has turned; dropped is what is farthest from where it was
+    // platform and inertial carry differ by how the platform has turned; dropped is what is farthest from
+    // where it was
     let turned = positions.clone().map(|i| apart(0, i)).fold(0.0, f64::max);
     let farthest = positions.map(|i| (i, apart(i - 1, i))).max_by(|a, b| a.1.total_cmp(&b.1));
     let changes = [
@@ -413,8 +417,8 @@ fn controls(
     Ok(out)
 }
 
-/// Whether the innovations of a wrong filter must show it in [`MANY_RUNS`]: by what of the truths that are drawn no state of the filter explains,
-/// without samples of it drowned in random drift.
+/// Whether the innovations of a wrong filter must show it in [`MANY_RUNS`]: by what of the truths that are
+/// drawn no state of the filter explains, without samples of it drowned in random drift.
 fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<bool, SimulationError> {
     let samples: usize = truth.stages.iter().map(|s| s.steps * s.outputs.len()).sum();
     let many = samples * truth.unknowns().max(filter.unknowns()) > MOST_NUMBERS;

@@ -1,7 +1,8 @@
-//! Evidence d: many runs. Linear truths are drawn from the prior. An exact truth is that of the scheme's own drifts, whatever the filter, and
-//! initial estimates are drawn about it, so that the errors are those that the prior says and the drifts those of the platform. Of the
-//! linear filter the covariance pass runs once, and a run is a truth and a state pass. Runs are summed
-//! in a fixed order, so that the result does not depend on the number of threads.
+//! Evidence d: many runs. Linear truths are drawn from the prior. An exact truth is that of the scheme's own
+//! drifts, whatever the filter, and initial estimates are drawn about it, so that the errors are those that
+//! the prior says and the drifts those of the platform. Of the linear filter the covariance pass runs once,
+//! and a run is a truth and a state pass. Runs are summed in a fixed order, so that the result does not
+//! depend on the number of threads.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::{FilterKind, Truth};
@@ -60,7 +61,8 @@ pub struct Totals {
     pub largest_psi: f64,
     /// Runs whose linearisations did not settle, or that ended in numbers that are none.
     pub unsettled: usize,
-    /// Sums of the squares of the errors at the end, in units of the prior, per unknown; empty where the filter is linear.
+    /// Sums of the squares of the errors at the end, in units of the prior, per unknown; empty where the
+    /// filter is linear.
     pub errors: Vec<f64>,
 }
 
@@ -189,13 +191,14 @@ impl<'a> Prepared<'a> {
         self.kind
     }
 
-    /// Whether runs have the scheme's own truth, from initial estimates about it: an exact truth, and a filter of its unknowns. Others have truths
-    /// drawn about the initial estimate.
+    /// Whether runs have the scheme's own truth, from initial estimates about it: an exact truth, and a
+    /// filter of its unknowns. Others have truths drawn about the initial estimate.
     pub fn is_about_the_truth(&self) -> bool {
         self.experiment.conditions.truth == Truth::Exact && self.comparable()
     }
 
-    /// The truth of a run, whose biases are drawn while everything else is what the scheme says, and an initial estimate about it.
+    /// The truth of a run, whose biases are drawn while everything else is what the scheme says, and an
+    /// initial estimate about it.
     fn draw_about_the_truth(&self, noise: &mut Noise, truth: &mut [f64], estimate: &mut [f64]) {
         let unknowns = self.experiment.truth.unknowns();
         truth.copy_from_slice(&self.truth_start.truth);

@@ -1,7 +1,7 @@
 //! Evidence e: Kendall's tau-b, which handles ties.
 
-/// Kendall's tau-b (Kendall 1945, doi:10.1093/biomet/33.3.239) of two rankings of the same items; `None` when all items
-/// are tied in one of them.
+/// Kendall's tau-b (Kendall 1945, doi:10.1093/biomet/33.3.239) of two rankings of the same items; `None` when
+/// all items are tied in one of them.
 ///
 /// ```
 /// use obsdeg_evidence::crosscheck::kendall_tau_b;

@@ -7,8 +7,8 @@ use super::answer::{Agreement, Check, Count};
 /// How far a measured slope may be from the predicted one.
 pub(crate) const SLOPE_TOLERANCE: f64 = 0.1;
 
-/// The factors on sigma, when a prior is ten times as loose, of what is determined and of what is not: 1 and 10 in the
-/// limit.
+/// The factors on sigma, when a prior is ten times as loose, of what is determined and of what is not: 1 and
+/// 10 in the limit.
 pub(crate) struct Inflation {
     pub(crate) determined: RangeInclusive<f64>,
     pub(crate) open: RangeInclusive<f64>,
@@ -27,8 +27,8 @@ impl Inflation {
     }
 }
 
-/// The log-log slope of sigma against time of what has an order, -(order + 1/2); without one nothing is learnt: sigma
-/// stays, or grows as what nobody sees moves it.
+/// The log-log slope of sigma against time of what has an order, -(order + 1/2); without one nothing is
+/// learnt: sigma stays, or grows as what nobody sees moves it.
 pub(crate) fn slope(order: Option<usize>, measured: Option<f64>) -> Check {
     let predicted = order.map_or(0.0, |d| -(d as f64 + 0.5));
     Check::new(predicted, measured, |x| match order {
@@ -37,8 +37,8 @@ pub(crate) fn slope(order: Option<usize>, measured: Option<f64>) -> Check {
     })
 }
 
-/// The number of directions that are not seen: predicted, and singular values (largest first) below `unseen` times the
-/// largest.
+/// The number of directions that are not seen: predicted, and singular values (largest first) below `unseen`
+/// times the largest.
 pub(crate) fn defect(predicted: usize, values: &[f64], unseen: f64) -> Count {
     let largest = values.first().copied().unwrap_or(1.0);
     let measured = values.iter().filter(|s| **s <= unseen * largest).count();

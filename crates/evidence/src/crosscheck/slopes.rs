@@ -24,8 +24,8 @@ pub(crate) struct Slopes {
     pub sigmas: Vec<Vec<f64>>,
 }
 
-/// Sigma of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior. Dwells that doubles do not
-/// resolve are left out.
+/// Sigma of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior.
+/// Dwells that doubles do not resolve are left out.
 pub(crate) fn slopes(scheme: &Scheme, conditions: &Conditions, functionals: &[Vec<(usize, f64)>]) -> Slopes {
     let plan = |dwell: f64| -> Result<Plan, SimulationError> {
         let (scheme, conditions) = scaled(scheme, conditions, dwell)?;

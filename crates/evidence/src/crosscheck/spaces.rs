@@ -1,5 +1,5 @@
-//! Evidence a for what is no number: ranks, null space, combinations and partners, against what samples show as the
-//! dwell goes to zero.
+//! Evidence a for what is no number: ranks, null space, combinations and partners, against what samples show
+//! as the dwell goes to zero.
 
 use obsdeg_core::degree::Status;
 
@@ -8,7 +8,8 @@ use super::asymptotics::{Asymptotics, ROUNDED, functional};
 use super::precise::{Digits, Seen, add_up};
 use crate::prediction::{Combination, Prediction};
 
-/// Pivots of rows and columns of unit size above the first are there, below the second are rounding of doubles.
+/// Pivots of rows and columns of unit size above the first are there, below the second are rounding of
+/// doubles.
 const CLEAR: [f64; 2] = [1e-7, 1e-12];
 
 /// The checks of what derivatives determine as a whole; `is_psi` says which unknowns are no drifts.
@@ -126,8 +127,8 @@ pub(super) fn with_dwells(
     }
 }
 
-/// The combinations: with the unknowns of degree up to k they span what is seen with k derivatives, and each adds
-/// a direction to those before it.
+/// The combinations: with the unknowns of degree up to k they span what is seen with k derivatives, and each
+/// adds a direction to those before it.
 fn combinations(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,
@@ -189,7 +190,8 @@ fn combinations(
     out
 }
 
-/// Entries at some columns, drifts in units of the earth rate: of a change of the unknowns, or of a functional.
+/// Entries at some columns, drifts in units of the earth rate: of a change of the unknowns, or of a
+/// functional.
 fn dense(
     terms: &[(usize, f64)],
     columns: &[usize],
@@ -203,7 +205,8 @@ fn dense(
     columns.iter().map(entry).collect()
 }
 
-/// The rank of rows, by elimination with the largest pivot; `None` where a pivot is neither there nor rounding.
+/// The rank of rows, by elimination with the largest pivot; `None` where a pivot is neither there nor
+/// rounding.
 fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
     let size = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0f64, |m, x| m.max(x.abs()));
     let columns = rows.first().map_or(0, Vec::len);
@@ -238,8 +241,9 @@ fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
     }
 }
 
-/// Of every unknown those that share a direction with it that is not seen and holds no shorter one. These are the connected parts of
-/// the graph that joins a pivot to the free unknowns which move it, whatever the pivots are.
+/// Of every unknown those that share a direction with it that is not seen and holds no shorter one. These are
+/// the connected parts of the graph that joins a pivot to the free unknowns which move it, whatever the
+/// pivots are.
 pub(super) fn partners(seen: &Seen) -> Vec<Vec<usize>> {
     let n = seen.excited.len();
     let (free, rows) = seen.reduced();

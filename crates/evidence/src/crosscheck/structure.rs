@@ -166,7 +166,8 @@ fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<
 struct Shown {
     /// Of every functional of the filter: psi handed on as it was at the start of a position.
     derivatives: Option<Asymptotics>,
-    /// With dwells: first with psi of the start, then with psi of the end. `None` where psi is not handed on, and both are the same.
+    /// With dwells: first with psi of the start, then with psi of the end. `None` where psi is not handed on,
+    /// and both are the same.
     dwells: Option<Option<Asymptotics>>,
 }
 
@@ -215,7 +216,8 @@ impl Shown {
     }
 }
 
-/// The check of an order against a course; what bends, or is not told from rounding, is neither for nor against.
+/// The check of an order against a course; what bends, or is not told from rounding, is neither for nor
+/// against.
 fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check {
     let measured = match course {
         Some(Course::Slope(s)) => Some(s),
@@ -336,8 +338,9 @@ fn quantities(
                 let found = partners.as_ref().map(|p| p[c].as_slice());
                 spaces::named(&u.partners, found, truth.platform.names())
             };
-            // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as rounding: so does what dwells add to
-            // it, a part as small as the dwell, and the slope is then that of the degree
+            // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as
+            // rounding: so does what dwells add to it, a part as small as the dwell, and the slope is then
+            // that of the degree
             let rounded = |check: Check, order: Option<usize>| {
                 let hides = c >= n && degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
                 let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
@@ -383,7 +386,8 @@ fn null_evidence(
 ) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();
     let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is nothing
+    // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is
+    // nothing
     let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
     let units = filter.platform.units();
     let largest_of = |unit: &str| {

@@ -134,8 +134,8 @@ pub struct ConditionsReport {
     /// Factor on the true drifts and their priors, dimensionless.
     pub drift_scale: f64,
     /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
-    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and
-    /// other_priors where they are stated for some of the unknowns only.
+    /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values
+    /// and other_priors where they are stated for some of the unknowns only.
     pub by_default: Vec<String>,
 }
 
@@ -196,8 +196,8 @@ pub struct MeasurementReport {
     /// Priors that are stated, as 1 sigma in the units of the unknowns; null if none are.
     #[serde(default)]
     pub prior: Option<String>,
-    /// Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out where
-    /// none is.
+    /// Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out
+    /// where none is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bench: Option<String>,
     /// Keys of the conditions above that nobody states, so that the program chose them: latitude_deg,
@@ -319,7 +319,8 @@ pub struct FilterReport {
     /// True if the linearisations converged.
     pub converged: bool,
     /// False if the sigmas are not to be trusted even where one run is consistent: the small-angle model does
-    /// not hold for the truth, and the filter is linear, or extended and so linearised before drifts are known.
+    /// not hold for the truth, and the filter is linear, or extended and so linearised before drifts are
+    /// known.
     pub trusted: bool,
 }
 

@@ -39,8 +39,8 @@ pub struct Attained {
     /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated
     /// priors bound it.
     pub sigmas: Vec<Option<f64>>,
-    /// Total uncertainty of every unknown in its shown unit: sigma, and what the errors of the bench add. Sigma where
-    /// no bench is stated.
+    /// Total uncertainty of every unknown in its shown unit: sigma, and what the errors of the bench add.
+    /// Sigma where no bench is stated.
     pub totals: Vec<Option<f64>>,
     /// True for an unknown that the samples do not determine and stated priors bound.
     pub by_prior: Vec<bool>,
@@ -49,7 +49,8 @@ pub struct Attained {
     prior: Vec<f64>,
     /// True if random drift or biases make a filter of it.
     noisy: bool,
-    /// Changes of the estimates by one sigma of every error of the bench (n x errors, SI units); no columns without.
+    /// Changes of the estimates by one sigma of every error of the bench (n x errors, SI units); no columns
+    /// without.
     contributions: DMatrix<f64>,
 }
 
@@ -200,8 +201,8 @@ impl Attained {
         Ok(out)
     }
 
-    /// The largest sigma (total uncertainty with a bench) of a drift coefficient that counts, if all of these have one: other coefficients
-    /// have other units.
+    /// The largest sigma (total uncertainty with a bench) of a drift coefficient that counts, if all of these
+    /// have one: other coefficients have other units.
     pub fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let (units, names) = (self.plan.platform.units(), self.plan.platform.names());
         let mut worst: Option<Worst> = None;
@@ -215,15 +216,15 @@ impl Attained {
     }
 }
 
-/// Root of the sum of squares of what every column of `contributions` (unknowns x errors) adds to a combination of
-/// unknowns, `(unknown, coefficient)`.
+/// Root of the sum of squares of what every column of `contributions` (unknowns x errors) adds to a
+/// combination of unknowns, `(unknown, coefficient)`.
 pub(crate) fn added_to(contributions: &DMatrix<f64>, terms: &[(usize, f64)]) -> f64 {
     let change = |e: usize| terms.iter().map(|(c, k)| k * contributions[(*c, e)]).sum::<f64>();
     (0..contributions.ncols()).map(|e| change(e).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Changes of the estimates of the filter of a run by one sigma of every error of the bench (unknowns x errors, SI
-/// units), by its own gains at small angles; no columns without a bench.
+/// Changes of the estimates of the filter of a run by one sigma of every error of the bench (unknowns x
+/// errors, SI units), by its own gains at small angles; no columns without a bench.
 pub(crate) fn run_contributions(
     plan: &Plan,
     conditions: &Conditions,

@@ -7,12 +7,12 @@ use obsdeg_exact::interrupt;
 use super::conditions::is_rate;
 use super::plan::Plan;
 
-/// How many times wider a prior that says nothing is than what the measurements alone say of one unknown, the others
-/// known: wide against all that can be determined, and far enough from 1e16 that rounding does not look like
-/// information.
+/// How many times wider a prior that says nothing is than what the measurements alone say of one unknown, the
+/// others known: wide against all that can be determined, and far enough from 1e16 that rounding does not
+/// look like information.
 const WIDER_PSI: f64 = 1e12;
-/// The same for drifts. They enter with the dwell, which in a sweep grows to hundreds of times that at which the prior
-/// was taken.
+/// The same for drifts. They enter with the dwell, which in a sweep grows to hundreds of times that at which
+/// the prior was taken.
 const WIDER_DRIFT: f64 = 1e10;
 /// Rows that are added at a time.
 const ROWS: usize = 4096;
@@ -26,7 +26,8 @@ pub struct Batch {
     pub to_end: DMatrix<f64>,
 }
 
-/// Adds all measurements of `plan` to `information`, as functionals of the initial unknowns; process noise is left out, and so are the biases.
+/// Adds all measurements of `plan` to `information`, as functionals of the initial unknowns; process noise is
+/// left out, and so are the biases.
 ///
 /// # Errors
 /// [`EkfError`] when a number is not finite.
@@ -49,8 +50,8 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
     Ok(Batch { information, to_end })
 }
 
-/// All measurements of `plan` in units of their noise as functionals of the initial unknowns, one after the other; the transition from
-/// start to end.
+/// All measurements of `plan` in units of their noise as functionals of the initial unknowns, one after the
+/// other; the transition from start to end.
 pub(crate) fn each_row(
     plan: &Plan,
     mut sink: impl FnMut(&mut dyn Iterator<Item = f64>) -> Result<(), EkfError>,
@@ -76,8 +77,8 @@ pub(crate) fn each_row(
     Ok(to_now.resize_vertically(n, 0.0))
 }
 
-/// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so that noise,
-/// steps and dwells do not matter.
+/// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so
+/// that noise, steps and dwells do not matter.
 ///
 /// # Errors
 /// [`EkfError`] when a number is not finite.
@@ -86,8 +87,8 @@ pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     Ok(wider(plan, &information, WIDER_PSI, WIDER_DRIFT))
 }
 
-/// Standard deviations so many times wider than what `information` says of the best known drift, and of the best known of the others (psi,
-/// and what is no rate), all others known.
+/// Standard deviations so many times wider than what `information` says of the best known drift, and of the
+/// best known of the others (psi, and what is no rate), all others known.
 pub(crate) fn wider(plan: &Plan, information: &SquareRootInformation, psi: f64, drift: f64) -> Vec<f64> {
     let units = plan.platform.units();
     let sigma = |psi: bool, wider: f64| {

@@ -8,8 +8,8 @@ use obsdeg_ekf::{BiasState, SensorNoise};
 pub enum Sensor {
     /// A gyro: 0, 1, 2 for X, Y, Z. Its bias is a drift, in rad/s.
     Gyro(usize),
-    /// What accelerometers make of a component of Z, in platform axes x, y, z: 0, 1, 2; in g. Three alike and independent make the same in any
-    /// axes, so the mounting does not matter.
+    /// What accelerometers make of a component of Z, in platform axes x, y, z: 0, 1, 2; in g. Three alike and
+    /// independent make the same in any axes, so the mounting does not matter.
     Accelerometer(usize),
 }
 

@@ -19,13 +19,15 @@ use crate::requirements::Basis;
 pub struct Conditions {
     /// How the truth is generated.
     pub truth: Truth,
-    /// Filter that is asked for; `None`: the linear one while its model holds, the iterated one where it does not.
+    /// Filter that is asked for; `None`: the linear one while its model holds, the iterated one where it does
+    /// not.
     pub filter: Option<FilterKind>,
     /// Largest step, in s; a position is divided into equal steps.
     pub step_s: f64,
     /// Dwell of positions that do not say theirs, in s.
     pub dwell_s: f64,
-    /// Rate of the rotations between positions in deg/s; `None`: instantaneous, unless the position says otherwise.
+    /// Rate of the rotations between positions in deg/s; `None`: instantaneous, unless the position says
+    /// otherwise.
     pub slew_rate_deg_s: Option<f64>,
     /// False: every position is reached at once, whatever it says.
     pub slews: bool,
@@ -138,8 +140,8 @@ impl Default for Conditions {
     }
 }
 
-/// Families before single unknowns, so that these are what they say in whatever order they are given; of equal names
-/// the last counts.
+/// Families before single unknowns, so that these are what they say in whatever order they are given; of
+/// equal names the last counts.
 pub fn general_first(mut given: Vec<Assignment>) -> Vec<Assignment> {
     given.sort_by_key(|a| a.name.len());
     given
@@ -237,7 +239,8 @@ impl Conditions {
         (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
     }
 
-    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error; `None` where none is stated.
+    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error; `None` where none is
+    /// stated.
     pub fn bench_in_words(&self) -> Option<String> {
         // of two sizes of the same error the later one counts
         let counts = |i: &usize| {
@@ -300,7 +303,8 @@ impl Conditions {
         own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
-    /// The same without random drift of any kind, and without bias instability of the accelerometers: Z has white noise.
+    /// The same without random drift of any kind, and without bias instability of the accelerometers: Z has
+    /// white noise.
     pub fn without_drift_noise(self) -> Self {
         Self {
             drift_noise: DriftNoise::OneStep(0.0),
@@ -360,8 +364,8 @@ impl Conditions {
         ]
     }
 
-    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or other
-    /// positions.
+    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or
+    /// other positions.
     pub(crate) fn within(&self, platform: &Platform) -> Self {
         let kept = |list: &[Assignment]| -> Vec<Assignment> {
             let has = |a: &&Assignment| {
@@ -378,7 +382,8 @@ impl Conditions {
         }
     }
 
-    /// Checks that every assignment concerns an unknown of `platform`, or a family that a gyro model may have.
+    /// Checks that every assignment concerns an unknown of `platform`, or a family that a gyro model may
+    /// have.
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`].
@@ -407,8 +412,8 @@ pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
 /// assigned.
 ///
 /// # Errors
-/// [`SimulationError::UnknownName`] for an assignment that concerns nothing; a family that the scheme does not have is
-/// accepted when the gyro model has it.
+/// [`SimulationError::UnknownName`] for an assignment that concerns nothing; a family that the scheme does
+/// not have is accepted when the gyro model has it.
 pub fn resolve(
     what: &'static str,
     platform: &Platform,
@@ -457,7 +462,8 @@ pub fn is_rate(unit: &str) -> bool {
     unit.starts_with("deg/h")
 }
 
-/// Units of the equations per shown unit of an unknown: rad per deg, rad/s per deg/h, 1 per ppm, rad per arcsec, g per ug.
+/// Units of the equations per shown unit of an unknown: rad per deg, rad/s per deg/h, 1 per ppm, rad per
+/// arcsec, g per ug.
 pub fn si_per_shown(unit: &str) -> f64 {
     match unit {
         "rad" => 1f64.to_radians(),

@@ -194,8 +194,8 @@ mod tests {
         assert!(!judged(&broken, [0.0, 0.0]).consistent);
     }
 
-    /// Right runs are doubted as often as the bands say: of 2000 NIS 2, NEES 1, errors 0.2. Ljung and Box's statistic has a heavier tail than its
-    /// chi-square with 200 samples: more than 2.
+    /// Right runs are doubted as often as the bands say: of 2000 NIS 2, NEES 1, errors 0.2. Ljung and Box's
+    /// statistic has a heavier tail than its chi-square with 200 samples: more than 2.
     #[test]
     fn right_runs_are_consistent() {
         let mut rng = SplitMix64::new(11);

@@ -1,17 +1,19 @@
 //! How a run bends over what its measurements leave open.
 //!
-//! A linearised run puts a flat normal distribution where the likely starts lie along something bent: over the spread of an
-//! unknown that is hardly seen, second-order terms shift what is known far better. So the terms of second order are made
-//! unknowns of their own. With a likely start `x0 + sum_i s_i xi_i`, the xi independent and of variance one, a run is
+//! A linearised run puts a flat normal distribution where the likely starts lie along something bent: over
+//! the spread of an unknown that is hardly seen, second-order terms shift what is known far better. So the
+//! terms of second order are made unknowns of their own. With a likely start `x0 + sum_i s_i xi_i`, the xi
+//! independent and of variance one, a run is
 //!
 //! ```text
 //! y = y0 + sum_i y_i xi_i + 1/2 sum_i y_ii + 1/2 sum_i y_ii (xi_i^2 - 1) + sum_(i<j) y_ij xi_i xi_j
 //! ```
 //!
-//! where `xi_i^2 - 1` (variance 2) and `xi_i xi_j` (variance 1) correlate with no xi and not with each other: to second
-//! moments they are further unknowns with a known prior. Few combinations of them can be told from nothing; these are columns.
-//! The mean and the covariance of such a model are those of the bent distribution to this order (a linear regression over the
-//! likely starts instead of a tangent: Garcia-Fernandez, Svensson, Morelande, Sarkka 2015, doi:10.1109/TSP.2015.2454485).
+//! where `xi_i^2 - 1` (variance 2) and `xi_i xi_j` (variance 1) correlate with no xi and not with each other:
+//! to second moments they are further unknowns with a known prior. Few combinations of them can be told from
+//! nothing; these are columns. The mean and the covariance of such a model are those of the bent distribution
+//! to this order (a linear regression over the likely starts instead of a tangent: Garcia-Fernandez,
+//! Svensson, Morelande, Sarkka 2015, doi:10.1109/TSP.2015.2454485).
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Stage};
@@ -22,8 +24,8 @@ use super::trajectory::Trajectory;
 
 /// Most directions that bend: their products are columns.
 const MOST_DIRECTIONS: usize = 6;
-/// A direction may bend the run when the square of what it turns the platform by, and a column counts when its outputs, are
-/// more than this part of what all samples could tell from nothing.
+/// A direction may bend the run when the square of what it turns the platform by, and a column counts when
+/// its outputs, are more than this part of what all samples could tell from nothing.
 const SEEN: f64 = 0.1;
 
 /// The second-order terms of a run, over the likely starts.
@@ -35,8 +37,8 @@ pub(super) struct Curvature {
 }
 
 impl Curvature {
-    /// That of the run linearised in `stages` along the trajectory `at` from `x0`, when the start has the covariance `p` (n x n) and had
-    /// the standard deviations `prior`; `None` where nothing bends.
+    /// That of the run linearised in `stages` along the trajectory `at` from `x0`, when the start has the
+    /// covariance `p` (n x n) and had the standard deviations `prior`; `None` where nothing bends.
     ///
     /// # Errors
     /// [`EkfError`] when a trajectory ends in numbers that are none.
@@ -154,8 +156,8 @@ impl Curvature {
     }
 }
 
-/// The directions of the likely starts, each as far as one standard deviation, that turn the platform by angles whose square is
-/// more than `least`; the widest first.
+/// The directions of the likely starts, each as far as one standard deviation, that turn the platform by
+/// angles whose square is more than `least`; the widest first.
 fn directions(
     stages: &[Stage],
     p: &DMatrix<f64>,

@@ -1,8 +1,10 @@
-//! The extended filter of a platform: its state is the attitude itself, its dynamics those of direction cosines, and its
-//! Jacobians are taken at the estimate. Nothing here is the linear model (6), (8): equations are written anew.
+//! The extended filter of a platform: its state is the attitude itself, its dynamics those of direction
+//! cosines, and its Jacobians are taken at the estimate. Nothing here is the linear model (6), (8): equations
+//! are written anew.
 //!
-//! `E = C_p^n C_n^c = exp([psi^n x])` obeys `E' = [(E omega - omega + eps^n) x] E`, with `eps^n = C_p^n eps^p(g^p)` and
-//! `g^p = C_n^p g^n`, and the output is `Z^n = g^n - E^T g^n`. The error is `delta` with `E_true = exp([delta x]) E`, so
+//! `E = C_p^n C_n^c = exp([psi^n x])` obeys `E' = [(E omega - omega + eps^n) x] E`, with
+//! `eps^n = C_p^n eps^p(g^p)` and `g^p = C_n^p g^n`, and the output is `Z^n = g^n - E^T g^n`. The error is
+//! `delta` with `E_true = exp([delta x]) E`, so
 //!
 //! ```text
 //! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD        Gamma = d eps^p / d g^p,  N D = eps^n
@@ -11,7 +13,8 @@
 //!
 //! with the error `a^p` of the accelerometers and the torqued rate among what `eps^p` is a function of,
 //!
-//! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn by `delta`).
+//! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn
+//! by `delta`).
 
 use std::borrow::Cow;
 
@@ -41,8 +44,9 @@ struct Errors {
     slope: Matrix3<f64>,
 }
 
-/// Of the constants `d` where what they are functions of is as `of` says (platform axes; nothing: they have no part in it), each times its
-/// weight; the derivative is by the source `by`, and `by_d` becomes what each adds to its platform axis per unit: `(axis, value)`.
+/// Of the constants `d` where what they are functions of is as `of` says (platform axes; nothing: they have
+/// no part in it), each times its weight; the derivative is by the source `by`, and `by_d` becomes what each
+/// adds to its platform axis per unit: `(axis, value)`.
 fn errors<'a>(
     terms: &[ErrorTerm],
     weights: &[f64],
@@ -80,8 +84,8 @@ fn errors<'a>(
 /// What drifts may turn a platform by in one step, in rad: far beyond what any run is good for.
 const MOST_TURN: f64 = 100.0;
 
-/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at the start, or
-/// none where nobody asks.
+/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at
+/// the start, or none where nobody asks.
 #[derive(Clone)]
 struct Moving {
     e: Matrix3<f64>,
@@ -102,7 +106,8 @@ pub struct PlatformMotion<'a> {
 }
 
 impl PlatformMotion<'_> {
-    /// What is left of each constant, on average over a step of `dt`: all of a coefficient, less of a bias that fades.
+    /// What is left of each constant, on average over a step of `dt`: all of a coefficient, less of a bias
+    /// that fades.
     fn weights(&self, dt: f64) -> Vec<f64> {
         let mean = |x: f64| if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x };
         let fading = self.plan.biases.iter().map(|b| mean(b.process.decay * dt));
@@ -150,7 +155,8 @@ impl PlatformMotion<'_> {
 }
 
 impl PlatformMotion<'_> {
-    /// `C_c^n` at the end of a step, the errors of the accelerometers there, and what each constant adds to its platform axis.
+    /// `C_c^n` at the end of a step, the errors of the accelerometers there, and what each constant adds to
+    /// its platform axis.
     fn accelerometers(
         &self,
         e: &Matrix3<f64>,
@@ -206,7 +212,8 @@ impl PlatformMotion<'_> {
         Ok(())
     }
 
-    /// Turns the psi of `x` that moves by `dt`, and the `rows` of local coordinates with it (in n, as [`Moving`] has them).
+    /// Turns the psi of `x` that moves by `dt`, and the `rows` of local coordinates with it (in n, as
+    /// [`Moving`] has them).
     fn integrate(
         &self,
         t: f64,
@@ -421,9 +428,9 @@ impl<'a> Extended<'a> {
         self.plan
     }
 
-    /// Runs it from `start` over the measurements `z`: of every step as many as there are outputs, those of slews unused.
-    /// `on_step` sees the number of every step, the estimate, the covariance of its local coordinates and the whitened
-    /// innovations.
+    /// Runs it from `start` over the measurements `z`: of every step as many as there are outputs, those of
+    /// slews unused. `on_step` sees the number of every step, the estimate, the covariance of its local
+    /// coordinates and the whitened innovations.
     ///
     /// # Errors
     /// [`EkfError`] when a number is none, or `z` is of another run.
@@ -564,8 +571,8 @@ mod tests {
         }
     }
 
-    /// At zero the Jacobians are those of the linear model of the verdicts, which shares no line with them: (1)-(6) and the
-    /// carries a second time.
+    /// At zero the Jacobians are those of the linear model of the verdicts, which shares no line with them:
+    /// (1)-(6) and the carries a second time.
     #[test]
     fn at_zero_it_is_the_linear_model() {
         for case in CASES {

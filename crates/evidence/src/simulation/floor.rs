@@ -1,26 +1,32 @@
-//! The noise floor: how well a coefficient can be known at all under random drift, and the dwell beyond which longer is no better.
+//! The noise floor: how well a coefficient can be known at all under random drift, and the dwell beyond which
+//! longer is no better.
 //!
-//! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2 as far as dwells are admitted (on average); for each the covariance of the filter runs once,
-//! with noise of Z, random drift and biases as in a run but without a prior (that is, with one that says nothing). The least sigma of a
-//! coefficient over these dwells is its floor; the dwell beyond which longer is no better is the shortest at which sigma is within 5 % of it. A
-//! coefficient whose sigma gets there only in the last two octaves still falls, and has no floor in this range; one that is there at the shortest dwell
-//! may have its least at a shorter one. Within a long
-//! position samples are taken together, of the same density of noise: twice as many after every 20 steps, from its start and from its end, for it is
-//! there that what a walk forgets is seen.
+//! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2 as far as dwells
+//! are admitted (on average); for each the covariance of the filter runs once, with noise of Z, random drift
+//! and biases as in a run but without a prior (that is, with one that says nothing). The least sigma of a
+//! coefficient over these dwells is its floor; the dwell beyond which longer is no better is the shortest at
+//! which sigma is within 5 % of it. A coefficient whose sigma gets there only in the last two octaves still
+//! falls, and has no floor in this range; one that is there at the shortest dwell may have its least at a
+//! shorter one. Within a long position samples are taken together, of the same density of noise: twice as
+//! many after every 20 steps, from its start and from its end, for it is there that what a walk forgets is
+//! seen.
 //!
 //! # One position in closed form
-//! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`, `b' = v`, `z = psi + u`, with
-//! densities `N^2` of w (angle random walk), `K^2` of v (rate random walk) and `R = sigma_Z^2 dt` of u. With an unknown psi(0) and D, and
-//! `b(0) = 0`, D is the rate at the start; by time reversal it is as well known as `D + b` at the end.
+//! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`,
+//! `b' = v`, `z = psi + u`, with densities `N^2` of w (angle random walk), `K^2` of v (rate random walk) and
+//! `R = sigma_Z^2 dt` of u. With an unknown psi(0) and D, and `b(0) = 0`, D is the rate at the start; by time
+//! reversal it is as well known as `D + b` at the end.
 //!
-//! - Exact observations, R = 0: D is seen through `psi'`, with white noise of density N^2. The Riccati equation `p' = K^2 - p^2/N^2` from
-//!   p(0) = infinity has `sigma^2 = K N coth(K T/N)`: the floor is `sqrt(K N)`, and it is within 5 % at `T = 1.530 N/K`, where
-//!   `coth = 1.05^2`.
-//! - No angle random walk, N = 0: with `P = U V^-1` the Riccati equation is `U' = F U + Q V`, `V' = H^T U/R - F^T V`, U(0) = 1, V(0) = 0. In units
-//!   of `1/lambda = (R/K^2)^(1/4)` every entry obeys `y'''' = -y`, so with `a = lambda T/sqrt 2`
-//!   `sigma^2 = K^(3/2) R^(1/4) sqrt 2 (sinh a cosh a + sin a cos a)/(sinh^2 a - sin^2 a)`: `12 R/T^3` for short dwells (order one), and a floor of
-//!   `sqrt 2 K^(3/2) R^(1/4)`.
-//! - No rate random walk, K = 0: `sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau)))` with `tau = sqrt R/N`: `12 R/T^3`, then `N^2/T`, and no floor.
+//! - Exact observations, R = 0: D is seen through `psi'`, with white noise of density N^2. The Riccati
+//!   equation `p' = K^2 - p^2/N^2` from p(0) = infinity has `sigma^2 = K N coth(K T/N)`: the floor is
+//!   `sqrt(K N)`, and it is within 5 % at `T = 1.530 N/K`, where `coth = 1.05^2`.
+//! - No angle random walk, N = 0: with `P = U V^-1` the Riccati equation is `U' = F U + Q V`,
+//!   `V' = H^T U/R - F^T V`, U(0) = 1, V(0) = 0. In units of `1/lambda = (R/K^2)^(1/4)` every entry obeys
+//!   `y'''' = -y`, so with `a = lambda T/sqrt 2`
+//!   `sigma^2 = K^(3/2) R^(1/4) sqrt 2 (sinh a cosh a + sin a cos a)/(sinh^2 a - sin^2 a)`: `12 R/T^3` for
+//!   short dwells (order one), and a floor of `sqrt 2 K^(3/2) R^(1/4)`.
+//! - No rate random walk, K = 0: `sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau)))` with `tau = sqrt R/N`:
+//!   `12 R/T^3`, then `N^2/T`, and no floor.
 
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
@@ -156,7 +162,8 @@ fn mean_dwell(scheme: &Scheme, conditions: &Conditions) -> f64 {
     dwells.sum::<f64>() / scheme.positions.len() as f64
 }
 
-/// Sigma of every unknown at the end of a run with all dwells times `factor`, with all noise and without a prior, in SI units (shape n).
+/// Sigma of every unknown at the end of a run with all dwells times `factor`, with all noise and without a
+/// prior, in SI units (shape n).
 ///
 /// # Errors
 /// [`SimulationError`].

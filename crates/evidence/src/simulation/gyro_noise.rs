@@ -1,9 +1,11 @@
-//! Random drift of the gyros by their datasheet: angle random walk as white drift, rate random walk and bias instability as states behind the
-//! unknowns, in the filter and in the truth alike; and the bias instability of the accelerometers, which is noise of Z that is not white.
+//! Random drift of the gyros by their datasheet: angle random walk as white drift, rate random walk and bias
+//! instability as states behind the unknowns, in the filter and in the truth alike; and the bias instability
+//! of the accelerometers, which is noise of Z that is not white.
 //!
-//! The drift of a gyro is `D_F + b_K + b_B` about its input axis, with g-sensitive terms as ever. `b_K' = w`, `b_K(0) = 0`, is the rate random
-//! walk, `b_B' = -b_B/T + w` the bias instability: so every D is a constant, and D_F is the bias at the *start* of the run, but for what of
-//! `b_B` is there. A coefficient is not what the bias is at the end.
+//! The drift of a gyro is `D_F + b_K + b_B` about its input axis, with g-sensitive terms as ever. `b_K' = w`,
+//! `b_K(0) = 0`, is the rate random walk, `b_B' = -b_B/T + w` the bias instability: so every D is a constant,
+//! and D_F is the bias at the *start* of the run, but for what of `b_B` is there. A coefficient is not what
+//! the bias is at the end.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::apply;
@@ -27,8 +29,9 @@ impl Plan {
         !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
     }
 
-    /// `(Phi, Q)` of psi (in the axes of the unknowns) and the biases over a step of a segment (3 + m states), by the noise of the gyros: exact
-    /// at a position; while the platform turns, in parts of at most 0.02 rad with the attitude of their middle.
+    /// `(Phi, Q)` of psi (in the axes of the unknowns) and the biases over a step of a segment (3 + m
+    /// states), by the noise of the gyros: exact at a position; while the platform turns, in parts of at most
+    /// 0.02 rad with the attitude of their middle.
     pub(super) fn bias_step(&self, segment: usize) -> Result<Step, SimulationError> {
         let s = &self.segments[segment];
         let n = 3 + self.biases.len();
@@ -84,8 +87,8 @@ impl Plan {
         (f, q)
     }
 
-    /// Standard deviations of the biases at the start. A filter takes positive ones: a random walk, which starts at none, has a millionth of
-    /// what the shortest step makes of it.
+    /// Standard deviations of the biases at the start. A filter takes positive ones: a random walk, which
+    /// starts at none, has a millionth of what the shortest step makes of it.
     pub fn bias_sigmas(&self) -> Vec<f64> {
         let shortest = self.segments.iter().map(|s| s.dt).fold(f64::MAX, f64::min);
         let sigma = |b: &Bias| b.process.variance.max(1e-12 * b.process.density * shortest).sqrt();
@@ -140,7 +143,8 @@ impl Gyros {
         self.h == h
     }
 
-    /// Draws one part: the biases go on, and the mean drift over it is added to `drift`, in platform axes (rad/s).
+    /// Draws one part: the biases go on, and the mean drift over it is added to `drift`, in platform axes
+    /// (rad/s).
     pub(super) fn draw(&self, plan: &Plan, biases: &mut [f64], noise: &mut Noise, drift: &mut [f64; 3]) {
         let mut first = 0;
         for (g, (phi, root)) in self.steps.iter().enumerate() {

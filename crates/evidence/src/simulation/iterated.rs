@@ -1,11 +1,13 @@
-//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start, then the mean about it.
+//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start,
+//! then the mean about it.
 //!
-//! A filter that goes through a run once linearises every step where the estimate was then, before the drifts were known;
-//! later steps cannot mend that, and iterating single updates cannot either, since it is the motion between them that is
-//! bent. So the run is linearised along one trajectory of the nonlinear equations, filtered with its process noise as a
-//! linear model, and what all measurements say of its start (`linear::smoothed_start`) moves the trajectory, until the
-//! estimate at the end stays (Bell 1994, doi:10.1137/0804035). Where what is left open bends the run, a last pass takes
-//! that into the estimate and its covariance (`curvature`).
+//! A filter that goes through a run once linearises every step where the estimate was then, before the drifts
+//! were known; later steps cannot mend that, and iterating single updates cannot either, since it is the
+//! motion between them that is bent. So the run is linearised along one trajectory of the nonlinear
+//! equations, filtered with its process noise as a linear model, and what all measurements say of its start
+//! (`linear::smoothed_start`) moves the trajectory, until the estimate at the end stays (Bell 1994,
+//! doi:10.1137/0804035). Where what is left open bends the run, a last pass takes that into the estimate and
+//! its covariance (`curvature`).
 
 use std::borrow::Cow;
 
@@ -27,7 +29,8 @@ use super::validity::Validity;
 pub(crate) const MAX_ITERATED_STEPS: usize = 100_000;
 /// Most linearisations of the run.
 const PASSES: usize = 40;
-/// The run has settled when the estimate at its end moves by less than this, in standard deviations of any combination.
+/// The run has settled when the estimate at its end moves by less than this, in standard deviations of any
+/// combination.
 const SETTLED: f64 = 0.01;
 /// Squared innovations of this many times their number are poor.
 const POOR: f64 = 2.0;
@@ -158,8 +161,8 @@ fn settle(
     Ok(Settled { x0, passes, converged, misfit: best.misfit })
 }
 
-/// Settles on the first eighth of the run, from there on the first quarter, and so on: a trajectory that is known for a while is near
-/// enough to be known for longer.
+/// Settles on the first eighth of the run, from there on the first quarter, and so on: a trajectory that is
+/// known for a while is near enough to be known for longer.
 fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<Settled, EkfError> {
     let outputs = filter.plan().components.len();
     let mut x0 = start.state(filter.plan());
@@ -174,8 +177,9 @@ fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Resul
     Ok(Settled { passes: passes + settled.passes, ..settled })
 }
 
-/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory that it found,
-/// until that stays. Where it does not, or fits poorly, longer and longer parts of the run are tried from the initial estimate too.
+/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory
+/// that it found, until that stays. Where it does not, or fits poorly, longer and longer parts of the run are
+/// tried from the initial estimate too.
 ///
 /// # Errors
 /// [`EkfError`] when a number is none, or `z` is of another run.
@@ -223,9 +227,10 @@ fn bent(
     Ok(curvature)
 }
 
-/// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at the drifts that
-/// `conditions` say, by equations of full attitudes linearised along it: with the prior, without noise of the drift. `None`
-/// where the unknowns are the drift itself, where torquer errors act in turns at once, or for a run of too many steps.
+/// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at
+/// the drifts that `conditions` say, by equations of full attitudes linearised along it: with the prior,
+/// without noise of the drift. `None` where the unknowns are the drift itself, where torquer errors act in
+/// turns at once, or for a run of too many steps.
 ///
 /// # Errors
 /// [`SimulationError`] for conditions that cannot be, and numbers that are none.

@@ -86,7 +86,8 @@ pub struct Plan {
     pub attitudes: Vec<Matrix3<f64>>,
     /// `C_c^n` at the end of every position.
     pub ends: Vec<Matrix3<f64>>,
-    /// `S_i` at the start of every position. What torquer errors leave in psi^n in turns at once is in it, and not in psi.
+    /// `S_i` at the start of every position. What torquer errors leave in psi^n in turns at once is in it,
+    /// and not in psi.
     pub blocks: Vec<Block<f64>>,
     /// Positions and slews in order.
     pub segments: Vec<Segment>,
@@ -96,7 +97,8 @@ pub struct Plan {
     pub gyros: [SensorNoise; 3],
     /// What of them, and of the accelerometers, is a state, behind the unknowns.
     pub biases: Vec<Bias>,
-    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the biases (rad/s, g).
+    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the
+    /// biases (rad/s, g).
     pub noise_roots: Vec<DMatrix<f64>>,
     /// Components of Z that are used (1, 3, with errors of the accelerometers 2, and [`AZIMUTH`]).
     pub components: Vec<usize>,
@@ -106,15 +108,15 @@ impl Plan {
     /// The plan of `scheme`; a scheme without latitude is put at the default.
     ///
     /// # Errors
-    /// [`SimulationError`] for what cannot be run: generic angles, slews without inertial carry, too many unknowns
-    /// or steps, conditions that are not positive.
+    /// [`SimulationError`] for what cannot be run: generic angles, slews without inertial carry, too many
+    /// unknowns or steps, conditions that are not positive.
     pub fn new(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
         conditions.validate()?;
         Self::derived(scheme, conditions)
     }
 
-    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond what is
-    /// admitted.
+    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond
+    /// what is admitted.
     ///
     /// # Errors
     /// [`SimulationError`], as [`Self::new`].
@@ -174,7 +176,8 @@ impl Plan {
         Ok(())
     }
 
-    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as `parts` divides it.
+    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as
+    /// `parts` divides it.
     ///
     /// # Errors
     /// [`SimulationError`], as [`Self::new`].
@@ -386,9 +389,9 @@ impl Plan {
     }
 }
 
-/// psi after `dt` s by psi before (`exp(W dt)`, W the rate of the earth in rad/s) and by a constant drift meanwhile
-/// (the integral of `exp(W t)`, in s): Rodrigues' formula. A plan of a record has one for every bin: buffers of
-/// matrix products between what is kept of each would leave the memory full of holes.
+/// psi after `dt` s by psi before (`exp(W dt)`, W the rate of the earth in rad/s) and by a constant drift
+/// meanwhile (the integral of `exp(W t)`, in s): Rodrigues' formula. A plan of a record has one for every
+/// bin: buffers of matrix products between what is kept of each would leave the memory full of holes.
 fn earth_step(w_n: f64, w_u: f64, dt: f64) -> (Matrix3<f64>, Matrix3<f64>) {
     let f = local_dynamics(&Float, &w_n, &w_u);
     let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
@@ -580,7 +583,8 @@ impl Process for PlatformProcess<'_> {
 pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
 
 impl Plan {
-    /// The rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate at which a slew turns (rad/s).
+    /// The rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate at which a
+    /// slew turns (rad/s).
     pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         self.platform.errors().drift_rows(&Float, c, || self.torqued_rate(c, slew))
     }
@@ -604,8 +608,8 @@ impl Plan {
         self.point.turns.iter().any(|turns| !turns.is_empty())
     }
 
-    /// A bound on the rate at which coefficients turn the platform, in rad/s: g is one at most, and torquers have the earth rate and
-    /// that of the fastest turn.
+    /// A bound on the rate at which coefficients turn the platform, in rad/s: g is one at most, and torquers
+    /// have the earth rate and that of the fastest turn.
     pub(crate) fn drift_bound(&self, coefficients: &[f64]) -> f64 {
         let fastest = (0..self.segments.len()).filter_map(|i| self.turns(i)).map(|s| s.turned(1.0));
         let fastest = fastest.fold(W_IE, f64::max);
@@ -642,7 +646,8 @@ impl Plan {
         }
     }
 
-    /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is commanded.
+    /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is
+    /// commanded.
     pub(crate) fn substeps(&self, segment: usize) -> usize {
         let s = &self.segments[segment];
         let turn = match &s.kind {

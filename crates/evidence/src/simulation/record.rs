@@ -86,8 +86,8 @@ impl Recorded<'_> {
         x[..self.unknowns].iter().copied().chain(self.combinations.iter().map(combination))
     }
 
-    /// All standard deviations; `local` makes a functional of the unknowns one of what the covariance is of, where that is
-    /// another.
+    /// All standard deviations; `local` makes a functional of the unknowns one of what the covariance is of,
+    /// where that is another.
     fn sigmas(
         &self,
         p: &Covariance,
@@ -119,7 +119,8 @@ pub(crate) struct Sampled {
     pub(crate) largest_psi: f64,
 }
 
-/// The truth that starts from the states `x`, measured over the whole of `plan`; `record` sees the states from t = 0.
+/// The truth that starts from the states `x`, measured over the whole of `plan`; `record` sees the states
+/// from t = 0.
 pub(crate) fn sample(
     truth: &mut TruthModel<'_>,
     plan: &Plan,
@@ -265,12 +266,13 @@ fn extended(
     Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
 }
 
-/// Runs the filter of `plan` against one truth; its biases are drawn. Which filter, the conditions say, or whether the
-/// small-angle model holds; where it is not the linear one, that goes along on the same measurements.
+/// Runs the filter of `plan` against one truth; its biases are drawn. Which filter, the conditions say, or
+/// whether the small-angle model holds; where it is not the linear one, that goes along on the same
+/// measurements.
 ///
 /// # Errors
-/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact truth that
-/// turns too fast, [`SimulationError::Unresolvable`] when something is not finite.
+/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact
+/// truth that turns too fast, [`SimulationError::Unresolvable`] when something is not finite.
 pub fn run(
     plan: &Plan,
     conditions: &Conditions,
@@ -366,8 +368,8 @@ pub(crate) fn choose(
     }
 }
 
-/// Whether sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose model
-/// is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
+/// Whether sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose
+/// model is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
 fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity, psi_prior: f64) -> bool {
     match kind {
         FilterKind::Linear => validity.holds || conditions.truth == Truth::Linear,

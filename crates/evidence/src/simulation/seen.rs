@@ -1,5 +1,5 @@
-//! What the samples of a plan with slews determine. No exact verdict covers a platform that turns between positions, so
-//! this is decided in floating point, by what a wider prior does to the standard deviations.
+//! What the samples of a plan with slews determine. No exact verdict covers a platform that turns between
+//! positions, so this is decided in floating point, by what a wider prior does to the standard deviations.
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
@@ -9,8 +9,8 @@ use super::error::SimulationError;
 use super::plan::Plan;
 use crate::prediction::Prediction;
 
-/// Two priors that say nothing, so many times wider than what the samples say of the best known unknown: far from 1e16,
-/// where rounding looks like information.
+/// Two priors that say nothing, so many times wider than what the samples say of the best known unknown: far
+/// from 1e16, where rounding looks like information.
 const WIDTHS: [f64; 2] = [1e11, 1e13];
 /// What the wider of these may do to a standard deviation that comes of the samples alone.
 const ALONE: f64 = 1.05;
@@ -19,7 +19,8 @@ const WIDER: f64 = 10.0;
 /// What that does to a standard deviation that comes of the prior only, nearly.
 const MOSTLY: f64 = 9.0;
 
-/// Inverse roots of the information of all samples with either prior: of the unknowns at the start, and at the end.
+/// Inverse roots of the information of all samples with either prior: of the unknowns at the start, and at
+/// the end.
 struct Seen {
     start: [DMatrix<f64>; 2],
     end: [DMatrix<f64>; 2],
@@ -97,8 +98,8 @@ pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
     with_slews(plan, seed, ALONE, || Seen::of(plan, wide))
 }
 
-/// The prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a prior ten
-/// times wider widens its standard deviation (nearly) as much.
+/// The prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a
+/// prior ten times wider widens its standard deviation (nearly) as much.
 ///
 /// # Errors
 /// [`SimulationError`].

@@ -16,12 +16,14 @@ pub struct SchemeAnalysis {
     /// Exact verdicts on the scheme.
     #[serde(flatten)]
     pub verdicts: Analysis,
-    /// Changes of the estimates per unit of each error that is not estimated; left out unless they are asked for.
+    /// Changes of the estimates per unit of each error that is not estimated; left out unless they are asked
+    /// for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensitivities: Option<Sensitivities>,
 }
 
-/// Changes of the estimates of a scheme per unit of each error that it does not estimate, by the weights of one record.
+/// Changes of the estimates of a scheme per unit of each error that it does not estimate, by the weights of
+/// one record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Sensitivities {
     /// Conditions of the record whose noise and priors weight the samples.

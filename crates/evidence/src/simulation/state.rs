@@ -1,11 +1,13 @@
-//! The state of a filter that carries attitudes: as many local coordinates as there are unknowns, in their order.
+//! The state of a filter that carries attitudes: as many local coordinates as there are unknowns, in their
+//! order.
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::{cross, rotation, rotation_vector, times, transpose};
 use obsdeg_ekf::{Manifold, Transition};
 
-/// Attitudes `A = exp([psi x])`, each in the axes of its unknowns psi, and the constants: the coefficients D, and biases behind them. The local coordinates of an
-/// attitude are the rotation vector `delta` with `A_true = exp([delta x]) A`.
+/// Attitudes `A = exp([psi x])`, each in the axes of its unknowns psi, and the constants: the coefficients D,
+/// and biases behind them. The local coordinates of an attitude are the rotation vector `delta` with
+/// `A_true = exp([delta x]) A`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformState {
     pub(super) attitudes: Vec<Matrix3<f64>>,
@@ -44,8 +46,8 @@ impl PlatformState {
         self
     }
 
-    /// The functional `c` of the unknowns as one of the local coordinates (of psi: by the derivative of the rotation
-    /// vector).
+    /// The functional `c` of the unknowns as one of the local coordinates (of psi: by the derivative of the
+    /// rotation vector).
     pub fn functional(&self, c: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let first = 3 * self.attitudes.len();
         let mut out = vec![0.0; first];
@@ -164,8 +166,8 @@ mod tests {
         a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
     }
 
-    /// Two attitudes and three constants: what is retracted is found again, the transport is the derivative of the
-    /// coordinates about the new state, and a functional the derivative of the unknowns.
+    /// Two attitudes and three constants: what is retracted is found again, the transport is the derivative
+    /// of the coordinates about the new state, and a functional the derivative of the unknowns.
     #[test]
     fn a_manifold() {
         let mut rng = SplitMix64::new(7);

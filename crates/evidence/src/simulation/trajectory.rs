@@ -15,8 +15,8 @@ pub(super) struct Trajectory {
 }
 
 impl Trajectory {
-    /// From `x`, of at most so many steps. `on_step` hears the segment, the time within it, how long the step is, and the state to be
-    /// moved by it.
+    /// From `x`, of at most so many steps. `on_step` hears the segment, the time within it, how long the step
+    /// is, and the state to be moved by it.
     fn through(
         filter: &Extended<'_>,
         most: usize,

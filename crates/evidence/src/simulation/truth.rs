@@ -13,14 +13,14 @@ pub(crate) use super::noise::Noise;
 use super::plan::{G_N, Plan, SegmentKind, integration_steps};
 use super::state::orthonormal;
 
-/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is one at
-/// most.
+/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is
+/// one at most.
 pub(super) fn drift_turn(drifts: f64, dt: f64) -> f64 {
     (drifts + W_IE) * dt.abs()
 }
 
-/// Refuses an exact truth whose drifts take too many integration steps, and one with torquer errors in turns at once: `drifts` bounds the
-/// rate that the coefficients make, in rad/s.
+/// Refuses an exact truth whose drifts take too many integration steps, and one with torquer errors in turns
+/// at once: `drifts` bounds the rate that the coefficients make, in rad/s.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].
@@ -171,7 +171,8 @@ impl<'a> TruthModel<'a> {
         for (k, &column) in block.columns[..3].iter().enumerate() {
             self.x[column] = (0..3).map(|r| block.rows[r][k] * psi_n[r]).sum();
         }
-        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n; what the accelerometers add
+        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n; what the
+        // accelerometers add
         let seen = apply(&transpose(&e), &G_N);
         let c = plan.attitude(segment, (step + 1) as f64 * s.dt);
         let force = apply(&transpose(&c), &seen).map(|x| -x);
@@ -186,8 +187,8 @@ impl<'a> TruthModel<'a> {
         }
     }
 
-    /// How many draws of the drift noise a step of a segment has, and how large they are: as many steps as a slew would have, each
-    /// with its share of the angle that the filter allows for.
+    /// How many draws of the drift noise a step of a segment has, and how large they are: as many steps as a
+    /// slew would have, each with its share of the angle that the filter allows for.
     fn held(&self, segment: usize) -> (usize, f64) {
         let s = &self.plan.segments[segment];
         if !matches!(s.kind, SegmentKind::Slew(_)) {
@@ -214,8 +215,8 @@ impl<'a> TruthModel<'a> {
         }
     }
 
-    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n: the platform turns at the commanded rate
-    /// in its own axes, plus its drift; the commanded rate itself drops out.
+    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n: the platform turns at the
+    /// commanded rate in its own axes, plus its drift; the commanded rate itself drops out.
     fn runge_kutta(&self, segment: usize, t: f64, h: f64, e: &Matrix3<f64>, kick: &[f64; 3]) -> Matrix3<f64> {
         let earth = self.plan.earth_rate();
         let slope = |t: f64, e: &Matrix3<f64>| {

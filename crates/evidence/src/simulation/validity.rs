@@ -26,7 +26,8 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// The figures that decide it, for a run from the true states `start` in which `|psi|` reached `psi` (rad).
+    /// The figures that decide it, for a run from the true states `start` in which `|psi|` reached `psi`
+    /// (rad).
     ///
     /// # Errors
     /// [`SimulationError::UnknownName`] for a requirement on what the scheme does not have.

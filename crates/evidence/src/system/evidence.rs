@@ -32,7 +32,8 @@ const HORIZONS: i32 = 45;
 /// Singular values (columns of unit length) above this are seen, below the next are not.
 const SEEN: f64 = 1e-9;
 const UNSEEN: f64 = 1e-12;
-/// What moves no output by more than this part of the outputs themselves, over the width of its prior, is rounding.
+/// What moves no output by more than this part of the outputs themselves, over the width of its prior, is
+/// rounding.
 const ROUNDING: f64 = 1e-13;
 /// Where samples leave more than this part of the diffuse prior, its inflation says nothing.
 const LEFT: f64 = 0.01;
@@ -70,8 +71,8 @@ pub struct SystemEvidence {
     /// Bound on the order of derivatives up to which an unknown that is not seen was looked for; samples may
     /// see it by higher ones, which contradicts nothing. Null where the end is proven.
     pub seen_up_to: Option<usize>,
-    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
-    /// equations nor the known inputs hold the time.
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where
+    /// neither the equations nor the known inputs hold the time.
     pub time: Option<f64>,
     /// Longest horizon, of every experiment, in the unit of `t` in the model.
     pub duration: f64,
@@ -109,8 +110,9 @@ pub struct SymmetryEvidence {
     pub seen: Check,
 }
 
-/// The rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start, and those of the constraints, each
-/// of which weighs as much as the best sample; and the size of all outputs, over their noise.
+/// The rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start,
+/// and those of the constraints, each of which weighs as much as the best sample; and the size of all
+/// outputs, over their noise.
 fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
     let numeric = &setup.numeric;
     let n = numeric.states.len();
@@ -171,7 +173,8 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError
     }
 }
 
-/// Rows for unknowns only (states whose start is known have none), with columns of unit length: `(rows, lengths)`.
+/// Rows for unknowns only (states whose start is known have none), with columns of unit length:
+/// `(rows, lengths)`.
 fn scaled(rows: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, Vec<f64>) {
     let picked = rows.select_columns(columns);
     let norms: Vec<f64> =
@@ -180,8 +183,8 @@ fn scaled(rows: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, Vec<f64>) {
     (m, norms)
 }
 
-/// Sigma of every unknown from what is seen: `sum (V_ij / s_j)^2` over the first `rank` singular values; `None` when rounding and what is
-/// seen cannot be told apart.
+/// Sigma of every unknown from what is seen: `sum (V_ij / s_j)^2` over the first `rank` singular values;
+/// `None` when rounding and what is seen cannot be told apart.
 fn sigmas(rows: &DMatrix<f64>, columns: &[usize], rank: usize) -> Result<Option<Vec<f64>>, EkfError> {
     let (m, norms) = scaled(rows, columns);
     let square = m.qr().r();
@@ -360,7 +363,8 @@ fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[u
     v
 }
 
-/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose, and the part of the first that is left.
+/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose, and the part
+/// of the first that is left.
 fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<(f64, f64)>, EkfError> {
     let picked = rows.select_columns(columns);
     let sigmas = |factor: f64| {
@@ -374,8 +378,8 @@ fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Resul
     Ok(large.iter().zip(&small).zip(prior).map(|((l, s), prior)| (l / s, s / prior)).collect())
 }
 
-/// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and less and less. Two that agree
-/// are no sign of it: slopes that go up and down meet.
+/// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and
+/// less and less. Two that agree are no sign of it: slopes that go up and down meet.
 fn settled(slopes: &[f64]) -> Option<f64> {
     let last = slopes.last_chunk::<SETTLED>()?;
     let changes: Vec<f64> = last.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
@@ -385,7 +389,8 @@ fn settled(slopes: &[f64]) -> Option<f64> {
     (less && little).then_some(last[SETTLED - 1])
 }
 
-/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where those before it settle there.
+/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where those before
+/// it settle there.
 fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
     let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
     for j in 0..HORIZONS {

@@ -18,8 +18,9 @@ pub enum FilterState {
     Input { experiment: usize, i: usize, derivative: usize },
 }
 
-/// A model with numbers for what is known: states of the filter are the states of the model and the derivatives of its unknown inputs,
-/// of every experiment, and its parameters. The parts of its timeline are the segments of the first experiment, then those of the next.
+/// A model with numbers for what is known: states of the filter are the states of the model and the
+/// derivatives of its unknown inputs, of every experiment, and its parameters. The parts of its timeline are
+/// the segments of the first experiment, then those of the next.
 #[derive(Debug, Clone)]
 pub struct Numeric<'a> {
     compiled: &'a Compiled,
@@ -40,7 +41,8 @@ pub struct Numeric<'a> {
 }
 
 impl<'a> Numeric<'a> {
-    /// Numbers for `model`: known inputs that are generic as functions of `t`, generic constants as numbers, from `[simulation]`.
+    /// Numbers for `model`: known inputs that are generic as functions of `t`, generic constants as numbers,
+    /// from `[simulation]`.
     ///
     /// # Errors
     /// [`ModelError`] naming what has no number, and for arbitrary unknown inputs.
@@ -244,8 +246,8 @@ impl<'a> Numeric<'a> {
         }
     }
 
-    /// The values of the combinations that the model asks for, of the unknowns at the start of the first experiment, and their derivatives by the
-    /// states of the filter, a row each.
+    /// The values of the combinations that the model asks for, of the unknowns at the start of the first
+    /// experiment, and their derivatives by the states of the filter, a row each.
     pub fn combinations(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
         let (nodes, n) = (&self.compiled.combinations, self.states.len());
         let values = self.values(0, 0.0, x.as_slice());
@@ -254,8 +256,8 @@ impl<'a> Numeric<'a> {
         (nodes.iter().map(|&node| values[node]).collect(), rows)
     }
 
-    /// The values of the constraints at the start of every experiment, which should be zero, and their derivatives by the states of the
-    /// filter, a row each.
+    /// The values of the constraints at the start of every experiment, which should be zero, and their
+    /// derivatives by the states of the filter, a row each.
     pub fn constraints(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
         let nodes = &self.compiled.constraints;
         let n = self.states.len();
@@ -275,7 +277,8 @@ impl<'a> Numeric<'a> {
     }
 }
 
-/// The known inputs of an experiment as functions of time; `None` for those whose value is a node of the graph.
+/// The known inputs of an experiment as functions of time; `None` for those whose value is a node of the
+/// graph.
 fn inputs_of(
     model: &SystemModel,
     experiment: usize,
@@ -332,7 +335,8 @@ fn constants_of(model: &SystemModel, experiment: usize) -> Result<Vec<Vec<f64>>,
     Ok(out)
 }
 
-/// The dynamics of a part: parameters and what belongs to other experiments stay, the derivatives of an unknown input integrate each other.
+/// The dynamics of a part: parameters and what belongs to other experiments stay, the derivatives of an
+/// unknown input integrate each other.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemProcess<'a> {
     numeric: &'a Numeric<'a>,
@@ -350,7 +354,8 @@ impl SystemProcess<'_> {
         })
     }
 
-    /// The filter states that are derivatives of an unknown input of this experiment, with the place of the next derivative.
+    /// The filter states that are derivatives of an unknown input of this experiment, with the place of the
+    /// next derivative.
     fn chained(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let states = &self.numeric.states;
         let own = self.part / self.numeric.segments();

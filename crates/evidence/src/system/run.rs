@@ -34,8 +34,8 @@ const HELD: f64 = 1e-9;
 const SINGULAR: f64 = 1e-7;
 /// Draws from the prior for what is left of a constraint beyond its differential.
 const DRAWS: usize = 64;
-/// What a run linearised at its estimates says of a direction below this part of the unknowns' sigmas is less than what linearising and
-/// rounding leave there.
+/// What a run linearised at its estimates says of a direction below this part of the unknowns' sigmas is less
+/// than what linearising and rounding leave there.
 const RESOLUTION: f64 = 1e-6;
 
 /// Simulated run of a system with an extended Kalman filter.
@@ -51,8 +51,8 @@ pub struct SystemRun {
     pub quantities: Vec<SystemEstimate>,
     /// Consistency of errors and innovations with the filter's covariances.
     pub consistency: Consistency,
-    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where neither the
-    /// equations nor the known inputs hold the time.
+    /// Time of the model at which the run begins, in its unit; 1 stands for a generic time. Null where
+    /// neither the equations nor the known inputs hold the time.
     pub time: Option<f64>,
     /// Duration of every experiment, in the unit of `t` in the model.
     pub duration: f64,
@@ -96,7 +96,8 @@ pub struct SystemEstimate {
 }
 
 impl SystemEstimate {
-    /// True if the exact verdict is that the outputs determine it; false also where no order up to the bound does.
+    /// True if the exact verdict is that the outputs determine it; false also where no order up to the bound
+    /// does.
     pub fn is_determined(&self) -> bool {
         is_determined(self.status)
     }
@@ -203,8 +204,8 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// An initial error drawn from the prior given that the constraints hold, and its covariance. A constraint is bent: what is left of it along its tangent space, as
-/// draws show, is its uncertainty.
+/// An initial error drawn from the prior given that the constraints hold, and its covariance. A constraint is
+/// bent: what is left of it along its tangent space, as draws show, is its uncertainty.
 fn initial_error(
     numeric: &Numeric<'_>,
     truth: &DVector<f64>,
@@ -301,8 +302,8 @@ fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     reflected.columns(1, basis.ncols() - 1).into_owned()
 }
 
-/// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn from the prior, random numbers
-/// come from `seed`.
+/// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn
+/// from the prior, random numbers come from `seed`.
 ///
 /// # Errors
 /// [`RunError`].

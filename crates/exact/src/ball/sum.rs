@@ -2,10 +2,11 @@
 
 use super::{Ball, FAR, SLACK, exact_tail, power, product, shifted_right, subtract_from};
 
-/// `sum a_i b_i` over balls: digits in two's complement above one last place, that of the largest term so far.
+/// `sum a_i b_i` over balls: digits in two's complement above one last place, that of the largest term so
+/// far.
 ///
-/// Terms are neither normalised nor rounded one by one, which is most of what a sum of balls costs. The result holds what
-/// [`Ball::mul`] and [`Ball::add`] would have to hold.
+/// Terms are neither normalised nor rounded one by one, which is most of what a sum of balls costs. The
+/// result holds what [`Ball::mul`] and [`Ball::add`] would have to hold.
 ///
 /// ```
 /// use obsdeg_exact::{Ball, BallSum};
@@ -160,7 +161,8 @@ impl<const N: usize> BallSum<N> {
     }
 }
 
-/// Adds digits, or takes them off, that are shifted to the right by less than 64 bits; the carry of the sum, of the complement if they are taken off.
+/// Adds digits, or takes them off, that are shifted to the right by less than 64 bits; the carry of the sum,
+/// of the complement if they are taken off.
 #[inline(always)]
 fn add_shifted<const N: usize>(sum: &mut [u64; N], digits: &[u64; N], bits: i64, negative: bool) -> bool {
     let (mask, mut carry) = (0u64.wrapping_sub(u64::from(negative)), negative);
@@ -185,7 +187,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// Whatever the true numbers are, the sum of their products is held, at every step, and not much wider than by single operations.
+        /// Whatever the true numbers are, the sum of their products is held, at every step, and not much
+        /// wider than by single operations.
         #[test]
         fn sums_hold_the_true_ones(
             terms in prop::collection::vec((numbers(), numbers()), 0..6),

@@ -94,8 +94,8 @@ fn name_of_model(name: &str) -> String {
     }
 }
 
-/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that nothing
-/// hangs on which of two operations binds more; text as it is where it is no expression.
+/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that
+/// nothing hangs on which of two operations binds more; text as it is where it is no expression.
 pub(crate) fn expression(text: &str) -> String {
     let mut reader = Reader { rest: text, depth: 0 };
     match reader.sum() {
@@ -425,8 +425,8 @@ pub(crate) fn solution(s: &Solution, frame: Frame, stations: &[StationLabel]) ->
     }
 }
 
-/// A solution from an answer's terms, each a coefficient in program notation, an observation (`Z3'`) and a station: those of one
-/// coefficient, but for the sign, in a bracket.
+/// A solution from an answer's terms, each a coefficient in program notation, an observation (`Z3'`) and a
+/// station: those of one coefficient, but for the sign, in a bracket.
 pub(crate) fn solution_of(terms: &[[&str; 3]]) -> String {
     let mut groups: Vec<(&str, Vec<(bool, String)>)> = Vec::new();
     for &[coefficient, observation, station] in terms {

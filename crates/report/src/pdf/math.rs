@@ -1,4 +1,5 @@
-//! The LaTeX of our formulas as the typesetter's math. Only what `latex` writes is known; other commands become text.
+//! The LaTeX of our formulas as the typesetter's math. Only what `latex` writes is known; other commands
+//! become text.
 
 use crate::latex::{FUNCTIONS, GREEK};
 

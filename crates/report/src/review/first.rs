@@ -1,4 +1,5 @@
-//! What a review begins with: every unknown in one picture, what to do, and of several schemes the comparison and the one to take.
+//! What a review begins with: every unknown in one picture, what to do, and of several schemes the comparison
+//! and the one to take.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::SystemAnalysis;

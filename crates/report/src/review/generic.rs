@@ -1,4 +1,5 @@
-//! The part of a scheme with generic angles: what holds for almost all of them, and nothing that needs numbers.
+//! The part of a scheme with generic angles: what holds for almost all of them, and nothing that needs
+//! numbers.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::GenericReview;

@@ -7,7 +7,8 @@ use obsdeg_design::review::DesignReview;
 
 use crate::document::{Block, left};
 
-/// The symbols of schemes: what stands for what, in which unit, and where the paper (J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06) has it.
+/// The symbols of schemes: what stands for what, in which unit, and where the paper (J. NUDT 39(1), 2017,
+/// 1001-2486(2017)01-040-06) has it.
 const SCHEMES: [[&str; 4]; 15] = [
     [
         "n, c, p",

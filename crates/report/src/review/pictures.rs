@@ -214,8 +214,8 @@ fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
     (high > 0.0).then_some((low / 1.5, high * 1.5))
 }
 
-/// Total time against the largest sigma: schemes at other dwells, and the front of what was found; nothing where no
-/// dwell determines anything.
+/// Total time against the largest sigma: schemes at other dwells, and the front of what was found; nothing
+/// where no dwell determines anything.
 pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option<Block> {
     let mut lines = Vec::new();
     for (i, s) in schemes.iter().enumerate() {

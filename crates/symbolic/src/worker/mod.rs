@@ -38,15 +38,15 @@ pub(crate) enum JobError {
     OverLimit,
 }
 
-/// Answers requests, one per line, as soon as this process holds `lock_file`. Whatever the engine itself writes to
-/// stdout has no [`PREFIX`].
+/// Answers requests, one per line, as soon as this process holds `lock_file`. Whatever the engine itself
+/// writes to stdout has no [`PREFIX`].
 ///
-/// `end` ends the process: it is called in the middle of whatever is going on when the input ends, since then nobody waits for an answer
-/// any more, and when a job has used up its processor time.
+/// `end` ends the process: it is called in the middle of whatever is going on when the input ends, since then
+/// nobody waits for an answer any more, and when a job has used up its processor time.
 ///
-/// The work of a job is counted where that is possible (products of terms), so that it ends at the same place on every
-/// machine and under any load. What cannot be counted, such as a factorisation, is bounded by the time that this
-/// process has spent on the processor.
+/// The work of a job is counted where that is possible (products of terms), so that it ends at the same place
+/// on every machine and under any load. What cannot be counted, such as a factorisation, is bounded by the
+/// time that this process has spent on the processor.
 ///
 /// # Errors
 /// Whatever `output` reports.

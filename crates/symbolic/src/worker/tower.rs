@@ -94,8 +94,8 @@ impl Tower {
         Ok(s)
     }
 
-    /// Accounts for an operation on two scalars: its cost follows their products of terms (a common divisor is sought
-    /// among them).
+    /// Accounts for an operation on two scalars: its cost follows their products of terms (a common divisor
+    /// is sought among them).
     pub(crate) fn charge(&self, x: &Scalar, y: &Scalar) {
         let terms = |s: &Scalar| (s.numerator.nterms() + s.denominator.nterms()) as u64;
         self.spend(OPERATION.saturating_add(terms(x).saturating_mul(terms(y))));

@@ -65,9 +65,9 @@ pub struct SchemeFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::REQUIREMENT)))]
     pub(super) requirements: Numbers,
-    /// Bench: sizes (one sigma) of errors that the scheme does not estimate, by error or family, as in K0 = 20:
-    /// in ug for K0, ppm for K1, GS, earth_rate and gravity, arcsec for M, GM, latitude, azimuth and attitude, in
-    /// the unit of the coefficient for others. Errors that are left out count nothing.
+    /// Bench: sizes (one sigma) of errors that the scheme does not estimate, by error or family, as in K0 =
+    /// 20: in ug for K0, ppm for K1, GS, earth_rate and gravity, arcsec for M, GM, latitude, azimuth and
+    /// attitude, in the unit of the coefficient for others. Errors that are left out count nothing.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::BENCH)))]
     pub(super) bench: Numbers,

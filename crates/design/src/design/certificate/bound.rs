@@ -1,6 +1,8 @@
-//! What no scheme of some candidates can beat, where information adds over positions: duality of optimal design.
+//! What no scheme of some candidates can beat, where information adds over positions: duality of optimal
+//! design.
 //!
-//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: known beforehand). For every matrix X
+//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: known beforehand). For every
+//! matrix X
 //!
 //! ```text
 //! tr(V^T M^-1 V) >= tr(V^T X)^2 / tr(X^T M X)            (Cauchy and Schwarz in the inner product of M)
@@ -8,9 +10,9 @@
 //! tr(X^T M X)    <= tr(X^T P X) + k max_i tr(X^T A_i X)
 //! ```
 //!
-//! so any X gives a bound, whatever rounding did on the way to it, and the X of the optimal weights gives the best
-//! (J. Kiefer and J. Wolfowitz, 1960, doi 10.4153/CJM-1960-030-4, for the determinant; F. Pukelsheim, *Optimal Design
-//! of Experiments*, 1993, chapter 7, for the others).
+//! so any X gives a bound, whatever rounding did on the way to it, and the X of the optimal weights gives the
+//! best (J. Kiefer and J. Wolfowitz, 1960, doi 10.4153/CJM-1960-030-4, for the determinant; F. Pukelsheim,
+//! *Optimal Design of Experiments*, 1993, chapter 7, for the others).
 
 use nalgebra::DMatrix;
 
@@ -67,8 +69,8 @@ impl Additive {
         self.candidates.iter().map(|a| a.dot(&w)).collect()
     }
 
-    /// The aim is not below this at any weights of sum 1, hence in no scheme; 0 where nothing is known. Rounding in
-    /// evaluating it is allowed for: what is claimed of matrices `A_i`, P as they are given.
+    /// The aim is not below this at any weights of sum 1, hence in no scheme; 0 where nothing is known.
+    /// Rounding in evaluating it is allowed for: what is claimed of matrices `A_i`, P as they are given.
     pub(super) fn lower_bound(&self, dual: &Dual) -> f64 {
         self.lower_bound_over(dual, 0.0)
     }
@@ -174,8 +176,8 @@ mod tests {
         }
     }
 
-    /// Random tasks of every criterion: the bound in double precision is not above what its X proves in 512 bits, and below by
-    /// less than 1e-7 of it.
+    /// Random tasks of every criterion: the bound in double precision is not above what its X proves in 512
+    /// bits, and below by less than 1e-7 of it.
     #[test]
     fn no_bound_is_above_what_its_matrix_proves() {
         let mut rng = SplitMix64::new(43);

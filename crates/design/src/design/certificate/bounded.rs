@@ -1,10 +1,11 @@
-//! Numbers in double precision, each with a bound on what rounding has made of it: running error analysis (N. J. Higham, *Accuracy and
-//! Stability of Numerical Algorithms*, 2nd edition, 2002, section 3.3).
+//! Numbers in double precision, each with a bound on what rounding has made of it: running error analysis (N.
+//! J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, section 3.3).
 
 use obsdeg_core::model::Ring;
 
-/// Relative error of a sum of so many products at most, whatever their order: Higham's `gamma_n = n u / (1 - n u)` (3.4), u = 2^-53, with
-/// a factor of two and a few more operations to spare; so it also bounds what is computed of bounds.
+/// Relative error of a sum of so many products at most, whatever their order: Higham's
+/// `gamma_n = n u / (1 - n u)` (3.4), u = 2^-53, with a factor of two and a few more operations to spare; so
+/// it also bounds what is computed of bounds.
 pub(crate) fn rounding(terms: usize) -> f64 {
     (terms + 16) as f64 * f64::EPSILON
 }

@@ -1,14 +1,16 @@
-//! The best weights over all attitudes: attitudes are taken up where they would add most, and what the net of attitudes
-//! leaves between its points is bounded.
+//! The best weights over all attitudes: attitudes are taken up where they would add most, and what the net of
+//! attitudes leaves between its points is bounded.
 //!
-//! What a position adds to `tr(X^T M X)` is `d(C) = |G^(1/2) C E(g) X|^2`. Along a rotation about any axis it is a
-//! trigonometric polynomial of its angle, of degree n = 2, 4, 6 for drift terms of no, one, two factors of g; it is not
-//! negative. So with D its maximum over all attitudes, `d >= D (1 + cos(n a)) / 2` at an angle a <= pi / n from there (M.
-//! Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))` over a net that is never further than h.
+//! What a position adds to `tr(X^T M X)` is `d(C) = |G^(1/2) C E(g) X|^2`. Along a rotation about any axis it
+//! is a trigonometric polynomial of its angle, of degree n = 2, 4, 6 for drift terms of no, one, two factors
+//! of g; it is not negative. So with D its maximum over all attitudes, `d >= D (1 + cos(n a)) / 2` at an
+//! angle a <= pi / n from there (M. Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))`
+//! over a net that is never further than h.
 //!
-//! G, the information on drift and accelerometers that a dwell gives, is taken as double precision gives it; what is said is of `d` with this G
-//! and X at all rotations C. Rounding: d is evaluated at the nodes of an interpolation with a bound on its rounding, that of cosines included (`bounded`).
-//! Interpolation makes of errors r at the nodes at most `L^2 r`, L the largest sum of the sizes of its weights.
+//! G, the information on drift and accelerometers that a dwell gives, is taken as double precision gives it;
+//! what is said is of `d` with this G and X at all rotations C. Rounding: d is evaluated at the nodes of an
+//! interpolation with a bound on its rounding, that of cosines included (`bounded`). Interpolation makes of
+//! errors r at the nodes at most `L^2 r`, L the largest sum of the sizes of its weights.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, elementary, product};
@@ -50,9 +52,9 @@ pub struct Everywhere {
 }
 
 impl Evaluator {
-    /// What no scheme of `k` attitudes is below, requirements on psi left out, and the attitudes that weights for it
-    /// need; the candidates are where the search for them begins. `None` as for [`Self::bound`], and where psi
-    /// is known beforehand about one axis better than about another: `d` is no polynomial then.
+    /// What no scheme of `k` attitudes is below, requirements on psi left out, and the attitudes that weights
+    /// for it need; the candidates are where the search for them begins. `None` as for [`Self::bound`], and
+    /// where psi is known beforehand about one axis better than about another: `d` is no polynomial then.
     pub fn everywhere(
         &self,
         criterion: &Criterion,
@@ -91,7 +93,8 @@ impl Evaluator {
             problem = here.additive(problem.aim.clone(), k);
             found = weigh(&problem, going)?;
         }
-        // h: rates of three angles, of which two axes may coincide, are a turn of at most sqrt(5) times the largest
+        // h: rates of three angles, of which two axes may coincide, are a turn of at most sqrt(5) times the
+        // largest
         let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
         let n = self.degree();
         let g = self.information_of_effects();
@@ -146,7 +149,8 @@ impl Evaluator {
     fn effects_bounded(&self, euler: &Euler) -> [Vec<Bounded>; LOCAL - 3] {
         let turn = |axis: usize| {
             let (cos, sin) = euler[axis].turn().cos_sin_f64();
-            // an angle below a whole turn is rounded three times on its way to radians; nothing is at right angles
+            // an angle below a whole turn is rounded three times on its way to radians; nothing is at right
+            // angles
             let radius = if cos * sin == 0.0 { 0.0 } else { 16.0 * f64::EPSILON };
             elementary(&Bounds, axis, &(Bounded { value: cos, radius }, Bounded { value: sin, radius }))
         };
@@ -162,8 +166,8 @@ impl Evaluator {
         std::array::from_fn(|_| rows.next().unwrap_or_default())
     }
 
-    /// How far the information of the positions of a sequence, as the search has it, is from that of the rotations of their angles with G as it is, at
-    /// most (m x m, sizes).
+    /// How far the information of the positions of a sequence, as the search has it, is from that of the
+    /// rotations of their angles with G as it is, at most (m x m, sizes).
     pub(crate) fn errors_of<'e>(&self, positions: impl Iterator<Item = (usize, &'e Euler)>) -> DMatrix<f64> {
         let (n, m) = (self.n, self.n - 3);
         let g = self.information_of_effects();
@@ -195,7 +199,8 @@ impl Evaluator {
     }
 }
 
-/// The nodes that determine a trigonometric polynomial of degree n, and the weights of its values there at every `step` degrees.
+/// The nodes that determine a trigonometric polynomial of degree n, and the weights of its values there at
+/// every `step` degrees.
 fn interpolation(step: usize, n: usize) -> (Vec<f64>, DMatrix<f64>) {
     let count = 2 * n + 1;
     let nodes: Vec<f64> = (0..count).map(|i| 360.0 * i as f64 / count as f64).collect();
@@ -216,8 +221,9 @@ fn betas(step: usize) -> Vec<f64> {
     (0..=180).step_by(step).map(|b| b as f64 - 90.0).collect()
 }
 
-/// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about fixed axes, it is a trigonometric
-/// polynomial of degree n: 2 n + 1 values of each determine the others (the interpolation adds a few roundings to them).
+/// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about
+/// fixed axes, it is a trigonometric polynomial of degree n: 2 n + 1 values of each determine the others (the
+/// interpolation adds a few roundings to them).
 fn on_net(
     step: usize,
     n: usize,
@@ -236,8 +242,8 @@ fn on_net(
     })
 }
 
-/// What the values of [`on_net`] may be off by rounding, from what is known of those at the nodes; and what nodes that are no multiples of
-/// 1e-9 degrees add, as a part of the largest value of the function anywhere.
+/// What the values of [`on_net`] may be off by rounding, from what is known of those at the nodes; and what
+/// nodes that are no multiples of 1e-9 degrees add, as a part of the largest value of the function anywhere.
 fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) -> (f64, f64) {
     let (nodes, weights) = interpolation(step, n);
     let count = nodes.len();
@@ -252,7 +258,8 @@ fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) ->
     let sizes = weights.row_iter().map(|row| row.iter().map(|w| w.abs()).sum::<f64>()).fold(0.0, f64::max);
     let sizes = sizes + weight * count as f64;
     let by_weights = 2.0 * weight * count as f64 * sizes + rounding(2 * count) * sizes * sizes;
-    // half a unit of each of two angles, where a slope is at most n / 2 of the largest value (S. N. Bernstein, of d - D / 2)
+    // half a unit of each of two angles, where a slope is at most n / 2 of the largest value (S. N.
+    // Bernstein, of d - D / 2)
     let off = if FULL.is_multiple_of(count as u64) { 0.0 } else { 1e-9f64.to_radians() };
     (sizes * sizes * radius + by_weights * size, sizes * sizes * n as f64 / 2.0 * off)
 }
@@ -301,7 +308,8 @@ fn angles(c: &Matrix3<f64>) -> Euler {
     euler([alpha, beta, gamma].map(f64::to_degrees).map(positive))
 }
 
-/// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest first.
+/// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest
+/// first.
 fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
     let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, &|e| energy(&c_n_f64(e))).collect();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -358,7 +366,8 @@ mod tests {
         }
     }
 
-    /// What is interpolated is what it is where it is evaluated, whatever the terms; a degree less would not do.
+    /// What is interpolated is what it is where it is evaluated, whatever the terms; a degree less would not
+    /// do.
     #[test]
     fn a_net_is_interpolated() {
         let mut rng = SplitMix64::new(3);
@@ -382,8 +391,8 @@ mod tests {
         }
     }
 
-    /// What energies, what is interpolated of them, and the information of positions are off by is within what is told, against 512 bits; and
-    /// what is told is not much more than that.
+    /// What energies, what is interpolated of them, and the information of positions are off by is within
+    /// what is told, against 512 bits; and what is told is not much more than that.
     #[test]
     fn rounding_is_within_its_bounds() {
         let mut rng = SplitMix64::new(5);

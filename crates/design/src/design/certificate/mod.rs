@@ -1,5 +1,6 @@
-//! How good the best scheme can be, where information adds over positions (reset carry): a lower bound on the criterion
-//! of every scheme of k candidates, from the optimal weights of the candidates (approximate design theory).
+//! How good the best scheme can be, where information adds over positions (reset carry): a lower bound on the
+//! criterion of every scheme of k candidates, from the optimal weights of the candidates (approximate design
+//! theory).
 
 mod bound;
 pub(crate) mod bounded;
@@ -36,9 +37,10 @@ pub struct Bound {
 }
 
 impl Evaluator {
-    /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates such that
-    /// every scheme is as good as one that has one of them. `None` where information does not add over positions
-    /// (platform and inertial carry, noise of Z that is correlated), where the candidates together do not determine what counts, or when stopped.
+    /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates
+    /// such that every scheme is as good as one that has one of them. `None` where information does not add
+    /// over positions (platform and inertial carry, noise of Z that is correlated), where the candidates
+    /// together do not determine what counts, or when stopped.
     pub fn bound(
         &self,
         criterion: &Criterion,

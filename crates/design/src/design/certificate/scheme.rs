@@ -1,4 +1,5 @@
-//! What the criterion of a scheme is at most, whatever rounding did on the way to it: a posteriori, by a residual.
+//! What the criterion of a scheme is at most, whatever rounding did on the way to it: a posteriori, by a
+//! residual.
 //!
 //! For any regular K, best the computed inverse of the root of M, and `T = K M K^T - 1`,
 //!
@@ -6,9 +7,10 @@
 //! M^-1 = K^T (1 + T)^-1 K,    so    M^-1 <= K^T K / (1 - t)    wherever |T|_2 <= t < 1
 //! ```
 //!
-//! T is computed, and what rounding makes of it is at most `gamma_n` times the same product of the sizes `|K| S |K|^T`, S the sum of the sizes of
-//! what M is the sum of (N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, (3.4) and (3.13); the residual of
-//! an approximate inverse as a proof: S. M. Rump, *Acta Numerica* 19, 2010, 287-449). How K was found does not matter, and no condition
+//! T is computed, and what rounding makes of it is at most `gamma_n` times the same product of the sizes
+//! `|K| S |K|^T`, S the sum of the sizes of what M is the sum of (N. J. Higham, *Accuracy and Stability of
+//! Numerical Algorithms*, 2nd edition, 2002, (3.4) and (3.13); the residual of an approximate inverse as a
+//! proof: S. M. Rump, *Acta Numerica* 19, 2010, 287-449). How K was found does not matter, and no condition
 //! number is assumed: where M is too near a singular matrix t is not below 1, and nothing is said.
 
 use nalgebra::DMatrix;
@@ -19,9 +21,9 @@ use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
-    /// The criterion of a sequence is not above this, of the information of each of its positions as double precision gives it, whose
-    /// error is at most `errors` (m x m, sizes; psi left out): deg/h (per g), or for margin a ratio. `None` where order matters, and where
-    /// rounding may hide all of it.
+    /// The criterion of a sequence is not above this, of the information of each of its positions as double
+    /// precision gives it, whose error is at most `errors` (m x m, sizes; psi left out): deg/h (per g), or
+    /// for margin a ratio. `None` where order matters, and where rounding may hide all of it.
     pub(crate) fn at_most(
         &self,
         sequence: &[Stop],
@@ -82,8 +84,9 @@ impl Evaluator {
     }
 }
 
-/// What no eigenvalue of `K^T K` is above: with Q any matrix, best its computed eigenvectors, and `Q^T Q = 1 + F`, it is at most the largest eigenvalue of
-/// `Q^T K^T K Q`, which no sum of the sizes of a row is below, divided by `1 - |F|`.
+/// What no eigenvalue of `K^T K` is above: with Q any matrix, best its computed eigenvectors, and
+/// `Q^T Q = 1 + F`, it is at most the largest eigenvalue of `Q^T K^T K Q`, which no sum of the sizes of a row
+/// is below, divided by `1 - |F|`.
 fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
     let (m, d) = k.shape();
     let q = (k.transpose() * k).symmetric_eigen().eigenvectors;
@@ -109,8 +112,9 @@ mod tests {
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
-    /// Random schemes: the criterion in 512 bits, of the same information, is not above what is told, and hardly below; that of double
-    /// precision is often below it, so that rounding has to be allowed for. Some have coefficients that do not count, some are near singular.
+    /// Random schemes: the criterion in 512 bits, of the same information, is not above what is told, and
+    /// hardly below; that of double precision is often below it, so that rounding has to be allowed for. Some
+    /// have coefficients that do not count, some are near singular.
     #[test]
     fn no_criterion_is_above_what_is_told() {
         let mut rng = SplitMix64::new(41);
@@ -157,7 +161,8 @@ mod tests {
             let exact = Exact::of(&evaluator, &sequence);
             let part = most / computed - 1.0;
             if criterion == Criterion::E {
-                // the largest eigenvalue is below a number where that times 1 - S is positive; double precision has the smallest of S^-1
+                // the largest eigenvalue is below a number where that times 1 - S is positive; double
+                // precision has the smallest of S^-1
                 let is_above = |sigma: f64| exact.covariance_is_below(sigma);
                 assert!(is_above(most), "task {task}: {computed} {most}");
                 assert!(

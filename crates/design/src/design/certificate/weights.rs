@@ -1,10 +1,10 @@
-//! Optimal weights of candidates: a primal-dual interior-point method on the simplex, and candidates taken up as they are
-//! needed (column generation).
+//! Optimal weights of candidates: a primal-dual interior-point method on the simplex, and candidates taken up
+//! as they are needed (column generation).
 //!
-//! With the aim f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau of the least aim.
-//! Newton's method follows these minima; the curvature of the barriers is that of their multipliers (S. J. Wright,
-//! *Primal-Dual Interior-Point Methods*, 1997), without which weights go to zero slowly. The matrix X of each minimum
-//! gives a bound that needs none of this (`bound`).
+//! With the aim f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau of the
+//! least aim. Newton's method follows these minima; the curvature of the barriers is that of their
+//! multipliers (S. J. Wright, *Primal-Dual Interior-Point Methods*, 1997), without which weights go to zero
+//! slowly. The matrix X of each minimum gives a bound that needs none of this (`bound`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -80,8 +80,8 @@ struct Weighing<'a> {
     ridge: f64,
 }
 
-/// The best weights that are found while `going`, and the bound that they prove; `None` where all candidates together
-/// do not determine what counts as far as double precision tells.
+/// The best weights that are found while `going`, and the bound that they prove; `None` where all candidates
+/// together do not determine what counts as far as double precision tells.
 pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weighed> {
     // where the ridge decides, and where rounding does without it, nothing is known
     [RIDGE, 0.0].into_iter().find_map(|ridge| {
@@ -91,8 +91,8 @@ pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weig
     })
 }
 
-/// Weights as they are listed: of two digits, or of more where those are worse by more than [`COARSE`]; divided by their sum they
-/// have this aim. `None` where rounded weights do not determine what counts.
+/// Weights as they are listed: of two digits, or of more where those are worse by more than [`COARSE`];
+/// divided by their sum they have this aim. `None` where rounded weights do not determine what counts.
 pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
     let of = |weights: &[f64]| {
         let active: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
@@ -247,7 +247,8 @@ impl<'a> Weighing<'a> {
         Some(value).filter(|v| v.is_finite() && *v > 0.0)
     }
 
-    /// `tau f / scale` with the barriers of the aim, not those of the weights; `None` outside of where it is defined.
+    /// `tau f / scale` with the barriers of the aim, not those of the weights; `None` outside of where it is
+    /// defined.
     fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<At> {
         let root = self.reduced(w, s).cholesky()?;
         let value = match &self.problem.aim {
@@ -482,7 +483,8 @@ impl<'a> Weighing<'a> {
                     .iter()
                     .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
                     .collect();
-                // share_j times what the slope of v_j by the weights is beside that of s, which follows their mean
+                // share_j times what the slope of v_j by the weights is beside that of s, which follows their
+                // mean
                 let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
                 let slopes = DMatrix::from_fn(n, shares.len(), slope);
                 let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
@@ -507,12 +509,13 @@ impl<'a> Weighing<'a> {
     }
 }
 
-/// The s that makes `rate s - sum_j ln(s - o_j - v_j)` least, and how far each aim is below it; `None` where values are
-/// not finite.
+/// The s that makes `rate s - sum_j ln(s - o_j - v_j)` least, and how far each aim is below it; `None` where
+/// values are not finite.
 fn left_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
     let aims: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
     let largest = aims.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // how far s is above the largest: the sum of the inverses falls with it, and is convex, so Newton's steps grow to the end
+    // how far s is above the largest: the sum of the inverses falls with it, and is convex, so Newton's steps
+    // grow to the end
     let mut above = 1.0 / rate;
     for _ in 0..100 {
         let left = || aims.iter().map(|a| above + (largest - a));
@@ -550,8 +553,9 @@ mod tests {
         Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, aim }
     }
 
-    /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and E-optimal designs, and
-    /// of the one for the coefficient of x^2 alone; column generation finds them among 401 points.
+    /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and
+    /// E-optimal designs, and of the one for the coefficient of x^2 alone; column generation finds them among
+    /// 401 points.
     #[test]
     fn weights_are_those_of_the_textbook() {
         let units = DMatrix::identity(3, 3);

@@ -1,4 +1,5 @@
-//! Changes of the estimates of a sequence by errors that the scheme does not estimate, beside its information.
+//! Changes of the estimates of a sequence by errors that the scheme does not estimate, beside its
+//! information.
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Carry, Float, LOCAL, Matrix3, PSI_EPS, earth_rate_in};

@@ -44,7 +44,8 @@ impl Evaluator {
         local
     }
 
-    /// What is known beforehand of psi^n, which is what goes on under inertial carry: by the axes of the first position.
+    /// What is known beforehand of psi^n, which is what goes on under inertial carry: by the axes of the
+    /// first position.
     #[inline]
     pub(crate) fn know_first(&self, state: &State, c: &Matrix3<f64>, mut add: impl FnMut(usize, usize, f64)) {
         if self.carry() != Carry::Inertial || !state.path.is_empty() {

@@ -1,13 +1,16 @@
-//! Noise of Z that is correlated: each accelerometer has a bias that is a Gauss-Markov process beside its white noise, and that goes on
-//! in platform axes from position to position. Three alike and independent ones are so in any axes.
+//! Noise of Z that is correlated: each accelerometer has a bias that is a Gauss-Markov process beside its
+//! white noise, and that goes on in platform axes from position to position. Three alike and independent ones
+//! are so in any axes.
 //!
-//! The bias b of the moment is a state that no coefficient depends on. Given the unknowns x it has a mean `K x` and a covariance that knows nothing of
-//! them, so a sequence keeps these two beside the information on x. Of a dwell the information on its local unknowns, b at its start and b at its end holds
-//! all that samples and the process say, what b was in between eliminated: it is computed once, sample by sample. Putting a position behind others
-//! adds what is left of that when b at the start, up to its mean, and b at the end are eliminated: information only grows, and nothing large
-//! is subtracted from it.
+//! The bias b of the moment is a state that no coefficient depends on. Given the unknowns x it has a mean
+//! `K x` and a covariance that knows nothing of them, so a sequence keeps these two beside the information on
+//! x. Of a dwell the information on its local unknowns, b at its start and b at its end holds all that
+//! samples and the process say, what b was in between eliminated: it is computed once, sample by sample.
+//! Putting a position behind others adds what is left of that when b at the start, up to its mean, and b at
+//! the end are eliminated: information only grows, and nothing large is subtracted from it.
 //!
-//! So information is no sum over positions, under no carry, and order matters: bounds that rest on such a sum do not hold here.
+//! So information is no sum over positions, under no carry, and order matters: bounds that rest on such a sum
+//! do not hold here.
 
 use nalgebra::Matrix3 as Small;
 use obsdeg_core::model::{Carry, LOCAL};
@@ -20,8 +23,8 @@ use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 impl Evaluator {
-    /// Adds a position to `state`. Under reset carry its psi is eliminated, or where it is `kept` stands in the place of psi among the
-    /// unknowns.
+    /// Adds a position to `state`. Under reset carry its psi is eliminated, or where it is `kept` stands in
+    /// the place of psi among the unknowns.
     pub(crate) fn extend_correlated(
         &self,
         bias: &BiasState,
@@ -41,7 +44,8 @@ impl Evaluator {
             Some(joint) => joint.wait(bias, seconds, &axes),
             None => Joint::start(bias, n),
         };
-        // b at the start up to its mean, psi where it is of this position alone, b at the end; the rest of the local unknowns, and the mean
+        // b at the start up to its mean, psi where it is of this position alone, b at the end; the rest of
+        // the local unknowns, and the mean
         let alone = reset && !kept;
         let (psi, end) = if alone { (3, 6) } else { (6, 3) };
         let mean = STEP - 3;
@@ -126,7 +130,8 @@ impl Evaluator {
         out.seconds = state.seconds + dwelling.seconds + seconds;
     }
 
-    /// The root of the information on psi of one position of a sequence and all coefficients, under reset carry.
+    /// The root of the information on psi of one position of a sequence and all coefficients, under reset
+    /// carry.
     pub(crate) fn root_with_psi(
         &self,
         bias: &BiasState,

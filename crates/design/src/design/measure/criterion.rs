@@ -83,8 +83,8 @@ impl Criterion {
 }
 
 impl Evaluator {
-    /// The root of the information, psi and the coefficients that do not count first: the block of the others is the
-    /// root of the inverse of their covariance. False when one of them is not determined.
+    /// The root of the information, psi and the coefficients that do not count first: the block of the others
+    /// is the root of the inverse of their covariance. False when one of them is not determined.
     pub(crate) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
         self.root_from(if self.carry() == Carry::Reset { 3 } else { 0 }, state, root)
     }
@@ -115,9 +115,9 @@ impl Evaluator {
         true
     }
 
-    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a coefficient
-    /// that counts is not determined. Sigmas are in deg/h (per g); where errors that are not estimated count they are
-    /// total uncertainties. `root` is working space.
+    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a
+    /// coefficient that counts is not determined. Sigmas are in deg/h (per g); where errors that are not
+    /// estimated count they are total uncertainties. `root` is working space.
     pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
         match self.root(state, root) {
             true => self.by_root(state, criterion, root, &mut Vec::new(), true),
@@ -125,8 +125,8 @@ impl Evaluator {
         }
     }
 
-    /// Criterion of the sigmas alone, which no total is below. `variances` takes the variances of the coefficients that
-    /// count, where the criterion is made of them.
+    /// Criterion of the sigmas alone, which no total is below. `variances` takes the variances of the
+    /// coefficients that count, where the criterion is made of them.
     pub(crate) fn sigma_value(
         &self,
         state: &State,
@@ -141,8 +141,8 @@ impl Evaluator {
         }
     }
 
-    /// The criterion from the root of the information and the variances of the coefficients that count, which are
-    /// computed where `own` is empty; of the total uncertainties with `total`, of the sigmas without.
+    /// The criterion from the root of the information and the variances of the coefficients that count, which
+    /// are computed where `own` is empty; of the total uncertainties with `total`, of the sigmas without.
     pub(crate) fn by_root(
         &self,
         state: &State,
@@ -217,7 +217,8 @@ impl Evaluator {
         now
     }
 
-    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not determined.
+    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not
+    /// determined.
     pub fn sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<f64> {
         let mut root = Vec::new();
         if !self.root(&self.state_of(sequence), &mut root) {

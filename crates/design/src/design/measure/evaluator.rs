@@ -23,11 +23,11 @@ use crate::design::request::limits::MAX_UNKNOWNS;
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) c: Matrix3<f64>,
-    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the order of the evaluator; the last three
-    /// are empty where none is unknown.
+    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the order of
+    /// the evaluator; the last three are empty where none is unknown.
     pub(crate) effects: [Vec<f64>; LOCAL - 3],
-    /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower triangle): what it
-    /// adds to any scheme under reset carry; empty under the others.
+    /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower
+    /// triangle): what it adds to any scheme under reset carry; empty under the others.
     pub(crate) own: Vec<f64>,
     /// Its own psi under reset carry, as soon as that was asked for.
     pub(crate) psi: OnceLock<OwnPsi>,
@@ -40,10 +40,11 @@ pub(crate) struct Candidate {
 /// A position's own psi in platform axes, at the end of the position.
 #[derive(Debug, Clone)]
 pub(crate) struct OwnPsi {
-    /// The variance in rad^2 of every component, prior included, where the coefficients are known; infinite where it is not determined.
+    /// The variance in rad^2 of every component, prior included, where the coefficients are known; infinite
+    /// where it is not determined.
     pub(crate) variances: [f64; 3],
-    /// By which functional of the coefficients each component is off where they are not known (d x 3, in the order of the evaluator);
-    /// zero where it is not determined.
+    /// By which functional of the coefficients each component is off where they are not known (d x 3, in the
+    /// order of the evaluator); zero where it is not determined.
     pub(crate) moved: Vec<[f64; 3]>,
 }
 
@@ -97,7 +98,8 @@ pub struct Evaluator {
     pub(crate) bias: Option<BiasState>,
     /// Errors that are not estimated and count: they make totals of sigmas.
     pub(crate) omitted: Option<Arc<Omitted>>,
-    /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its coefficient.
+    /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its
+    /// coefficient.
     pub(crate) dph: f64,
 }
 
@@ -233,7 +235,8 @@ impl Evaluator {
         (c, &self.dwells[*dwell])
     }
 
-    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on, or the noise of Z.
+    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on, or the
+    /// noise of Z.
     fn information_alone(
         &self,
         c: &Matrix3<f64>,
@@ -269,8 +272,8 @@ impl Evaluator {
             .collect()
     }
 
-    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi eliminated, whose prior is
-    /// the same about every axis.
+    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi
+    /// eliminated, whose prior is the same about every axis.
     pub(crate) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
         let mut all = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         for (row, local) in all.iter_mut().zip(&self.dwells[0].local) {

@@ -34,14 +34,14 @@ impl Evaluator {
         self.extend_any(state, stop, true, out);
     }
 
-    /// Adds the information of a position alone: effects of errors that are not estimated stay in `out` as they were.
-    /// Enough for sigmas and for bounds on them.
+    /// Adds the information of a position alone: effects of errors that are not estimated stay in `out` as
+    /// they were. Enough for sigmas and for bounds on them.
     pub(crate) fn extend_information(&self, state: &State, stop: Stop, out: &mut State) {
         self.extend_any(state, stop, false, out);
     }
 
-    /// Adds the effects of errors that are not estimated, to an `out` that [`Self::extend_information`] made of the
-    /// same `state` and `stop`.
+    /// Adds the effects of errors that are not estimated, to an `out` that [`Self::extend_information`] made
+    /// of the same `state` and `stop`.
     pub(crate) fn extend_errors(&self, state: &State, stop: Stop, out: &mut State) {
         if self.carry() == Carry::Reset {
             return self.add_beside(state, stop.candidate, out);

@@ -1,5 +1,5 @@
-//! Noise of Z that is correlated: the process that each accelerometer has beside its white noise, over waits and
-//! dwells.
+//! Noise of Z that is correlated: the process that each accelerometer has beside its white noise, over waits
+//! and dwells.
 
 use nalgebra::{DMatrix, Matrix3 as Small};
 use obsdeg_core::model::{AZIMUTH, LOCAL};
@@ -50,7 +50,8 @@ pub(crate) fn times(a: &Small<f64>, x: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
     std::array::from_fn(|r| (0..n).map(|j| (0..3).map(|k| a[(r, k)] * x[k][j]).sum()).collect())
 }
 
-/// A component of Z in n: its index, its row on the local unknowns, and the weight of a sample (1 / variance).
+/// A component of Z in n: its index, its row on the local unknowns, and the weight of a sample (1 /
+/// variance).
 pub(crate) struct Output {
     pub(crate) component: usize,
     pub(crate) row: [f64; LOCAL],

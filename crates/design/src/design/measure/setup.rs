@@ -14,8 +14,9 @@ use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 impl Evaluator {
-    /// The evaluator for positions of `dwell_s` each, without drift noise; of priors those count that are stated. `required` are the
-    /// coefficients that count (indices among the coefficients); the others are estimated with them.
+    /// The evaluator for positions of `dwell_s` each, without drift noise; of priors those count that are
+    /// stated. `required` are the coefficients that count (indices among the coefficients); the others are
+    /// estimated with them.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -28,7 +29,8 @@ impl Evaluator {
         Self::while_going((base, candidates), required, (conditions, None), &|| true)
     }
 
-    /// The same with errors that are not estimated and count, as long as `going` says so: the ways between many candidates take a while.
+    /// The same with errors that are not estimated and count, as long as `going` says so: the ways between
+    /// many candidates take a while.
     pub(crate) fn while_going(
         (base, candidates): (&Scheme, &[Euler]),
         required: &[usize],

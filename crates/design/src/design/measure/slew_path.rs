@@ -31,7 +31,8 @@ impl SlewPath {
     }
 
     /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n after a turn by psi^n and the
-    /// coefficients; `drift_at` is `C E(g)` (3 x d) at a time in s, columns of errors that are not estimated behind it.
+    /// coefficients; `drift_at` is `C E(g)` (3 x d) at a time in s, columns of errors that are not estimated
+    /// behind it.
     pub(crate) fn along(
         slew: &Slew,
         w: &Matrix3<f64>,

@@ -71,8 +71,8 @@ impl Evaluator {
         self.ways.get(from * self.candidates.len() + to).map_or(0.0, |w| w.seconds)
     }
 
-    /// The ways from the position before (`None`: there is none) to a candidate: one, or two where half a turn leads
-    /// there.
+    /// The ways from the position before (`None`: there is none) to a candidate: one, or two where half a
+    /// turn leads there.
     pub fn stops(&self, last: Option<usize>, candidate: usize) -> impl Iterator<Item = Stop> {
         let way = last.and_then(|last| self.ways.get(last * self.candidates.len() + candidate));
         let two = way.is_some_and(|w| w.other.is_some());

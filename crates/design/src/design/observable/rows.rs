@@ -1,8 +1,9 @@
-//! Which sets of candidates make the required coefficients observable, and with what degrees: exact ranks in several
-//! prime fields, sets in lexicographic order with the echelon bases of the prefix shared.
+//! Which sets of candidates make the required coefficients observable, and with what degrees: exact ranks in
+//! several prime fields, sets in lexicographic order with the echelon bases of the prefix shared.
 //!
-//! A rank in a field can only be too small. So a set that one field calls observable is observable, and the smallest
-//! degree that any field gives is right unless all of them err: for each rank with probability below `miss^fields`.
+//! A rank in a field can only be too small. So a set that one field calls observable is observable, and the
+//! smallest degree that any field gives is right unless all of them err: for each rank with probability below
+//! `miss^fields`.
 
 use std::collections::HashMap;
 
@@ -15,8 +16,8 @@ use rayon::prelude::*;
 use crate::design::observable::symmetry::Symmetry;
 use crate::design::request::error::DesignError;
 
-/// So many fields are taken that a rank is wrong in all of them with a probability below this: a search makes up to
-/// 1e12 of them.
+/// So many fields are taken that a rank is wrong in all of them with a probability below this: a search makes
+/// up to 1e12 of them.
 const MISS: f64 = 1e-24;
 /// Sets and prefixes between two questions whether to go on.
 const PATIENCE: u64 = 256;
@@ -73,9 +74,10 @@ impl<'a> Patience<'a> {
 }
 
 impl Rows {
-    /// The rows of `candidates` under the assumptions of `base`, in random fields that `seed` and all of this choose;
-    /// `required` are indices among the coefficients. Under platform and inertial carry psi is shared and the rows are
-    /// those of the chain; under reset carry psi of the position is eliminated, and rows of the coefficients are left.
+    /// The rows of `candidates` under the assumptions of `base`, in random fields that `seed` and all of this
+    /// choose; `required` are indices among the coefficients. Under platform and inertial carry psi is shared
+    /// and the rows are those of the chain; under reset carry psi of the position is eliminated, and rows of
+    /// the coefficients are left.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -100,8 +102,8 @@ impl Rows {
         while fields.len() < 2 || f64::powi(miss, fields.len() as i32) > MISS {
             let values = RandomValues::draw(platform.scheme(), &mut rng).map_err(EnsembleError::from)?;
             let here = InField::new(&platform, &values, first);
-            // a rank is one minor: of the rows of all orders of some positions, each with a psi of its own under reset
-            // carry
+            // a rank is one minor: of the rows of all orders of some positions, each with a psi of its own
+            // under reset carry
             let psi = if reset { 3 * candidates.len() } else { 3 };
             let orders = here.by_order.len();
             let claim = Claim {
@@ -109,7 +111,8 @@ impl Rows {
                 decisions: 1,
                 order: values.roots().order,
                 row_degree: orders + usize::from(base.unknowns.have(Source::Rate)),
-                // |entry| <= 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most sqrt(15) together, w/ margin
+                // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most
+                // sqrt(15) together, with margin
                 row_bits: 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0,
             };
             miss = error_bound(&claim, 1);
@@ -134,8 +137,8 @@ impl Rows {
         self.fields.len()
     }
 
-    /// Bound on the probability that of so many sets any was taken for less than it is, or that candidates were taken
-    /// for images of each other which are not.
+    /// Bound on the probability that of so many sets any was taken for less than it is, or that candidates
+    /// were taken for images of each other which are not.
     pub fn error_bound(&self, sets: f64) -> f64 {
         let images = 24.0 * (self.candidates() as f64).powi(2);
         let ranks = (sets + 1.0) * (self.last_order() + 1) as f64;
@@ -210,8 +213,8 @@ impl Rows {
         self.fields[0].degrees(set, self.columns, &self.required)
     }
 
-    /// All sets of `size` candidates with every required coefficient observable, each ascending, in lexicographic
-    /// order.
+    /// All sets of `size` candidates with every required coefficient observable, each ascending, in
+    /// lexicographic order.
     pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
         let behind = |first: usize| {
             let mut out = Vec::new();
@@ -224,8 +227,9 @@ impl Rows {
         (0..self.candidates()).into_par_iter().flat_map_iter(behind).collect()
     }
 
-    /// The first such set among those that begin with one of `firsts`, and whether all were examined otherwise: no more
-    /// than `budget` prefixes and sets are looked at for each of `firsts`, and only while `going`.
+    /// The first such set among those that begin with one of `firsts`, and whether all were examined
+    /// otherwise: no more than `budget` prefixes and sets are looked at for each of `firsts`, and only while
+    /// `going`.
     pub(crate) fn first_observable_set(
         &self,
         size: usize,
@@ -248,8 +252,8 @@ impl Rows {
         (found.into_iter().find_map(|f| f.0), complete)
     }
 
-    /// Hands all observable sets of `size` that begin with `prefix` (ascending) to `found`, in lexicographic order,
-    /// until it wants no more; `repeat`: a candidate may be taken more than once.
+    /// Hands all observable sets of `size` that begin with `prefix` (ascending) to `found`, in lexicographic
+    /// order, until it wants no more; `repeat`: a candidate may be taken more than once.
     pub fn each(
         &self,
         prefix: &[usize],
@@ -267,8 +271,8 @@ impl Rows {
         self.extend(&bases, &mut before.to_vec(), last, (size, usize::from(!repeat)), patience, found);
     }
 
-    /// Adds `candidate` and everything behind it, `step` further on at least, to a set with these bases; false when
-    /// `found` wants no more or patience is at its end.
+    /// Adds `candidate` and everything behind it, `step` further on at least, to a set with these bases;
+    /// false when `found` wants no more or patience is at its end.
     fn extend(
         &self,
         bases: &[Echelon],
@@ -433,7 +437,8 @@ impl Unseen {
 }
 
 impl InField {
-    /// The rows of every position of `platform` at random values; psi, the first `leading` columns, eliminated.
+    /// The rows of every position of `platform` at random values; psi, the first `leading` columns,
+    /// eliminated.
     fn new(platform: &Platform, values: &RandomValues, leading: usize) -> Self {
         let sample = values.sample(platform.scheme(), 1);
         let (f, point) = (sample.point.ring, &sample.point);

@@ -1,8 +1,8 @@
-//! Some of the sets of candidates, as one bit for each: at its place in the combinatorial number system (D. E. Knuth, *The Art of
-//! Computer Programming*, volume 4A, 7.2.1.3), those of fewer members first.
+//! Some of the sets of candidates, as one bit for each: at its place in the combinatorial number system (D.
+//! E. Knuth, *The Art of Computer Programming*, volume 4A, 7.2.1.3), those of fewer members first.
 //!
-//! The set `c_1 < ... < c_t` is behind `sum_i binom(c_i, i)` others of its size. What is held does not grow with the sequences, and with
-//! the sets by an eighth of a byte.
+//! The set `c_1 < ... < c_t` is behind `sum_i binom(c_i, i)` others of its size. What is held does not grow
+//! with the sequences, and with the sets by an eighth of a byte.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -10,10 +10,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Debug)]
 pub(crate) struct Sets {
     candidates: usize,
-    /// `binom(c, i)` at `i * candidates + c`, c below the number of candidates, i up to one more than the members of a set;
-    /// those of which no set needs the place may be cut off at the largest number.
+    /// `binom(c, i)` at `i * candidates + c`, c below the number of candidates, i up to one more than the
+    /// members of a set; those of which no set needs the place may be cut off at the largest number.
     binomials: Vec<usize>,
-    /// How many sets have fewer members, by the number of members counted from 1, and how many there are in all.
+    /// How many sets have fewer members, by the number of members counted from 1, and how many there are in
+    /// all.
     first: Vec<usize>,
     bits: Vec<AtomicU64>,
 }
@@ -74,8 +75,8 @@ impl Sets {
         self.bits.iter().all(|word| word.load(Ordering::Relaxed) == 0)
     }
 
-    /// The candidates, ascending, of which each with an ascending set of at least one makes one of these; members of the set do
-    /// where it is one itself. Sets of so many more must be possible.
+    /// The candidates, ascending, of which each with an ascending set of at least one makes one of these;
+    /// members of the set do where it is one itself. Sets of so many more must be possible.
     pub(crate) fn completing<'a>(&'a self, set: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
         let itself = self.contains(set);
         // of the set with a member before all others; this one goes up from there
@@ -103,7 +104,8 @@ mod tests {
         (1..1u32 << candidates).map(members).filter(|set| set.len() <= most).collect()
     }
 
-    /// Against a tree of sets: what is added is there, nothing else is, and what completes a set does; a bit for each.
+    /// Against a tree of sets: what is added is there, nothing else is, and what completes a set does; a bit
+    /// for each.
     #[test]
     fn sets_are_those_added() {
         for (candidates, most) in [(1, 1), (1, 4), (5, 2), (7, 3), (6, 6), (4, 9), (10, 5)] {

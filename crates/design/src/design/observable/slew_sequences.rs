@@ -1,10 +1,11 @@
-//! Fewest positions where the way between them counts: torquer errors act in every turn, so a scheme is a walk over candidates, and a position
-//! adds rows that depend on all turns before it.
+//! Fewest positions where the way between them counts: torquer errors act in every turn, so a scheme is a
+//! walk over candidates, and a position adds rows that depend on all turns before it.
 //!
-//! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows `[r_psi | r_psi J + B_i]` of the
-//! local chain, `B_i = r_eps E_i + r_a A_i`: six at most. Walks are taken depth first with the echelon bases of their beginnings; a walk ends
-//! where even six more rows in every position to come could not do. A walk that is found is exact whatever the prime; that no shorter one
-//! does is wrong with a probability that is stated.
+//! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows
+//! `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most. Walks are taken
+//! depth first with the echelon bases of their beginnings; a walk ends where even six more rows in every
+//! position to come could not do. A walk that is found is exact whatever the prime; that no shorter one does
+//! is wrong with a probability that is stated.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -296,8 +297,9 @@ impl Space {
     }
 }
 
-/// Finds the fewest positions of a walk over candidates that make the required coefficients observable under the assumptions of `base`,
-/// whose carry is inertial and whose torquer errors are unknown. `going` is asked whether to go on.
+/// Finds the fewest positions of a walk over candidates that make the required coefficients observable under
+/// the assumptions of `base`, whose carry is inertial and whose torquer errors are unknown. `going` is asked
+/// whether to go on.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -436,7 +438,8 @@ pub fn scheme_of_walk(found: &Walks, base: &Scheme) -> Option<Scheme> {
     (!positions.is_empty()).then(|| Scheme { positions, path: Some(Path::OneAxis), ..base.clone() })
 }
 
-/// Of every candidate those that a turn of at most so many degrees leads to, and a tour that takes every such turn.
+/// Of every candidate those that a turn of at most so many degrees leads to, and a tour that takes every such
+/// turn.
 fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>) {
     let matrices: Vec<Matrix3<f64>> = attitudes.iter().map(c_n_f64).collect();
     let angle = |i: usize, j: usize| {
@@ -466,7 +469,8 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
     (neighbours, tour)
 }
 
-/// Whether the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets does.
+/// Whether the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets
+/// does.
 pub fn is_walk(base: &Scheme) -> bool {
     base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)
 }

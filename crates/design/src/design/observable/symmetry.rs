@@ -1,9 +1,9 @@
-//! Turning the platform axes under a scheme: 24 rotations P, `C_c^n -> C_c^n P`, that map schemes to schemes of equal
-//! worth.
+//! Turning the platform axes under a scheme: 24 rotations P, `C_c^n -> C_c^n P`, that map schemes to schemes
+//! of equal worth.
 //!
-//! `g^c` becomes `P^T g^c`. Where every column of `C P E(P^T g)` is, up to sign, a column of `C E(g)`, the new scheme is
-//! the old one with the coefficients renamed: D_SX for D_IY, say. Then it is enough to search schemes whose first
-//! position is one of each orbit.
+//! `g^c` becomes `P^T g^c`. Where every column of `C P E(P^T g)` is, up to sign, a column of `C E(g)`, the
+//! new scheme is the old one with the coefficients renamed: D_SX for D_IY, say. Then it is enough to search
+//! schemes whose first position is one of each orbit.
 
 use std::collections::HashMap;
 
@@ -23,8 +23,8 @@ pub struct Symmetry {
 }
 
 impl Symmetry {
-    /// The symmetry of candidates given by their `C_c^n` in some fields, all of which must agree; `same(i, j)` says
-    /// whether coefficients i and j count alike.
+    /// The symmetry of candidates given by their `C_c^n` in some fields, all of which must agree;
+    /// `same(i, j)` says whether coefficients i and j count alike.
     pub fn new(
         fields: &[(Field, &[Matrix3<u64>])],
         platform: &Platform,
@@ -69,10 +69,10 @@ impl Symmetry {
         Self { order: 1, orbit: (0..candidates).collect(), maps: vec![(0..candidates).collect()] }
     }
 
-    /// How many schemes a searched one stands for, as a fraction: it has `order` images (counted once for every turn of
-    /// the axes); of these so many are searched, where only the smallest of a set must be the first of its orbit. A
-    /// turn of the axes that is not the identity moves every attitude, so one turn brings each member of the lowest
-    /// orbit to its first.
+    /// How many schemes a searched one stands for, as a fraction: it has `order` images (counted once for
+    /// every turn of the axes); of these so many are searched, where only the smallest of a set must be the
+    /// first of its orbit. A turn of the axes that is not the identity moves every attitude, so one turn
+    /// brings each member of the lowest orbit to its first.
     pub(crate) fn searched_images(&self, set: &[usize]) -> usize {
         let lowest = set.iter().map(|&c| self.orbit[c]).min();
         let members = |(i, c): (usize, &usize)| Some(self.orbit[*c]) == lowest && !set[..i].contains(c);
@@ -112,8 +112,9 @@ fn rotations(f: &Field) -> Vec<Matrix3<u64>> {
     out
 }
 
-/// Whether turning the platform axes by `p` renames the coefficients, those that count alike among themselves. The
-/// columns (of the drift and of Z) are polynomials in C: equal at a random matrix, they are equal.
+/// Whether turning the platform axes by `p` renames the coefficients, those that count alike among
+/// themselves. The columns (of the drift and of Z) are polynomials in C: equal at a random matrix, they are
+/// equal.
 fn renames(f: &Field, platform: &Platform, p: &Matrix3<u64>, same: &dyn Fn(usize, usize) -> bool) -> bool {
     let mut rng = SplitMix64::new(0x7261_6e64_6f6d_2043);
     let c: Matrix3<u64> = std::array::from_fn(|_| std::array::from_fn(|_| rng.below(f.modulus())));

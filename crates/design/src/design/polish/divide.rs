@@ -9,12 +9,14 @@ use crate::design::measure::evaluator::{Dwelling, Evaluator};
 use crate::design::measure::stop::Stop;
 use crate::design::request::error::DesignError;
 
-/// Times that are moved from one position to another, as parts of an equal dwell: from the largest to the smallest, or to one step.
+/// Times that are moved from one position to another, as parts of an equal dwell: from the largest to the
+/// smallest, or to one step.
 const FINEST: usize = 256;
 
-/// Dwells of the positions of `path`, whose candidates are those of `evaluator` in this order, that make the criterion smaller than
-/// equal ones: multiples of the time between samples, none without a sample, of the same sum. None of them is made better by moving the
-/// finest part from one position to another. `allowed` says whether dwells keep what else is wanted. `None` when equal ones are as good.
+/// Dwells of the positions of `path`, whose candidates are those of `evaluator` in this order, that make the
+/// criterion smaller than equal ones: multiples of the time between samples, none without a sample, of the
+/// same sum. None of them is made better by moving the finest part from one position to another. `allowed`
+/// says whether dwells keep what else is wanted. `None` when equal ones are as good.
 ///
 /// # Errors
 /// [`DesignError::Filter`].

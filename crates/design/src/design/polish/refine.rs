@@ -1,5 +1,5 @@
-//! Continuous refinement of a sequence: its Euler angles are moved to make the criterion smaller (COBYLA: M. J. D.
-//! Powell, 1994).
+//! Continuous refinement of a sequence: its Euler angles are moved to make the criterion smaller (COBYLA: M.
+//! J. D. Powell, 1994).
 
 use cobyla::{RhoBeg, StopTols, minimize};
 use obsdeg_core::model::{Angle, Euler, Gimbals, c_n_f64};
@@ -15,9 +15,9 @@ const STEPS: [f64; 3] = [20.0, 5.0, 1.0];
 /// Angles are rounded to this many 1e-9 degrees.
 const ROUNDED: i64 = 10_000_000;
 
-/// A sequence of attitudes near `start` with a smaller criterion, within the gimbal limits and `allowed` (given the
-/// evaluator of the attitudes, which are its candidates); angles in hundredths of a degree. `path` goes through them.
-/// `None` when there is none.
+/// A sequence of attitudes near `start` with a smaller criterion, within the gimbal limits and `allowed`
+/// (given the evaluator of the attitudes, which are its candidates); angles in hundredths of a degree. `path`
+/// goes through them. `None` when there is none.
 pub(crate) fn refine(
     evaluator: &Evaluator,
     start: &[Euler],

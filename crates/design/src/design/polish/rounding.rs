@@ -87,8 +87,8 @@ fn around(euler: &Euler, by: i64, step: i64) -> impl Iterator<Item = Euler> {
     })
 }
 
-/// The same attitude with beta up to a quarter of a turn and the others up to half of one, where half a turn is a multiple of
-/// `step`; where it is not, none beyond them.
+/// The same attitude with beta up to a quarter of a turn and the others up to half of one, where half a turn
+/// is a multiple of `step`; where it is not, none beyond them.
 fn within_a_turn(at: [i64; 3], step: i64) -> Option<Euler> {
     let wrapped = |x: i64| {
         if x > HALF {
@@ -128,8 +128,8 @@ impl Moves<'_> {
         OnGrids { finer, on_step: Moved { examined, ..best } }
     }
 
-    /// A scheme moved on the grid of multiples of `step` 1e-9 degrees: one position after the other goes where the
-    /// criterion is smallest around it, by smaller and smaller moves, until none helps.
+    /// A scheme moved on the grid of multiples of `step` 1e-9 degrees: one position after the other goes
+    /// where the criterion is smallest around it, by smaller and smaller moves, until none helps.
     fn moved(&self, start: &[Euler], step: i64) -> Moved {
         let mut here = self.evaluator.along(&start.iter().map(c_n_f64).collect::<Vec<_>>());
         let order: Vec<Stop> = (0..start.len()).map(Stop::from).collect();
@@ -159,7 +159,8 @@ impl Moves<'_> {
         best
     }
 
-    /// The position at `place` goes where the criterion is smallest around it, if that makes the scheme better.
+    /// The position at `place` goes where the criterion is smallest around it, if that makes the scheme
+    /// better.
     fn move_one(
         &self,
         here: &mut Evaluator,

@@ -24,8 +24,8 @@ impl Candidates {
         Self { names, attitudes }
     }
 
-    /// All attitudes whose Euler angles are multiples of `step` 1e-9 degrees, each once: beta from -90 to 90 degrees,
-    /// gamma = 0 where beta = +-90 degrees.
+    /// All attitudes whose Euler angles are multiples of `step` 1e-9 degrees, each once: beta from -90 to 90
+    /// degrees, gamma = 0 where beta = +-90 degrees.
     ///
     /// # Errors
     /// [`DesignError::Grid`] when `step` does not divide 90 degrees.

@@ -49,8 +49,8 @@ pub struct DesignOptions {
     pub within: Option<f64>,
     /// Whether the bound over all attitudes is sought too (reset carry).
     pub everywhere: bool,
-    /// The candidates are where the search for the best attitudes of all begins; these take their place, with angles
-    /// rounded to multiples of so many 1e-9 degrees (reset carry).
+    /// The candidates are where the search for the best attitudes of all begins; these take their place, with
+    /// angles rounded to multiples of so many 1e-9 degrees (reset carry).
     pub free: Option<i64>,
     /// Seed of all random choices.
     pub seed: u64,

@@ -81,8 +81,8 @@ impl Task<'_> {
         }
     }
 
-    /// `[total time, criterion]`: no scheme of the candidates that takes this time in equal dwells is below, whatever of
-    /// the numbers of positions asked for it has.
+    /// `[total time, criterion]`: no scheme of the candidates that takes this time in equal dwells is below,
+    /// whatever of the numbers of positions asked for it has.
     pub(crate) fn front_bound(
         &self,
         evaluator: &Evaluator,

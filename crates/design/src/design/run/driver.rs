@@ -19,9 +19,9 @@ use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 use crate::design::search::ties::TIE;
 
-/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise, the dwell,
-/// the rate of slews and the requirements. `progress` says whether to go on: a search that is stopped gives the best so
-/// far.
+/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise,
+/// the dwell, the rate of slews and the requirements. `progress` says whether to go on: a search that is
+/// stopped gives the best so far.
 ///
 /// # Errors
 /// [`DesignError`].

@@ -1,10 +1,10 @@
-//! Free attitudes: those that weights on all attitudes need, and those near them, with angles rounded. What is chosen is
-//! evaluated as it is rounded.
+//! Free attitudes: those that weights on all attitudes need, and those near them, with angles rounded. What
+//! is chosen is evaluated as it is rounded.
 //!
-//! Schemes begin with the cardinal attitudes, with the rounded ones of the weights, and at random. Each of their positions
-//! then moves on the grid of rounded angles until no move helps; the attitudes of the best are what is chosen from, beside those
-//! they began with. The cardinal attitudes stay among them, and the best scheme of these is one to begin with, so that
-//! no free scheme is worse.
+//! Schemes begin with the cardinal attitudes, with the rounded ones of the weights, and at random. Each of
+//! their positions then moves on the grid of rounded angles until no move helps; the attitudes of the best
+//! are what is chosen from, beside those they began with. The cardinal attitudes stay among them, and the
+//! best scheme of these is one to begin with, so that no free scheme is worse.
 
 use obsdeg_core::model::{Carry, Euler, Scheme, c_n_f64, format_decimal};
 use obsdeg_evidence::simulation::Conditions;
@@ -57,7 +57,8 @@ fn of_cardinals(options: &DesignOptions) -> DesignOptions {
 }
 
 impl Free {
-    /// The attitudes for a task whose candidates are where the search for them begins; angles are multiples of `step` 1e-9 degrees.
+    /// The attitudes for a task whose candidates are where the search for them begins; angles are multiples
+    /// of `step` 1e-9 degrees.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -162,7 +163,8 @@ impl Free {
         Ok(())
     }
 
-    /// The best of the candidates, which `prepared` has; all of them where they are few, with the number of sets and sequences.
+    /// The best of the candidates, which `prepared` has; all of them where they are few, with the number of
+    /// sets and sequences.
     ///
     /// # Errors
     /// [`DesignError`].

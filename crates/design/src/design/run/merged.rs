@@ -18,13 +18,14 @@ use crate::design::search::progress::Progress;
 /// A part with its name.
 type Named = (String, Part);
 
-/// What all parts of an exhaustive search found together: the answer of the whole, if the parts were searched as they
-/// state. The parts are named, and come in any order. Everything that they list is evaluated again, their starts and
-/// counts must add up to the whole, and `check` of their blocks, chosen at random, are searched again.
+/// What all parts of an exhaustive search found together: the answer of the whole, if the parts were searched
+/// as they state. The parts are named, and come in any order. Everything that they list is evaluated again,
+/// their starts and counts must add up to the whole, and `check` of their blocks, chosen at random, are
+/// searched again.
 ///
 /// # Errors
-/// [`DesignError::Part`] for one that is foreign, changed, doubled or not done, [`DesignError::MissingParts`];
-/// [`DesignError`].
+/// [`DesignError::Part`] for one that is foreign, changed, doubled or not done,
+/// [`DesignError::MissingParts`]; [`DesignError`].
 pub fn design_merged(
     base: &Scheme,
     conditions: &Conditions,
@@ -123,7 +124,8 @@ fn versions(sorted: &[&Named]) -> Vec<String> {
     out
 }
 
-/// Random numbers for the choice of blocks: they change with every part, so that no part is written for the choice.
+/// Random numbers for the choice of blocks: they change with every part, so that no part is written for the
+/// choice.
 fn choice(sorted: &[&Named], seed: u64) -> SplitMix64 {
     let seals: Vec<&str> = sorted.iter().map(|(_, part)| part.seal.as_str()).collect();
     SplitMix64::of(seed, "blocks of parts", &seals)

@@ -288,8 +288,8 @@ fn outside(basis: &[DVector<f64>], v: &DVector<f64>) -> DVector<f64> {
     rest
 }
 
-/// Size in ug from which on each K0 shows at three sigma (1e-5 g a sample): 0 if none has an effect, infinite if
-/// one is in the span of the unknowns; by ranks of the records of this file.
+/// Size in ug from which on each K0 shows at three sigma (1e-5 g a sample): 0 if none has an effect, infinite
+/// if one is in the span of the unknowns; by ranks of the records of this file.
 fn shown_from(positions: &[&str], carry: Carry) -> f64 {
     let own = if carry == Carry::Reset { positions.len() } else { 1 };
     let psi = (0..own).flat_map(|at| (0..3).map(move |k| Column::Psi(k, at)));

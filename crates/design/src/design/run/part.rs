@@ -120,7 +120,8 @@ impl Part {
     }
 }
 
-/// The starts of part `number` of `of`, counted from 1: each part has about as many sequences behind its starts as any other.
+/// The starts of part `number` of `of`, counted from 1: each part has about as many sequences behind its
+/// starts as any other.
 pub(crate) fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
     let total: f64 = work.iter().sum();
     // where the middle of a start is
@@ -137,7 +138,8 @@ pub(crate) fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
     to(number - 1)..to(number)
 }
 
-/// The number of starts of an exhaustive search: what its parts divide. More parts than starts leave some of them empty.
+/// The number of starts of an exhaustive search: what its parts divide. More parts than starts leave some of
+/// them empty.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -153,8 +155,8 @@ pub fn design_starts(
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
 }
 
-/// Part `number` of `of` of the exhaustive search, however large that is; `resumed` is what an interrupted run of the
-/// same part found. Interrupted again, it is not complete.
+/// Part `number` of `of` of the exhaustive search, however large that is; `resumed` is what an interrupted
+/// run of the same part found. Interrupted again, it is not complete.
 ///
 /// # Errors
 /// [`DesignError`]; [`PartError`] for a part that cannot be gone on with.

@@ -1,4 +1,5 @@
-//! Checks of a part before it is believed: its starts and counts add up, and what it lists is evaluated again.
+//! Checks of a part before it is believed: its starts and counts add up, and what it lists is evaluated
+//! again.
 
 use std::collections::BTreeSet;
 

@@ -18,7 +18,8 @@ use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 use crate::design::search::screen::Screen;
 
-/// Schemes of least sigma that are kept, to be ranked by their total uncertainty, where the search does not count it.
+/// Schemes of least sigma that are kept, to be ranked by their total uncertainty, where the search does not
+/// count it.
 const RANKED: usize = 100;
 
 /// A search that can begin: its task, and what evaluates sequences.
@@ -110,8 +111,8 @@ impl<'a> Prepared<'a> {
         many && k >= 3 && Screen::new(&self.evaluator, &self.task.criterion).is_some()
     }
 
-    /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many or `bound` shows that those
-    /// an exchange finds are good enough.
+    /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many
+    /// or `bound` shows that those an exchange finds are good enough.
     pub(crate) fn searched(
         &self,
         search: &Search<'_>,

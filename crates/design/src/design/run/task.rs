@@ -300,8 +300,8 @@ impl<'a> Task<'a> {
         Ok(out)
     }
 
-    /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry; `None` where
-    /// there are too many to hold, or to count.
+    /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry;
+    /// `None` where there are too many to hold, or to count.
     pub(crate) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
         if self.walks {
             return None;
@@ -467,16 +467,16 @@ impl<'a> Task<'a> {
         Ok(self.options.immune.iter().all(kept))
     }
 
-    /// True if random drift is stated, or a bench that the search does not count: the search leaves them out, and what
-    /// it finds is evaluated with them.
+    /// True if random drift is stated, or a bench that the search does not count: the search leaves them out,
+    /// and what it finds is evaluated with them.
     pub(crate) fn is_noisy(&self) -> bool {
         self.ranks()
             || !self.conditions.gyro_noise.is_none()
             || self.conditions.as_stated().drift_noise.amount() > 0.0
     }
 
-    /// True if a bench, or an error that schemes must be immune to, is stated that the search does not count: the
-    /// schemes of least sigma are ranked by their total uncertainty.
+    /// True if a bench, or an error that schemes must be immune to, is stated that the search does not count:
+    /// the schemes of least sigma are ranked by their total uncertainty.
     pub(crate) fn ranks(&self) -> bool {
         self.omitted.is_none() && !(self.conditions.bench.is_empty() && self.options.immune.is_empty())
     }
@@ -540,8 +540,8 @@ impl<'a> Task<'a> {
         self.attained(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
     }
 
-    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and with a
-    /// smaller criterion.
+    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and
+    /// with a smaller criterion.
     pub(crate) fn refined(
         &self,
         evaluator: &Evaluator,

@@ -55,8 +55,8 @@ fn chosen(angles: &[String], base: &Scheme) -> Vec<String> {
     base.gimbals.along(&attitudes).iter().map(angles_text).collect()
 }
 
-/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of half
-/// turns: its sigmas are those that the search gave. Positions are p1, p2, ...
+/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of
+/// half turns: its sigmas are those that the search gave. Positions are p1, p2, ...
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a dwell that no scheme has.

@@ -25,7 +25,8 @@ impl Constraints {
         self.degrees.as_ref().is_none_or(|caps| degrees.iter().zip(caps).all(|(d, cap)| d <= cap))
     }
 
-    /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are kept.
+    /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are
+    /// kept.
     pub(crate) fn violation(
         &self,
         evaluator: &Evaluator,

@@ -25,13 +25,15 @@ impl Search<'_> {
         (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
     }
 
-    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better way of
-    /// half turns, then any two change places, until none helps. From the sequences given, then from random ones.
+    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better
+    /// way of half turns, then any two change places, until none helps. From the sequences given, then from
+    /// random ones.
     pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
         self.exchange_from(k, given, restarts, seed, None)
     }
 
-    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept too.
+    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept
+    /// too.
     pub(crate) fn exchange_from(
         &self,
         k: usize,

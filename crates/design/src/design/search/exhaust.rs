@@ -1,4 +1,5 @@
-//! Exhaustion: all sequences that begin with some starts, walked over with what their prefixes have in common.
+//! Exhaustion: all sequences that begin with some starts, walked over with what their prefixes have in
+//! common.
 
 use std::collections::BTreeMap;
 
@@ -80,8 +81,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Puts a position behind the sequence; true if times are within the limits. The last one of a sequence takes no
-    /// effects of errors that are not estimated, which [`Self::score`] adds where they count.
+    /// Puts a position behind the sequence; true if times are within the limits. The last one of a sequence
+    /// takes no effects of errors that are not estimated, which [`Self::score`] adds where they count.
     fn push(&mut self, stop: Stop, last: bool) -> bool {
         let (search, depth) = (self.search, self.sequence.len());
         self.pushed += 1;
@@ -221,15 +222,15 @@ impl<'a> Walk<'a> {
 }
 
 impl Search<'_> {
-    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the first of an
-    /// orbit (where order does not matter: that have one of them as their smallest). As many of the best as are kept:
-    /// worst degrees that are too large for these are not looked at.
+    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the
+    /// first of an orbit (where order does not matter: that have one of them as their smallest). As many of
+    /// the best as are kept: worst degrees that are too large for these are not looked at.
     pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
         self.exhausted(symmetry, k, None)
     }
 
-    /// The same, where order matters without those that a bound leaves out: what is kept is the same. The bound is held
-    /// against what an exchange from `seed` finds first.
+    /// The same, where order matters without those that a bound leaves out: what is kept is the same. The
+    /// bound is held against what an exchange from `seed` finds first.
     pub fn exhaust_pruned(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Best {
         let Some(pruning) = self.pruning(symmetry, k, seed) else { return self.exhaust(symmetry, k) };
         let mut best = self.exhausted(symmetry, k, Some(&pruning));
@@ -271,8 +272,8 @@ impl Search<'_> {
         Some(Pruning { screen, known })
     }
 
-    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions, or more
-    /// where order matters and too many sequences would be behind a start to be searched at once.
+    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions, or
+    /// more where order matters and too many sequences would be behind a start to be searched at once.
     pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
         let ordered = self.evaluator.ordered();
         let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
@@ -404,8 +405,8 @@ impl Search<'_> {
         walk.best
     }
 
-    /// All observable sets of up to `k` within the caps, by their worst degree; `None` when the search was stopped. They are judged as
-    /// they are found, and none is kept but as a bit.
+    /// All observable sets of up to `k` within the caps, by their worst degree; `None` when the search was
+    /// stopped. They are judged as they are found, and none is kept but as a bit.
     fn levels(&self, k: usize) -> Option<Vec<Sets>> {
         let meter = Meter::new(self.progress, 1);
         let going = || meter.report(0, 0, None);

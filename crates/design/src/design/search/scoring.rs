@@ -12,7 +12,8 @@ use crate::design::search::score::{Scored, Worth};
 pub struct Search<'a> {
     /// Exact verdicts of sets.
     pub rows: &'a Rows,
-    /// Torquer errors act on the way: then a set has no verdict, and those sequences count whose samples determine what is required.
+    /// Torquer errors act on the way: then a set has no verdict, and those sequences count whose samples
+    /// determine what is required.
     pub walks: bool,
     /// Sigmas.
     pub evaluator: &'a Evaluator,
@@ -48,8 +49,8 @@ impl Search<'_> {
         degrees.iter().max().copied().filter(|_| self.constraints.cap(&degrees))
     }
 
-    /// The worst degree of every observable set, where it is known beforehand: none is better than all candidates
-    /// together, none worse than the last order.
+    /// The worst degree of every observable set, where it is known beforehand: none is better than all
+    /// candidates together, none worse than the last order.
     pub(crate) fn only_degree(&self) -> Option<usize> {
         if self.walks {
             return Some(0);
@@ -57,8 +58,8 @@ impl Search<'_> {
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
     }
 
-    /// Score and time of a sequence from the state behind its first `known` positions; at least one position follows.
-    /// Degrees are those of one field.
+    /// Score and time of a sequence from the state behind its first `known` positions; at least one position
+    /// follows. Degrees are those of one field.
     pub(crate) fn worth_behind(
         &self,
         (state, known): (&State, usize),
@@ -83,8 +84,8 @@ impl Search<'_> {
         Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
     }
 
-    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of repositioning at
-    /// once, does not.
+    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of
+    /// repositioning at once, does not.
     pub(crate) fn judged(&self, mut scored: Scored) -> Scored {
         if self.walks {
             return scored;

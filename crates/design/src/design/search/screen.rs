@@ -1,32 +1,37 @@
-//! What the last two positions of a sequence cannot make good, where information does not add over positions: which pairs
-//! of them need not be evaluated.
+//! What the last two positions of a sequence cannot make good, where information does not add over positions:
+//! which pairs of them need not be evaluated.
 //!
-//! Behind a prefix psi is a functional P of the unknowns x, and whatever follows, a sequence s, adds `T^T S(s) T`: S(s) is
-//! the information of s as a scheme of its own, on psi at its start and the coefficients, and `T = [P; 0 I]`. So for any
-//! vector x
+//! Behind a prefix psi is a functional P of the unknowns x, and whatever follows, a sequence s, adds
+//! `T^T S(s) T`: S(s) is the information of s as a scheme of its own, on psi at its start and the
+//! coefficients, and `T = [P; 0 I]`. So for any vector x
 //!
 //! ```text
 //! x^T M x = x^T M_prefix x + sum_j q_j(z_j, x),   z_0 = P x,  z_(j+1) = F_j z_j + h_j x
 //! ```
 //!
-//! with q_j the information of position j alone, F_j and h_j what its dwell makes of psi: x is carried through the positions
-//! in three numbers z, instead of a matrix. By duality (`certificate::bound`) the criterion of the whole is not below one
-//! over it, so that all pairs that add too little along x are excluded at once. Any x is valid. Good ones are those of the prefix
-//! with the mean of all that may follow, and those of one of the pairs left itself: what shows why that one is worse shows it of
-//! many others.
+//! with q_j the information of position j alone, F_j and h_j what its dwell makes of psi: x is carried
+//! through the positions in three numbers z, instead of a matrix. By duality (`certificate::bound`) the
+//! criterion of the whole is not below one over it, so that all pairs that add too little along x are
+//! excluded at once. Any x is valid. Good ones are those of the prefix with the mean of all that may follow,
+//! and those of one of the pairs left itself: what shows why that one is worse shows it of many others.
 //!
-//! psi goes on here as it does. Bounds that relax this are of little use: where psi may be anything before a dwell, carry only adds
-//! information, so that reset carry bounds nothing; with psi known before every dwell the drift between is known exactly; and one X
-//! for all that may follow (the mean, or its best weights) leaves most pairs of the best schemes (`crates/README.md`, with numbers).
+//! psi goes on here as it does. Bounds that relax this are of little use: where psi may be anything before a
+//! dwell, carry only adds information, so that reset carry bounds nothing; with psi known before every dwell
+//! the drift between is known exactly; and one X for all that may follow (the mean, or its best weights)
+//! leaves most pairs of the best schemes (`crates/README.md`, with numbers).
 //!
-//! Rounding: what is left out must be worse than the limit *as the search would have computed it*. Cholesky's decomposition and the triangular
-//! systems of a criterion are exact for a matrix that differs from the computed M by at most `gamma_(3n+1) sqrt(m_ii m_jj)` in every entry (N. J. Higham,
-//! *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, theorems 8.5 and 10.3, each column of L being no longer than `sqrt(m_ii)`), and every bound
-//! above holds for that matrix too. So no condition number enters: the energy of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. With the information
-//! of a position `L^T G L`, `|G_ab| <= sqrt(G_aa G_bb)`, what sums and products make of it is in the same way at most `gamma (sum_i |x_i| s_i)^2`,
-//! `s_i = sum_a sqrt(G_aa) |L_ai|` ([`Reach`]). Eigenvalues (E) are those of a matrix that is off by a small multiple of n u of its norm, as for any
-//! backward stable method (G. H. Golub, C. F. Van Loan, *Matrix Computations*, section 8.3); that of the library is taken to be [`EIGENVALUES`] n u at most. A pivot that the
-//! search passes over, as what rounding leaves of an undetermined direction, is taken for zero here as there.
+//! Rounding: what is left out must be worse than the limit *as the search would have computed it*. Cholesky's
+//! decomposition and the triangular systems of a criterion are exact for a matrix that differs from the
+//! computed M by at most `gamma_(3n+1) sqrt(m_ii m_jj)` in every entry (N. J. Higham, *Accuracy and Stability
+//! of Numerical Algorithms*, 2nd edition, 2002, theorems 8.5 and 10.3, each column of L being no longer than
+//! `sqrt(m_ii)`), and every bound above holds for that matrix too. So no condition number enters: the energy
+//! of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. With the information of a position `L^T G L`,
+//! `|G_ab| <= sqrt(G_aa G_bb)`, what sums and products make of it is in the same way at most
+//! `gamma (sum_i |x_i| s_i)^2`, `s_i = sum_a sqrt(G_aa) |L_ai|` ([`Reach`]). Eigenvalues (E) are those of a
+//! matrix that is off by a small multiple of n u of its norm, as for any backward stable method (G. H. Golub,
+//! C. F. Van Loan, *Matrix Computations*, section 8.3); that of the library is taken to be [`EIGENVALUES`] n
+//! u at most. A pivot that the search passes over, as what rounding leaves of an undetermined direction, is
+//! taken for zero here as there.
 
 use obsdeg_core::model::LOCAL;
 use obsdeg_exact::SplitMix64;
@@ -42,7 +47,8 @@ const EIGENVALUES: usize = 10;
 const DIRECTIONS: usize = 2;
 /// The mean's part of what a test is made by.
 const MEAN: f64 = 1e-3;
-/// What a vector costs, in evaluations of a pair: where vectors exclude fewer for a while, those left are evaluated.
+/// What a vector costs, in evaluations of a pair: where vectors exclude fewer for a while, those left are
+/// evaluated.
 const WORTH: usize = 4;
 const CREDIT: usize = 40;
 const MOST_CREDIT: usize = 80;
@@ -71,8 +77,8 @@ struct Reach {
     gain: Vec<f64>,
 }
 
-/// Every candidate as a scheme of its own, by psi at its start, as it is carried, and the coefficients: of each entry a lane, of every
-/// candidate.
+/// Every candidate as a scheme of its own, by psi at its start, as it is carried, and the coefficients: of
+/// each entry a lane, of every candidate.
 struct Positions {
     /// Information on psi: xx, 2 xy, yy, 2 xz, 2 yz, zz.
     psi: [Vec<f64>; 6],
@@ -85,14 +91,15 @@ struct Positions {
     shifted: [Vec<Vec<f64>>; 3],
 }
 
-/// Some vectors, and what they prove: the square of the criterion, in units of the evaluator, is not below `most` over the sum
-/// of their `x^T M x`.
+/// Some vectors, and what they prove: the square of the criterion, in units of the evaluator, is not below
+/// `most` over the sum of their `x^T M x`.
 struct Test {
     vectors: Vec<[f64; MAX_UNKNOWNS]>,
     most: f64,
 }
 
-/// One vector, as every candidate takes it: a position adds `constant + linear z + psi(z)`, and leaves `turned z + shift`.
+/// One vector, as every candidate takes it: a position adds `constant + linear z + psi(z)`, and leaves
+/// `turned z + shift`.
 struct Lanes {
     linear: [Vec<f64>; 3],
     constant: Vec<f64>,
@@ -110,15 +117,16 @@ pub(crate) struct Scratch {
     draw: SplitMix64,
     root: Vec<f64>,
     inverse: Vec<f64>,
-    /// Of every unknown, how large the root of what it adds to M becomes: in the prefix, and at two more positions.
+    /// Of every unknown, how large the root of what it adds to M becomes: in the prefix, and at two more
+    /// positions.
     sizes: Vec<[f64; 3]>,
     lanes: Lanes,
     energy: Vec<f64>,
 }
 
 impl<'a> Screen<'a> {
-    /// The screen of what `evaluator` evaluates; `None` where order does not matter, where turns take time, or where
-    /// the noise of Z is correlated, so that what follows a prefix is no information of its own.
+    /// The screen of what `evaluator` evaluates; `None` where order does not matter, where turns take time,
+    /// or where the noise of Z is correlated, so that what follows a prefix is no information of its own.
     pub(crate) fn new(evaluator: &'a Evaluator, criterion: &'a Criterion) -> Option<Self> {
         if !evaluator.ordered() || !evaluator.ways.is_empty() || evaluator.bias.is_some() {
             return None;
@@ -165,8 +173,8 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// Which pairs of candidates behind `state` may have a criterion up to `limit`: second by second of every first; `alive` is as long as
-    /// there are pairs, and those that may not leave it.
+    /// Which pairs of candidates behind `state` may have a criterion up to `limit`: second by second of every
+    /// first; `alive` is as long as there are pairs, and those that may not leave it.
     pub(crate) fn pairs(&self, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) {
         self.with_mean(state, on);
         self.reach.behind(state, &mut on.sizes);
@@ -226,7 +234,8 @@ impl<'a> Screen<'a> {
         gone
     }
 
-    /// Whether a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number says nothing.
+    /// Whether a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number
+    /// says nothing.
     fn is_worse(&self, most: f64, energy: f64, limit: f64) -> bool {
         // of n logarithms up to 100 (D), or n squares
         let limit = limit * self.evaluator.dph * (1.0 + rounding(64 * self.evaluator.n));
@@ -261,8 +270,8 @@ impl<'a> Screen<'a> {
             Criterion::E => rounding(3 * EIGENVALUES * n) * counting[0] * counting[1],
             _ => 0.0,
         };
-        // of each position its functionals, their products and sums, and those of x with them; then the decomposition, of which the
-        // root of each m_ii is at most the sum of the three
+        // of each position its functionals, their products and sums, and those of x with them; then the
+        // decomposition, of which the root of each m_ii is at most the sum of the three
         *known += sum + rounding(8 * n + 128) * size.iter().map(|s| s * s).sum::<f64>() + eigenvalues;
         z
     }
@@ -368,7 +377,8 @@ impl Reach {
             let size = |i: usize| -> f64 {
                 local.iter().enumerate().map(|(a, row)| dwelling.local[a][a].sqrt() * row[i].abs()).sum()
             };
-            // psi is turned from the platform axes to n and back: two matrices whose rows have sizes up to sqrt(3)
+            // psi is turned from the platform axes to n and back: two matrices whose rows have sizes up to
+            // sqrt(3)
             let after = |row: &[f64]| 3.0 * row.iter().map(|x| x.abs()).sum::<f64>();
             out.psi = out.psi.max((0..3).map(size).sum());
             out.grow = state.psi.iter().fold(out.grow, |m, row| m.max(after(&row[..3])));
@@ -498,8 +508,9 @@ mod tests {
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
 
-    /// Whatever the limit, no pair is excluded whose criterion is within it: both carries, every criterion, terms, candidates, dwells
-    /// and coefficients that do not count drawn at random. And nearly all that are worse are excluded.
+    /// Whatever the limit, no pair is excluded whose criterion is within it: both carries, every criterion,
+    /// terms, candidates, dwells and coefficients that do not count drawn at random. And nearly all that are
+    /// worse are excluded.
     #[test]
     fn what_is_within_the_limit_is_not_excluded() {
         let mut rng = SplitMix64::new(23);

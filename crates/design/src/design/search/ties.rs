@@ -104,7 +104,8 @@ impl Ties {
         }
     }
 
-    /// How many there are of all sequences, where each searched one stands for `order` divided by its searched images.
+    /// How many there are of all sequences, where each searched one stands for `order` divided by its
+    /// searched images.
     pub fn total(&self, order: usize) -> u64 {
         let limit = self.limit();
         let mut by_images: BTreeMap<usize, u128> = BTreeMap::new();
@@ -113,8 +114,8 @@ impl Ties {
                 *by_images.entry(images).or_default() += u128::from(count) * order as u128;
             }
         }
-        // images of one sequence have as many searched images: each sum is a multiple of them but for rounding at the
-        // limit
+        // images of one sequence have as many searched images: each sum is a multiple of them but for
+        // rounding at the limit
         let all = by_images.into_iter().map(|(images, sum)| (sum + images as u128 / 2) / images as u128);
         u64::try_from(all.sum::<u128>()).unwrap_or(u64::MAX)
     }

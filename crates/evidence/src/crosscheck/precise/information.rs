@@ -25,15 +25,15 @@ pub(in super::super) struct Information {
     pub(super) digits: Digits,
     /// Its matrix (n x n), symmetric.
     pub(super) matrix: Vec<Vector>,
-    /// psi of the end in the carried axes as functionals of the unknowns at the start: one for each unknown psi,
-    /// which is that of the end of the run, with reset carry of the end of its own position.
+    /// psi of the end in the carried axes as functionals of the unknowns at the start: one for each unknown
+    /// psi, which is that of the end of the run, with reset carry of the end of its own position.
     pub(super) psi_at_end: Vec<Functional>,
 }
 
 impl Information {
-    /// Of the samples of a filter: at the ends of equal steps, as many as `samples` says of each position, over
-    /// dwells of which the first is `dwell / w_ie`, with noise of these standard deviations, of Z and of a
-    /// measured azimuth.
+    /// Of the samples of a filter: at the ends of equal steps, as many as `samples` says of each position,
+    /// over dwells of which the first is `dwell / w_ie`, with noise of these standard deviations, of Z and of
+    /// a measured azimuth.
     pub(in super::super) fn of_filter(model: &Model, dwell: f64, samples: &[usize], noise: [f64; 2]) -> Self {
         let d = model.digits;
         let weights = noise.map(|s| d.double(1.0 / (s * s)));

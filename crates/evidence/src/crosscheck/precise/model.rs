@@ -334,7 +334,8 @@ impl Model {
         out
     }
 
-    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6): the series of `psi' = psi x omega + eps`.
+    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6): the series of
+    /// `psi' = psi x omega + eps`.
     fn moved(&self, time: &Real) -> [Vector; 3] {
         let d = self.digits;
         let mut term: [Vector; 3] =
@@ -362,8 +363,8 @@ impl Model {
         sum
     }
 
-    /// Samples at the ends of equal steps over the dwell of each position, the first of `dwell / w_ie`: as many
-    /// as `samples` says of a position, of these weights ([`Weights`]). Equal dwells share them.
+    /// Samples at the ends of equal steps over the dwell of each position, the first of `dwell / w_ie`: as
+    /// many as `samples` says of a position, of these weights ([`Weights`]). Equal dwells share them.
     pub(super) fn moments(&self, dwell: f64, samples: &[usize], weights: &Weights) -> Vec<Arc<Moments>> {
         let d = self.digits;
         let mut out: Vec<Arc<Moments>> = Vec::new();

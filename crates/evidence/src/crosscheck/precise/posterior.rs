@@ -15,8 +15,8 @@ pub(in super::super) struct Posterior {
 }
 
 impl Posterior {
-    /// Of the information of samples and a prior (standard deviations in rad and in w_ie). `None` when rounding
-    /// leaves no information.
+    /// Of the information of samples and a prior (standard deviations in rad and in w_ie). `None` when
+    /// rounding leaves no information.
     pub(in super::super) fn new(information: &Information, prior: &[f64]) -> Option<Self> {
         let Information { digits: d, matrix, psi_at_end } = information;
         let d = *d;
@@ -40,7 +40,8 @@ impl Posterior {
         Some(Self { digits: d, prior, factor, psi_at_end: psi_at_end.clone() })
     }
 
-    /// `L^-1 c` of a functional of psi at the end and the coefficients, in units of the prior: its square is the variance.
+    /// `L^-1 c` of a functional of psi at the end and the coefficients, in units of the prior: its square is
+    /// the variance.
     fn solved(&self, functional: &Functional) -> Vector {
         let d = self.digits;
         let mut c = vec![d.int(0); self.prior.len()];

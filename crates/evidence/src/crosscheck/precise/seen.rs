@@ -148,8 +148,8 @@ impl Seen {
         vanishes(&rest, &sizes, &variance).then(|| log2(&variance).map(|v| v / 2.0)).flatten()
     }
 
-    /// A functional of psi at the end and the coefficients as one of the unknowns at the start, without what rounding
-    /// leaves of unknowns that no sample holds (`cos^2 + sin^2 - 1` where attitudes cancel).
+    /// A functional of psi at the end and the coefficients as one of the unknowns at the start, without what
+    /// rounding leaves of unknowns that no sample holds (`cos^2 + sin^2 - 1` where attitudes cancel).
     pub(in super::super) fn at_start(&self, functional: &Functional) -> Functional {
         let mut moved: BTreeMap<usize, Real> = BTreeMap::new();
         for (c, x) in at_start(self.digits, &self.psi_at_end, functional) {

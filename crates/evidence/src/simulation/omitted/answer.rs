@@ -32,8 +32,8 @@ pub struct OmittedEffects {
     /// Names in the bench that are among the unknowns: estimated, so that their sizes do not count.
     #[serde(default)]
     pub estimated: Vec<String>,
-    /// True if attitudes of the positions are among the terms: those of rotating positions, and of more than 64, are
-    /// not computed.
+    /// True if attitudes of the positions are among the terms: those of rotating positions, and of more than
+    /// 64, are not computed.
     #[serde(default = "yes")]
     pub attitudes: bool,
 }

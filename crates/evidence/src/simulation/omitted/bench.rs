@@ -40,8 +40,8 @@ impl Bench {
         Ok(Self { sizes: model.terms().iter().map(size).collect() })
     }
 
-    /// Refuses sizes of attitudes whose effect is not computed for a scheme of so many positions, or of one whose
-    /// positions rotate.
+    /// Refuses sizes of attitudes whose effect is not computed for a scheme of so many positions, or of one
+    /// whose positions rotate.
     ///
     /// # Errors
     /// [`BenchError`].
@@ -70,7 +70,8 @@ impl Bench {
         }
     }
 
-    /// The names of a bench that are among the unknowns of `platform`: estimated, so that their sizes do not count.
+    /// The names of a bench that are among the unknowns of `platform`: estimated, so that their sizes do not
+    /// count.
     pub fn estimated(stated: &[Assignment], platform: &Platform) -> Vec<String> {
         let model = OmittedModel::new(platform);
         let is_omitted =
@@ -80,8 +81,8 @@ impl Bench {
         own.map(|a| a.name.clone()).collect()
     }
 
-    /// The sizes of a bench for the same scheme without a position (counted from 0): attitudes of later ones move
-    /// up.
+    /// The sizes of a bench for the same scheme without a position (counted from 0): attitudes of later ones
+    /// move up.
     pub fn without(stated: &[Assignment], position: usize) -> Vec<Assignment> {
         let moved = |a: &Assignment| match attitude_position(&a.name) {
             Some(i) if i == position + 1 => None,

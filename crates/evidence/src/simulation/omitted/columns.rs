@@ -1,8 +1,9 @@
-//! Columns of omitted errors in the samples of a plan: what one SI unit of each adds to Z, step by step, and to psi.
+//! Columns of omitted errors in the samples of a plan: what one SI unit of each adds to Z, step by step, and
+//! to psi.
 //!
-//! `psi^n` of an error obeys the equations of the platform by itself: `psi' = psi x omega_ie + eps`, integrated over each
-//! step (exactly while a position lasts), carried between positions as the scheme says. Nothing of the filter's model
-//! enters.
+//! `psi^n` of an error obeys the equations of the platform by itself: `psi' = psi x omega_ie + eps`,
+//! integrated over each step (exactly while a position lasts), carried between positions as the scheme says.
+//! Nothing of the filter's model enters.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, apply, transpose};
@@ -76,8 +77,8 @@ impl<'a> OmittedColumns<'a> {
         self.model.terms().len()
     }
 
-    /// The rows of the next step in the order of the outputs of the plan (outputs x errors, row by row); none for a
-    /// step without outputs. `None` at the end.
+    /// The rows of the next step in the order of the outputs of the plan (outputs x errors, row by row); none
+    /// for a step without outputs. `None` at the end.
     ///
     /// # Errors
     /// [`SimulationError`] for a number that is not finite.
@@ -98,8 +99,8 @@ impl<'a> OmittedColumns<'a> {
         Ok(Some(&self.rows))
     }
 
-    /// Psi of the unknowns at the end, as far as the errors change it: (unknown, one entry per error in rad). Under
-    /// reset carry at the end of each position.
+    /// Psi of the unknowns at the end, as far as the errors change it: (unknown, one entry per error in rad).
+    /// Under reset carry at the end of each position.
     pub fn ends(&self) -> &[(usize, Vec<f64>)] {
         &self.ends
     }

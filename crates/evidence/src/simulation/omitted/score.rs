@@ -1,8 +1,8 @@
 //! Score test: which omitted error explains the residuals of a fit.
 //!
-//! With `r` the residuals and `w_j` the part of column j that no change of the unknowns imitates (both whitened),
-//! `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom where the error is zero: the fall of
-//! chi-square with the error among the unknowns. Its estimate is `(w_j r) / (w_j w_j)` (Rao 1948,
+//! With `r` the residuals and `w_j` the part of column j that no change of the unknowns imitates (both
+//! whitened), `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom where the error is zero:
+//! the fall of chi-square with the error among the unknowns. Its estimate is `(w_j r) / (w_j w_j)` (Rao 1948,
 //! doi:10.1017/S0305004100023987). Where residuals are larger than their sigmas even with the error among the
 //! unknowns, the fall counts in units of what is left per degree of freedom: noise that is larger than stated
 //! is no error of the bench. The number of errors tried counts by Bonferroni's bound.
@@ -32,8 +32,8 @@ pub struct Score {
     pub chi_square: f64,
     /// Degrees of freedom of the fit.
     pub degrees_of_freedom: f64,
-    /// True for each error that a record can show, by its exact class; what is left of the column of another one is
-    /// the width of the prior.
+    /// True for each error that a record can show, by its exact class; what is left of the column of another
+    /// one is the width of the prior.
     pub shown: Vec<bool>,
 }
 
@@ -63,7 +63,8 @@ pub struct Suspicion {
     pub chi_square_fall: f64,
     /// Bound on the probability that chance gives such a fall to any of the errors that were tried.
     pub probability: f64,
-    /// Estimates that the errors, or an indistinguishable one, change most in their own sigma, the largest change first.
+    /// Estimates that the errors, or an indistinguishable one, change most in their own sigma, the largest
+    /// change first.
     pub changes: Vec<SuspectedChange>,
 }
 
@@ -91,11 +92,11 @@ pub struct SuspectedChange {
     pub estimate: f64,
     /// Estimate with the suspected errors among the unknowns, in the unit of `unit`.
     pub with: f64,
-    /// Lowest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of
-    /// `unit`.
+    /// Lowest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit
+    /// of `unit`.
     pub lowest: f64,
-    /// Highest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the unit of
-    /// `unit`.
+    /// Highest estimate with the suspected error or one of `indistinguishable` among the unknowns, in the
+    /// unit of `unit`.
     pub highest: f64,
 }
 
@@ -142,8 +143,8 @@ impl Score {
         tried.iter().filter(differs).copied().collect()
     }
 
-    /// What explains the residuals best: a single error, or a pair where no single one does; nothing where chance is
-    /// enough.
+    /// What explains the residuals best: a single error, or a pair where no single one does; nothing where
+    /// chance is enough.
     pub fn explanation(&self) -> Option<Explanation> {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;

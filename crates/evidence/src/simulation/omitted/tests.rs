@@ -1,4 +1,5 @@
-//! The reference table of the method, and brute force: a model written anew here, with least squares of its own.
+//! The reference table of the method, and brute force: a model written anew here, with least squares of its
+//! own.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Angle, Carry, OmittedModel, Platform, Scheme, cardinal, cardinal_names};
@@ -33,25 +34,25 @@ fn figures(of: &OmittedEffects, family: &str, s: f64) -> [f64; 2] {
     [worst, f.worst_in_sigmas.unwrap_or(0.0) * s]
 }
 
-/// Whether a figure is that of the table: within half a unit of its last digit, and four units of the fourth digit of
-/// two computations.
+/// Whether a figure is that of the table: within half a unit of its last digit, and four units of the fourth
+/// digit of two computations.
 fn is_printed(x: f64, like: &str) -> bool {
     let decimals = like.split_once('.').map_or(0, |(_, d)| d.len()) as i32;
     let expected: f64 = like.parse().expect("a number");
     (x - expected).abs() <= 0.5 * 10f64.powi(-decimals) + 4e-4 * expected
 }
 
-/// The 24 cardinal attitudes by their letters, in the order N, U, E, S, D, W. Under inertial carry the figures depend
-/// on the order of the positions; with this one they are those of the table.
+/// The 24 cardinal attitudes by their letters, in the order N, U, E, S, D, W. Under inertial carry the
+/// figures depend on the order of the positions; with this one they are those of the table.
 pub(super) fn by_letters() -> Vec<String> {
     let mut all = cardinal_names();
     all.sort_by_key(|n| n.chars().map(|c| "NUESDW".find(c)).collect::<Vec<_>>());
     all
 }
 
-/// The reference table of the method: two computations elsewhere, neither of them this program. The table does not
-/// state the order of its 24 attitudes; of the orders that were tried (by angles, by the alphabet, by permutations and
-/// signs) only that of [`by_letters`] gives its figures.
+/// The reference table of the method: two computations elsewhere, neither of them this program. The table
+/// does not state the order of its 24 attitudes; of the orders that were tried (by angles, by the alphabet,
+/// by permutations and signs) only that of [`by_letters`] gives its figures.
 #[test]
 fn the_reference_table() {
     type Line<'a> = (Vec<&'a str>, Carry, &'a str, [(&'a str, &'a str); 6]);
@@ -406,8 +407,8 @@ pub(super) fn columns_every(
     platform.names().iter().enumerate().map(column).collect()
 }
 
-/// Largest relative difference between printed sensitivities and brute force, over `schemes` random schemes: an
-/// estimate of a noise-free record with one unit of the error in its truth and not in the model.
+/// Largest relative difference between printed sensitivities and brute force, over `schemes` random schemes:
+/// an estimate of a noise-free record with one unit of the error in its truth and not in the model.
 fn largest_difference(schemes: usize, seed: u64) -> f64 {
     let mut rng = SplitMix64::new(seed);
     let mut largest: f64 = 0.0;
@@ -459,8 +460,8 @@ fn sensitivities_are_those_of_brute_force_at_length() {
     assert!(found < 1e-6, "{found:e}");
 }
 
-/// Exact classes against ranks in floating point, by the model of this file: how many were decided, and how many were
-/// not (a rank that is neither full nor short beyond doubt).
+/// Exact classes against ranks in floating point, by the model of this file: how many were decided, and how
+/// many were not (a rank that is neither full nor short beyond doubt).
 fn compared_classes(schemes: usize, seed: u64) -> [usize; 4] {
     let mut rng = SplitMix64::new(seed);
     let mut counts = [0; 4];
@@ -508,8 +509,8 @@ fn classes_are_those_of_ranks_at_length() {
     assert!(20 * counts[3] < counts[..3].iter().sum::<usize>());
 }
 
-/// True if an error enters no sample of Z1 and Z3, by the letters of the axes X, Y, Z at each cardinal position: the
-/// conditions that the book states, each with its proof.
+/// True if an error enters no sample of Z1 and Z3, by the letters of the axes X, Y, Z at each cardinal
+/// position: the conditions that the book states, each with its proof.
 fn enters_nothing(name: &str, positions: &[String]) -> bool {
     let all = |condition: &dyn Fn(&[u8]) -> bool| positions.iter().all(|p| condition(p.as_bytes()));
     let vertical = |p: &[u8], axis: u8| b"UD".contains(&p[usize::from(axis - b'X')]);
@@ -647,8 +648,8 @@ impl Records {
     }
 }
 
-/// Shares of `count` records: suspicion without an error; the error or its group first at twice the visible size;
-/// found at the visible size, with the computed power.
+/// Shares of `count` records: suspicion without an error; the error or its group first at twice the visible
+/// size; found at the visible size, with the computed power.
 fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
     let records =
         Records::new(&letters(&["DSW", "WSU", "WND", "WUN", "NUE", "DES", "UEN", "DNE"], Carry::Inertial));

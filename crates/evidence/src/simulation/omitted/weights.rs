@@ -19,16 +19,17 @@ const ROWS: usize = 1024;
 pub struct Influence {
     /// Change of the error of every estimate at the end (unknowns x errors, SI units).
     pub changes: DMatrix<f64>,
-    /// `O_j' R^-1 (O_j - J B_j)` of every error: a record shows an error of k with a chi-square of k^2 times it.
+    /// `O_j' R^-1 (O_j - J B_j)` of every error: a record shows an error of k with a chi-square of k^2 times
+    /// it.
     pub information: Vec<f64>,
     /// `O_j' R^-1 O_j` of every error: what all its samples are, in sigmas of the noise.
     pub squares: Vec<f64>,
 }
 
 impl Influence {
-    /// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x errors); zero
-    /// where the exact class says so, and where nothing but rounding is left. `units` and `sigmas` (shown) are those of
-    /// the unknowns.
+    /// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x
+    /// errors); zero where the exact class says so, and where nothing but rounding is left. `units` and
+    /// `sigmas` (shown) are those of the unknowns.
     pub fn shown(
         &self,
         units: &[&'static str],
@@ -118,7 +119,8 @@ pub(crate) fn by_information(
     }
     while columns.step()?.is_some() {}
     let start = reduced.solve()?;
-    // column by column: a product of whole matrices takes other instructions, and other bits, on other processors
+    // column by column: a product of whole matrices takes other instructions, and other bits, on other
+    // processors
     let ended: Vec<_> = start.column_iter().map(|column| &to_end * column).collect();
     let changes = at_the_end(plan, &DMatrix::from_columns(&ended), &columns);
     Ok(Influence { changes, information: reduced.information, squares: reduced.squares })
