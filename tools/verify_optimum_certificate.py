@@ -285,6 +285,8 @@ class Space:
                     # psi^n goes on: what takes psi^n = C psi takes psi times C^T
                     row[:3] = [sum(x * y for x, y in zip(row, line)) % field.p for line in attitudes[i]]
                 rows[i].append((triple, row))
+            if self.reset:
+                rows = [without_psi(field.p, own) for own in rows]
             self.fields.append((field.p, rows))
             here = self.turns(field, random)
             maps = here if maps is None else [a if a == b else None for a, b in zip(maps, here)]
@@ -332,17 +334,29 @@ class Space:
 
     def judged(self, p, candidates, members):
         d = len(self.problem.names) - 3
-        psi = 3 * len(members) if self.reset else 3
-        rows = []
-        for i, c in enumerate(members):
-            at = 3 * i if self.reset else 0
-            for (_, k, component), row in candidates[c]:
-                rows.append(((i + 1, k, component), [0] * at + row[:3] + [0] * (psi - 3 - at) + row[3:]))
+        psi = 0 if self.reset else 3  # under reset carry no row has entries at psi
+        rows = [((i + 1, k, component), row) for i, c in enumerate(members) for (_, k, component), row in candidates[c]]
         names = [""] * (psi + d)
         _, _, witnesses = base.judge(p, names, rows, [{psi + column: 1} for column, _, _ in self.required])
         degrees = [w["degree"] for w in witnesses]
         good = all(x is not None and x <= cap for x, (_, cap, _) in zip(degrees, self.required))
         return max(degrees) if good else None
+
+
+def without_psi(p, rows):
+    """The combinations of the rows of one candidate that have no entries at its psi, by order, on the coefficients alone."""
+    reduced, out = [], []
+    for triple, row in rows:
+        for pivot, e in reduced:
+            if factor := row[pivot]:
+                row = [(x - factor * y) % p for x, y in zip(row, e)]
+        pivot = next((j for j in range(3) if row[j]), None)
+        if pivot is not None:
+            scale = pow(row[pivot], -1, p)
+            reduced.append((pivot, [x * scale % p for x in row]))
+        elif any(row):
+            out.append((triple, row[3:]))
+    return out
 
 
 def read_required(raw, problem):

@@ -284,7 +284,7 @@ pub(crate) struct Judged {
 }
 
 /// `v - factor e`.
-fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
+pub(crate) fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
     for (x, &y) in v.iter_mut().zip(e).filter(|(_, y)| **y != 0) {
         *x = (*x + p - times(factor, y, p)) % p;
     }

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use crate::file::RowName;
-use crate::modular::{PrimeField, Randomness, judge};
+use crate::modular::{PrimeField, Randomness, inverse, judge, subtract, times};
 use crate::problem::{Matrix, Problem, Ring, times as product};
 
 /// Rows of one candidate by order and component: psi first, then the coefficients.
@@ -55,6 +55,9 @@ impl Space {
                     all.into_iter().zip(here).map(|(a, b)| a.filter(|a| Some(a) == b.as_ref())).collect()
                 }
             });
+            if carry == "reset" {
+                of = of.iter().map(|rows| without_psi(field.p, rows)).collect();
+            }
             fields.push((field.p, of));
         }
         let maps = maps.into_iter().flatten().flatten().collect();
@@ -98,16 +101,11 @@ impl Space {
 
     fn judged(&self, (p, candidates): &(u64, Vec<RowsOf>), set: &[usize]) -> Option<usize> {
         let d = self.names.len() - 3;
-        let psi = if self.reset { 3 * set.len() } else { 3 };
+        // under reset carry no row has entries at psi
+        let psi = if self.reset { 0 } else { 3 };
         let mut rows: RowsOf = Vec::new();
         for (i, &c) in set.iter().enumerate() {
-            let own = if self.reset { 3 * i } else { 0 };
-            for (name, row) in &candidates[c] {
-                let mut wide = vec![0; psi + d];
-                wide[own..own + 3].copy_from_slice(&row[..3]);
-                wide[psi..].copy_from_slice(&row[3..]);
-                rows.push(((i + 1, name.1, name.2), wide));
-            }
+            rows.extend(candidates[c].iter().map(|(name, row)| ((i + 1, name.1, name.2), row.clone())));
         }
         let unit = |k: usize| (0..psi + d).map(|j| u64::from(j == psi + k)).collect();
         let functionals: Vec<Vec<u64>> = self.required.iter().map(|r| unit(r.0)).collect();
@@ -120,6 +118,29 @@ impl Space {
             .into_iter()
             .max()
     }
+}
+
+/// The combinations of the rows of one candidate that have no entries at its psi, by order, on the coefficients alone:
+/// what they add to the rows of others that have a psi of their own.
+fn without_psi(p: u64, rows: &RowsOf) -> RowsOf {
+    let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
+    let mut out = Vec::new();
+    for (name, row) in rows {
+        let mut row = row.clone();
+        for (pivot, e) in &reduced {
+            let factor = row[*pivot];
+            subtract(&mut row, factor, e, p);
+        }
+        match (0..3).find(|&j| row[j] != 0) {
+            Some(pivot) => {
+                let scale = inverse(row[pivot], p);
+                reduced.push((pivot, row.iter().map(|x| times(*x, scale, p)).collect()));
+            }
+            None if row.iter().any(|x| *x != 0) => out.push((*name, row[3..].to_vec())),
+            None => {}
+        }
+    }
+    out
 }
 
 /// For the 24 rotations of the platform axes, where each takes the candidates; `None` where it takes one to

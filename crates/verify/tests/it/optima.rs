@@ -235,7 +235,7 @@ const CHANGES: [(&str, &str); 15] = [
     ("a candidate", ": "),
     ("the carry", ": "),
     ("the criterion", ": "),
-    ("the dwell", "best.0.value"),
+    ("the samples", "best.0.value"),
     ("the noise", "best.0.value"),
 ];
 
@@ -263,8 +263,11 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
             }
         }
         "a degree" => out["degree"] = json!((value["degree"].as_u64()? + 1) % 3),
-        // at its cap a bound is no least value
-        "a bound raised" if bound < 9.9 * least => out["blocks"][block]["bound"] = json!(bound * 1.001),
+        // a bound is nine tenths of the way from the best to the least value, or to the cap
+        "a bound raised" if bound < 8.9 * least => {
+            let value = least + (bound - least) / 0.9;
+            out["blocks"][block]["bound"] = json!(value * 1.01);
+        }
         "a bound below the best" => out["blocks"][block]["bound"] = json!(least * 0.999),
         "no bound" => out["blocks"][block]["bound"] = Value::Null,
         "a block left out" => drop(out["blocks"].as_array_mut()?.remove(any)),
@@ -283,7 +286,7 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
             let other = if problem["criterion"] == "a" { "worst" } else { "a" };
             out["problem"]["criterion"] = json!(other);
         }
-        "the dwell" => out["problem"]["dwell_s"] = json!(problem["dwell_s"].as_f64()? + 1.0),
+        "the samples" => out["problem"]["samples"] = json!(2 * problem["samples"].as_u64()?),
         "the noise" => out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01),
         _ => return None,
     }

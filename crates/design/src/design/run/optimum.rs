@@ -26,8 +26,10 @@ pub const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
 const LONG: f64 = 1e6;
 /// Most blocks.
 const MOST_BLOCKS: usize = 100_000;
-/// Largest bound of a block, as a multiple of the best value: sequences far above it are determined by
-/// rounding.
+/// Part of what the least value of a block is above the best that its bound claims: a value far above the best may
+/// rest on rounding.
+const ROOM: f64 = 0.9;
+/// Largest value of a block that counts, as a multiple of the best one.
 const CAP: f64 = 10.0;
 
 /// Certificate of a proven optimum: the best sequences of candidates, with bounds on all others by blocks.
@@ -267,7 +269,8 @@ fn blocks(
         let found = best.found.first().filter(|s| s.worth.degree == degree).map(|s| s.worth.value);
         // what a bound leaves out is above the best, and what rounding hides is not known
         let hidden = best.excluded > 0 || best.lost > 0;
-        let bound = if hidden { Some(least) } else { found.map(|value| value.min(CAP * least)) };
+        let above = |value: f64| least + ROOM * (value.min(CAP * least) - least);
+        let bound = if hidden { Some(least) } else { found.map(above) };
         Ok(SequenceBlock {
             start: start.iter().map(|c| c + 1).collect(),
             sequences: behind(start, (n, k), prepared.evaluator.ordered())
