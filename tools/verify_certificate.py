@@ -3,7 +3,7 @@
 
     verify_certificate.py CERTIFICATE.json [SCHEME.toml]
 
-Certificates of models need verify_model_certificate.py beside this file.
+Certificates of models need verify_model_certificate.py beside this file, those of optima verify_optimum_certificate.py.
 
 One sentence per unknown. Exit codes: 0 accepted, 1 refused, 2 not readable or bad usage.
 """
@@ -29,6 +29,10 @@ NEGATIVE_POWERS = (-9, 9)
 
 class Refused(Exception):
     """Why a certificate is not accepted."""
+
+
+class Unreadable(Refused):
+    """Why nothing is judged: a scheme file that is not TOML."""
 
 
 def need(holds, place, says, found):
@@ -523,18 +527,35 @@ def error_bound(problem, levels, combinations):
     for q in (2, 3, 5):
         phi = phi * (q - 1) // q if order % q == 0 else phi
     factors = max((len(f) for _, _, f in problem.coefficients), default=0)
-    turns = [angle for turns in problem.slews or [] for _, angle in turns]
-    bits = 3 * (factors + 1) + 9 + math.log2(n) / 2
-    if turns:
-        bits += 24 + math.log2(len(turns)) + math.log2(TURN // 2 // math.gcd(TURN // 2, *turns))
+    turns = sum(map(len, problem.slews or []))
+    bits = 3 * (factors + 1) + 9 + math.log2(n) / 2 + (bits_of_turns(problem.slews) if turns else 0)
     t = max((sum(len(x.terms) for x in c.values()) for c in combinations), default=0)
-    decisions = levels * (1 + n + len(combinations))
+    decisions = levels * (1 + n + len(combinations)) + 2 * turns
     prime = (n * bits + 40 * (t + 1)) * phi * math.log(2**61) / (60 * 2**60)
     return decisions * ((5 * n + 40) / 2**60 + prime)
 
 
-def verify(data, scheme=None):
-    """The sentences on an accepted certificate (bytes), of a scheme file (text) if it is given."""
+def bits_of_turns(slews):
+    """What turns add to the binary logarithm of the norm of a row: denominators and sizes."""
+    turns = [turn for turns in slews for turn in turns]
+    denominators = [q.denominator for about, _ in turns if isinstance(about, list) for x in about for q in x.terms.values()]
+    # exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a jump
+    two = own = 0
+    for position in slews:
+        a2, a_own = 3, 0
+        for about, _ in position:
+            u2, u_own = {"X_p": (0, 0), "Y_p": (0, 0), "Z_p": (0, 0), "middle": (1, 0), None: (6, 0)}.get(about if not isinstance(about, list) else "", (a2, a_own))
+            u_own += isinstance(about, list)
+            two, own = max(two, a2 + 1 + 3 * u2), max(own, a_own + 3 * u_own)
+            a2, a_own = a2 + 1 + 2 * u2, a_own + 2 * u_own
+    angles = [abs(angle) for _, angle in turns]
+    half = TURN // 2
+    sizes = math.log2(len(turns)) + math.log2(half // math.gcd(half, *angles)) + math.log2(4 + max(angles) / half) + 3
+    return two + own * (math.lcm(1, *denominators) - 1).bit_length() + 3 * sum(about is None for about, _ in turns) + sizes
+
+
+def verify(data, scheme=None, blocks=None, seed=None):
+    """The sentences on an accepted certificate (bytes), of a scheme file (text) if it is given; of an optimum so many blocks are searched again."""
     need(len(data) <= 16 * 10**6, "certificate", "expected at most 16 MB", f"found {len(data)} bytes")
     try:
         value = json.loads(data.decode("utf-8"), object_pairs_hook=no_repetition)
@@ -544,6 +565,10 @@ def verify(data, scheme=None):
         from verify_model_certificate import verify_model
 
         return verify_model(value, data, scheme)
+    if isinstance(value, dict) and value.get("layout") == "obsdeg.optimum-certificate/1":
+        from verify_optimum_certificate import verify_optimum
+
+        return verify_optimum(value, data, scheme, blocks, seed)
     names = ["layout", "problem", "unknowns", "kind", "ranks", "basis", "null_vectors", "verdicts", "combinations"]
     layout, problem, unknowns, kind, ranks, basis, null_vectors, verdicts, combinations = keys("certificate", value, names)
     same("layout", layout, "obsdeg.certificate/1")
@@ -610,17 +635,33 @@ def primes(each):
 
 
 def by_primes(count, bound):
-    # 1.5 times: rounding to one digit never goes below the bound
-    return f"modulo {count} primes (wrong with probability below {1.5 * bound:.0e})"
+    return f"modulo {count} primes (wrong with probability below {rounded_up(bound)})"
+
+
+def rounded_up(x):
+    """One digit and an exponent, never below the number."""
+    shown = f"{x:.0e}"
+    if float(shown) >= x:
+        return shown
+    digit, exponent = shown.split("e")
+    return f"{int(digit) + 1}e{exponent}" if digit != "9" else f"1e{int(exponent) + 1:03d}"
 
 
 def fewest_positions(problem, seen):
     """Least number of positions that may determine so many coefficients; None where the counting argument does not hold."""
-    if problem.pole or any(t not in GRAVITY for t in problem.terms):
+    if problem.pole:
         return None
-    lost = {"platform": (3, 0), "inertial": (3, 1), "reset": (2, 0)}
-    each, once = (3, 0) if problem.azimuth else lost[problem.carry]
-    return -(-(seen + once) // each)
+    torqued = problem.carry == "inertial" and any(t in RATE for t in problem.terms)
+    rows = 5 + problem.force + problem.azimuth
+    k = 1
+    while True:
+        most = rows * k - (3 * k if problem.carry == "reset" else 3)
+        if not problem.force and not torqued:
+            # the rows that hold no drift are about psi alone
+            most = min(most, 3 * k - (problem.carry == "inertial" and not problem.azimuth))
+        if most >= seen:
+            return k
+        k += 1
 
 
 def sentence(name, claim, how):
@@ -743,7 +784,7 @@ def read_scheme(scheme, claimed):
     try:
         file = tomllib.loads(scheme, parse_float=Decimal)
     except tomllib.TOMLDecodeError as e:
-        raise Refused(f"scheme: expected TOML; {e}") from None
+        raise Unreadable(f"scheme: expected TOML; {e}") from None
 
     def decimal(x):
         need(type(x) in (int, Decimal) and Decimal(x).is_finite(), "scheme", "expected decimal degrees", f"found {text(x)}")
@@ -754,6 +795,9 @@ def read_scheme(scheme, claimed):
     def position(entry):
         need(isinstance(entry, dict), "scheme", "expected a table for each position", f"found {text(entry)}")
         known_keys(entry, "name angles_deg attitude dwell_s slew")
+        slew = entry.get("slew", {})
+        need(isinstance(slew, dict), "scheme", "expected a table for each slew", f"found {text(slew)}")
+        known_keys(slew, "about angle_deg rate_deg_s")
         if "attitude" in entry:
             return cardinal(entry["attitude"])
         return [decimal(a) for a in entry.get("angles_deg", [])]
@@ -761,6 +805,8 @@ def read_scheme(scheme, claimed):
     known_keys(file, KEYS_OF_SCHEME)
     terms = scheme_terms(file)
     geometry = file.get("geometry", {})
+    need(isinstance(geometry, dict), "scheme", "expected a table of the geometry", f"found {text(geometry)}")
+    known_keys(geometry, "X Y Z accelerometers")
     default = ["+x -z +y", "+y -z -x", "+z +x +y"]
     signed = lambda a: a if a[:1] in "+-" else f"+{a}"
     gyros = []
@@ -817,6 +863,9 @@ def main():
         return 2
     try:
         print("\n".join(verify(data, scheme)))
+    except Unreadable as e:
+        print(f"error: {e}", file=sys.stderr)
+        return 2
     except Refused as e:
         print(f"refused: {e}")
         return 1

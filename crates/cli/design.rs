@@ -11,7 +11,7 @@ use crate::arguments::RequireMet;
 use crate::failure::Failure;
 use crate::input::{is_stdin, read};
 use crate::interrupt;
-use crate::output::{Output, print, to_a_folder};
+use crate::output::{Output, print, to_a_folder, write_file};
 use crate::progress::Bar;
 
 const AFTER_HELP: &str = "\
@@ -27,6 +27,7 @@ Examples:
   obsdeg design --positions 12 --terms all --carry inertial --slew-rate 1 --criterion d
   obsdeg design --positions 8 --carry platform --within 0
   obsdeg design --positions 5 --carry inertial --divide
+  obsdeg design --positions 5 --carry inertial --certificate c.json    a proof for obsdeg verify and other checkers
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --merge part-*.json --check 3
   obsdeg design scheme.toml --candidates grid:45        with carry, dwell, noise, requirements and gimbals of the file
@@ -61,6 +62,10 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     met: RequireMet,
 
+    /// Write a certificate of the optimum (JSON) that `obsdeg verify` and other checkers search again: the answer must be proven to be the best
+    #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with_all = ["minimum", "part", "merge"])]
+    certificate: Option<PathBuf>,
+
     #[command(flatten)]
     output: Output,
 }
@@ -81,6 +86,9 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     if a.asked.part.is_none() {
         a.output.check_folder()?;
     }
+    if let Some(path) = a.certificate.as_ref().filter(|path| path.exists() && !a.output.target.force) {
+        return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
+    }
     let file = |text: &&String| is_stdin(Path::new(text)) || Path::new(text).exists();
     let candidates = Some(&a.asked.candidates).filter(|text| !is_word(text)).filter(file);
     let part = |path: &Path| read(path, "part");
@@ -96,10 +104,14 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         bar.shows(&now);
         !interrupted.load(Ordering::Relaxed)
     };
-    let designed = design(&a.asked, &files, &Host { worker: None, going: &going });
+    let asked = Search { certificate: a.certificate.is_some(), ..a.asked.clone() };
+    let designed = design(&asked, &files, &Host { worker: None, going: &going });
     drop(bar);
     match designed? {
-        Designed::Schemes(found) => {
+        Designed::Schemes(mut found) => {
+            if let (Some(path), Some(file)) = (&a.certificate, found.take_certificate()) {
+                write_file(path, &file.bytes)?;
+            }
             let first = || found.found.found.first().map(|f| &f.requirements);
             a.met.check(first())?;
             a.output.write_folder(&*found, "design.json", || found.files())?;

@@ -84,7 +84,7 @@ enum Command {
     Report(report::Arguments),
     /// Recompute the equations and claims of the paper: what agrees, and what does not
     Paper(paper::Arguments),
-    /// Check a certificate of `obsdeg analyze --certificate`, with code of its own
+    /// Check a certificate of `obsdeg analyze` or `obsdeg design`, with code of its own
     Verify(verify::Arguments),
     /// Print what others wrote of this build, and the texts of their licences
     Licences(licences::Arguments),

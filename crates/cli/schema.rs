@@ -7,7 +7,7 @@ use obsdeg_core::certificate::{Certificate, ModelCertificate};
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_design::design::{Design, Part, Walks};
+use obsdeg_design::design::{Design, OptimumCertificate, Part, Walks};
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
@@ -30,6 +30,8 @@ enum Kind {
     Certificate,
     /// The JSON of `obsdeg analyze --certificate` of a model
     ModelCertificate,
+    /// The JSON of `obsdeg design --certificate`
+    OptimumCertificate,
     /// The JSON of `obsdeg paper`
     Audit,
     /// The JSON of `obsdeg simulate`
@@ -74,6 +76,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Kind::Analysis => written::<SchemeAnalysis>(),
         Kind::Certificate => written::<Certificate>(),
         Kind::ModelCertificate => written::<ModelCertificate>(),
+        Kind::OptimumCertificate => written::<OptimumCertificate>(),
         Kind::Audit => written::<Audit>(),
         Kind::Simulation => written::<Simulation>(),
         Kind::Crosscheck => written::<CrossCheck>(),

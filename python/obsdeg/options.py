@@ -214,6 +214,8 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     """Restarts of the exchange [default: 200]."""
     within: Real
     """Under reset carry: a scheme is enough when it is within so many percent of what is possible at all [default: 0.01]."""
+    certificate: bool
+    """``certificate.json`` among the files of the answer: the proof of the best sequence, for checkers."""
     refine: bool
     """Move the angles of the best scheme continuously, to hundredths of a degree."""
     divide: bool

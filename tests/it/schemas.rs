@@ -8,7 +8,7 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// The kinds of `obsdeg schema`.
-const KINDS: [&str; 18] = [
+const KINDS: [&str; 19] = [
     "allan",
     "analysis",
     "audit",
@@ -19,6 +19,7 @@ const KINDS: [&str; 18] = [
     "design",
     "model",
     "model-certificate",
+    "optimum-certificate",
     "part",
     "scheme",
     "simulation",
@@ -135,14 +136,18 @@ fn files_and_answers_are_as_their_schemas_say() {
     ] {
         answer(&json(&[line, &["--format", "json"]].concat()), &line.join(" "));
     }
-    for file in [five, "examples/lotka-volterra/model.toml"] {
+    for line in [
+        &["analyze", five, "--solutions", "off"][..],
+        &["analyze", "examples/lotka-volterra/model.toml", "--solutions", "off"],
+        &["design", "--positions", "3", "--observable", "D_F", "--carry", "inertial"],
+    ] {
         let path = folder.path().join("c.json").display().to_string();
-        stdout(&run(&["analyze", file, "--solutions", "off", "--certificate", &path, "--force"]));
+        stdout(&run(&[line, &["--certificate", &path, "--force"]].concat()));
         let mut value: Value =
             serde_json::from_str(&std::fs::read_to_string(&path).expect("written")).expect("JSON");
         // what is no answer says its layout under another key
         value["schema"] = value["layout"].clone();
-        answer(&value, file);
+        answer(&value, &line.join(" "));
     }
     // every schema of an answer was used
     let unused: Vec<&String> = schemas

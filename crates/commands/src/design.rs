@@ -11,8 +11,8 @@ use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
     Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Immune, Part, Progress,
-    WalkOptions, Walks, asked as asked_conditions, design_merged, design_part, is_walk, scheme_found,
-    scheme_of_walk, walks,
+    WalkOptions, Walks, asked as asked_conditions, certify_optimum, check_certifiable, design_merged,
+    design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
@@ -135,6 +135,10 @@ pub struct Search {
     #[arg(long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED), conflicts_with_all = ["minimum", "part"])]
     pub check: Option<u64>,
 
+    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
+    #[arg(skip)]
+    pub certificate: bool,
+
     /// What a scheme must be.
     #[command(flatten)]
     #[serde(flatten)]
@@ -216,6 +220,7 @@ impl Default for Search {
             front: Vec::new(),
             part: None,
             check: None,
+            certificate: false,
             wanted: WantedOptions::default(),
             measurement: MeasurementOptions::default(),
         }
@@ -301,6 +306,8 @@ pub struct Searched {
     base: Scheme,
     #[serde(skip)]
     conditions: Conditions,
+    #[serde(skip)]
+    certificate: Option<File>,
 }
 
 /// Walks, with what they were searched under.
@@ -437,6 +444,14 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     if a.minimum && is_walk(&base) {
         return fewest_of_walks(a, base, options, host);
     }
+    if a.certificate {
+        if a.part.is_some() || !files.merge.is_empty() {
+            return Err(Problem::input(
+                "a certificate is of a search at once; found parts (--part, --merge)",
+            ));
+        }
+        check_certifiable(&base, &conditions, &options)?;
+    }
     let parts = files.merge.iter().map(|part| Ok((part.name.clone(), read_part(part)?)));
     let parts: Vec<(String, Part)> = parts.collect::<Result<_, Problem>>()?;
     let progress = |now: Progress| (host.going)(now.into());
@@ -452,8 +467,24 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         let check = a.check.map_or(0, |blocks| usize::try_from(blocks).unwrap_or(usize::MAX));
         design_merged(&base, &conditions, &options, &parts, check, &progress)
     }?;
+    let certificate =
+        a.certificate.then(|| proof(&base, &conditions, &options, &found, &progress)).transpose()?;
     let conditions = asked_conditions(&base, &conditions, &options.required)?;
-    Ok(Designed::Schemes(Box::new(Searched { found, base, conditions })))
+    Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
+}
+
+/// The certificate of a proven optimum, as a file.
+fn proof(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    found: &Design,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<File, Problem> {
+    let certificate = certify_optimum(base, conditions, options, found, progress)?;
+    // a block a line
+    let text = serde_json::to_string(&certificate).map_err(no_json)?.replace("{\"start\"", "\n{\"start\"");
+    Ok(File { name: "certificate.json".into(), bytes: (text + "\n").into_bytes() })
 }
 
 /// Options and files of a part, as its file keeps them for the merge.
@@ -663,13 +694,18 @@ impl Walked {
 }
 
 impl Searched {
+    /// The certificate that was asked for, which is then no more among the files.
+    pub fn take_certificate(&mut self) -> Option<File> {
+        self.certificate.take()
+    }
+
     /// What goes into a folder beside the JSON: the best scheme, its positions, the front.
     ///
     /// # Errors
     /// What cannot be drawn.
     pub fn files(&self) -> Result<Vec<File>, Problem> {
-        let Self { found, base, conditions } = self;
-        let mut files = Vec::new();
+        let Self { found, base, conditions, certificate } = self;
+        let mut files: Vec<File> = certificate.iter().cloned().collect();
         if let Some(best) = found.found.first() {
             let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
             files.push(File { name: "winner.toml".into(), bytes });

@@ -59,7 +59,7 @@ pub(crate) enum RawAxis {
     Direction([Number; 3]),
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Deserialize, Serialize, Clone)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case, reason = "the letters of the specification")]
 pub(crate) struct RawGyro {

@@ -10,6 +10,7 @@ mod exact;
 mod file;
 mod model;
 mod modular;
+mod optimum;
 mod problem;
 mod scheme;
 
@@ -22,11 +23,40 @@ const MOST_BYTES: usize = 16_000_000;
 
 /// Reason why a certificate is not accepted: the place, what the certificate says, what is found.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refused(String);
+pub struct Refused {
+    text: String,
+    unreadable: bool,
+}
+
+impl Refused {
+    fn new(text: String) -> Self {
+        Self { text, unreadable: false }
+    }
+
+    /// The same where what was given beside the certificate cannot be used.
+    fn unreadable(self) -> Self {
+        Self { unreadable: true, ..self }
+    }
+
+    /// True if nothing was judged: the scheme file is not TOML, or blocks are chosen where there are none.
+    pub fn is_unreadable(&self) -> bool {
+        self.unreadable
+    }
+}
+
+/// How much of the certificate of an optimum is searched again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Replay {
+    /// Number of blocks, chosen at random; none: all where these are at most two million sequences, otherwise as
+    /// many blocks as these fill.
+    pub blocks: Option<usize>,
+    /// Seed of the choice; none: a number of the system.
+    pub seed: Option<u64>,
+}
 
 impl std::fmt::Display for Refused {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.text)
     }
 }
 
@@ -34,7 +64,7 @@ impl std::error::Error for Refused {}
 
 /// A refusal: the place, what was expected there, what was found.
 fn refusal(place: &str, expected: &str, found: impl std::fmt::Display) -> Refused {
-    Refused(format!("{place}: expected {expected}; found {}", short(&found.to_string())))
+    Refused::new(format!("{place}: expected {expected}; found {}", short(&found.to_string())))
 }
 
 /// Refuses unless `holds`.
@@ -49,7 +79,8 @@ fn same<T: serde::Serialize>(place: &str, certificate: &T, found: &T) -> Result<
     match says == found {
         true => Ok(()),
         false => {
-            Err(Refused(format!("{place}: the certificate says {}; found {}", short(&says), short(&found))))
+            let text = format!("{place}: the certificate says {}; found {}", short(&says), short(&found));
+            Err(Refused::new(text))
         }
     }
 }
@@ -66,6 +97,18 @@ fn short(text: &str) -> String {
 /// # Errors
 /// [`Refused`] with the reason.
 pub fn verify(certificate: &[u8], scheme: Option<&str>) -> Result<Vec<String>, Refused> {
+    verify_with(certificate, scheme, &Replay::default())
+}
+
+/// The same, with what is searched again where the certificate is that of an optimum.
+///
+/// # Errors
+/// [`Refused`] with the reason.
+pub fn verify_with(
+    certificate: &[u8],
+    scheme: Option<&str>,
+    replay: &Replay,
+) -> Result<Vec<String>, Refused> {
     need(
         certificate.len() <= MOST_BYTES,
         "certificate",
@@ -74,10 +117,17 @@ pub fn verify(certificate: &[u8], scheme: Option<&str>) -> Result<Vec<String>, R
     )?;
     let layout: Layout = parsed(certificate)?;
     objects(&parsed(certificate)?)?;
+    if *replay != Replay::default() && layout.layout != optimum::LAYOUT {
+        return Err(refusal("choice of blocks", "the certificate of an optimum", layout.layout).unreadable());
+    }
     match layout.layout.as_str() {
         "obsdeg.certificate/1" => of_scheme(certificate, scheme),
         model::LAYOUT => model::verify(certificate, scheme.is_some()),
-        other => Err(refusal("layout", &format!("obsdeg.certificate/1 or {}", model::LAYOUT), other)),
+        optimum::LAYOUT => optimum::verify(certificate, scheme.is_some(), replay),
+        other => {
+            let layouts = format!("obsdeg.certificate/1, {} or {}", model::LAYOUT, optimum::LAYOUT);
+            Err(refusal("layout", &layouts, other))
+        }
     }
 }
 
@@ -89,7 +139,7 @@ struct Layout {
 
 /// JSON with the keys of a layout.
 fn parsed<'de, T: serde::Deserialize<'de>>(certificate: &'de [u8]) -> Result<T, Refused> {
-    serde_json::from_slice(certificate).map_err(|e| Refused(short(&format!("certificate: {e}"))))
+    serde_json::from_slice(certificate).map_err(|e| Refused::new(short(&format!("certificate: {e}"))))
 }
 
 /// Refuses lists in place of objects, which the reader would take for the values of their keys.
@@ -108,6 +158,9 @@ fn objects(value: &serde_json::Value) -> Result<(), Refused> {
         ("problem.gyros", &value["problem"]["gyros"]),
         ("verdicts", &value["verdicts"]),
         ("combinations", &value["combinations"]),
+        ("problem.required", &value["problem"]["required"]),
+        ("best", &value["best"]),
+        ("blocks", &value["blocks"]),
     ] {
         list(value).iter().enumerate().try_for_each(|(i, entry)| object(format!("{place}.{i}"), entry))?;
     }
@@ -171,8 +224,22 @@ fn no_coefficients(claims: &[Claim<'_>]) -> Result<(), Refused> {
 }
 
 fn by_primes(count: usize, bound: f64) -> String {
-    // 1.5 times: rounding to one digit never goes below the bound
-    format!("modulo {count} primes (wrong with probability below {:.0e})", 1.5 * bound)
+    format!("modulo {count} primes (wrong with probability below {})", rounded_up(bound))
+}
+
+/// One digit and an exponent, never below the number.
+fn rounded_up(x: f64) -> String {
+    let shown = format!("{x:.0e}");
+    match shown.split_once('e') {
+        Some((digit, exponent)) if shown.parse::<f64>().is_ok_and(|y| y < x) => {
+            let exponent: i32 = exponent.parse().unwrap_or(0);
+            match digit {
+                "9" => format!("1e{}", exponent + 1),
+                _ => format!("{}e{exponent}", digit.parse().unwrap_or(0) + 1),
+            }
+        }
+        _ => shown,
+    }
 }
 
 /// A claim by the name of what it is about.

@@ -284,14 +284,14 @@ pub(crate) struct Judged {
 }
 
 /// `v - factor e`.
-fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
+pub(crate) fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
     for (x, &y) in v.iter_mut().zip(e).filter(|(_, y)| **y != 0) {
         *x = (*x + p - times(factor, y, p)) % p;
     }
 }
 
-/// The images of functionals, as long as a row. Refused is an entry that is 0 at the latitude of the problem, such
-/// as `wN - wU` at 45 deg.
+/// The images of functionals, as long as a row. Refused is an entry that is 0 at the latitude of the problem,
+/// such as `wN - wU` at 45 deg.
 pub(crate) fn images(
     problem: &Problem,
     field: &PrimeField,
@@ -392,21 +392,169 @@ pub(crate) fn primes(each: f64) -> Result<(usize, f64), Refused> {
 
 /// Bound on the probability that one prime misleads.
 pub(crate) fn error_bound(problem: &Problem, levels: usize, functionals: &[Functional]) -> f64 {
+    let terms = |c: &Functional| c.0.values().map(|x| x.0.len()).sum::<usize>();
+    let t = functionals[problem.names.len()..].iter().map(terms).max().unwrap_or(0) as f64;
+    // of every turn that its axis has length 1, and that it leads to the position
+    let turns: usize = problem.slews.iter().map(Vec::len).sum();
+    chance_of(problem, problem.names.len(), levels * (1 + functionals.len()) + 2 * turns, t)
+}
+
+/// The same of so many decisions about unknowns, for `n` of these.
+pub(crate) fn chance(problem: &Problem, n: usize, decisions: usize) -> f64 {
+    chance_of(problem, n, decisions, 0.0)
+}
+
+fn chance_of(problem: &Problem, n: usize, decisions: usize, t: f64) -> f64 {
     let order = order_of(problem);
     let parts = [2, 3, 5].into_iter().filter(|q| order.is_multiple_of(*q));
     let phi = parts.fold(order, |phi, q| phi / q * (q - 1)) as f64;
-    let n = problem.names.len() as f64;
-    let mut bits = 3.0 * (problem.factors() as f64 + 1.0) + 9.0 + n.log2() / 2.0;
-    let half = TURN as u64 / 2;
-    let turns: Vec<u64> = problem.slews.iter().flatten().map(|s| s.angle.unsigned_abs()).collect();
-    if !turns.is_empty() {
-        let common = turns.iter().fold(half, |g, angle| gcd(g, *angle));
-        bits += 24.0 + (turns.len() as f64).log2() + ((half / common) as f64).log2();
-    }
-    let terms = |c: &Functional| c.0.values().map(|x| x.0.len()).sum::<usize>();
-    let t = functionals[problem.names.len()..].iter().map(terms).max().unwrap_or(0) as f64;
-    let decisions = levels as f64 * (1.0 + functionals.len() as f64);
+    let n = n as f64;
+    let bits = 3.0 * (problem.factors() as f64 + 1.0) + 9.0 + n.log2() / 2.0 + of_turns(problem);
     let two60 = 2f64.powi(60);
     let prime = (n * bits + 40.0 * (t + 1.0)) * phi * 61.0 * std::f64::consts::LN_2 / (60.0 * two60);
-    decisions * ((5.0 * n + 40.0) / two60 + prime)
+    decisions as f64 * ((5.0 * n + 40.0) / two60 + prime)
+}
+
+/// What turns add to the binary logarithm of the norm of a row: denominators and sizes.
+fn of_turns(problem: &Problem) -> f64 {
+    let half = TURN as u64 / 2;
+    let turns: Vec<&Slew> = problem.slews.iter().flatten().collect();
+    if turns.is_empty() {
+        return 0.0;
+    }
+    let common = turns.iter().fold(half, |g, turn| gcd(g, turn.angle.unsigned_abs()));
+    let largest = turns.iter().map(|turn| turn.angle.unsigned_abs()).max().unwrap_or(0);
+    let denominators: BigInt = turns.iter().fold(BigInt::from(1), |all, turn| match &turn.about {
+        About::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
+        _ => all,
+    });
+    // exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a jump
+    let (mut two, mut own) = (0, 0);
+    for turns in &problem.slews {
+        let mut attitude = (3, 0);
+        for turn in turns {
+            let axis = match turn.about {
+                About::Platform(_) => (0, 0),
+                About::Middle(_) => (1, 0),
+                About::Geographic(_) => attitude,
+                About::Direction(_) => (attitude.0, attitude.1 + 1),
+                About::Shortest => (6, 0),
+            };
+            two = two.max(attitude.0 + 1 + 3 * axis.0);
+            own = own.max(attitude.1 + 3 * axis.1);
+            attitude = (attitude.0 + 1 + 2 * axis.0, attitude.1 + 2 * axis.1);
+        }
+    }
+    let shortest = turns.iter().filter(|turn| matches!(turn.about, About::Shortest)).count();
+    f64::from(two)
+        + f64::from(own) * (denominators - BigInt::from(1)).bits() as f64
+        + 3.0 * shortest as f64
+        + (turns.len() as f64).log2()
+        + ((half / common) as f64).log2()
+        + (4.0 + largest as f64 / half as f64).log2()
+        + 3.0
+}
+
+/// Least common multiple of positive numbers.
+fn lcm(a: BigInt, b: &BigInt) -> BigInt {
+    let (mut x, mut y) = (a.clone(), b.clone());
+    while y != BigInt::from(0) {
+        (x, y) = (y.clone(), x % y);
+    }
+    a / x * b
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+
+    use super::*;
+    use crate::file::{RawAxis, RawGyro, RawProblem, RawTurn};
+
+    type Exact = Vec<Vec<BigRational>>;
+
+    fn rational(p: i64, q: i64) -> BigRational {
+        BigRational::new(p.into(), q.into())
+    }
+
+    fn product_of(a: &Exact, b: &Exact) -> Exact {
+        let entry = |row: &[BigRational], j: usize| {
+            row.iter().zip(b).fold(rational(0, 1), |sum, (x, row)| sum + x * &row[j])
+        };
+        a.iter().map(|row| (0..3).map(|j| entry(row, j)).collect()).collect()
+    }
+
+    /// `a 1 + b [u x] + c u u^T`.
+    fn mixed(u: &[BigRational], [a, b, c]: [i64; 3]) -> Exact {
+        let [a, b, c] = [a, b, c].map(|x| rational(x, 1));
+        let skew = [
+            [None, Some((2, -1)), Some((1, 1))],
+            [Some((2, 1)), None, Some((0, -1))],
+            [Some((1, -1)), Some((0, 1)), None],
+        ];
+        let entry = |i: usize, j: usize| {
+            let unit = if i == j { a.clone() } else { rational(0, 1) };
+            let cross =
+                skew[i][j].map_or(rational(0, 1), |(k, sign): (usize, i64)| rational(sign, 1) * &u[k]);
+            unit + &b * cross + &c * &u[i] * &u[j]
+        };
+        (0..3).map(|i| (0..3).map(|j| entry(i, j)).collect()).collect()
+    }
+
+    /// The axis of length 1 with denominator `m^2 + n^2`.
+    fn direction(m: i64, n: i64) -> Vec<BigRational> {
+        let q = m * m + n * n;
+        vec![rational(m * m - n * n, q), rational(2 * m * n, q), rational(0, 1)]
+    }
+
+    /// Half turns about rational directions, in exact arithmetic: the denominators of what the turns leave
+    /// (`A J u`, the parts with and without pi) are within the bits that are allowed for them, which for a
+    /// denominator near 2^31 are many.
+    #[test]
+    fn bits_of_turns_hold_the_denominators() {
+        for parameters in
+            [vec![(2, 1)], vec![(46_340, 1)], vec![(2, 1), (3, 2)], vec![(40_001, 2), (5, 4), (46_340, 1)]]
+        {
+            let identity = mixed(&[rational(0, 1), rational(0, 1), rational(0, 1)], [1, 0, 0]);
+            let (mut a, mut denominators) = (identity, BigInt::from(1));
+            let mut turns = Vec::new();
+            for &(m, n) in &parameters {
+                let v = direction(m, n);
+                let u: Vec<BigRational> =
+                    (0..3).map(|j| (0..3).fold(rational(0, 1), |sum, i| sum + &a[i][j] * &v[i])).collect();
+                for parts in [[0, 2, 0], [0, 0, 1]] {
+                    let jump = product_of(&a, &mixed(&u, parts));
+                    for x in jump.iter().flatten().flat_map(|x| u.iter().map(move |u| x * u)) {
+                        denominators = lcm(denominators, x.denom());
+                    }
+                }
+                a = product_of(&a, &mixed(&u, [-1, 0, 2]));
+                let number = |x: &BigRational| {
+                    let zero = *x == rational(0, 1);
+                    Number(if zero { [].into() } else { [((1, 0, 0), x.clone())].into() })
+                };
+                let about = RawAxis::Direction([number(&v[0]), number(&v[1]), number(&v[2])]);
+                turns.push(RawTurn { about: Some(about), angle_deg: "180".into() });
+            }
+            let axes = |i: &str, o: &str, s: &str| RawGyro { I: i.into(), O: o.into(), S: s.into() };
+            let zero = || ["0", "0", "0"].map(String::from);
+            let problem = Problem::new(&RawProblem {
+                carry: "inertial".into(),
+                latitude_deg: None,
+                measured_azimuth: false,
+                terms: vec!["GS".into()],
+                gyros: [axes("+x", "-z", "+y"), axes("+y", "-z", "-x"), axes("+z", "+x", "+y")],
+                accelerometers: ["+x", "+y", "+z"].map(String::from),
+                positions: vec![zero(), zero()],
+                slews: Some(vec![Vec::new(), turns]),
+            });
+            let Ok(problem) = problem else { panic!("a problem") };
+            let bits = of_turns(&problem);
+            assert!(denominators.bits() as f64 <= bits, "{parameters:?}: {} {bits}", denominators.bits());
+            assert!(
+                parameters.len() > 1 || denominators.bits() as f64 > bits - 40.0,
+                "{parameters:?}: {bits}"
+            );
+        }
+    }
 }

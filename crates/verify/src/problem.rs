@@ -189,16 +189,21 @@ impl Problem {
     /// Least number of positions that may determine `seen` coefficients, by counting rows; `None` where the
     /// argument does not hold.
     pub(crate) fn fewest_positions(&self, seen: usize) -> Option<usize> {
-        if seen == 0 || self.pole || self.coefficients.iter().any(|c| c.of != Source::Gravity) {
+        if seen == 0 || self.pole {
             return None;
         }
-        let (each, once) = match self.carry.as_str() {
-            _ if self.azimuth => (3, 0),
-            "platform" => (3, 0),
-            "inertial" => (3, 1),
-            _ => (2, 0),
+        let (reset, inertial) = (self.carry == "reset", self.carry == "inertial");
+        let rows = 5 + usize::from(self.force()) + usize::from(self.azimuth);
+        // without accelerometers and slews the rows that hold no drift are about psi alone
+        let drift_alone = !(self.force() || inertial && self.is_torqued());
+        let most = |k: usize| {
+            let all = rows * k - if reset { 3 * k } else { 3 };
+            match drift_alone {
+                true => all.min(3 * k - usize::from(inertial && !self.azimuth)),
+                false => all,
+            }
         };
-        Some((seen + once).div_ceil(each))
+        (1..=seen).find(|&k| most(k) >= seen)
     }
 
     /// Largest number of factors of a coefficient.
@@ -206,18 +211,23 @@ impl Problem {
         self.coefficients.iter().map(|c| c.factors.len()).max().unwrap_or(0)
     }
 
+    /// True if an error of a torquer is unknown.
+    pub(crate) fn is_torqued(&self) -> bool {
+        self.coefficients.iter().any(|c| c.of == Source::Rate)
+    }
+
     /// True if an error of an accelerometer is unknown.
-    fn force(&self) -> bool {
+    pub(crate) fn force(&self) -> bool {
         self.coefficients.iter().any(|c| c.of == Source::Force)
     }
 
-    fn components(&self) -> Vec<usize> {
+    pub(crate) fn components(&self) -> Vec<usize> {
         let force = self.force();
         (1..=4).filter(|c| (*c != 2 || force) && (*c != 4 || self.azimuth)).collect()
     }
 
     /// `S_i`: the local quantities of a position in terms of the unknowns.
-    fn local<R: Ring>(
+    pub(crate) fn local<R: Ring>(
         &self,
         ring: &R,
         i: usize,

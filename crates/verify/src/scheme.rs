@@ -107,11 +107,16 @@ fn terms(file: &toml::Table) -> Result<Vec<&'static str>, Refused> {
 }
 
 fn read(scheme: &str, claimed: Option<&[Vec<RawTurn>]>) -> Result<RawProblem, Refused> {
-    let file: toml::Table = scheme.parse().or_else(|e: toml::de::Error| refused("TOML", e.message()))?;
+    let no_toml = |e: toml::de::Error| refusal("scheme file", "TOML", e.message()).unreadable();
+    let file: toml::Table = scheme.parse().map_err(no_toml)?;
     known_keys(&file, &KEYS)?;
     let terms = terms(&file)?;
     let empty = Value::Table(toml::Table::new());
     let geometry = file.get("geometry").unwrap_or(&empty);
+    match geometry.as_table() {
+        Some(table) => known_keys(table, &["X", "Y", "Z", "accelerometers"])?,
+        None => return refused("a table of the geometry", geometry.type_str()),
+    }
     let gyro = |letter: &str, defaults: [&str; 3]| {
         let [i, o, s] = axes(geometry.get(letter), ["I", "O", "S"], defaults)?;
         Ok::<_, Refused>(RawGyro { I: i, O: o, S: s })
@@ -163,6 +168,11 @@ fn position(entry: &Value) -> Result<[String; 3], Refused> {
     match entry.as_table() {
         Some(table) => known_keys(table, &KEYS_OF_POSITION)?,
         None => return refused("a table for each position", entry.type_str()),
+    }
+    match entry.get("slew") {
+        None => {}
+        Some(Value::Table(table)) => known_keys(table, &["about", "angle_deg", "rate_deg_s"])?,
+        Some(other) => return refused("a table for each slew", other.type_str()),
     }
     if let Some(letters) = entry.get("attitude") {
         return cardinal(text(Some(letters), "", "an attitude")?);

@@ -30,6 +30,10 @@ pub use request::limits::EXHAUSTIVE;
 pub use request::options::{CriterionName, DesignOptions, Immune};
 pub use run::driver::design;
 pub use run::merged::design_merged;
+pub use run::optimum::{
+    BestSequence, OPTIMUM_LAYOUT, OptimumCertificate, OptimumProblem, RequiredCoefficient, SequenceBlock,
+    certify_optimum, check_certifiable,
+};
 pub use run::part::{Block, Level, PART_SCHEMA, Part, design_part, design_starts};
 pub use run::task::asked;
 pub use run::winner::scheme as scheme_found;

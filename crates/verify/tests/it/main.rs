@@ -3,5 +3,6 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "what was measured")]
 
 mod models;
+mod optima;
 mod python;
 mod schemes;

@@ -1,4 +1,4 @@
-//! The checker in Python, `tools/verify_certificate.py`.
+//! The checkers in Python, `tools/verify_certificate.py` and those beside it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -19,9 +19,9 @@ sys.path.insert(0, sys.argv[1])
 sys.dont_write_bytecode = True
 from verify_certificate import Refused, verify
 for line in sys.stdin:
-    certificate, scheme = json.loads(line)
+    certificate, scheme, *replay = json.loads(line)
     try:
-        answer = [True, "\n".join(verify(certificate.encode(), scheme))]
+        answer = [True, "\n".join(verify(certificate.encode(), scheme, *replay))]
     except Refused as e:
         answer = [False, str(e)]
     print(json.dumps(answer), flush=True)
@@ -50,7 +50,16 @@ impl Python {
 
     /// Accepted or refused, and what was printed.
     pub(crate) fn asks(&mut self, certificate: &str, scheme: Option<&str>) -> (bool, String) {
-        writeln!(self.input, "{}", json!([certificate, scheme])).expect("written");
+        self.answers(certificate, &json!([certificate, scheme, 1_000_000]))
+    }
+
+    /// The same of an optimum, of which `blocks` blocks are searched again that a seed chooses.
+    pub(crate) fn replays(&mut self, certificate: &str, blocks: usize, seed: u64) -> (bool, String) {
+        self.answers(certificate, &json!([certificate, null, blocks, seed]))
+    }
+
+    fn answers(&mut self, certificate: &str, asked: &serde_json::Value) -> (bool, String) {
+        writeln!(self.input, "{asked}").expect("written");
         let mut line = String::new();
         self.output.read_line(&mut line).expect("an answer");
         serde_json::from_str(&line).unwrap_or_else(|e| panic!("{e}: {line:?} about {certificate}"))

@@ -5,7 +5,7 @@ use obsdeg_core::certificate::{Certificate, Kind, certify};
 use obsdeg_core::degree::{Status, Verdict, judge};
 use obsdeg_core::model::{Platform, Scheme, scheme_file};
 use obsdeg_exact::SplitMix64;
-use obsdeg_verify::verify;
+use obsdeg_verify::{Replay, verify, verify_with};
 use serde_json::{Value, json};
 
 use crate::python::Python;
@@ -84,7 +84,7 @@ fn certified(text: &str) -> (Certificate, String) {
 fn accept(count: usize, seed: u64) {
     let mut rng = SplitMix64::new(seed);
     let mut python = Python::start();
-    let (mut exact, mut observable, mut combinations) = (0, 0, 0);
+    let (mut exact, mut observable, mut combinations, mut fewest) = (0, 0, 0, 0);
     for _ in 0..count {
         let text = draw(&mut rng);
         let (certificate, json) = certified(&text);
@@ -100,6 +100,11 @@ fn accept(count: usize, seed: u64) {
             assert_eq!((claimed.proof.status, claimed.proof.degree), (status, degree), "{text}");
             observable += usize::from(status == Status::Observable);
         }
+        // no scheme shows more coefficients than the count of its positions allows
+        if let Some(least) = fewest_of(&sentences) {
+            assert!(least <= certificate.problem.positions.len(), "{text}\n{sentences:?}");
+            fewest += usize::from(least == certificate.problem.positions.len());
+        }
         exact += usize::from(certificate.kind == Kind::Exact);
         combinations += certificate.combinations.len();
     }
@@ -107,6 +112,71 @@ fn accept(count: usize, seed: u64) {
     assert!(
         exact * 4 > count && exact * 20 < count * 19 && observable > 2 * count && combinations > count / 4
     );
+    assert!(fewest > count / 20, "{fewest}");
+}
+
+/// The number of positions of the sentence on counting.
+fn fewest_of(sentences: &[String]) -> Option<usize> {
+    let rest = sentences.iter().find_map(|s| s.strip_prefix("Counting: no scheme of fewer than "))?;
+    rest.split(' ').next()?.parse().ok()
+}
+
+/// By hand: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, with slews too; the twelve drifts
+/// need 4, 5 and 6.
+#[test]
+fn fewest_positions_by_counting() {
+    let root =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/fifteen-positions/scheme.toml");
+    let text = std::fs::read_to_string(root).expect("an example");
+    let drifts = text.replace("\"all\"", "\"F\", \"I\", \"O\", \"S\"").replace("GM = 60\nK1 = 5\n", "");
+    let head = |text: &str, carry: &str| {
+        let fewer = text.replace("carry = \"inertial\"", &format!("carry = \"{carry}\""));
+        let simulation = fewer.replace("slew_rate_deg_s = 1\n", "");
+        if carry == "inertial" { text.to_string() } else { simulation.replace("path = \"one-axis\"\n", "") }
+    };
+    let mut python = Python::start();
+    for (text, carry, seen, positions) in [
+        (&text, "inertial", 33, 6),
+        (&text, "platform", 33, 6),
+        (&drifts, "platform", 12, 4),
+        (&drifts, "inertial", 12, 5),
+        (&drifts, "reset", 12, 6),
+    ] {
+        let (_, json) = certified(&head(text, carry));
+        let sentences = verify(json.as_bytes(), None).expect("accepted");
+        assert_eq!(fewest_of(&sentences), Some(positions), "{carry} {sentences:?}");
+        let makes = format!("positions makes {seen} coefficients observable under {carry} carry");
+        assert!(sentences.iter().any(|s| s.contains(&makes)), "{sentences:?}");
+        if let Some(python) = &mut python {
+            assert_eq!(python.asks(&json, None), (true, sentences.join("\n")));
+        }
+    }
+}
+
+/// A file that is no scheme is bad input, and no key inside a table is passed over.
+#[test]
+fn scheme_files_that_are_none() {
+    let (_, json) = certified(P1_P2);
+    let of = |text: &str| verify(json.as_bytes(), Some(text)).expect_err("no scheme");
+    assert!(of("{ not TOML").is_unreadable());
+    let mut python = Python::start();
+    for key in [
+        "[geometry]\nW = [\"+x\", \"-z\", \"+y\"]\n",
+        "[[position]]\nattitude = \"NDW\"\nslew = { about = \"N\", turn = 1 }\n",
+    ] {
+        let text = format!("{P1_P2}{key}");
+        let refused = of(&text);
+        assert!(
+            !refused.is_unreadable() && refused.to_string().contains("keys of standing positions"),
+            "{refused}"
+        );
+        if let Some(python) = &mut python {
+            let (accepted, said) = python.asks(&json, Some(&text));
+            assert!(!accepted && said.contains("keys of standing positions"), "{said}");
+        }
+    }
+    let blocks = Replay { blocks: Some(1), seed: None };
+    assert!(verify_with(json.as_bytes(), None, &blocks).expect_err("no blocks").is_unreadable());
 }
 
 #[test]

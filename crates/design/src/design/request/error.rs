@@ -50,6 +50,15 @@ pub enum DesignError {
         /// Its name.
         name: String,
     },
+    /// No certificate of an optimum covers the search or its answer.
+    #[error(
+        "no certificate: found {found}; certificates of optima cover an exhaustive search that proves the best sequence of given candidates, \
+         equal dwells, repositioning at once, white noise of Z and nothing known beforehand"
+    )]
+    NoCertificate {
+        /// What is not covered.
+        found: String,
+    },
     /// A name that is no coefficient.
     #[error("`{found}` is no coefficient of this scheme; expected some of {known}, or families such as D_F")]
     UnknownName {

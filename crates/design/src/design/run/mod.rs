@@ -8,6 +8,7 @@ pub(crate) mod inputs;
 pub(crate) mod merged;
 #[cfg(test)]
 mod omitted_tests;
+pub(crate) mod optimum;
 pub(crate) mod part;
 pub(crate) mod part_check;
 pub(crate) mod prepared;
