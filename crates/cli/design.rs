@@ -62,7 +62,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     met: RequireMet,
 
-    /// Write a certificate of the optimum (JSON) that `obsdeg verify` and other checkers search again: the answer must be proven to be the best
+    /// Write a certificate of the optimum (JSON) that `obsdeg verify` and other checkers search again: the
+    /// answer must be proven to be the best
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with_all = ["minimum", "part", "merge"])]
     certificate: Option<PathBuf>,
 

@@ -1,4 +1,5 @@
-//! `-h`: a line for every option, inputs first; `--help` has what options say at length, with their ranges and words.
+//! `-h`: a line for every option, inputs first; `--help` has what options say at length, with their ranges
+//! and words.
 
 use clap::builder::StyledStr;
 use clap::{Arg, ArgAction, Command};

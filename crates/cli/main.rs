@@ -96,8 +96,9 @@ enum Command {
     Schema(schema::Arguments),
 }
 
-/// The command line as it is read: a negative number behind an option is its value, so that the option can say what it expects. Behind an
-/// option that takes one any exponent counts (`-1e-5`); behind others only what cannot be an option.
+/// The command line as it is read: a negative number behind an option is its value, so that the option can
+/// say what it expects. Behind an option that takes one any exponent counts (`-1e-5`); behind others only
+/// what cannot be an option.
 fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
@@ -146,7 +147,8 @@ fn hint(e: &clap::Error) -> Option<String> {
     None
 }
 
-/// The arguments, and which of them concern one kind of file; what is wrong with them is said, and nothing of theirs but text.
+/// The arguments, and which of them concern one kind of file; what is wrong with them is said, and nothing of
+/// theirs but text.
 fn arguments() -> Result<(Cli, Given), ExitCode> {
     let command = command();
     let parsed = command.clone().try_get_matches().and_then(|matches| {

@@ -36,8 +36,8 @@ pub(crate) struct Arguments {
     #[arg(value_name = "SCHEME")]
     scheme: Option<PathBuf>,
 
-    /// Number of blocks of the certificate of an optimum that are searched again, chosen at random (default: all
-    /// up to two million sequences, otherwise as many blocks as these fill)
+    /// Number of blocks of the certificate of an optimum that are searched again, chosen at random (default:
+    /// all up to two million sequences, otherwise as many blocks as these fill)
     #[arg(long, value_name = "N")]
     blocks: Option<usize>,
 

@@ -1,4 +1,5 @@
-//! Command lines drawn from the grammar of the program: each is done, refused as bad input or fails a check; none meets a defect.
+//! Command lines drawn from the grammar of the program: each is done, refused as bad input or fails a check;
+//! none meets a defect.
 
 use std::collections::BTreeMap;
 use std::fs;

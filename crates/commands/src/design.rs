@@ -74,8 +74,8 @@ pub struct Search {
     #[arg(long, value_name = "WHAT", default_value = CARDINAL, value_parser = WordOr(CANDIDATES))]
     pub candidates: String,
 
-    /// With --candidates free: angles are rounded to multiples of so many degrees, and schemes evaluated as they are rounded; the cardinal
-    /// attitudes may be chosen too (default: 5)
+    /// With --candidates free: angles are rounded to multiples of so many degrees, and schemes evaluated as
+    /// they are rounded; the cardinal attitudes may be chosen too (default: 5)
     #[arg(long, value_name = "DEG")]
     #[serde(with = "text")]
     pub round: Option<String>,
@@ -90,8 +90,8 @@ pub struct Search {
     #[serde(flatten)]
     pub terms: TermOptions,
 
-    /// With --minimum and torquer errors (GS, GM, GM3): the largest turn from one position to the next, in degrees
-    /// (default: 90)
+    /// With --minimum and torquer errors (GS, GM, GM3): the largest turn from one position to the next, in
+    /// degrees (default: 90)
     #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
     pub max_turn: Option<f64>,
 
@@ -115,7 +115,8 @@ pub struct Search {
     #[arg(long)]
     pub refine: bool,
 
-    /// Divide the total time among the positions of the best scheme: dwells of their own, in steps of the samples
+    /// Divide the total time among the positions of the best scheme: dwells of their own, in steps of the
+    /// samples
     #[arg(long)]
     pub divide: bool,
 
@@ -130,12 +131,13 @@ pub struct Search {
     #[arg(long, value_name = "I/N", help_heading = "Parts", value_parser = part, conflicts_with = "minimum")]
     pub part: Option<[usize; 2]>,
 
-    /// With --merge: search N blocks of the parts again, chosen at random, and refuse a part whose block gives
-    /// something else (default: 0; a block is at most 16 of the starts)
+    /// With --merge: search N blocks of the parts again, chosen at random, and refuse a part whose block
+    /// gives something else (default: 0; a block is at most 16 of the starts)
     #[arg(long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED), conflicts_with_all = ["minimum", "part"])]
     pub check: Option<u64>,
 
-    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names the file.
+    /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names
+    /// the file.
     #[arg(skip)]
     pub certificate: bool,
 
@@ -155,7 +157,8 @@ pub struct Search {
 #[command(next_help_heading = "What is wanted")]
 #[serde(default)]
 pub struct WantedOptions {
-    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX (default: all)
+    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX
+    /// (default: all)
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub observable: Vec<String>,
 
@@ -164,15 +167,15 @@ pub struct WantedOptions {
     #[serde(with = "text::list")]
     pub max_degree: Vec<DegreeCap>,
 
-    /// Only schemes that are immune to an error or a family that they do not estimate, each of its terms: it has no
-    /// effect (K0), or none but one that a record shows at 3 sigma from a size on (K0=20). Exact classes; the units are
-    /// those of --bench
+    /// Only schemes that are immune to an error or a family that they do not estimate, each of its terms: it
+    /// has no effect (K0), or none but one that a record shows at 3 sigma from a size on (K0=20). Exact
+    /// classes; the units are those of --bench
     #[arg(long, value_name = "NAME[=X]", value_delimiter = ',')]
     #[serde(with = "text::list")]
     pub immune: Vec<Immune>,
 
-    /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the coefficients but counts in margin and
-    /// --meet only (default: worst)
+    /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the
+    /// coefficients but counts in margin and --meet only (default: worst)
     #[arg(long, value_name = "HOW", value_parser = one_of(CRITERIA))]
     pub criterion: Option<CriterionName>,
 
@@ -188,7 +191,8 @@ pub struct WantedOptions {
     #[arg(long, value_name = "S")]
     pub max_slew: Option<f64>,
 
-    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default: instantaneous; 0.001 to 10000 deg/s)
+    /// Positions are reached by rotations at this rate, in deg/s; inertial carry only (default:
+    /// instantaneous; 0.001 to 10000 deg/s)
     #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 

@@ -47,8 +47,8 @@ impl Refused {
 /// How much of the certificate of an optimum is searched again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Replay {
-    /// Number of blocks, chosen at random; none: all where these are at most two million sequences, otherwise as
-    /// many blocks as these fill.
+    /// Number of blocks, chosen at random; none: all where these are at most two million sequences, otherwise
+    /// as many blocks as these fill.
     pub blocks: Option<usize>,
     /// Seed of the choice; none: a number of the system.
     pub seed: Option<u64>,

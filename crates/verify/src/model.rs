@@ -115,8 +115,8 @@ pub(crate) fn verify(certificate: &[u8], compared: bool) -> Result<Vec<String>, 
     Ok(out)
 }
 
-/// True for at most 256 letters, digits and `_ [ ] , . @ '`, a letter or `_` first: such a name can not pass for
-/// an expression or for a sentence of the answer.
+/// True for at most 256 letters, digits and `_ [ ] , . @ '`, a letter or `_` first: such a name can not pass
+/// for an expression or for a sentence of the answer.
 fn is_name(name: &str) -> bool {
     let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
     first && name.chars().count() <= 256 && name.chars().all(|c| c.is_alphanumeric() || "_[],.@'".contains(c))

@@ -428,7 +428,8 @@ fn of_turns(problem: &Problem) -> f64 {
         About::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
         _ => all,
     });
-    // exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a jump
+    // exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a
+    // jump
     let (mut two, mut own) = (0, 0);
     for turns in &problem.slews {
         let mut attitude = (3, 0);

@@ -238,8 +238,8 @@ fn value(x: &Number) -> f64 {
     x.0.iter().map(|((r, _, _), q)| ratio(q) * f64::from(*r).sqrt()).sum()
 }
 
-/// One turn about a direction of a scheme file, by its angle (degrees) if one is stated: half a turn about it,
-/// or the turn below 180 degrees that the attitudes give.
+/// One turn about a direction of a scheme file, by its angle (degrees) if one is stated: half a turn about
+/// it, or the turn below 180 degrees that the attitudes give.
 fn is_along(turns: &[RawTurn], direction: &[Value], angle: Option<&str>) -> bool {
     let [turn] = turns else { return false };
     let number = |x: &Value| x.as_float().or(x.as_integer().map(|i| i as f64));

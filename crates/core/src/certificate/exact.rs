@@ -179,8 +179,9 @@ impl<'a> Points<'a> {
         }
         let mut out = vec![ExactNumber::new(); rows.len()];
         for (weight, part) in parts {
-            // y[field][embedding][point][row]; what is observable at the given latitude alone has no solution, and
-            // a row whose coefficient is zero at it alone (such as wN - wU at 45 deg) is none of `rows`
+            // y[field][embedding][point][row]; what is observable at the given latitude alone has no
+            // solution, and a row whose coefficient is zero at it alone (such as wN - wU at 45 deg) is none
+            // of `rows`
             let holds = Cell::new(true);
             let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;

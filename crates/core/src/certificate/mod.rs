@@ -142,11 +142,11 @@ pub struct Proof {
     pub status: Status,
     /// Observable degree; null if it is not observable.
     pub degree: Option<usize>,
-    /// Basis rows (segment, order, index of the component) whose coefficient in the solution is not 0; null if
-    /// it is not observable.
+    /// Basis rows (segment, order, index of the component) whose coefficient in the solution is not 0; null
+    /// if it is not observable.
     pub solution: Option<Vec<RowName>>,
-    /// Coefficients of these rows, in units of powers of wN and wU; null if it is not observable or the kind is
-    /// modular.
+    /// Coefficients of these rows, in units of powers of wN and wU; null if it is not observable or the kind
+    /// is modular.
     pub coefficients: Option<Vec<ExactNumber>>,
     /// Name of the free unknown of the null vector that proves the lower bound; null for degree 0.
     pub hidden_by: Option<String>,

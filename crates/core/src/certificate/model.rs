@@ -47,8 +47,8 @@ pub struct CertifiedModel {
     pub parameters: Vec<String>,
     /// Names of the known constants of generic value.
     pub constants: Vec<String>,
-    /// Known inputs: name, and degree of the polynomial in time (dimensionless), or null for a generic function
-    /// of time.
+    /// Known inputs: name, and degree of the polynomial in time (dimensionless), or null for a generic
+    /// function of time.
     pub inputs: Vec<(String, Option<usize>)>,
     /// Operations, each on values before it.
     pub program: Vec<Operation>,

@@ -2,8 +2,8 @@
 //!
 //! Sets of candidates are first judged exactly (`observable`). Sequences of those that make the required
 //! coefficients observable, in every order where the carry makes order matter and by both paths of half turns
-//! (`measure::slews`), are then ranked (`search`): constraints first, then the worst degree, then a criterion of
-//! optimal design (`measure`), up to turns of the platform axes (`observable::symmetry`).
+//! (`measure::slews`), are then ranked (`search`): constraints first, then the worst degree, then a criterion
+//! of optimal design (`measure`), up to turns of the platform axes (`observable::symmetry`).
 
 pub(crate) mod answer;
 mod certificate;

@@ -120,8 +120,8 @@ impl Space {
     }
 }
 
-/// The combinations of the rows of one candidate that have no entries at its psi, by order, on the coefficients alone:
-/// what they add to the rows of others that have a psi of their own.
+/// The combinations of the rows of one candidate that have no entries at its psi, by order, on the
+/// coefficients alone: what they add to the rows of others that have a psi of their own.
 fn without_psi(p: u64, rows: &RowsOf) -> RowsOf {
     let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
     let mut out = Vec::new();

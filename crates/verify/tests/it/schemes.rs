@@ -121,8 +121,8 @@ fn fewest_of(sentences: &[String]) -> Option<usize> {
     rest.split(' ').next()?.parse().ok()
 }
 
-/// By hand: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, with slews too; the twelve drifts
-/// need 4, 5 and 6.
+/// By hand: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, with slews too; the
+/// twelve drifts need 4, 5 and 6.
 #[test]
 fn fewest_positions_by_counting() {
     let root =
@@ -431,8 +431,8 @@ fn schemes_without_certificates() {
     }
 }
 
-/// A verdict that holds at the latitude of the scheme alone has a certificate of kind modular that both checkers accept; a
-/// combination that is zero there is refused.
+/// A verdict that holds at the latitude of the scheme alone has a certificate of kind modular that both
+/// checkers accept; a combination that is zero there is refused.
 #[test]
 fn what_holds_at_one_latitude_is_modular() {
     let head = "carry = \"inertial\"\nlatitude_deg = 45\nterms = [\"F\", \"I\", \"O\", \"S\", \"II\", \"IO\", \"OS\"]\n\

@@ -111,8 +111,8 @@ impl Rows {
                 decisions: 1,
                 order: values.roots().order,
                 row_degree: orders + usize::from(base.unknowns.have(Source::Rate)),
-                // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most
-                // sqrt(15) together, with margin
+                // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of
+                // norm at most sqrt(15) together, with margin
                 row_bits: 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0,
             };
             miss = error_bound(&claim, 1);

@@ -26,8 +26,8 @@ pub const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
 const LONG: f64 = 1e6;
 /// Most blocks.
 const MOST_BLOCKS: usize = 100_000;
-/// Part of what the least value of a block is above the best that its bound claims: a value far above the best may
-/// rest on rounding.
+/// Part of what the least value of a block is above the best that its bound claims: a value far above the
+/// best may rest on rounding.
 const ROOM: f64 = 0.9;
 /// Largest value of a block that counts, as a multiple of the best one.
 const CAP: f64 = 10.0;
