@@ -417,3 +417,31 @@ fn a_partial_bench_leaves_limits_of_the_rest() {
     assert!(sentence(0.999 * limit).contains(met), "{}", sentence(0.999 * limit));
     assert!(!sentence(1.02 * limit).contains(met), "{}", sentence(1.02 * limit));
 }
+
+/// A report says up to which size of errors its requirements are met, where no bench is stated; schemes with
+/// different benches are not compared; with a bench the table of unknowns has the totals that its margins are of.
+#[test]
+fn a_report_says_what_its_met_rests_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string(BENCH).expect("the example");
+    let (start, rest) = text.split_once("[bench]").expect("a bench");
+    let without = format!("{start}{}", &rest[rest.find("[[position]]").expect("positions")..]);
+    let path = folder.path().join("without.toml");
+    std::fs::write(&path, without).expect("written");
+    let path = path.display().to_string();
+    let page = Html::parse_document(&report(folder.path(), "without.html", &[&path]).1);
+    let front = texts(&page, "section.front").concat();
+    assert!(
+        front.contains("No bench is stated (--bench). Met while") && front.contains("K0 < 3.1"),
+        "{front}"
+    );
+    let page = Html::parse_document(&report(folder.path(), "both.html", &[BENCH, &path]).1);
+    let front = texts(&page, "section.front").concat();
+    assert!(front.contains("the schemes differ in bench") && !front.contains("the only one that"), "{front}");
+    let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);
+    let rows = table(&page, "Every unknown");
+    let row = rows.iter().find(|r| r[0] == "D_IZ").expect("D_IZ");
+    let at = row.iter().position(|x| x == "0.1000").expect("the requirement");
+    let [total, margin] = [number(&row[at - 1]), number(&row[at + 1])];
+    assert!((0.1 / total / margin - 1.0).abs() < 2e-3 && total > 0.5, "{row:?}");
+}

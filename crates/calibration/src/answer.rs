@@ -221,6 +221,23 @@ pub struct Omitted {
     pub suspicion: Option<Suspicion>,
     /// Errors that no record of this scheme shows and that change a coefficient.
     pub silent: Vec<SilentError>,
+    /// Sizes of families that the bench does not state in full, at which one by itself uses up the margin of
+    /// a requirement; empty where a requirement is missed or none is stated.
+    #[serde(default)]
+    pub limits: Vec<FamilyLimit>,
+}
+
+/// Size of all terms of a family of errors at which a requirement is just met.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FamilyLimit {
+    /// Name of the family, such as `K0` or `latitude`.
+    pub family: String,
+    /// Unit of its sizes: ug, ppm, arcsec, ...
+    pub unit: String,
+    /// Name of the unknown whose requirement is reached first.
+    pub unknown: String,
+    /// Size (one sigma) of each term of the family, in the unit of `unit`.
+    pub size: f64,
 }
 
 /// Error that no record of a scheme shows.
@@ -356,7 +373,8 @@ pub struct NextRun {
     pub unit: String,
     /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
     pub sigma: Option<f64>,
-    /// Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench
+    /// Largest sigma that meets the requirement, in the unit of `unit`; zero if a bench alone uses it up. It is
+    /// less than the requirement if a bench
     /// adds to it.
     pub required_sigma: f64,
     /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no

@@ -168,6 +168,7 @@ mod tests {
             uses_up: None,
         };
         OmittedEffects {
+            priors: false,
             families: Vec::new(),
             terms: vec![term("K0_X"), term("K0_Y")],
             budgets: vec![Budget {

@@ -198,8 +198,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             number(*difference)
         ),
         Finding::Suspect { errors, chi_square_fall } => format!(
-            "{} would explain the residuals (chi-square falls by {}) and is not among the unknowns: see Not estimated",
-            errors.join(" with "),
+            "with {} among the unknowns chi-square would fall by {}, more than by chance: see Not estimated",
+            errors.join(" and "),
             number(*chi_square_fall)
         ),
         Finding::Known { chi_square } => format!(
@@ -425,6 +425,11 @@ fn next_run(n: &NextRun) -> String {
         || format!("{} is not determined", n.unknown),
         |s| format!("sigma of {} is {} {}", n.unknown, number(s), n.unit),
     );
+    if n.required_sigma == 0.0 {
+        return format!(
+            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of the bench too, or make them smaller."
+        );
+    }
     let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
     let (Some(attitude), Some(dwell), Some(then)) = (&n.attitude, n.dwell_s, n.sigma_then) else {
         return format!(
@@ -575,6 +580,7 @@ impl Answer for Calibration {
             let psi = "; those on psi are not judged, since psi here is that of the start of a record";
             format!("{}{psi}.", stated::capital(&stated::requirements(r)))
         }));
+        lead.extend(omitted::of_requirements(self));
         lead.extend(left_open(self));
         lead.extend(by_default(&self.assumed));
         lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));

@@ -1,6 +1,7 @@
 //! Effects of errors that a scheme does not estimate, as tables and sentences.
 
-use obsdeg_calibration::answer::{Omitted, SilentError};
+use obsdeg_calibration::Calibration;
+use obsdeg_calibration::answer::{FamilyLimit, Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_evidence::simulation::omitted::{
     Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
@@ -69,6 +70,11 @@ fn row(f: &FamilyEffect) -> Vec<String> {
     ]
 }
 
+/// True if an error uses up the margin of a requirement.
+fn judged(of: &OmittedEffects) -> bool {
+    of.terms.iter().any(|t| t.uses_up.is_some())
+}
+
 /// The blocks of a document: the families, and the budgets where a bench is stated.
 pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
     let columns = [
@@ -80,8 +86,7 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
         right("seen from (3 sigma)"),
         right("uses up a margin at"),
     ];
-    let judged = of.terms.iter().any(|t| t.uses_up.is_some());
-    let left_out: &[&str] = if judged { &[] } else { &["uses up a margin at"] };
+    let left_out: &[&str] = if judged(of) { &[] } else { &["uses up a margin at"] };
     let heading = format!("Not estimated{whose}: effect on the estimates");
     let mut out = vec![Block::table(heading, columns, of.families.iter().map(row)).without(left_out)];
     out.push(Block::list(format!("Not estimated{whose}: conditions"), conditions(of)));
@@ -230,7 +235,7 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         }
         .into(),
     ];
-    if !of.budgets.is_empty() {
+    if judged(of) && !of.budgets.is_empty() {
         out.push(
             "uses up a margin at: size in place of that of the bench, for the requirements that are met with it".into(),
         );
@@ -259,6 +264,12 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
         ))
     });
     out.extend(first_lines(silent.collect()));
+    if of.priors {
+        out.push(
+            "exact changes by silent errors are those by the samples alone: the stated priors hold part of them back, as the figures per unit say"
+                .into(),
+        );
+    }
     out
 }
 
@@ -341,9 +352,14 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
         .iter()
         .map(|e| format!("{} = {} +- {} {}", e.name, number(e.estimate), number(e.sigma), e.unit))
         .collect();
-    let verb = if errors.len() > 1 { "explain" } else { "explains" };
+    let verb = match (s.explained, errors.len() > 1) {
+        (true, true) => "explain the residuals",
+        (true, false) => "explains the residuals",
+        (false, true) => "explain most of the residuals, of all pairs, but not all of them",
+        (false, false) => "explains most of the residuals, of all errors, but not all of them",
+    };
     out.push(format!(
-        "{} {verb} the residuals: chi-square falls by {} (probability by chance {})",
+        "{} {verb}: chi-square falls by {} (probability by chance {})",
         errors.join(" and "),
         number(s.chi_square_fall),
         match s.probability > SMALLEST {
@@ -351,11 +367,61 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
             false => format!("below {SMALLEST:e}"),
         }
     ));
-    if !s.indistinguishable.is_empty() {
-        out.push(format!("this record does not distinguish it from {}", s.indistinguishable.join(", ")));
+    // answers of before name the others of the first error alone
+    let of_first = s.errors.iter().all(|e| e.indistinguishable.is_empty()).then_some(&s.indistinguishable);
+    for (e, first) in s.errors.iter().zip(of_first.into_iter().map(Some).chain(std::iter::repeat(None))) {
+        let others = first.unwrap_or(&e.indistinguishable);
+        if !others.is_empty() {
+            out.push(format!("this record does not distinguish {} from {}", e.name, others.join(", ")));
+        }
     }
+    let names: Vec<String> = s.errors.iter().map(|e| e.name.clone()).collect();
+    out.push(estimated_by(&names));
     let with = if errors.len() > 1 { "them" } else { "it" };
-    out.extend(s.changes.iter().map(|c| change(c, s.indistinguishable.len(), with)));
+    let others = if errors.len() > 1 { 0 } else { s.indistinguishable.len() };
+    out.extend(s.changes.iter().map(|c| change(c, others, with)));
+    out
+}
+
+/// How errors become unknowns: terms of the scheme, or what must be measured.
+pub(crate) fn estimated_by(errors: &[String]) -> String {
+    let (mut terms, mut others) = (Vec::new(), Vec::new());
+    for name in errors {
+        let family = name.split(['_', '@']).next().unwrap_or(name);
+        match family {
+            "D" => terms.push(name[2..].trim_end_matches(['X', 'Y', 'Z']).to_string()),
+            "M" => terms.push("M6".into()),
+            "K0" | "K1" | "K2" | "K3" | "Kx" | "GS" | "GM" => terms.push(family.into()),
+            _ => others.push(name.clone()),
+        }
+    }
+    terms.dedup();
+    let add = (!terms.is_empty())
+        .then(|| format!("add {} to `terms` of the scheme to estimate it", terms.join(",")));
+    let measure = (!others.is_empty())
+        .then(|| format!("{} is no term: correct it in the scheme, or measure it", others.join(", ")));
+    add.into_iter().chain(measure).collect::<Vec<_>>().join("; ")
+}
+
+/// What the requirements of a calibration rest on: suspected errors, and sizes of what the bench does not
+/// state.
+pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
+    let Some(r) = &c.requirements else { return Vec::new() };
+    let mut out = Vec::new();
+    out.extend(c.omitted.suspicion.as_ref().map(|s| {
+        let names: Vec<&str> = s.errors.iter().map(|e| e.name.as_str()).collect();
+        format!("In this an estimate counts as uncertain by what {} would change of it.", names.join(" and "))
+    }));
+    let limit = |l: &FamilyLimit| format!("{} < {} {}", l.family, below(l.size), l.unit);
+    let limits: Vec<String> = c.omitted.limits.iter().map(limit).collect();
+    out.extend((!limits.is_empty()).then(|| {
+        let of = if r.with_bench { ", of what the bench does not state" } else { "" };
+        let bench = if r.with_bench { "" } else { "No bench is stated. " };
+        format!(
+            "{bench}Met while{of}, each family by itself, 1 sigma of each of its terms: {}.",
+            limits.join(", ")
+        )
+    }));
     out
 }
 

@@ -38,16 +38,14 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
         false if r.requirements.stated > 0 => "nothing observable is lost and no further requirement missed",
         false => "nothing observable is lost",
     };
+    let what = if r.conditions.bench.is_some() { "total uncertainty" } else { "predicted sigma" };
     let grows = |now: &Worst, then: &Worst| {
         let [now, then] = [now, then].map(worst_sigma);
-        format!("the largest predicted sigma of a coefficient grows from {now} to {then}")
+        format!("the largest {what} of a coefficient grows from {now} to {then}")
     };
     Some(match (&r.worst, &d.worst) {
         (Some(now), Some(then)) if then.sigma_dph <= now.sigma_dph * SAME => {
-            format!(
-                "Drop {}: {kept}, and the largest predicted sigma of a coefficient does not grow",
-                d.position
-            )
+            format!("Drop {}: {kept}, and the largest {what} of a coefficient does not grow", d.position)
         }
         (Some(now), Some(then)) if met => {
             format!("You can drop {}: {kept}; {}", d.position, grows(now, then))

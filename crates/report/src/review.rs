@@ -240,6 +240,7 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
             words::accuracy_order(q.degree, q.accuracy_order, a.has_accuracy_orders),
             if q.partners.is_empty() { "-".into() } else { q.partners.join(" ") },
             of(|p| p.sigma),
+            of(|p| p.total),
             of(|p| p.requirement),
             of(|p| p.margin),
             if excited.is_empty() { "-".into() } else { excited.join(" ") },
@@ -258,18 +259,24 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
             right("accuracy order"),
             left("not told from"),
             right("predicted sigma"),
+            right(TOTAL),
             right("required"),
             right("margin"),
             left("excited at"),
         ],
         a.quantities.iter().map(row),
     )
-    .without(left_out(review))
+    .without(&left_out(review))
 }
 
-/// Columns that say nothing where no requirement is stated.
-fn left_out(review: &ComparedScheme) -> &'static [&'static str] {
-    if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS }
+/// Column of total uncertainties.
+const TOTAL: &str = "total with the bench";
+
+/// Columns that say nothing where no requirement, or no bench, is stated.
+fn left_out(review: &ComparedScheme) -> Vec<&'static str> {
+    let required: &[&str] = if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS };
+    let bench = review.conditions.bench.is_none().then_some(TOTAL);
+    required.iter().copied().chain(bench).collect()
 }
 
 fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
@@ -476,7 +483,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
             ["without", "not observable any more", "worst sigma(D) [deg/h, /g]", compare::REQUIREMENTS[0]]
                 .map(left);
         let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
-        blocks.push(table.without(left_out(review)));
+        blocks.push(table.without(&left_out(review)));
     }
     if !alternatives.front.is_empty() {
         blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));

@@ -189,10 +189,12 @@ pub(crate) fn predicted(m: &MeasurementReport) -> String {
 
 /// The same of several schemes, whose conditions may differ.
 pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementReport>) -> String {
-    let mut said: Vec<String> = all.into_iter().map(predicted).collect();
+    let all: Vec<&MeasurementReport> = all.into_iter().collect();
+    let mut said: Vec<String> = all.iter().map(|m| predicted(m)).collect();
     said.dedup();
     match said.len() {
         1 => said.remove(0),
+        _ if all.iter().any(|m| m.bench.is_some()) => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end; worst sigma: of schemes with a bench the total uncertainty".into(),
         _ => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end".into(),
     }
 }

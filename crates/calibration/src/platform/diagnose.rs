@@ -19,11 +19,11 @@ use super::gross::Why;
 use super::observe::{By, channel_name};
 use super::offset::Offset;
 use super::run::Key;
-use super::suspects::omitted;
+use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options, STRICT};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, Fit, Moved, Outlier,
-    PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Fit, Moved,
+    Outlier, PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -353,7 +353,7 @@ impl Parts<'_> {
         let outliers = self.outliers();
         let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
         let asked = (&self.conditions.bench[..], self.options.seed);
-        let (omitted, bench) = omitted(self.problem, self.estimate, &quantities, asked)?;
+        let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, asked)?;
         let mut out = Calibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -387,8 +387,11 @@ impl Parts<'_> {
         };
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
-        out.requirements = self.requirements(&out.quantities, &bench);
-        out.next_runs = self.next_runs(&out, &bench)?;
+        out.requirements = self.requirements(&out.quantities, &outside);
+        if out.requirements.as_ref().is_some_and(Requirements::all_met) {
+            out.omitted.limits = limits(&out.quantities, &outside);
+        }
+        out.next_runs = self.next_runs(&out, &outside.bench)?;
         Ok(out)
     }
 
@@ -398,18 +401,13 @@ impl Parts<'_> {
         self.conditions.requirements.iter().rfind(of).map(|a| a.value)
     }
 
-    /// Outcome of the requirements on coefficients, with what a bench adds to each; `None` where none is
-    /// stated.
-    fn requirements(&self, quantities: &[Estimated], bench: &[(String, f64)]) -> Option<Requirements> {
-        let added = |name: &str| bench.iter().find(|(of, _)| of == name).map_or(0.0, |(_, added)| *added);
-        let sigma = |e: &Estimated| {
-            let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
-            own.map(|s| s.hypot(added(&e.name)))
-        };
+    /// Outcome of the requirements on coefficients, with what a bench adds to each and how far a suspected
+    /// error moves it; `None` where none is stated.
+    fn requirements(&self, quantities: &[Estimated], outside: &Outside) -> Option<Requirements> {
         let claims = quantities.iter().map(|e| Claim {
             name: &e.name,
             required: e.required_sigma,
-            sigma: sigma(e).ok_or(Miss::NotObservable),
+            sigma: total(e, outside).ok_or(Miss::NotObservable),
         });
         let mut out = Requirements::of(Basis::Record, claims);
         let stated = &self.conditions.bench;
@@ -681,4 +679,26 @@ impl MapBoth for (f64, f64) {
     fn map_both(self, f: impl Fn(f64) -> f64) -> Self {
         (f(self.0), f(self.1))
     }
+}
+
+/// Uncertainty of an estimate: its larger sigma, what the bench adds, and how far a suspected error moves it.
+fn total(e: &Estimated, outside: &Outside) -> Option<f64> {
+    let named = |of: &[(String, f64)]| of.iter().find(|(name, _)| *name == e.name).map_or(0.0, |(_, x)| *x);
+    let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)))?;
+    Some(own.hypot(named(&outside.bench)).hypot(named(&outside.suspected)))
+}
+
+/// The smallest size of each open family at which a total reaches its requirement, beside the bench.
+fn limits(quantities: &[Estimated], outside: &Outside) -> Vec<FamilyLimit> {
+    let of = |family: &FamilyChange| {
+        let used = family.changes.iter().filter(|(_, change)| *change != 0.0).filter_map(|(name, change)| {
+            let e = quantities.iter().find(|e| e.name == *name)?;
+            let left = e.required_sigma?.powi(2) - total(e, outside)?.powi(2);
+            (left > 0.0).then(|| (name, left.sqrt() / change))
+        });
+        let (unknown, size) = used.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (family, unit) = (family.family.into(), family.unit.into());
+        Some(FamilyLimit { family, unit, unknown: unknown.clone(), size })
+    };
+    outside.families.iter().filter_map(of).collect()
 }

@@ -86,6 +86,20 @@ impl Parts<'_> {
         }
         let mut out = Vec::new();
         for (k, (e, required)) in missed.iter().enumerate() {
+            // what the bench adds is more than is allowed: no run helps
+            if *required == 0.0 {
+                out.push(NextRun {
+                    unknown: e.name.clone(),
+                    unit: e.unit.clone(),
+                    sigma: e.sigma_rescaled,
+                    required_sigma: 0.0,
+                    attitude: None,
+                    dwell_s: None,
+                    sigma_then: None,
+                    met: false,
+                });
+                continue;
+            }
             let Some((angles, own)) = sigmas.iter().min_by(|a, b| a.1[k].total_cmp(&b.1[k])) else {
                 continue;
             };

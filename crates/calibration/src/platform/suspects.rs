@@ -28,9 +28,33 @@ const WIDE: f64 = 1e4;
 /// Most estimates whose change is listed.
 const CHANGES: usize = 3;
 
+/// Uncertainty of the coefficients by what is not estimated, in their shown units, by the weights of the
+/// first record.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Outside {
+    /// What a bench adds to the sigma of every coefficient, by name (root of the sum of squares).
+    pub bench: Vec<(String, f64)>,
+    /// Largest change of every coefficient by a suspected error.
+    pub suspected: Vec<(String, f64)>,
+    /// Families that the bench does not state in full.
+    pub families: Vec<FamilyChange>,
+}
+
+/// Change of every coefficient by a family of errors, all terms one unit large (root of the sum of squares).
+#[derive(Debug, Clone)]
+pub(super) struct FamilyChange {
+    /// Name of the family.
+    pub family: &'static str,
+    /// Unit of its sizes.
+    pub unit: &'static str,
+    /// True if the bench does not state one of its terms.
+    pub open: bool,
+    /// Changes by name, in shown units per unit of the size.
+    pub changes: Vec<(String, f64)>,
+}
+
 /// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme
-/// shows; beside them what a bench adds to the sigma of every coefficient, by name in its shown unit (root of
-/// the sum of squares), by the weights of the first record.
+/// shows; beside them the uncertainty of the coefficients by what is not estimated.
 ///
 /// # Errors
 /// [`CalibrationError`] for a number that is not finite.
@@ -39,7 +63,7 @@ pub(super) fn omitted(
     estimate: &Estimate,
     quantities: &[Estimated],
     (bench, seed): (&[Assignment], u64),
-) -> Result<(Omitted, Vec<(String, f64)>), CalibrationError> {
+) -> Result<(Omitted, Outside), CalibrationError> {
     let Some(first) = problem.runs.first() else { return Ok(Default::default()) };
     let platform = &first.plan.platform;
     let model = OmittedModel::new(platform);
@@ -58,10 +82,12 @@ pub(super) fn omitted(
             |of| of.per_unit(j, &t.changes),
         ),
     });
-    let suspicion = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
+    let suspected = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
+    let (suspicion, moved) = suspected.map_or((None, Vec::new()), |(s, moved)| (Some(s), moved));
     let found = Omitted {
         tried: tested.score.tried().len(),
         suspicion,
+        limits: Vec::new(),
         silent: silent.filter(|s| s.changes.iter().any(|c| !c.starts_with("psi"))).collect(),
     };
     let scheme = platform.scheme();
@@ -72,7 +98,35 @@ pub(super) fn omitted(
     let added =
         |changes: &[f64]| changes.iter().zip(&sizes).map(|(b, s)| (b * s).powi(2)).sum::<f64>().sqrt();
     let added = tested.changes.iter().map(|(name, unit, of)| (name.clone(), added(of) / si_per_shown(unit)));
-    Ok((found, added.collect()))
+    let enters = |j: usize| class(j) != Some(OmittedClass::NoEffect);
+    let families = families(&model, &tested, &enters, bench);
+    let outside = Outside { bench: added.collect(), suspected: moved, families };
+    Ok((found, outside))
+}
+
+/// Largest changes per unit of families that a bench does not state in full.
+fn families(
+    model: &OmittedModel,
+    tested: &Tested,
+    enters: &dyn Fn(usize) -> bool,
+    bench: &[Assignment],
+) -> Vec<FamilyChange> {
+    let mut out: Vec<FamilyChange> = Vec::new();
+    for (j, t) in model.terms().iter().enumerate().filter(|(j, _)| enters(*j)) {
+        let open = Bench::size_of(bench, t.family, &t.name).is_none();
+        let at = out.iter().position(|f| f.family == t.family).unwrap_or_else(|| {
+            let changes = tested.changes.iter().map(|(name, ..)| (name.clone(), 0.0)).collect();
+            out.push(FamilyChange { family: t.family, unit: t.unit, open: false, changes });
+            out.len() - 1
+        });
+        let family = &mut out[at];
+        family.open |= open;
+        for ((_, change), (_, unit, of)) in family.changes.iter_mut().zip(&tested.changes) {
+            *change = change.hypot(of[j] * si_per_shown(t.unit) / si_per_shown(unit));
+        }
+    }
+    out.retain(|f| f.open);
+    out
 }
 
 /// Changes by errors that no record shows: they do not depend on the weights, so that no prior takes part.
@@ -210,29 +264,33 @@ fn columns(run: &Run, model: &OmittedModel, keys: &[Key]) -> Result<Vec<Vec<f64>
     Ok((0..m).map(|j| keys.iter().map(|k| entry(j, k).unwrap_or(0.0)).collect()).collect())
 }
 
-/// The suspicion in names and units.
+/// The suspicion in names and units, and the largest change of each coefficient by it, in its shown unit.
 fn suspicion(
     found: &Explanation,
     model: &OmittedModel,
     tested: &Tested,
     quantities: &[Estimated],
-) -> Suspicion {
+) -> (Suspicion, Vec<(String, f64)>) {
     let terms = model.terms();
-    let errors = found.errors.iter().zip(&found.estimates).map(|(&j, [estimate, sigma])| {
+    let names = |of: &[usize]| of.iter().map(|&j| terms[j].name.clone()).collect::<Vec<_>>();
+    let errors = found.errors.iter().zip(&found.estimates).zip(&found.groups);
+    let errors = errors.map(|((&j, [estimate, sigma]), group)| {
         let scale = si_per_shown(terms[j].unit);
         SuspectedError {
             name: terms[j].name.clone(),
             unit: terms[j].unit.into(),
             estimate: estimate / scale,
             sigma: sigma / scale,
+            indistinguishable: names(group),
         }
     });
     // each of a group explains the residuals as well, and may change the estimates in another way
     let alone = |&j: &usize| vec![(j, tested.score.against[j] / tested.score.products[(j, j)])];
     let best: Vec<(usize, f64)> =
         found.errors.iter().zip(&found.estimates).map(|(&j, e)| (j, e[0])).collect();
-    let members: Vec<Vec<(usize, f64)>> =
-        std::iter::once(best).chain(found.group.iter().map(alone)).collect();
+    // of a pair the others of its groups are named, without a range of changes
+    let group = if found.errors.len() == 1 { &found.groups[0][..] } else { &[] };
+    let members: Vec<Vec<(usize, f64)>> = std::iter::once(best).chain(group.iter().map(alone)).collect();
     let mut changes: Vec<(f64, SuspectedChange)> = Vec::new();
     for (name, unit, per_unit) in &tested.changes {
         let Some(q) = quantities.iter().find(|q| q.name == *name) else { continue };
@@ -254,11 +312,18 @@ fn suspicion(
         changes.push((most / sigma, change));
     }
     changes.sort_by(|a, b| b.0.total_cmp(&a.0));
-    Suspicion {
+    let moved = changes.iter().map(|(_, c)| {
+        let most = (c.lowest - c.estimate).abs().max((c.highest - c.estimate).abs());
+        (c.unknown.clone(), most)
+    });
+    let moved = moved.collect();
+    let suspicion = Suspicion {
         errors: errors.collect(),
-        indistinguishable: found.group.iter().map(|&j| terms[j].name.clone()).collect(),
+        indistinguishable: names(&found.groups[0]),
+        explained: found.explained,
         chi_square_fall: found.fall,
         probability: found.probability,
         changes: changes.into_iter().take(CHANGES).map(|(_, c)| c).collect(),
-    }
+    };
+    (suspicion, moved)
 }

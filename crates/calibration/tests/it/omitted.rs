@@ -4,6 +4,8 @@
 use obsdeg_calibration::answer::Finding;
 use obsdeg_calibration::{Calibration, Options, calibrate, record::Record};
 
+use obsdeg_core::model::settings::Assignment;
+
 use crate::round_trip::{conditions, scheme};
 use crate::simulator::{Bench, attitude, turned};
 
@@ -28,6 +30,11 @@ fn five(k0_y_ug: f64, seed: u64) -> Bench {
 
 /// Z1 and Z3 of the record of a bench, `C_c^n f - (0, 1, 0)`.
 fn calibrated(bench: &Bench) -> Calibration {
+    required(bench, &[], &[])
+}
+
+/// The same with requirements and a bench, by names.
+fn required(bench: &Bench, requirements: &[(&str, f64)], sizes: &[(&str, f64)]) -> Calibration {
     let mut text = String::from("t [s],position,Z1 [g],Z3 [g]\n");
     for s in bench.record() {
         let angles = bench.positions.iter().find(|p| p.0 == s.label).expect("a position").1;
@@ -35,8 +42,39 @@ fn calibrated(bench: &Bench) -> Calibration {
         text += &format!("{},{},{},{}\n", s.t, s.label, z[0], z[2]);
     }
     let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
-    calibrate(&scheme(bench, "F,I,O,S"), &conditions(bench), vec![record], &Options::default(), &|_| true)
+    let named = |of: &[(&str, f64)]| -> Vec<Assignment> {
+        of.iter().map(|(name, value)| Assignment { name: (*name).into(), value: *value }).collect()
+    };
+    let mut conditions = conditions(bench);
+    conditions.requirements.extend(named(requirements));
+    conditions.bench.extend(named(sizes));
+    calibrate(&scheme(bench, "F,I,O,S"), &conditions, vec![record], &Options::default(), &|_| true)
         .expect("calibrated")
+}
+
+/// No requirement counts as met where a suspected error moves the estimate by more than it allows; without one the
+/// answer says which size of each error would use it up. By the reference table 1 ug of every K0 changes D_IZ by
+/// 0.02985 deg/h/g. Where a bench alone is beyond the requirement, no further run is offered.
+#[test]
+fn requirements_count_what_is_suspected_and_say_what_is_not_stated() {
+    let all = [("D", 0.1)];
+    let c = required(&five(15.0, 3), &all, &[]);
+    assert!(c.omitted.suspicion.is_some() && c.omitted.limits.is_empty());
+    let missed = &c.requirements.as_ref().expect("requirements").missed;
+    assert!(missed.iter().any(|m| m.name == "D_IZ"), "{missed:?}");
+    let c = required(&five(0.0, 3), &all, &[]);
+    assert!(c.requirements.as_ref().expect("requirements").all_met());
+    let k0 = c.omitted.limits.iter().find(|l| l.family == "K0").expect("a limit of K0");
+    let sigma = c.quantities.iter().find(|q| q.name == "D_IZ").and_then(|q| q.sigma).expect("a sigma");
+    let expected = (0.01 - sigma * sigma).sqrt() / 0.02985;
+    assert_eq!(k0.unknown, "D_IZ");
+    assert!((k0.size / expected - 1.0).abs() < 0.02, "{} {expected}", k0.size);
+    // of a bench the families that it states have no limit
+    let c = required(&five(0.0, 3), &all, &[("K0", 0.1)]);
+    assert!(c.omitted.limits.iter().all(|l| l.family != "K0") && c.omitted.limits.len() > 3);
+    let c = required(&five(0.0, 3), &all, &[("K0", 20.0)]);
+    let next = c.next_runs.iter().find(|n| n.unknown == "D_IZ").expect("a missed requirement");
+    assert!(next.required_sigma == 0.0 && next.attitude.is_none() && !next.met, "{next:?}");
 }
 
 /// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band, D_IZ is many sigmas off, and

@@ -31,7 +31,9 @@ pub fn omitted_meant(name: &str) -> String {
     let all: Vec<String> = Term::ALL.iter().map(|t| t.family().to_string()).chain(site).collect();
     let expected = "expected an error such as K0_X, a family such as K0, M or GS, or latitude, azimuth, \
                     earth_rate, gravity, attitude";
-    match nearest(name, &all) {
+    // letters of a term, whose errors have the name of its family
+    let term = Term::ALL.iter().find(|t| t.letters() == name).map(|t| t.family().to_string());
+    match term.or_else(|| nearest(name, &all)) {
         Some(near) => format!("did you mean `{near}`? ({expected})"),
         None => expected.into(),
     }

@@ -84,6 +84,7 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
         ("unknowns", other(&|r| !required(r).keys().eq(here.keys()))),
         ("requirements", other(&|r| required(r).iter().any(|(n, x)| here.get(n).is_some_and(|y| x != y)))),
         ("noise", other(&|r| noise(r) != noise(first))),
+        ("bench", other(&|r| r.conditions.bench != first.conditions.bench)),
         ("step", other(&|r| r.conditions.step_s != first.conditions.step_s)),
     ];
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()

@@ -67,12 +67,14 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         _ => {}
     }
     let met = review.requirements.all_met();
+    let open = omitted::lead(&review.omitted, review.requirements.with_bench, met);
+    let open = open.map_or_else(String::new, |l| format!(" {l}"));
     if out.is_empty() {
         out.push(match (review.requirements.stated, met, &s.evidence) {
             (0, ..) => "State requirements: nothing says yet what is good enough.".into(),
             (_, false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
-            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no check fails.".into(),
-            (_, _, Err(_)) => "No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.".into(),
+            (_, _, Ok(_)) => format!("No action: every requirement is met, by prediction and in the run, and no check fails.{open}"),
+            (_, _, Err(_)) => format!("No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.{open}"),
         });
     }
     out
@@ -278,8 +280,9 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         }
         Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
         Finding::Suspect { errors, .. } => format!(
-            "Add the error to the unknowns: {} would explain the residuals (section Not estimated of the calibration).",
-            errors.join(" with ")
+            "Estimate what the residuals show, or remove it from the bench: {} ({}).",
+            errors.join(" and "),
+            omitted::estimated_by(errors)
         ),
         Finding::Known { .. } => {
             "Calibrate without --prior: the earlier knowledge does not agree with these records.".into()

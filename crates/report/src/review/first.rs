@@ -57,7 +57,7 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
     };
     let picture = Chart {
         remark: "degree",
-        label: "margin: required over predicted sigma".into(),
+        label: "margin: required over predicted sigma, with a bench over the total".into(),
         orders: false,
         threshold: Some(1.0),
         series: Vec::new(),
@@ -248,8 +248,11 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
             }
         }));
     }
-    let heading =
-        if judged { "Margins (required over predicted sigma: 1 or more is met)" } else { "Side by side" };
+    let heading = if judged {
+        "Margins (required over predicted sigma, with a bench over the total: 1 or more is met)"
+    } else {
+        "Side by side"
+    };
     Block::table(heading, columns, rows)
 }
 

@@ -68,7 +68,12 @@ const SCHEMES: [[&str; 4]; 15] = [
         "as the unknown",
         "-",
     ],
-    ["margin", "required over predicted sigma: 1 or more is met", "-", "-"],
+    [
+        "margin",
+        "required over predicted sigma, with a bench over the total uncertainty: 1 or more is met",
+        "-",
+        "-",
+    ],
     [
         "NEES, NIS",
         "squares of errors and of innovations over what the filter believes of them: about their number where it is right",

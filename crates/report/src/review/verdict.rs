@@ -7,7 +7,7 @@ use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
 use crate::document::{Finding, Grade, Status, number};
-use crate::{gimbals, stated, words};
+use crate::{gimbals, omitted, stated, words};
 
 /// What the unknowns besides psi are.
 fn kind(coefficients: &[&Quantity]) -> &'static str {
@@ -171,6 +171,10 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
             )
         },
     );
+    let total = with_dwell.iter().filter_map(|q| Some((q, q.total?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    let total = total.map_or_else(String::new, |(q, total)| {
+        format!(", with the bench the largest total uncertainty is {} {} ({})", number(total), q.unit, q.name)
+    });
     let limits = limits(s);
     let filter = match (&s.evidence, limits.is_empty()) {
         (Ok(e), true) if e.passed && e.counts.not_resolvable == 0 => {
@@ -186,7 +190,9 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         Grade::Missed => (format!("{}. ", stated::capital(&requirements)), String::new()),
         _ => (String::new(), format!("; {requirements}")),
     };
-    format!("{missed}{lead}{first}. {accuracy}{others}{filter}.")
+    let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
+    let open = open.filter(|_| review.requirements.stated > 0).map_or_else(String::new, |l| format!(" {l}"));
+    format!("{missed}{lead}{first}. {accuracy}{total}{others}{filter}.{open}")
 }
 
 /// The box of a scheme.

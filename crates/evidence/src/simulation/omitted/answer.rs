@@ -32,6 +32,9 @@ pub struct OmittedEffects {
     /// Names in the bench that are among the unknowns: estimated, so that their sizes do not count.
     #[serde(default)]
     pub estimated: Vec<String>,
+    /// True if priors are stated: figures count them, exact changes by silent errors do not.
+    #[serde(default)]
+    pub priors: bool,
     /// True if attitudes of the positions are among the terms: those of rotating positions, and of more than
     /// 64, are not computed.
     #[serde(default = "yes")]

@@ -146,6 +146,7 @@ pub fn term_effects(
         error_bound: verdicts.map(|v| v.error_bound),
         not_classified,
         estimated: Bench::estimated(&conditions.bench, platform),
+        priors: !conditions.stated_priors().is_empty(),
         attitudes: model.terms().iter().any(|t| t.family == "attitude"),
     })
 }

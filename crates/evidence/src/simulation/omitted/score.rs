@@ -48,17 +48,23 @@ pub struct Explanation {
     pub fall: f64,
     /// Bound on the probability that chance alone gives such a fall to any that was tried.
     pub probability: f64,
-    /// Other errors whose columns these residuals do not distinguish from the first, by number.
-    pub group: Vec<usize>,
+    /// Of each of them: other errors that these residuals do not distinguish from it, by number.
+    pub groups: Vec<Vec<usize>>,
+    /// True if chi-square with the errors among the unknowns is within its band.
+    pub explained: bool,
 }
 
 /// Suspicion that errors that are not estimated are in a record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Suspicion {
-    /// One error, or a pair where no single one explains the residuals.
+    /// One error, or a pair where a second one explains more of the residuals than chance would.
     pub errors: Vec<SuspectedError>,
     /// Other errors that this record does not distinguish from the first one, by name.
     pub indistinguishable: Vec<String>,
+    /// True if the residuals are within their band with the errors among the unknowns; false if something is
+    /// left that they do not explain.
+    #[serde(default = "yes")]
+    pub explained: bool,
     /// Fall of chi-square with the errors among the unknowns, dimensionless.
     pub chi_square_fall: f64,
     /// Bound on the probability that chance gives such a fall to any of the errors that were tried.
@@ -66,6 +72,11 @@ pub struct Suspicion {
     /// Estimates that the errors, or an indistinguishable one, change most in their own sigma, the largest
     /// change first.
     pub changes: Vec<SuspectedChange>,
+}
+
+/// Value of `explained` in answers that do not have it.
+fn yes() -> bool {
+    true
 }
 
 /// Error that explains residuals, with its estimate.
@@ -79,6 +90,9 @@ pub struct SuspectedError {
     pub estimate: f64,
     /// Standard deviation of the estimate by the stated noise, in the unit of `unit`.
     pub sigma: f64,
+    /// Other errors that this record does not distinguish from this one, by name.
+    #[serde(default)]
+    pub indistinguishable: Vec<String>,
 }
 
 /// Estimate without and with suspected errors among the unknowns.
@@ -118,6 +132,28 @@ impl Score {
         ((self.chi_square - fall) / (self.degrees_of_freedom - unknowns).max(1.0)).max(1.0)
     }
 
+    /// Whether chi-square is within its band after a fall by so many unknowns more.
+    fn explained(&self, fall: f64, unknowns: f64) -> bool {
+        let free = (self.degrees_of_freedom - unknowns).max(1.0);
+        self.chi_square - fall <= chi_square_quantile(free, UNEXPLAINED)
+    }
+
+    /// Errors that explain as much in the place of one of a pair, beside the other.
+    fn group_beside(
+        &self,
+        own: usize,
+        other: usize,
+        (fall, left_over): (f64, f64),
+        tried: &[usize],
+    ) -> Vec<usize> {
+        let alike = |&&k: &&usize| {
+            k != own
+                && k != other
+                && self.pair([k, other]).is_some_and(|(_, with)| (fall - with) / left_over < SAME)
+        };
+        tried.iter().filter(alike).copied().collect()
+    }
+
     /// Estimates, with their standard deviations, and the fall of chi-square with a pair.
     fn pair(&self, [i, j]: [usize; 2]) -> Option<([[f64; 2]; 2], f64)> {
         let (a, b, c) = (self.products[(i, i)], self.products[(i, j)], self.products[(j, j)]);
@@ -152,16 +188,17 @@ impl Score {
         let counted = fall / self.left_over(fall, 1.0);
         let probability = (chi_square_tail(1.0, counted) * tried.len() as f64).min(1.0);
         let own = self.products[(best, best)];
+        let explained = self.explained(fall, 1.0);
         let single = Explanation {
             errors: vec![best],
             estimates: vec![[self.against[best] / own, 1.0 / own.sqrt()]],
             fall,
             probability,
-            group: self.group(best, &tried),
+            groups: vec![self.group(best, &tried)],
+            explained,
         };
-        let left = self.chi_square - fall;
-        let explained = left <= chi_square_quantile((self.degrees_of_freedom - 1.0).max(1.0), UNEXPLAINED);
-        let pair = if explained { None } else { self.best_pair(&tried, fall) };
+        // a band of all residuals hides a second error that is many sigmas large
+        let pair = if explained && probability >= LEVEL { None } else { self.best_pair(&tried, fall) };
         pair.or_else(|| (probability < LEVEL).then_some(single))
     }
 
@@ -182,12 +219,15 @@ impl Score {
             errors.reverse();
             estimates.reverse();
         }
+        let [a, b] = errors;
+        let found = (fall, left_over);
         Some(Explanation {
             errors: errors.into(),
             estimates: estimates.into(),
             fall,
             probability,
-            group: Vec::new(),
+            groups: vec![self.group_beside(a, b, found, tried), self.group_beside(b, a, found, tried)],
+            explained: self.explained(fall, 2.0),
         })
     }
 }
