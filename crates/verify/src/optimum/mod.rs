@@ -18,7 +18,7 @@ pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
 /// Number of sequences up to which all blocks are searched again, unless a number of blocks is asked for.
 const ALL_UP_TO: u64 = 2_000_000;
 /// Relative tolerance of every value and bound.
-const TOLERANCE: f64 = 1e-6;
+const TOLERANCE: f64 = 1e-5;
 /// Most blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
 
