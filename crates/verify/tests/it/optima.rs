@@ -276,7 +276,8 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
         "a block twice" => out["blocks"].as_array_mut()?.insert(any, blocks[any].clone()),
         "a count" => out["blocks"][any]["sequences"] = json!(blocks[any]["sequences"].as_u64()? + 1),
         "the sum of the counts" => out["sequences"] = json!(value["sequences"].as_u64()? + 1),
-        "a candidate" => {
+        // one attitude alone may be as good as any other
+        "a candidate" if value["best"][0]["sequence"].as_array()?.windows(2).any(|w| w[0] != w[1]) => {
             let used = value["best"][0]["sequence"][0].as_u64()? as usize - 1;
             out["problem"]["candidates"][used] = json!(["12.3", "-45.6", "78.9"]);
         }
