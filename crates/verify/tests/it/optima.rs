@@ -290,7 +290,10 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
             out["problem"]["criterion"] = json!(other);
         }
         "the samples" => out["problem"]["samples"] = json!(2 * problem["samples"].as_u64()?),
-        "the noise" => out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01),
+        // beside a measured azimuth it may be of no account
+        "the noise" if problem["measured_azimuth"] == false => {
+            out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01)
+        }
         _ => return None,
     }
     Some(out)
