@@ -21,7 +21,7 @@ KEYS = ["layout", "problem", "degree", "best", "sequences", "blocks"]
 PROBLEM = "carry latitude_deg measured_azimuth terms gyros accelerometers candidates positions dwell_s samples noise_g azimuth_noise_deg criterion required".split()
 EARTH_RATE = 7.292115e-5  # rad/s
 ARCSEC = math.pi / 648000
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 PIVOT = 1e-13
 ALL_UP_TO = 20_000
 

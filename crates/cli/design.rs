@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use clap::{Arg, Args};
 use obsdeg_commands::{Designed, Host, Search, SearchFiles, Source, design, is_word};
 use obsdeg_design::design::Part;
+use obsdeg_verify::{Replay, verify_with};
 
 use crate::arguments::RequireMet;
 use crate::failure::Failure;
@@ -111,6 +112,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     match designed? {
         Designed::Schemes(mut found) => {
             if let (Some(path), Some(file)) = (&a.certificate, found.take_certificate()) {
+                // its question, its best sequences and its cover; blocks are for those who doubt
+                let replay = Replay { blocks: Some(0), seed: Some(0) };
+                if let Err(refused) = verify_with(&file.bytes, None, &replay) {
+                    return Err(Failure::input(format!("no certificate: its check refuses it ({refused})")));
+                }
                 write_file(path, &file.bytes)?;
             }
             let first = || found.found.found.first().map(|f| &f.requirements);

@@ -18,7 +18,7 @@ pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
 /// Number of sequences up to which all blocks are searched again, unless a number of blocks is asked for.
 const ALL_UP_TO: u64 = 2_000_000;
 /// Relative tolerance of every value and bound.
-const TOLERANCE: f64 = 1e-6;
+const TOLERANCE: f64 = 1e-5;
 /// Most blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
 
@@ -215,6 +215,25 @@ fn positive(place: &str, x: f64, most: f64) -> Result<f64, Refused> {
     Ok(x)
 }
 
+/// What is measured at every position.
+fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
+    need((1..=100_000).contains(&raw.samples), "problem.samples", "1 to 100000 samples", raw.samples)?;
+    let azimuth = raw.azimuth_noise_deg;
+    let expected = if raw.measured_azimuth { "a number" } else { "null" };
+    need(
+        azimuth.is_some() == raw.measured_azimuth,
+        "problem.azimuth_noise_deg",
+        expected,
+        format!("{azimuth:?}"),
+    )?;
+    Ok(Dwell {
+        seconds: positive("problem.dwell_s", raw.dwell_s, 1e7)?,
+        samples: raw.samples,
+        noise_g: positive("problem.noise_g", raw.noise_g, 1.0)?,
+        azimuth_noise_deg: azimuth.map(|x| positive("problem.azimuth_noise_deg", x, 180.0)).transpose()?,
+    })
+}
+
 impl Search {
     fn new(raw: &RawSearch, certificate: &[u8]) -> Result<Self, Refused> {
         let carries = ["platform", "inertial", "reset"];
@@ -239,23 +258,7 @@ impl Search {
         need((1..=100).contains(&raw.positions), "problem.positions", "1 to 100 positions", raw.positions)?;
         let torqued = raw.carry == "inertial" && raw.positions > 1 && problem.is_torqued();
         need(!torqued, "problem.terms", "no torquer errors under inertial carry: they act in slews", "some")?;
-        need((1..=100_000).contains(&raw.samples), "problem.samples", "1 to 100000 samples", raw.samples)?;
-        let azimuth = raw.azimuth_noise_deg;
-        let expected = if raw.measured_azimuth { "a number" } else { "null" };
-        need(
-            azimuth.is_some() == raw.measured_azimuth,
-            "problem.azimuth_noise_deg",
-            expected,
-            format!("{azimuth:?}"),
-        )?;
-        let dwell = Dwell {
-            seconds: positive("problem.dwell_s", raw.dwell_s, 1e7)?,
-            samples: raw.samples,
-            noise_g: positive("problem.noise_g", raw.noise_g, 1.0)?,
-            azimuth_noise_deg: azimuth
-                .map(|x| positive("problem.azimuth_noise_deg", x, 180.0))
-                .transpose()?,
-        };
+        let dwell = dwell(raw)?;
         let (criterion, required) = required(raw, &problem)?;
         let columns: Vec<(usize, f64)> = required.iter().map(|r| (r.0, r.2)).collect();
         let (n, k) = (raw.candidates.len(), raw.positions);
@@ -314,29 +317,7 @@ impl Search {
         let depth = file.blocks[0].start.len();
         let lengths = format!("1 to {} candidates", self.positions);
         need((1..=self.positions).contains(&depth), "blocks.0.start", &lengths, depth)?;
-        // the next start in lexicographic order, whatever the first candidates are
-        let lowest = |before: usize| if self.carry == "reset" { before } else { 1 };
-        let follows = |start: &[usize]| {
-            let mut next = start.to_vec();
-            while let Some(last) = next.pop() {
-                if last < n && !next.is_empty() {
-                    next.push(last + 1);
-                    break;
-                }
-            }
-            let mut filled = next.clone();
-            while !filled.is_empty() && filled.len() < depth {
-                filled.push(lowest(filled[filled.len() - 1]));
-            }
-            filled
-        };
-        let beginning = |first: usize| {
-            let mut start = vec![first];
-            while start.len() < depth {
-                start.push(lowest(start[start.len() - 1]));
-            }
-            start
-        };
+        let reset = self.carry == "reset";
         let (mut firsts, mut expected, mut total) = (Vec::new(), Vec::new(), 0u64);
         for (i, block) in file.blocks.iter().enumerate() {
             let place = format!("blocks.{i}");
@@ -350,7 +331,7 @@ impl Search {
                     first,
                 )?;
                 firsts.push(first);
-                expected = beginning(first);
+                expected = filled(vec![first], depth, reset);
             }
             same(&format!("{place}.start"), &block.start, &expected)?;
             let count = self.behind(&block.start).unwrap_or(u64::MAX);
@@ -367,7 +348,7 @@ impl Search {
                     bound,
                 )?;
             }
-            expected = follows(&expected);
+            expected = next_start(expected, n, depth, reset);
         }
         need(
             expected.is_empty(),
@@ -499,6 +480,25 @@ impl Search {
         out.push("Assumption: the model of book/src/certificate.md, white noise of Z, nothing known beforehand, repositioning at once.".into());
         out
     }
+}
+
+/// The first start of so many candidates that begins with some.
+fn filled(mut start: Vec<usize>, depth: usize, reset: bool) -> Vec<usize> {
+    while start.len() < depth {
+        start.push(if reset { start[start.len() - 1] } else { 1 });
+    }
+    start
+}
+
+/// The next start in lexicographic order with the same first candidate; empty after the last.
+fn next_start(mut start: Vec<usize>, n: usize, depth: usize, reset: bool) -> Vec<usize> {
+    while let Some(last) = start.pop() {
+        if last < n && !start.is_empty() {
+            start.push(last + 1);
+            return filled(start, depth, reset);
+        }
+    }
+    start
 }
 
 /// The coefficients that count: column, largest degree, and the sigma that is 1 in the criterion.

@@ -195,9 +195,11 @@ fn accept(count: usize, seed: u64, simulated: usize) {
         {
             let required: Vec<String> = certificate.problem.required.iter().map(|r| r.name.clone()).collect();
             let (degree, value) = best_by_simulation(&task, &required).expect("an optimum");
+            // the covariance that the simulation gives is a difference of variances, which its determinant magnifies
+            let within = if task.options.criterion == CriterionName::D { 2e-3 } else { 1e-5 };
             let claimed = certificate.best[0].value;
             assert!(
-                degree == certificate.degree && (value / claimed - 1.0).abs() < 1e-5,
+                degree == certificate.degree && (value / claimed - 1.0).abs() < within,
                 "{degree} {value} {claimed}\n{json}"
             );
             compared += 1;
@@ -274,7 +276,8 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
         "a block twice" => out["blocks"].as_array_mut()?.insert(any, blocks[any].clone()),
         "a count" => out["blocks"][any]["sequences"] = json!(blocks[any]["sequences"].as_u64()? + 1),
         "the sum of the counts" => out["sequences"] = json!(value["sequences"].as_u64()? + 1),
-        "a candidate" => {
+        // one attitude alone may be as good as any other
+        "a candidate" if value["best"][0]["sequence"].as_array()?.windows(2).any(|w| w[0] != w[1]) => {
             let used = value["best"][0]["sequence"][0].as_u64()? as usize - 1;
             out["problem"]["candidates"][used] = json!(["12.3", "-45.6", "78.9"]);
         }
@@ -287,7 +290,10 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
             out["problem"]["criterion"] = json!(other);
         }
         "the samples" => out["problem"]["samples"] = json!(2 * problem["samples"].as_u64()?),
-        "the noise" => out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01),
+        // beside a measured azimuth it may be of no account
+        "the noise" if problem["measured_azimuth"] == false => {
+            out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01)
+        }
         _ => return None,
     }
     Some(out)
