@@ -170,8 +170,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "figures" => &["pictures", ".", "s.toml"],
         "certificate" => &["new.json", "s.toml", ".", ""],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
-        "measured-azimuth" | "formulas" | "minimum" | "refine" | "divide" | "meet" | "require-met"
-        | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
+        "measured-azimuth" | "formulas" | "sensitivities" | "minimum" | "refine" | "divide" | "meet"
+        | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
             return None;
         }
         _ => number,

@@ -419,7 +419,8 @@ fn a_partial_bench_leaves_limits_of_the_rest() {
 }
 
 /// A report says up to which size of errors its requirements are met, where no bench is stated; schemes with
-/// different benches are not compared; with a bench the table of unknowns has the totals that its margins are of.
+/// different benches are not compared; with a bench the table of unknowns has the totals that its margins are
+/// of.
 #[test]
 fn a_report_says_what_its_met_rests_on() {
     let folder = tempfile::tempdir().expect("a folder");

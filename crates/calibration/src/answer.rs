@@ -373,9 +373,8 @@ pub struct NextRun {
     pub unit: String,
     /// Sigma by this answer, rescaled, in the unit of `unit`; null if not determined.
     pub sigma: Option<f64>,
-    /// Largest sigma that meets the requirement, in the unit of `unit`; zero if a bench alone uses it up. It is
-    /// less than the requirement if a bench
-    /// adds to it.
+    /// Largest sigma that meets the requirement, in the unit of `unit`; zero if a bench alone uses it up. It
+    /// is less than the requirement if a bench adds to it.
     pub required_sigma: f64,
     /// Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no
     /// attitude makes sigma smaller by 1 %.

@@ -52,9 +52,9 @@ fn required(bench: &Bench, requirements: &[(&str, f64)], sizes: &[(&str, f64)]) 
         .expect("calibrated")
 }
 
-/// No requirement counts as met where a suspected error moves the estimate by more than it allows; without one the
-/// answer says which size of each error would use it up. By the reference table 1 ug of every K0 changes D_IZ by
-/// 0.02985 deg/h/g. Where a bench alone is beyond the requirement, no further run is offered.
+/// No requirement counts as met where a suspected error moves the estimate by more than it allows; without
+/// one the answer says which size of each error would use it up. By the reference table 1 ug of every K0
+/// changes D_IZ by 0.02985 deg/h/g. Where a bench alone is beyond the requirement, no further run is offered.
 #[test]
 fn requirements_count_what_is_suspected_and_say_what_is_not_stated() {
     let all = [("D", 0.1)];

@@ -195,7 +195,8 @@ fn accept(count: usize, seed: u64, simulated: usize) {
         {
             let required: Vec<String> = certificate.problem.required.iter().map(|r| r.name.clone()).collect();
             let (degree, value) = best_by_simulation(&task, &required).expect("an optimum");
-            // the covariance that the simulation gives is a difference of variances, which its determinant magnifies
+            // the covariance that the simulation gives is a difference of variances, which its determinant
+            // magnifies
             let within = if task.options.criterion == CriterionName::D { 2e-3 } else { 1e-5 };
             let claimed = certificate.best[0].value;
             assert!(

@@ -699,7 +699,8 @@ fn the_score_test_at_length() {
     check_shares(500, 77, 0.95);
 }
 
-/// A second error of eight sigmas is named beside the first, although the band of all residuals would hold it.
+/// A second error of eight sigmas is named beside the first, although the band of all residuals would hold
+/// it.
 #[test]
 fn a_second_error_is_not_hidden_by_the_band() {
     let records =
