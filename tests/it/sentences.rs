@@ -422,8 +422,8 @@ fn verdicts_are_those_of_the_time_that_is_said() {
     }
 }
 
-/// Runs say when they begin where that matters: a run of x' = a + b t^2 over 1 s from rest ends at a + b (1/3
-/// + t + t^2).
+/// Runs say when they begin where that matters: a run of x' = a + b t^2 over 1 s from rest ends at
+/// `a + b (1/3 + t + t^2)`.
 #[test]
 fn runs_say_when_they_begin() {
     let place = tempfile::tempdir().expect("a folder");
