@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from decimal import Context, Decimal
 from typing import Any
 
@@ -28,7 +28,11 @@ def plain(value: Any) -> Any:
     """
     if isinstance(value, Text):
         return value.text
-    if isinstance(value, (Decimal, os.PathLike)):
+    if isinstance(value, Decimal):
+        # a number, unless a double would lose digits
+        number = float(value)
+        return number if value.is_finite() and Decimal(repr(number)) == value else str(value)
+    if isinstance(value, os.PathLike):
         return str(value)
     if isinstance(value, range):
         return list(value)
@@ -46,6 +50,43 @@ def written(options: Any) -> str:
         TypeError: a value that JSON cannot hold.
     """
     return json.dumps(options, sort_keys=True, default=plain)
+
+
+def checked(task: Any, number: int, reserved: Container[str]) -> dict[str, Any]:
+    """A task as a folder can hold it: options by name, tags by name, in text that can be written.
+
+    Raises:
+        ValueError: what is wrong with the task, by its number.
+    """
+    if not isinstance(task, Mapping):
+        raise ValueError(f"task number {number}: found {_short(task)}; expected a mapping of options by name")
+    for name in task:
+        if not isinstance(name, str) or name in reserved:
+            raise ValueError(f"task number {number}: found the option {_short(name)}; expected the name of an option")
+    tags = task.get("tags")
+    if tags is not None and not isinstance(tags, Mapping):
+        raise ValueError(f"task number {number}: found the tags {_short(tags)}; expected values by name")
+    try:
+        held = json.loads(written(task))
+        json.dumps(held, ensure_ascii=False).encode()
+    except (TypeError, ValueError, RecursionError) as e:
+        said = "it is nested too deep" if isinstance(e, RecursionError) else e
+        raise ValueError(f"task number {number}: it cannot be written: {said}") from None
+    return dict(task)
+
+
+def stand_in(task: Any, number: int) -> dict[str, Any]:
+    """What a folder holds in the place of a task that it cannot hold."""
+    return {"number": number, "found": _short(task)}
+
+
+def _short(value: Any) -> str:
+    """A value in at most 200 ASCII characters."""
+    try:
+        text = ascii(value)
+    except (RecursionError, ValueError):
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= 200 else text[:197] + "..."
 
 
 def key(task: Mapping[str, Any]) -> bytes:

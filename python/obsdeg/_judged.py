@@ -83,6 +83,10 @@ FOUND = {
 }
 
 
+#: Names that are columns of every table, and so no options of a task.
+COLUMNS = frozenset(("task", *FOUND))
+
+
 def row_of(task: Mapping[str, Any], error: BaseException) -> dict[str, Any]:
     """The row of a task that has no answer."""
     return {**_options(task), **dict.fromkeys(FOUND), "error": said(error)}

@@ -11,7 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ._judged import FOUND, WHAT, judged_rows, said
+from ._asked import checked, stand_in
+from ._judged import COLUMNS, FOUND, WHAT, judged_rows, said
 from ._work import INPUT
 
 if TYPE_CHECKING:
@@ -114,22 +115,26 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
             by_task.setdefault(row.pop("task"), []).append(row)
     rows: list[dict[str, Any]] = []
     for number, text in enumerate(sorted(by_task)):
-        rows += [{**_asked(number, json.loads(text)), **row} for row in by_task[text]]
+        asked = json.loads(text)
+        asked = _asked(number, asked if isinstance(asked, dict) else {"found": text})
+        rows += [{**asked, **row} for row in by_task[text]]
     return _frame(rows)
 
 
-def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, dict[str, Any]]]]:
-    left = enumerate(map(dict, tasks))
+def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, Any]]]:
+    left = enumerate(tasks)
     while chunk := list(islice(left, _CHUNK)):
         yield chunk
 
 
-def _judged(chunk: list[tuple[int, dict[str, Any]]], *, record: bool) -> list[tuple[int, list[dict[str, Any]]]]:
+def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, list[dict[str, Any]]]]:
     """The rows of some tasks."""
     found = []
-    for number, task in chunk:
-        asked = _asked(number, task)
+    for number, given in chunk:
+        asked = _asked(number, stand_in(given, number))
         try:
+            task = checked(given, number, COLUMNS)
+            asked = _asked(number, task)
             rows = judged_rows(task)
         except INPUT as problem:
             if not record:
@@ -142,7 +147,9 @@ def _judged(chunk: list[tuple[int, dict[str, Any]]], *, record: bool) -> list[tu
 def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
     """The columns of a row that say what was asked."""
     options = {name: _value(name, value) for name, value in task.items() if name not in (*WHAT, "angles")}
-    tags = {name: value.item() if hasattr(value, "item") else value for name, value in dict(task.get("tags") or {}).items()}
+    given = task.get("tags")
+    given = given if isinstance(given, Mapping) else {}
+    tags = {name: value.item() if hasattr(value, "item") else value for name, value in given.items()}
     return {"task": number, **tags, **{n: v for n, v in options.items() if n not in tags}}
 
 

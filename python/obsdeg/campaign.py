@@ -32,10 +32,10 @@ from typing import Any, Literal
 
 import obsdeg
 
-from ._asked import digest, key
+from ._asked import checked, digest, key, stand_in
 from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
-from ._judged import FOUND, WHAT, Judged, judge, name_of, parquet, row_of
+from ._judged import COLUMNS, FOUND, WHAT, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
 from ._sweeps import read, table, threads
 from ._work import END, INPUT, CampaignError, Ended, Work
@@ -327,7 +327,8 @@ def _sweep(
     again: deque[list[dict[str, Any]]] = deque()
     rest = iter(tasks)
     first = list(islice(rest, FIRST))
-    options = [name for task in first for name in task if name not in WHAT]
+    named = [name for task in first if isinstance(task, Mapping) for name in task if isinstance(name, str)]
+    options = [name for name in named if name not in WHAT and name not in COLUMNS]
     columns = list(dict.fromkeys(["task", *options, *FOUND]))
 
     def wrong(end: Ended, task: dict[str, Any]) -> None:
@@ -340,17 +341,21 @@ def _sweep(
 
     def missing() -> Iterator[dict[str, Any]]:
         nonlocal done
-        for task in map(dict, chain(first, rest)):
+        for number, given in enumerate(chain(first, rest)):
+            error = None
             try:
-                by_value = key(task)
-            except (TypeError, ValueError) as e:
-                wrong(Ended(task, error=e), task)
-                done += 1
-                continue
+                task = checked(given, number, COLUMNS)
+            except ValueError as e:
+                task, error = stand_in(given, number), e
+            by_value = key(task)
             if by_value in there:
                 done += 1
                 continue
             there.add(by_value)
+            if error is not None:
+                wrong(Ended(task, error=error), task)
+                done += 1
+                continue
             yield task
 
     fresh = missing()

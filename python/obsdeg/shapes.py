@@ -823,6 +823,8 @@ class OmittedEffects(Record):
     """Reason why there are no exact classes; null if there are."""
     estimated: list[str]
     """Names in the bench that are among the unknowns: estimated, so that their sizes do not count."""
+    priors: bool
+    """True if priors are stated: figures count them, exact changes by silent errors do not."""
     attitudes: bool
     """True if attitudes of the positions are among the terms: those of rotating positions, and of more than 64, are not computed."""
 
@@ -3005,7 +3007,9 @@ class NextRun(Record):
     sigma: float | None
     """Sigma by this answer, rescaled, in the unit of `unit`; null if not determined."""
     required_sigma: float
-    """Largest sigma that meets the requirement, in the unit of `unit`: less than the requirement if a bench adds to it."""
+    """Largest sigma that meets the requirement, in the unit of `unit`; zero if a bench alone uses it up. It is less than the requirement
+    if a bench adds to it.
+    """
     attitude: str | None
     """Attitude of the run: the name of a cardinal attitude, or of a position of the scheme. Null if no attitude makes sigma smaller by 1
     %.
@@ -3333,6 +3337,8 @@ class SuspectedError(Record):
     """Estimate of the error from the residuals, in the unit of `unit`."""
     sigma: float
     """Standard deviation of the estimate by the stated noise, in the unit of `unit`."""
+    indistinguishable: list[str]
+    """Other errors that this record does not distinguish from this one, by name."""
 
 
 class SuspectedChange(Record):
@@ -3360,9 +3366,13 @@ class Suspicion(Record):
     __slots__ = ()
 
     errors: list[SuspectedError]
-    """One error, or a pair where no single one explains the residuals."""
+    """One error, or a pair where a second one explains more of the residuals than chance would."""
     indistinguishable: list[str]
     """Other errors that this record does not distinguish from the first one, by name."""
+    explained: bool
+    """True if the residuals are within their band with the errors among the unknowns; false if something is left that they do not
+    explain.
+    """
     chi_square_fall: float
     """Fall of chi-square with the errors among the unknowns, dimensionless."""
     probability: float
@@ -3386,6 +3396,21 @@ class SilentError(Record):
     """Changes of the coefficients per unit of the error: the same whatever the record says."""
 
 
+class FamilyLimit(Record):
+    """Size of all terms of a family of errors at which a requirement is just met."""
+
+    __slots__ = ()
+
+    family: str
+    """Name of the family, such as `K0` or `latitude`."""
+    unit: str
+    """Unit of its sizes: ug, ppm, arcsec, ..."""
+    unknown: str
+    """Name of the unknown whose requirement is reached first."""
+    size: float
+    """Size (one sigma) of each term of the family, in the unit of `unit`."""
+
+
 class Omitted(Record):
     """Errors that a calibration does not estimate."""
 
@@ -3397,6 +3422,10 @@ class Omitted(Record):
     """Error or pair that explains the residuals; null where chance is enough."""
     silent: list[SilentError]
     """Errors that no record of this scheme shows and that change a coefficient."""
+    limits: list[FamilyLimit]
+    """Sizes of families that the bench does not state in full, at which one by itself uses up the margin of a requirement; empty where a
+    requirement is missed or none is stated.
+    """
 
 
 class Setup(Record):

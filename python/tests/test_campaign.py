@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, ThreadPoolExecutor
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from typing import Any
 import obsdeg
 import pytest
 from obsdeg import campaign
+
+PAIR = [(0, 0, 0), (180, 0, 0)]
 
 
 def without_parts(found: obsdeg.Design) -> dict[str, Any]:
@@ -261,3 +264,41 @@ def test_options_of_some_tasks_and_schemes(tmp_path: Path) -> None:
     asked = rows["task"].map(json.loads)
     mine = rows[asked.map(lambda task: "scheme" in task and "noise" not in task)]
     assert dict(zip(mine["name"], mine["status"], strict=True)) == own
+
+
+def test_a_malformed_task_is_named_and_loses_nothing(tmp_path: Path) -> None:
+    """A task that a folder cannot hold is named by its number or has a row; the others are done, and the folder is read."""
+    good = [dict(angles=PAIR, latitude=x) for x in (1, 2)]
+    circular: list[Any] = []
+    circular.append(circular)
+    deep: list[Any] = []
+    for _ in range(5000):
+        deep = [deep]
+    bad: list[Any] = [
+        dict(angles=PAIR, task=1), dict(angles=PAIR, rank=1), dict(angles=PAIR, tags={"t": {1, 2}}), dict(angles=PAIR, tags={"t": circular}),
+        dict(angles=PAIR, tags=5), dict(angles=PAIR, tags=["a"]), dict(angles=PAIR, tags="north"), dict(angles=PAIR, tags={"t": "\ud800"}),
+        dict(angles=PAIR, latitude="\ud800"), None, 7, "text", {1: 2, "angles": PAIR}, dict(angles=PAIR, tags={"t": deep}),
+    ]
+    for i, task in enumerate(bad):
+        folder = tmp_path / str(i)
+        for _ in range(2):
+            campaign.sweep(folder, [good[0], task, good[1]], executor=campaign.threads, errors="record")
+        campaign.sweep(folder, good, executor=campaign.threads)
+        rows = campaign.read(folder)
+        assert len(rows) == 31 and rows.error.notna().sum() == 1, (task if i < 13 else "deep", rows)
+        assert "task number 1" in rows.error.dropna().iloc[0]
+        with pytest.raises(ValueError, match="task number 1"):
+            campaign.sweep(tmp_path / f"raise-{i}", [good[0], task, good[1]], executor=campaign.threads)
+        rows = campaign.table([good[0], task, good[1]])
+        assert len(rows) == 31 and rows.error.notna().sum() == 1
+
+
+def test_decimals_are_numbers(tmp_path: Path) -> None:
+    """A decimal is the number that it is, for every option; a text that an option refuses stays another task."""
+    forms: list[Any] = [1000, 1000.0, Decimal("1000"), Decimal("1E3")]
+    campaign.sweep(tmp_path, [dict(angles=PAIR, latitude=28, dwell=d) for d in forms], executor=campaign.threads)
+    assert len(campaign.read(tmp_path)) == 15
+    refused: dict[str, Any] = dict(angles=PAIR, latitude=28, noise="0.00001")
+    campaign.sweep(tmp_path, [refused], executor=campaign.threads, errors="record")
+    campaign.sweep(tmp_path, [{**refused, "noise": Decimal("0.00001")}], executor=campaign.threads)
+    assert len(campaign.read(tmp_path)) == 31
