@@ -1,4 +1,5 @@
-//! Ctrl-C: it ends the program, or long work that has something to show.
+//! Ctrl-C, and the signals by which a system ends a program (SIGTERM, SIGHUP): they end it, or long work that
+//! has something to show.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

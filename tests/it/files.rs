@@ -260,7 +260,9 @@ fn interruptions_leave_nothing(count: u64) {
         // most of them while files are written
         let part = 0.5 + 0.6 * random.below(1000) as f64 / 1000.0;
         std::thread::sleep(whole[kind].0.mul_f64(part));
-        Command::new("kill").args(["-INT", &child.id().to_string()]).output().expect("kill");
+        // Ctrl-C, and the signals of a system that ends a program or of a terminal that is closed
+        let signal = ["-INT", "-TERM", "-HUP"][i as usize % 3];
+        Command::new("kill").args([signal, &child.id().to_string()]).output().expect("kill");
         interrupted += u64::from(!child.wait().expect("it ends").success());
         let names = names_in(&at(""));
         let hidden: Vec<&String> = names.iter().filter(|name| name.starts_with('.')).collect();

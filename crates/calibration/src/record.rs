@@ -399,6 +399,15 @@ impl Record {
         Self::parquet(name, Box::new(reader))
     }
 
+    /// Number of rows, where the file says it before they are read.
+    pub(crate) fn rows_stated(&self) -> Option<usize> {
+        match &self.rows {
+            Rows::Csv(_) => None,
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(reader) => usize::try_from(reader.metadata().file_metadata().num_rows()).ok(),
+        }
+    }
+
     #[cfg(feature = "parquet")]
     fn parquet(name: &str, reader: Box<dyn FileReader>) -> Result<Self, RecordError> {
         let fields = reader.metadata().file_metadata().schema().get_fields();

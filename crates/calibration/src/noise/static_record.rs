@@ -103,6 +103,9 @@ impl StaticRecord {
         if wanted.len() > MOST {
             return Err(NoiseError::Long { record: record.name().into(), most: MOST - 1 });
         }
+        if record.rows_stated().is_some_and(|rows| rows.saturating_mul(wanted.len()) > MOST_NUMBERS) {
+            return Err(NoiseError::Long { record: record.name().into(), most: MOST_NUMBERS });
+        }
         let name = record.name().to_string();
         let used = |i: &usize| *i != time && columns.iter().all(|(c, ..)| c != i);
         let ignored = (0..record.columns().len()).filter(used);
