@@ -226,3 +226,14 @@ def test_what_is_quoted_does_not_steer_a_terminal(tmp_path: Path) -> None:
             raised()
         said = str(problem.value)
         assert said.isprintable() and "\\x1b\\u202e" in said, said
+
+
+def test_a_system_of_too_many_equations_is_refused(tmp_path: Path) -> None:
+    """More equations than the program takes states are counted before one of them is read."""
+    file = tmp_path / "chain.jl"
+    chain = [f" x{i}'(t) = x{i + 1}(t)," for i in range(20_000)]
+    file.write_text("\n".join(["ode = @ODEmodel(", *chain, " x20000'(t) = x0(t),", " y(t) = x0(t)", ")"]))
+    begun = time.process_time()
+    with pytest.raises(ImportProblem, match="20002 equations; expected at most 4000"):
+        load(file)
+    assert time.process_time() - begun < 5

@@ -11,6 +11,7 @@
 | digits of a number that powers make | `DIGITS` |
 | digits and exponent of a number as it is written | `LITERAL` |
 | entries of a vector | `ENTRIES` |
+| equations of an `@ODEmodel` | `EQUATIONS` |
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ WRITTEN = 1_000_000
 DIGITS = 10_000
 LITERAL = 1_000
 ENTRIES = 10_000
+EQUATIONS = 4_000
 
 
 def text_of_file(path: str | Path, *, errors: str = "strict") -> str:

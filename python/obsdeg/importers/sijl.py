@@ -9,8 +9,8 @@ import re
 from pathlib import Path
 
 from .formula import Expr, names_in, parse
-from .limits import text_of_file
-from .problem import ImportProblem
+from .limits import EQUATIONS, text_of_file
+from .problem import ImportProblem, OverLimit
 from .system import State, System
 
 _MACRO = re.compile(r"@ODEmodel\s*\(")
@@ -48,7 +48,10 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
     of_time: dict[str, str] = {}
     outputs: dict[str, tuple[str, str]] = {}
     rates: dict[str, tuple[str, str]] = {}
-    for line, equation in _equations(text, starts[model - 1]):
+    equations = _equations(text, starts[model - 1])
+    if len(equations) > EQUATIONS:
+        raise OverLimit(f"{len(equations)} equations", f"at most {EQUATIONS}")
+    for line, equation in equations:
         place = f"line {line}"
         left, equals, right = equation.partition("=")
         found = _LEFT.match(left)
