@@ -214,6 +214,51 @@ fn schemes_come_and_go() {
     assert!(page.is_file());
 }
 
+/// The families of errors that are not estimated stand below the verdicts, with the figures of the command
+/// line; with an edit they are those of the new scheme.
+#[test]
+fn errors_that_are_not_estimated_are_shown() {
+    let Some((mut browser, _)) = opened(1280) else { return };
+    let b = &mut browser;
+    let shown = |b: &mut Browser, carry: &str| {
+        wait(b, "errors", "!document.getElementById('not-estimated').hidden");
+        click(b, "#not-estimated summary");
+        let rows = b.value(
+            "[...document.querySelectorAll('#omitted tbody tr')].map(r => [...r.cells].map(c => c.textContent))",
+        );
+        let pair = ["--angles", "0,0,0", "--angles", "180,0,0", "--carry", carry, "--format", "json", "-q"];
+        let output = run(&[&["simulate"], &pair[..]].concat());
+        let answer: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let families = answer["omitted"]["families"].as_array().expect("families");
+        let rows = rows.as_array().expect("rows");
+        assert_eq!(rows.len(), families.len());
+        for (row, f) in rows.iter().zip(families) {
+            assert_eq!(row[0], json!(format!("{} ({})", f["family"].as_str().expect("a name"), f["terms"])));
+            let Some(worst) = f["worst"]["per_unit"].as_f64() else {
+                assert_eq!(row[2], json!("\u{2013}"), "{row}");
+                continue;
+            };
+            let text = row[2].as_str().expect("a text");
+            let number: f64 = text.split(' ').next().and_then(|n| n.parse().ok()).expect("a number");
+            assert!((number / worst.abs() - 1.0).abs() < 1e-3 && text.contains(" per "), "{row} {f}");
+            assert_eq!(row[3], f["worst"]["unknown"], "{row}");
+        }
+        let k0 = rows.iter().find(|r| r[0] == json!("K0 (3)")).expect("K0");
+        k0[1].as_str().expect("a class").to_string()
+    };
+    assert_eq!(shown(b, "platform"), "1 no effect, 2 visible");
+    choose(b, "#carry", "reset");
+    wait(
+        b,
+        "hidden",
+        "document.getElementById('not-estimated').hidden || document.querySelector('#verdicts table:not(.old-sigmas)')",
+    );
+    wait(b, "sigmas", "document.querySelector('#verdicts table:not(.old-sigmas)')");
+    b.value("document.getElementById('not-estimated').open = false, 1");
+    assert_eq!(shown(b, "reset"), "1 no effect, 2 silent");
+    quiet(b);
+}
+
 #[test]
 fn the_best_positions_are_found() {
     let Some((mut browser, _)) = opened(1400) else { return };
@@ -327,6 +372,7 @@ fn it_is_for_everyone() {
         "sigmas",
         "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
+    b.value("document.getElementById('not-estimated').open = true, 1");
     b.value(&format!("{axe};1"));
     click(b, "#start-tour");
     for scheme in ["light", "dark"] {

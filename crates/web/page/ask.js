@@ -69,7 +69,8 @@ function askRest() {
       verdicts.sigmas = null;
     }
     if (run?.text && still()) {
-      const { quantities, requirements } = JSON.parse(run.text);
+      const { quantities, requirements, omitted } = JSON.parse(run.text);
+      drawOmitted(omitted);
       const missed = new Map(requirements.missed.map((m) => [m.name, m.why]));
       verdicts.sigmas = new Map(quantities.map((q) => [q.name, { ...q, missed: missed.get(q.name) }]));
       verdicts.requirements = requirements;

@@ -76,6 +76,7 @@ function drawVerdicts() {
   // of another scheme they are faint until those of this one are there
   const asked = JSON.stringify(state.scheme);
   table.classList.toggle('old-sigmas', verdicts.sigmasOf !== asked);
+  if (verdicts.sigmasOf !== asked) drawOmitted(null);
   table.classList.toggle('old-solutions', verdicts.solutionsOf !== asked);
   const open = rows.filter((q) => q.degree === null).map((q) => q.name);
   const worst = Math.max(0, ...rows.map((q) => q.degree ?? 0));
@@ -86,6 +87,26 @@ function drawVerdicts() {
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
   drawSentences($('sentences'), verdicts.now.sentences);
   offerStrip(rows);
+}
+
+/** Classes of the terms of a family in words: one for all, or how many of each. */
+function classes(f) {
+  if (f.no_effect === null) return '\u2013';
+  const counts = [[f.no_effect, 'no effect'], [f.silent, 'silent'], [f.terms - f.no_effect - f.silent, 'visible']].filter(([n]) => n);
+  return counts.length === 1 ? counts[0][1] : counts.map(([n, word]) => `${n} ${word}`).join(', ');
+}
+
+/** The families of errors that the scheme does not estimate, with the change of the estimates per unit of each. */
+function drawOmitted(omitted) {
+  $('not-estimated').hidden = !omitted;
+  if (!omitted) return;
+  const head = ['family (terms)', 'class', 'worst change', 'of', 'as large as sigma at', 'seen from (3 sigma)'];
+  const rows = omitted.families.map((f) => [`${f.family} (${f.terms})`, classes(f),
+    f.worst ? `${Math.abs(f.worst.per_unit).toPrecision(4)} ${f.worst.unit} per ${f.unit}` : '\u2013', f.worst?.unknown ?? '\u2013',
+    f.worst_in_sigmas ? `${two(1 / f.worst_in_sigmas)} ${f.unit}` : '\u2013', f.visible_from === null ? '\u2013' : `${two(f.visible_from)} ${f.unit}`]);
+  const row = (cells, kind, more = {}) => element('tr', {}, ...cells.map((textContent) => element(kind, { textContent, ...more })));
+  const table = element('table', {}, element('thead', {}, row(head, 'th', { scope: 'col' })), element('tbody', {}, ...rows.map((cells) => row(cells, 'td'))));
+  $('omitted').replaceChildren(table);
 }
 
 /** The first lines of the answer: the answer, and what resolves what is not observable. */

@@ -17,10 +17,23 @@ use space::{Space, multisets, power};
 pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
 /// Number of sequences up to which all blocks are searched again, unless a number of blocks is asked for.
 const ALL_UP_TO: u64 = 2_000_000;
-/// Relative tolerance of every value and bound.
+/// Part by which a printed lower bound is smaller: it is not rounded up.
+const DIGITS: f64 = 1e-6;
+/// Relative tolerance of every value and bound: of the value, the bound and what is found together three
+/// times that.
 const TOLERANCE: f64 = 1e-5;
 /// Most blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
+/// Dwell of a position, in s.
+const DWELL_S: [f64; 2] = [1.0, 1e6];
+/// Noise of a sample of Z, in g.
+const NOISE_G: [f64; 2] = [1e-9, 1e-2];
+/// Noise of a sample of the azimuth, in degrees.
+const AZIMUTH_NOISE_DEG: [f64; 2] = [1e-6, 10.0];
+/// Required sigma of a coefficient, in its unit.
+const LIMIT: [f64; 2] = [1e-12, 1e12];
+/// Latitude, north or south, in degrees.
+const LATITUDE_DEG: [f64; 2] = [1.0, 89.0];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -209,15 +222,30 @@ fn of_the_system() -> u64 {
     std::collections::hash_map::RandomState::new().build_hasher().finish()
 }
 
-/// A positive number of a file.
-fn positive(place: &str, x: f64, most: f64) -> Result<f64, Refused> {
-    need(x > 0.0 && x <= most, place, &format!("a number above 0 and up to {most:e}"), x)?;
+/// A number of a file within limits.
+fn between(place: &str, x: f64, [least, most]: [f64; 2]) -> Result<f64, Refused> {
+    need((least..=most).contains(&x), place, &format!("a number from {least:e} to {most:e}"), x)?;
     Ok(x)
+}
+
+/// Searches that double precision decides: cardinal candidates, all coefficients required, a latitude away
+/// from the equator and the poles. Elsewhere a sequence may determine so little that rounding decides its
+/// value.
+fn within_precision(raw: &RawSearch, problem: &Problem) -> Result<(), Refused> {
+    let right = |text: &String| text.parse::<f64>().is_ok_and(|x| x % 90.0 == 0.0);
+    let other = raw.candidates.iter().flatten().find(|text| !right(text));
+    let found = other.map_or("", |text| text);
+    need(other.is_none(), "problem.candidates", "multiples of 90 degrees", format!("`{found}`"))?;
+    let latitude = raw.latitude_deg.parse::<f64>().unwrap_or(f64::NAN).abs();
+    let away = (LATITUDE_DEG[0]..=LATITUDE_DEG[1]).contains(&latitude);
+    need(away, "problem.latitude_deg", "a latitude of 1 to 89 degrees, north or south", &raw.latitude_deg)?;
+    let (all, found) = (problem.names.len() - 3, raw.required.len());
+    need(found == all, "problem.required", &format!("all {all} coefficients"), found)
 }
 
 /// What is measured at every position.
 fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
-    need((1..=100_000).contains(&raw.samples), "problem.samples", "1 to 100000 samples", raw.samples)?;
+    need((5..=10_000).contains(&raw.samples), "problem.samples", "5 to 10000 samples", raw.samples)?;
     let azimuth = raw.azimuth_noise_deg;
     let expected = if raw.measured_azimuth { "a number" } else { "null" };
     need(
@@ -227,10 +255,12 @@ fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
         format!("{azimuth:?}"),
     )?;
     Ok(Dwell {
-        seconds: positive("problem.dwell_s", raw.dwell_s, 1e7)?,
+        seconds: between("problem.dwell_s", raw.dwell_s, DWELL_S)?,
         samples: raw.samples,
-        noise_g: positive("problem.noise_g", raw.noise_g, 1.0)?,
-        azimuth_noise_deg: azimuth.map(|x| positive("problem.azimuth_noise_deg", x, 180.0)).transpose()?,
+        noise_g: between("problem.noise_g", raw.noise_g, NOISE_G)?,
+        azimuth_noise_deg: azimuth
+            .map(|x| between("problem.azimuth_noise_deg", x, AZIMUTH_NOISE_DEG))
+            .transpose()?,
     })
 }
 
@@ -258,6 +288,7 @@ impl Search {
         need((1..=100).contains(&raw.positions), "problem.positions", "1 to 100 positions", raw.positions)?;
         let torqued = raw.carry == "inertial" && raw.positions > 1 && problem.is_torqued();
         need(!torqued, "problem.terms", "no torquer errors under inertial carry: they act in slews", "some")?;
+        within_precision(raw, &problem)?;
         let dwell = dwell(raw)?;
         let (criterion, required) = required(raw, &problem)?;
         let columns: Vec<(usize, f64)> = required.iter().map(|r| (r.0, r.2)).collect();
@@ -464,14 +495,19 @@ impl Search {
         let chosen = seed.map_or_else(String::new, |seed| format!(", chosen by seed {seed}"));
         let least = match found.counted {
             0 => "none of this degree within the caps".into(),
-            _ => format!("none below {:.6e}{}", found.at_least, self.unit),
+            _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
         };
         out.push(format!(
             "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of a smaller one, {least}; {} sets judged {how}.",
             file.blocks.len(), found.sequences, found.counted, file.degree, self.space.judged_sets()
         ));
         out.push(match file.blocks.len() - replayed {
-            0 => format!("Proven: the first sequence is the best of all, to a part of {TOLERANCE:e}."),
+            0 => {
+                format!(
+                    "Proven: the first sequence is the best of all, to a part of {:.0e}.",
+                    3.0 * TOLERANCE
+                )
+            }
             left => format!(
                 "Believed only: the bounds of the other {left} blocks, {} sequences.",
                 file.sequences - found.sequences
@@ -524,7 +560,7 @@ fn required(raw: &RawSearch, problem: &Problem) -> Result<(Criterion, Counting),
         let margin = criterion == Criterion::Margin;
         need(margin || r.limit.is_none(), &format!("problem.required.{}", r.name), "no limit", "one")?;
         let limit =
-            r.limit.map(|x| positive(&format!("problem.required.{}.limit", r.name), x, 1e300)).transpose()?;
+            r.limit.map(|x| between(&format!("problem.required.{}.limit", r.name), x, LIMIT)).transpose()?;
         let free = if margin { f64::INFINITY } else { 1.0 };
         out.push((column, r.max_degree.unwrap_or(usize::MAX), limit.unwrap_or(free)));
     }

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::Assignment;
-use obsdeg_core::model::{Angle, Carry, Platform, Scheme};
+use obsdeg_core::model::{Carry, Platform, Scheme};
 use obsdeg_design::design::{
     Candidates, CriterionName, DesignError, DesignOptions, OptimumCertificate, certify_optimum, design,
 };
@@ -26,18 +26,11 @@ struct Task {
 const CRITERIA: [CriterionName; 5] =
     [CriterionName::Worst, CriterionName::A, CriterionName::D, CriterionName::E, CriterionName::Margin];
 
-/// Random candidates: cardinal ones, multiples of 15 or 30 degrees, or decimals.
+/// Random cardinal candidates.
 fn candidates(rng: &mut SplitMix64, count: usize) -> Candidates {
     let mut out = Candidates::default();
-    let kind = rng.below(3);
     while out.attitudes.len() < count {
-        let angles = match kind {
-            0 => Candidates::cardinals().attitudes[rng.below(24) as usize].clone(),
-            1 => std::array::from_fn(|_| Angle::from_degrees(15 * (rng.below(24) as i32 - 12))),
-            _ => std::array::from_fn(|_| {
-                Angle::from_nanodeg(rng.below(360_000) as i64 * 1_000_000 - 180_000_000_000)
-            }),
-        };
+        let angles = Candidates::cardinals().attitudes[rng.below(24) as usize].clone();
         if !out.attitudes.contains(&angles) {
             out.names.push(format!("c{}", out.names.len() + 1));
             out.attitudes.push(angles);
@@ -75,10 +68,8 @@ fn draw(rng: &mut SplitMix64, i: usize) -> Task {
                 .push(Assignment { name: name.clone(), value: *pick(rng, &[0.01, 0.1, 3.0]) });
         }
     }
-    let some = rng.below(3) == 0 && criterion != CriterionName::Margin;
     let options = DesignOptions {
         positions: Some(1 + rng.below(4) as usize),
-        required: if some { vec![families[0].clone()] } else { Vec::new() },
         degree_caps: if rng.below(4) == 0 { vec![(None, 1 + rng.below(2) as usize)] } else { Vec::new() },
         criterion,
         keep: 3,
@@ -377,9 +368,50 @@ fn symmetry_and_a_choice_of_blocks() {
     }
     // a candidate less takes the symmetry away: then every first candidate needs blocks
     let mut value: Value = serde_json::from_str(&json).expect("JSON");
-    value["problem"]["candidates"][23] = json!(["1", "2", "3"]);
+    value["problem"]["candidates"].as_array_mut().expect("candidates").pop();
     let refused = verify(value.to_string().as_bytes(), None).expect_err("no symmetry").to_string();
     assert!(refused.starts_with("b"), "{refused}");
+}
+
+/// What double precision does not decide is refused by both checkers, by the place: candidates that are
+/// nearly alike, some of the coefficients, a latitude near the equator, and numbers that leave nothing
+/// measured.
+#[test]
+fn searches_beyond_double_precision_are_refused() {
+    let (_, json) = certified(&cardinals(Carry::Platform, 4)).expect("a certificate");
+    let mut python = Python::start();
+    let problem = |key: &str, to: Value| {
+        let mut value: Value = serde_json::from_str(&json).expect("JSON");
+        value["problem"][key] = to;
+        (format!("problem.{key}"), value)
+    };
+    let mut candidates = problem("candidates", Value::Null);
+    candidates.1["problem"]["candidates"] =
+        serde_json::from_str::<Value>(&json).expect("JSON")["problem"]["candidates"].clone();
+    candidates.1["problem"]["candidates"][2][2] = json!("0.01");
+    let mut required = problem("required", Value::Null);
+    required.1["problem"]["required"] =
+        serde_json::from_str::<Value>(&json).expect("JSON")["problem"]["required"].clone();
+    required.1["problem"]["required"].as_array_mut().expect("a list").pop();
+    let cases = [
+        candidates,
+        required,
+        problem("latitude_deg", json!("0.5")),
+        problem("dwell_s", json!(1e-300)),
+        problem("noise_g", json!(1e-160)),
+        problem("noise_g", json!(6e-153)),
+        problem("samples", json!(1)),
+        problem("samples", json!(100_000)),
+    ];
+    for (place, value) in cases {
+        let text = value.to_string();
+        let refused = verify(text.as_bytes(), None).expect_err(&place).to_string();
+        assert!(refused.starts_with(&place), "{place}: {refused}");
+        if let Some(python) = &mut python {
+            let (accepted, said) = python.replays(&text, 1, 5);
+            assert!(!accepted && said.contains(&place), "{place}: {said}");
+        }
+    }
 }
 
 /// Searches that certificates do not cover are refused with a sentence that names what is not covered.
@@ -394,6 +426,11 @@ fn what_certificates_of_optima_do_not_cover() {
     let cases = [
         (with(&|t| t.options.positions = None), "a search for the fewest positions"),
         (with(&|t| t.options.refine = true), "--refine"),
+        (with(&|t| t.options.required.push("D_F".into())), "some of the coefficients alone"),
+        (
+            with(&|t| t.options.candidates.attitudes[0][0] = obsdeg_core::model::Angle::from_degrees(10)),
+            "candidates that are not cardinal",
+        ),
         (with(&|t| t.options.divide = true), "--divide"),
         (with(&|t| t.options.meet = true), "--meet"),
         (with(&|t| t.options.total_s = Some(1e5)), "--max-time"),

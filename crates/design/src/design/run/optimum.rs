@@ -3,7 +3,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use obsdeg_core::model::{Carry, GyroAxes, Scheme, Term, format_decimal};
+use obsdeg_core::model::{Carry, Euler, GyroAxes, Scheme, Term, cardinal_name, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, latitude_of, steps};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -131,8 +131,11 @@ pub fn check_certifiable(
     let conditions = &asked(base, conditions, &options.required)?;
     let psi = || conditions.requirements.iter().any(|r| r.name.starts_with("psi"));
     let limits_psi = options.criterion == CriterionName::Margin && options.required.is_empty() && psi();
+    let cardinal = |angles: &Euler| cardinal_name(angles).is_some();
     let found = [
         (options.positions.is_none(), "a search for the fewest positions"),
+        (!options.candidates.attitudes.iter().all(cardinal), "candidates that are not cardinal"),
+        (!options.required.is_empty(), "some of the coefficients alone (--observable)"),
         (options.free.is_some(), "--candidates free"),
         (options.refine, "--refine"),
         (options.divide, "--divide"),
