@@ -139,7 +139,7 @@ fn files_and_answers_are_as_their_schemas_say() {
     for line in [
         &["analyze", five, "--solutions", "off"][..],
         &["analyze", "examples/lotka-volterra/model.toml", "--solutions", "off"],
-        &["design", "--positions", "3", "--observable", "D_F", "--carry", "inertial"],
+        &["design", "--positions", "3", "--terms", "F", "--carry", "inertial"],
     ] {
         let path = folder.path().join("c.json").display().to_string();
         stdout(&run(&[line, &["--certificate", &path, "--force"]].concat()));
