@@ -57,6 +57,7 @@ def checked(task: Any, number: int, reserved: Container[str]) -> dict[str, Any]:
 
     Raises:
         ValueError: what is wrong with the task, by its number.
+        TypeError: a value that JSON cannot hold.
     """
     if not isinstance(task, Mapping):
         raise ValueError(f"task number {number}: found {_short(task)}; expected a mapping of options by name")
@@ -69,7 +70,9 @@ def checked(task: Any, number: int, reserved: Container[str]) -> dict[str, Any]:
     try:
         held = json.loads(written(task))
         json.dumps(held, ensure_ascii=False).encode()
-    except (TypeError, ValueError, RecursionError) as e:
+    except TypeError as e:
+        raise TypeError(f"{e} (task number {number})") from None
+    except (ValueError, RecursionError) as e:
         said = "it is nested too deep" if isinstance(e, RecursionError) else e
         raise ValueError(f"task number {number}: it cannot be written: {said}") from None
     return dict(task)

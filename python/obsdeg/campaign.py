@@ -342,10 +342,10 @@ def _sweep(
     def missing() -> Iterator[dict[str, Any]]:
         nonlocal done
         for number, given in enumerate(chain(first, rest)):
-            error = None
+            error: Exception | None = None
             try:
                 task = checked(given, number, COLUMNS)
-            except ValueError as e:
+            except (TypeError, ValueError) as e:
                 task, error = stand_in(given, number), e
             by_value = key(task)
             if by_value in there:
