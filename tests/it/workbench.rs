@@ -248,12 +248,12 @@ fn errors_that_are_not_estimated_are_shown() {
     };
     assert_eq!(shown(b, "platform"), "1 no effect, 2 visible");
     choose(b, "#carry", "reset");
+    // the table of before is there until the new scheme is simulated
     wait(
         b,
-        "hidden",
-        "document.getElementById('not-estimated').hidden || document.querySelector('#verdicts table:not(.old-sigmas)')",
+        "classes of the new scheme",
+        "[...document.querySelectorAll('#omitted tbody tr')].some(r => r.cells[0].textContent == 'K0 (3)' && r.cells[1].textContent == '1 no effect, 2 silent')",
     );
-    wait(b, "sigmas", "document.querySelector('#verdicts table:not(.old-sigmas)')");
     b.value("document.getElementById('not-estimated').open = false, 1");
     assert_eq!(shown(b, "reset"), "1 no effect, 2 silent");
     quiet(b);

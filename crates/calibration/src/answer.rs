@@ -26,8 +26,8 @@ pub struct Calibration {
     /// Estimates of the unknowns, psi of the start of each record.
     pub quantities: Vec<Estimated>,
     /// Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are
-    /// too small; null if none is stated. Requirements on psi are not judged: a calibration estimates psi of
-    /// the start of a record.
+    /// too small, with what a bench adds and what a suspected error would change; null if none is stated.
+    /// Requirements on psi are not judged: a calibration estimates psi of the start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
     /// Further runs that bring coefficients to requirements they miss; empty if none is missed.
@@ -200,7 +200,7 @@ pub enum Finding {
     },
     /// Error that is not among the unknowns and explains the residuals: see `omitted`.
     Suspect {
-        /// Names of the errors: one, or a pair where no single one explains the residuals.
+        /// Names of the errors: one, or a pair where a second one explains more than chance would.
         errors: Vec<String>,
         /// Fall of chi-square with them among the unknowns, dimensionless.
         chi_square_fall: f64,
@@ -217,7 +217,7 @@ pub enum Finding {
 pub struct Omitted {
     /// Number of errors that were tried, each by a score test on the residuals: those that a record can show.
     pub tried: usize,
-    /// Error or pair that explains the residuals; null where chance is enough.
+    /// Error or pair that explains residuals better than chance; null where chance is enough.
     pub suspicion: Option<Suspicion>,
     /// Errors that no record of this scheme shows and that change a coefficient.
     pub silent: Vec<SilentError>,

@@ -281,11 +281,6 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             let verdicts = obsdeg_core::analysis::analyze(scheme, options, worker)?;
             Judged::Scheme(Box::new(SchemeAnalysis { verdicts, sensitivities: of_record }))
         }
-        Input::Model(_) if options.sensitivities => {
-            return Err(Problem::input(
-                "--sensitivities found a model; expected a scheme: the errors that are not estimated are those of a platform",
-            ));
-        }
         Input::Model(file) => {
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
             let options = SystemOptions { seed, solutions, count_limit, order: order.map(Into::into) };

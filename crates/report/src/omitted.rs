@@ -383,7 +383,7 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     out
 }
 
-/// How errors become unknowns: terms of the scheme, or what must be measured.
+/// Advice on how errors become known: terms to add to the scheme, or errors to measure.
 pub(crate) fn estimated_by(errors: &[String]) -> String {
     let (mut terms, mut others) = (Vec::new(), Vec::new());
     for name in errors {
@@ -396,21 +396,23 @@ pub(crate) fn estimated_by(errors: &[String]) -> String {
         }
     }
     terms.dedup();
-    let add = (!terms.is_empty())
-        .then(|| format!("add {} to `terms` of the scheme to estimate it", terms.join(",")));
+    let add = (!terms.is_empty()).then(|| format!("add {} to `terms` of the scheme", terms.join(",")));
     let measure = (!others.is_empty())
-        .then(|| format!("{} is no term: correct it in the scheme, or measure it", others.join(", ")));
+        .then(|| format!("{} cannot be a term: measure it, and correct the scheme", others.join(", ")));
     add.into_iter().chain(measure).collect::<Vec<_>>().join("; ")
 }
 
-/// What the requirements of a calibration rest on: suspected errors, and sizes of what the bench does not
+/// Conditions of the requirements of a calibration: suspected errors, and sizes of what the bench does not
 /// state.
 pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
     let Some(r) = &c.requirements else { return Vec::new() };
     let mut out = Vec::new();
     out.extend(c.omitted.suspicion.as_ref().map(|s| {
         let names: Vec<&str> = s.errors.iter().map(|e| e.name.as_str()).collect();
-        format!("In this an estimate counts as uncertain by what {} would change of it.", names.join(" and "))
+        format!(
+            "The requirements count what {} would change of each estimate as an uncertainty.",
+            names.join(" and ")
+        )
     }));
     let limit = |l: &FamilyLimit| format!("{} < {} {}", l.family, below(l.size), l.unit);
     let limits: Vec<String> = c.omitted.limits.iter().map(limit).collect();

@@ -44,7 +44,7 @@ impl Refused {
     }
 }
 
-/// How much of the certificate of an optimum is searched again.
+/// Part of the certificate of an optimum that is searched again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Replay {
     /// Number of blocks, chosen at random; none: all where these are at most two million sequences, otherwise

@@ -415,7 +415,7 @@ fn chance_of(problem: &Problem, n: usize, decisions: usize, t: f64) -> f64 {
     decisions as f64 * ((5.0 * n + 40.0) / two60 + prime)
 }
 
-/// What turns add to the binary logarithm of the norm of a row: denominators and sizes.
+/// Increase of the binary logarithm of the norm of a row by turns: denominators and sizes.
 fn of_turns(problem: &Problem) -> f64 {
     let half = TURN as u64 / 2;
     let turns: Vec<&Slew> = problem.slews.iter().flatten().collect();

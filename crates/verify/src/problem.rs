@@ -121,15 +121,15 @@ fn attitude<R: Ring>(ring: &R, angles: &[i64; 3]) -> Matrix<R::Element> {
     times(ring, &times(ring, &x, &y), &z)
 }
 
+/// Refuses a word that is no carry.
+pub(crate) fn known_carry(carry: &str) -> Result<(), Refused> {
+    let known = ["platform", "inertial", "reset"].contains(&carry);
+    need(known, "problem.carry", "platform, inertial or reset", carry)
+}
+
 impl Problem {
     pub(crate) fn new(raw: &RawProblem) -> Result<Self, Refused> {
-        let carries = ["platform", "inertial", "reset"];
-        need(
-            carries.contains(&raw.carry.as_str()),
-            "problem.carry",
-            "platform, inertial or reset",
-            &raw.carry,
-        )?;
+        known_carry(&raw.carry)?;
         let latitude = raw.latitude_deg.as_ref().map(|l| nanodeg("problem.latitude_deg", l)).transpose()?;
         let in_range = latitude.is_none_or(|l| l.abs() <= TURN / 4);
         need(in_range, "problem.latitude_deg", "-90 to 90", raw.latitude_deg.as_deref().unwrap_or_default())?;

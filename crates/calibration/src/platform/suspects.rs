@@ -32,7 +32,7 @@ const CHANGES: usize = 3;
 /// first record.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outside {
-    /// What a bench adds to the sigma of every coefficient, by name (root of the sum of squares).
+    /// Contribution of a bench to the sigma of every coefficient, by name (root of the sum of squares).
     pub bench: Vec<(String, f64)>,
     /// Largest change of every coefficient by a suspected error.
     pub suspected: Vec<(String, f64)>,

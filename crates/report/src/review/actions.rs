@@ -280,7 +280,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         }
         Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
         Finding::Suspect { errors, .. } => format!(
-            "Estimate what the residuals show, or remove it from the bench: {} ({}).",
+            "Estimate the error that the residuals show, or repair the bench: {} ({}).",
             errors.join(" and "),
             omitted::estimated_by(errors)
         ),

@@ -89,7 +89,7 @@ pub(super) enum Criterion {
     Margin,
 }
 
-/// What is measured at every position.
+/// Measurement at every position: dwell, samples and noise.
 pub(super) struct Dwell {
     pub seconds: f64,
     pub samples: usize,

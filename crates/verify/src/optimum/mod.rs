@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::file::{RawGyro, RawProblem};
 use crate::modular::{Randomness, chance};
-use crate::problem::Problem;
+use crate::problem::{Problem, known_carry};
 use crate::{Refused, Replay, by_primes, need, parsed, refusal, same};
 use accuracy::{Accuracy, Criterion, Dwell, State, Value};
 use space::{Space, multisets, power};
@@ -143,7 +143,7 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
     Ok(search.sentences(&file, (&firsts, depth), (chosen.len(), seed), &found))
 }
 
-/// What replays found.
+/// Findings of replays.
 #[derive(Default)]
 struct Found {
     sequences: u64,
@@ -243,7 +243,7 @@ fn within_precision(raw: &RawSearch, problem: &Problem) -> Result<(), Refused> {
     need(found == all, "problem.required", &format!("all {all} coefficients"), found)
 }
 
-/// What is measured at every position.
+/// Measurement at every position: dwell, samples and noise.
 fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
     need((5..=10_000).contains(&raw.samples), "problem.samples", "5 to 10000 samples", raw.samples)?;
     let azimuth = raw.azimuth_noise_deg;
@@ -266,13 +266,7 @@ fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
 
 impl Search {
     fn new(raw: &RawSearch, certificate: &[u8]) -> Result<Self, Refused> {
-        let carries = ["platform", "inertial", "reset"];
-        need(
-            carries.contains(&raw.carry.as_str()),
-            "problem.carry",
-            "platform, inertial or reset",
-            &raw.carry,
-        )?;
+        known_carry(&raw.carry)?;
         // rows of the candidates; the carry acts where they are put together
         let problem = Problem::new(&RawProblem {
             carry: "platform".into(),
@@ -330,8 +324,8 @@ impl Search {
         self.accuracy.value(&state)
     }
 
-    /// Where order matters n^left sequences follow a start, otherwise the multisets of what is not below its
-    /// last.
+    /// Number of sequences behind a start: n^left where order matters, otherwise multisets of what is not
+    /// below its last.
     fn behind(&self, start: &[usize]) -> Option<u64> {
         let (n, left) = (self.problem.positions.len() as u64, (self.positions - start.len()) as u64);
         match (self.carry.as_str(), start.last()) {

@@ -19,7 +19,7 @@ pub(super) struct Space {
     /// Columns of the required coefficients among the coefficients, and their largest degrees.
     required: Vec<(usize, usize)>,
     known: HashMap<Vec<usize>, Option<usize>>,
-    /// Where turns of the platform axes take every candidate; the identity among them.
+    /// Images of every candidate under turns of the platform axes; the identity is among them.
     pub maps: Vec<Vec<usize>>,
 }
 

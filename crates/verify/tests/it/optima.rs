@@ -373,8 +373,8 @@ fn symmetry_and_a_choice_of_blocks() {
     assert!(refused.starts_with("b"), "{refused}");
 }
 
-/// What double precision does not decide is refused by both checkers, by the place: candidates that are
-/// nearly alike, some of the coefficients, a latitude near the equator, and numbers that leave nothing
+/// Searches that double precision does not decide are refused by both checkers, by the place: candidates that
+/// are nearly alike, some of the coefficients, a latitude near the equator, and numbers that leave nothing
 /// measured.
 #[test]
 fn searches_beyond_double_precision_are_refused() {

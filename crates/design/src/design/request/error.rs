@@ -56,7 +56,7 @@ pub enum DesignError {
          equal dwells, repositioning at once, white noise of Z and nothing known beforehand"
     )]
     NoCertificate {
-        /// What is not covered.
+        /// Part of the search that is not covered.
         found: String,
     },
     /// A name that is no coefficient.

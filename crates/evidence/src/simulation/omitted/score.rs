@@ -132,7 +132,7 @@ impl Score {
         ((self.chi_square - fall) / (self.degrees_of_freedom - unknowns).max(1.0)).max(1.0)
     }
 
-    /// Whether chi-square is within its band after a fall by so many unknowns more.
+    /// True if chi-square is within its band after a fall by so many unknowns more.
     fn explained(&self, fall: f64, unknowns: f64) -> bool {
         let free = (self.degrees_of_freedom - unknowns).max(1.0);
         self.chi_square - fall <= chi_square_quantile(free, UNEXPLAINED)
