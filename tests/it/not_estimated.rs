@@ -439,6 +439,9 @@ fn a_report_says_what_its_met_rests_on() {
     let page = Html::parse_document(&report(folder.path(), "both.html", &[BENCH, &path]).1);
     let front = texts(&page, "section.front").concat();
     assert!(front.contains("the schemes differ in bench") && !front.contains("the only one that"), "{front}");
+    // every margin of the picture and the table of margins is of the total: below one is missed
+    let body = texts(&page, "table td, svg text").join("\n");
+    assert!(body.contains("0.1158 MISSED") && !body.contains("0.1158 met"), "{body}");
     let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);
     let rows = table(&page, "Every unknown");
     let row = rows.iter().find(|r| r[0] == "D_IZ").expect("D_IZ");

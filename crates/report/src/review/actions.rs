@@ -67,14 +67,12 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         _ => {}
     }
     let met = review.requirements.all_met();
-    let open = omitted::lead(&review.omitted, review.requirements.with_bench, met);
-    let open = open.map_or_else(String::new, |l| format!(" {l}"));
     if out.is_empty() {
         out.push(match (review.requirements.stated, met, &s.evidence) {
             (0, ..) => "State requirements: nothing says yet what is good enough.".into(),
             (_, false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
-            (_, _, Ok(_)) => format!("No action: every requirement is met, by prediction and in the run, and no check fails.{open}"),
-            (_, _, Err(_)) => format!("No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.{open}"),
+            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no check fails.".into(),
+            (_, _, Err(_)) => "No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.".into(),
         });
     }
     out

@@ -16,10 +16,15 @@ use crate::{compare, words};
 /// At most so many rows of a chart, which fit a page.
 const ROWS: usize = 48;
 
-/// What becomes of one requirement, in words.
+/// Uncertainty that decides a requirement: with a bench the total, without one sigma.
+fn deciding(q: &Quantity) -> Option<f64> {
+    q.total.or(q.sigma)
+}
+
+/// Outcome of one requirement, in words.
 fn margin(q: &Quantity) -> (String, Grade) {
-    match (q.requirement, q.margin, q.sigma) {
-        (Some(required), Some(m), Some(sigma)) if sigma <= required => {
+    match (q.requirement, q.margin, deciding(q)) {
+        (Some(required), Some(m), Some(found)) if found <= required => {
             (format!("{} met", number(m)), Grade::Good)
         }
         (Some(_), Some(m), _) => (format!("{} MISSED", number(m)), Grade::Missed),
@@ -57,7 +62,10 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
     };
     let picture = Chart {
         remark: "degree",
-        label: "margin: required over predicted sigma, with a bench over the total".into(),
+        label: match review.conditions.bench {
+            Some(_) => "margin: required over total".into(),
+            None => "margin: required over predicted sigma".into(),
+        },
         orders: false,
         threshold: Some(1.0),
         series: Vec::new(),
@@ -259,6 +267,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
 /// The sigma of every unknown in every scheme, with what is required where all require the same.
 fn sigmas(schemes: &[ComparedScheme]) -> Block {
     let all = unknowns(schemes);
+    let bench = schemes.iter().any(|s| s.conditions.bench.is_some());
     let of = |s: &ComparedScheme, name: &str| s.quantities.iter().find(|q| q.name == name).cloned();
     let row = |q: &&Quantity| {
         let required = || schemes.iter().filter_map(|s| of(s, &q.name)).map(|q| q.requirement);
@@ -266,7 +275,7 @@ fn sigmas(schemes: &[ComparedScheme]) -> Block {
         Row {
             name: q.name.clone(),
             remark: q.unit.clone(),
-            marks: schemes.iter().map(|s| of(s, &q.name).and_then(|q| q.sigma)).collect(),
+            marks: schemes.iter().map(|s| of(s, &q.name).as_ref().and_then(deciding)).collect(),
             limit: q.requirement.filter(|_| same),
             text: String::new(),
             grade: Grade::Open,
@@ -274,13 +283,16 @@ fn sigmas(schemes: &[ComparedScheme]) -> Block {
     };
     let picture = Chart {
         remark: "unit",
-        label: "predicted sigma".into(),
+        label: if bench { "sigma or total" } else { "predicted sigma" }.into(),
         orders: false,
         threshold: None,
         series: schemes.iter().map(|s| s.name.clone()).collect(),
         rows: all.iter().take(ROWS).map(row).collect(),
     };
-    let caption = "Predicted sigma of every unknown in each scheme; a stroke: what is required; no mark: not determined".to_string();
+    let what = if bench { "Predicted sigma, of schemes with a bench the total," } else { "Predicted sigma" };
+    let caption = format!(
+        "{what} of every unknown in each scheme; a stroke: what is required; no mark: not determined"
+    );
     chart("comparison_sigmas", caption, picture, all.len())
 }
 
@@ -305,6 +317,9 @@ mod tests {
             excitation: Vec::new(),
             carried_by: Vec::new(),
         };
+        // with a bench the total decides
+        let missed = Quantity { total: Some(0.5), margin: Some(0.2), ..q(Some(0.1), Some(0.05)) };
+        assert!(margin(&missed) == ("0.2000 MISSED".into(), Grade::Missed));
         for (requirement, sigma, expected, grade) in [
             (Some(0.1), Some(0.05), "2.000 met", Grade::Good),
             (Some(0.1), Some(0.1), "1.000 met", Grade::Good),

@@ -190,9 +190,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         Grade::Missed => (format!("{}. ", stated::capital(&requirements)), String::new()),
         _ => (String::new(), format!("; {requirements}")),
     };
-    let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
-    let open = open.filter(|_| review.requirements.stated > 0).map_or_else(String::new, |l| format!(" {l}"));
-    format!("{missed}{lead}{first}. {accuracy}{total}{others}{filter}.{open}")
+    format!("{missed}{lead}{first}. {accuracy}{total}{others}{filter}.")
 }
 
 /// The box of a scheme.
@@ -225,6 +223,10 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let prior = by_prior(s);
     let (checks, agreement) = evidence(s);
     let (required, requirements) = requirements(s, review);
+    // what the outcome rests on: sizes of errors that no bench states
+    let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
+    let open = open.filter(|_| review.requirements.stated > 0);
+    let requirements = open.map_or(requirements.clone(), |open| format!("{requirements}. {open}"));
     let row = |what, grade, text| Finding { what, grade, text };
     Status {
         title: s.name.clone(),
