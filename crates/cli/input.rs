@@ -62,7 +62,7 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// Whether a path stands for stdin.
+/// True if a path stands for stdin.
 pub(crate) fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }

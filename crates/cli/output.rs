@@ -91,7 +91,7 @@ impl Output {
         given.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// Whether the ending says that the answer alone goes to a file, where there may be a folder with figures
+    /// True if the ending says that the answer alone goes to a file, where there may be a folder with figures
     /// and series too.
     fn is_file(&self) -> bool {
         let path = self.target.path().filter(|path| !path.is_dir());

@@ -52,7 +52,7 @@ fn same(shown: &str, printed: &str) -> bool {
     shown.trim_end() == printed.trim_end() || rule(shown) && rule(printed)
 }
 
-/// Whether what is shown is what was printed; `...` stands for any lines.
+/// True if what is shown is what was printed; `...` stands for any lines.
 fn agree(shown: &[&str], printed: &[&str]) -> bool {
     match shown.split_first() {
         None => printed.is_empty(),

@@ -79,7 +79,7 @@ fn task(draw: &mut Draw) -> Vec<String> {
     out
 }
 
-/// Whether two numbers are equal but for rounding; null is no number.
+/// True if two numbers are equal but for rounding; null is no number.
 fn same(a: &Value, b: &Value) -> bool {
     match (a.as_f64(), b.as_f64()) {
         (Some(a), Some(b)) => (a - b).abs() <= 1e-6 * a.abs().max(b.abs()),

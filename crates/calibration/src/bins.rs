@@ -9,7 +9,7 @@ pub struct Mean {
     pub value: f64,
     /// Its variance: this times that of a sample, or this alone where the record gives a sigma.
     pub variance: f64,
-    /// Whether the record gives the sigma.
+    /// True if the record gives the sigma.
     pub given: bool,
     /// Samples that count.
     pub samples: usize,

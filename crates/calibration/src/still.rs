@@ -46,7 +46,7 @@ pub struct Detector<S> {
     waiting: Vec<S>,
     since: f64,
     found: usize,
-    /// Whether the interval that `found` counts is going on.
+    /// True if the interval that `found` counts is going on.
     inside: bool,
 }
 

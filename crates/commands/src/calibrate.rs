@@ -200,7 +200,7 @@ impl Calibrated {
         }
     }
 
-    /// Whether the model and its sigmas explain the records.
+    /// True if the model and its sigmas explain the records.
     pub fn passed(&self) -> bool {
         match self {
             Self::Platform(c) => c.consistent,
@@ -209,7 +209,7 @@ impl Calibrated {
         }
     }
 
-    /// Whether it was ended before it had settled.
+    /// True if it was ended before it had settled.
     pub fn interrupted(&self) -> bool {
         match self {
             Self::Platform(c) => c.findings.contains(&Finding::Interrupted),

@@ -61,7 +61,7 @@ pub trait Rendered: Send + Sync {
 pub struct Answered {
     /// The answer.
     pub answer: Box<dyn Rendered>,
-    /// Whether the command line would exit with 0: false where something disagrees or is not explained.
+    /// True if the command line would exit with 0: false where something disagrees or is not explained.
     pub passed: bool,
 }
 

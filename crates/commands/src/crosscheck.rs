@@ -78,7 +78,7 @@ pub enum Evidence {
 }
 
 impl Evidence {
-    /// Whether nothing disagrees.
+    /// True if nothing disagrees.
     pub fn passed(&self) -> bool {
         match self {
             Self::Scheme(e) => e.passed,

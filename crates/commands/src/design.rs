@@ -683,7 +683,7 @@ fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates),
     )))
 }
 
-/// Whether `--candidates` says what it is by a word, and is no file.
+/// True if `--candidates` says what it is by a word, and is no file.
 pub fn is_word(candidates: &str) -> bool {
     candidates == CARDINAL || candidates == "free" || candidates.starts_with("grid:")
 }

@@ -146,12 +146,12 @@ impl Source {
         )))
     }
 
-    /// Whether it is meant as a model, which may be JSON.
+    /// True if it is meant as a model, which may be JSON.
     fn is_model(&self) -> bool {
         self.is_json() || model_file::is_model(&self.text)
     }
 
-    /// Whether it is JSON: no TOML begins with a brace. What neither begins so nor is meant as a scheme or a
+    /// True if it is JSON: no TOML begins with a brace. What neither begins so nor is meant as a scheme or a
     /// model in TOML is what its name says.
     fn is_json(&self) -> bool {
         let toml = || scheme_file::is_scheme(&self.text) || model_file::is_model(&self.text);

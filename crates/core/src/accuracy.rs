@@ -127,7 +127,7 @@ impl Accuracy {
         self.module.as_ref().map_or(degree, |m| m.series.order(row))
     }
 
-    /// Whether samples over the dwells see a direction (shape n, in the first field of the verdicts) that
+    /// True if samples over the dwells see a direction (shape n, in the first field of the verdicts) that
     /// derivatives do not see.
     pub fn sees(&self, direction: &[u64]) -> bool {
         self.module.as_ref().is_some_and(|m| {

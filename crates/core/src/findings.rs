@@ -56,7 +56,7 @@ pub struct SchemeFindings {
 pub struct CombinationFinding {
     /// What it is, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`, or as it was asked for.
     pub name: String,
-    /// Whether it was asked for.
+    /// True if it was asked for.
     pub requested: bool,
     /// Its coefficients in the first field of the verdicts (up to a factor).
     pub vector: Vec<u64>,

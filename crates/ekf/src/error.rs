@@ -89,13 +89,13 @@ pub enum EkfError {
 }
 
 impl EkfError {
-    /// Whether numbers of the right shape went beyond what doubles resolve.
+    /// True if numbers of the right shape went beyond what doubles resolve.
     pub fn is_numeric(&self) -> bool {
         !matches!(self, Self::Shape { .. } | Self::NotSymmetric { .. })
     }
 }
 
-/// Whether `x` is a number above zero; false for NaN.
+/// True if `x` is a number above zero; false for NaN.
 pub(crate) fn is_positive(x: f64) -> bool {
     x > 0.0
 }

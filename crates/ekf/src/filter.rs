@@ -80,11 +80,11 @@ pub struct Innovation {
     /// The innovation at the prediction, whitened: independent unit normals when the model is right (one per
     /// component that was there).
     pub whitened: Vec<f64>,
-    /// Whether it was used: false where the gate left it out.
+    /// True if it was used: false where the gate left it out.
     pub accepted: bool,
     /// Linearisations.
     pub iterations: usize,
-    /// Whether the last step was within the tolerance; the extended filter takes one step and does not ask.
+    /// True if the last step was within the tolerance; the extended filter takes one step and does not ask.
     pub converged: bool,
 }
 

@@ -22,7 +22,7 @@ pub trait Manifold: Clone {
     /// reset does to the covariance. `None` where it is the identity, as for vectors.
     fn transport(&self, delta: &[f64]) -> Option<Transition>;
 
-    /// Whether all its numbers are finite.
+    /// True if all its numbers are finite.
     fn is_finite(&self) -> bool;
 }
 

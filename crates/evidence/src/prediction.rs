@@ -18,12 +18,12 @@ pub struct PredictedUnknown {
     pub degree: Option<usize>,
     /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
-    /// Whether samples over the dwells determine it (psi: of the start): by the accuracy order, or by the
+    /// True if samples over the dwells determine it (psi: of the start): by the accuracy order, or by the
     /// degree where the orders are not computed.
     pub determined: bool,
     /// The accuracy order of its value at the end, which is what a filter shows.
     pub order_at_end: Option<usize>,
-    /// Whether samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves
+    /// True if samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves
     /// it.
     pub determined_at_end: bool,
     /// Unknowns that derivatives do not tell it from.
@@ -35,7 +35,7 @@ pub struct PredictedUnknown {
 pub struct PredictedCombination {
     /// In words: `D_FZ - wN*psi_y`.
     pub expression: String,
-    /// Whether it was asked for: others are part of a basis.
+    /// True if it was asked for: others are part of a basis.
     pub requested: bool,
     /// Its coefficients; the first is its leading unknown.
     pub terms: Combination,
@@ -47,7 +47,7 @@ pub struct PredictedCombination {
     pub accuracy_order: Option<usize>,
     /// The accuracy order of its value at the end.
     pub order_at_end: Option<usize>,
-    /// Whether samples over the dwells determine its value at the end.
+    /// True if samples over the dwells determine its value at the end.
     pub determined_at_end: bool,
 }
 
@@ -60,7 +60,7 @@ pub struct Prediction {
     pub combinations: Vec<PredictedCombination>,
     /// `dim V_0, dim V_1, ...` by derivatives.
     pub rank_profile: Vec<usize>,
-    /// Whether all combinations of the basis have numbers.
+    /// True if all combinations of the basis have numbers.
     pub all_combinations: bool,
     /// Basis of the directions that no derivative of Z sees, unknowns that are not excited left out; `None`
     /// when some have no numbers.
@@ -70,7 +70,7 @@ pub struct Prediction {
     pub null_space: Vec<Combination>,
     /// The rank with dwells: unknowns minus this is the defect of a filter.
     pub rank: usize,
-    /// Whether there are accuracy orders: none are computed for schemes that rotate.
+    /// True if there are accuracy orders: none are computed for schemes that rotate.
     pub has_accuracy_orders: bool,
     /// Bound on the probability that any of it is wrong.
     pub error_bound: f64,

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whether a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for
+/// True if a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for
 /// what is no number.
 pub fn meets(sigma: f64, required: f64) -> bool {
     sigma <= required
@@ -158,7 +158,7 @@ impl Requirements {
         !self.missed.is_empty()
     }
 
-    /// Whether the worst margin leaves out some that are missed: their sigma does not count.
+    /// True if the worst margin leaves out some that are missed: their sigma does not count.
     pub fn leaves_out(&self) -> bool {
         self.missed.iter().any(|m| m.why != Miss::TooLarge)
     }

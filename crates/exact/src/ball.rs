@@ -110,22 +110,22 @@ impl<const N: usize> Ball<N> {
         if self.is_zero() { Self::ZERO } else { Self { error: 0.0, ..*self } }
     }
 
-    /// Whether the ball holds zero.
+    /// True if the ball holds zero.
     pub fn is_zero(&self) -> bool {
         self.mantissa[N - 1] == 0
     }
 
-    /// Whether it is zero without an error.
+    /// True if it is zero without an error.
     pub fn is_exactly_zero(&self) -> bool {
         self.is_zero() && self.error == 0.0
     }
 
-    /// Whether every number of the ball is above zero.
+    /// True if every number of the ball is above zero.
     pub fn is_positive(&self) -> bool {
         !self.is_zero() && !self.negative
     }
 
-    /// Whether every number of the ball is below zero.
+    /// True if every number of the ball is below zero.
     pub fn is_negative(&self) -> bool {
         !self.is_zero() && self.negative
     }
@@ -473,7 +473,7 @@ fn shifted_left<const N: usize>(a: &[u64; N], bits: usize) -> [u64; N] {
     out
 }
 
-/// Whether the sum has one bit more.
+/// True if the sum has one bit more.
 fn add_to<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     let mut carry = false;
     for (x, &y) in a.iter_mut().zip(b) {
@@ -520,7 +520,7 @@ pub(crate) mod tests {
         if ball.negative { -size } else { size }
     }
 
-    /// Whether a number lies in the ball.
+    /// True if a number lies in the ball.
     pub(crate) fn holds<const N: usize>(ball: &Ball<N>, x: &BigRational) -> bool {
         let radius =
             BigRational::from_float(ball.error).expect("finite") * two(ball.exponent - Ball::<N>::BITS);

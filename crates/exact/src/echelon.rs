@@ -178,19 +178,19 @@ impl Echelon {
         pivot.is_some()
     }
 
-    /// Whether `row` (shape `columns`) lies in the space.
+    /// True if `row` (shape `columns`) lies in the space.
     pub fn contains(&self, row: &[u64]) -> bool {
         let mut out = vec![0; self.columns];
         self.reduce_into(row, &mut out, &mut Workspace::default());
         out.iter().all(|&a| a == 0)
     }
 
-    /// Whether the unit vector of `column` lies in the space.
+    /// True if the unit vector of `column` lies in the space.
     pub fn has_unit(&self, column: usize) -> bool {
         self.pivot_row(column).is_some_and(|row| row.iter().enumerate().all(|(c, &a)| a == 0 || c == column))
     }
 
-    /// Whether every vector of the space is zero in `column`.
+    /// True if every vector of the space is zero in `column`.
     pub fn is_zero_column(&self, column: usize) -> bool {
         (0..self.rank()).all(|i| self.row(i)[column] == 0)
     }

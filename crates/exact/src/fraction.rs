@@ -22,12 +22,12 @@ impl Fraction {
         self.numerator.len() + self.denominator.len()
     }
 
-    /// Whether it is zero.
+    /// True if it is zero.
     pub fn is_zero(&self) -> bool {
         self.numerator.is_empty()
     }
 
-    /// Whether a variable occurs.
+    /// True if a variable occurs.
     pub fn holds(&self, v: u32) -> bool {
         self.numerator.terms_with(v) > 0 || self.denominator.terms_with(v) > 0
     }

@@ -19,7 +19,7 @@ impl Gap {
         Self { nonzero: self.nonzero.min(other.nonzero), zero: self.zero.max(other.zero) }
     }
 
-    /// Whether the two kinds are unmistakable with so many bits: zero below half of them, and a quarter of
+    /// True if the two kinds are unmistakable with so many bits: zero below half of them, and a quarter of
     /// them between the two.
     pub fn is_decisive(self, bits: i64) -> bool {
         let bits = bits as f64;

@@ -187,7 +187,7 @@ pub struct Basis {
     rows: Vec<Row>,
     /// Whether no other leading monomial divides the row's.
     active: Vec<bool>,
-    /// Whether it is a Groebner basis: the work was enough.
+    /// True if it is a Groebner basis: the work was enough.
     complete: bool,
 }
 
@@ -207,7 +207,7 @@ impl Basis {
         out
     }
 
-    /// Whether it is a Groebner basis.
+    /// True if it is a Groebner basis.
     pub fn is_complete(&self) -> bool {
         self.complete
     }

@@ -74,7 +74,7 @@ impl Polynomial {
         self.terms.len()
     }
 
-    /// Whether it is zero.
+    /// True if it is zero.
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }

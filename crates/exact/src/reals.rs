@@ -136,7 +136,7 @@ impl<const N: usize> RealSpace<N> {
         if largest == f64::NEG_INFINITY { 0.0 } else { largest }
     }
 
-    /// Whether an entry counts as different from zero, in a row of this scale; the gap remembers.
+    /// True if an entry counts as different from zero, in a row of this scale; the gap remembers.
     fn differs(&self, entry: &Ball<N>, scale: f64) -> bool {
         if entry.is_exactly_zero() {
             return false;
@@ -171,7 +171,7 @@ impl<const N: usize> RealSpace<N> {
         (sums.iter().enumerate().map(of).collect(), taken)
     }
 
-    /// Whether an entry of a reduced row is known too badly to be judged.
+    /// True if an entry of a reduced row is known too badly to be judged.
     fn is_wide(&self) -> bool {
         let narrow = -0.75 * Ball::<N>::BITS as f64;
         let wide = |row: &Vec<Ball<N>>| row.iter().any(|x| x.radius_log2() - Self::scale(row) > narrow);

@@ -19,7 +19,7 @@ pub trait Scalars: Clone + Debug {
     fn one(&self) -> Self::Element;
     /// The image of an integer.
     fn integer(&self, x: i64) -> Self::Element;
-    /// Whether an element cannot be told from zero.
+    /// True if an element cannot be told from zero.
     fn is_zero(&self, a: &Self::Element) -> bool;
     /// `a + b`.
     fn add(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
@@ -73,11 +73,11 @@ pub trait RowSpace: Clone + Debug {
     fn rank(&self) -> usize;
     /// Adds a row; whether the rank grew.
     fn insert(&mut self, row: &[Self::Element]) -> bool;
-    /// Whether a row lies in the space.
+    /// True if a row lies in the space.
     fn contains(&self, row: &[Self::Element]) -> bool;
-    /// Whether the unit vector of a column does.
+    /// True if the unit vector of a column does.
     fn has_unit(&self, column: usize) -> bool;
-    /// Whether a column is zero in every row.
+    /// True if a column is zero in every row.
     fn is_zero_column(&self, column: usize) -> bool;
     /// Row i of a reduced basis.
     fn row(&self, i: usize) -> &[Self::Element];

@@ -30,7 +30,7 @@ impl Turn {
         self.0 as f64 / 1e9
     }
 
-    /// Whether the angle is a multiple of `deg` degrees.
+    /// True if the angle is a multiple of `deg` degrees.
     pub fn is_multiple_of_deg(self, deg: i64) -> bool {
         self.0 % (deg * 1_000_000_000) == 0
     }

@@ -34,7 +34,7 @@ struct Answer(Answered);
 
 #[pymethods]
 impl Answer {
-    /// Whether nothing disagrees, and the model explains the records.
+    /// True if nothing disagrees, and the model explains the records.
     #[getter]
     fn passed(&self) -> bool {
         self.0.passed

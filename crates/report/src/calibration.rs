@@ -54,7 +54,7 @@ fn part(fast: f64) -> String {
 /// From this part on an error of the clock is large.
 const CLOCK: f64 = 0.1;
 
-/// Whether durations and rates tell of the same clock: a quarter of its error is what drifts that follow take
+/// True if durations and rates tell of the same clock: a quarter of its error is what drifts that follow take
 /// of it.
 pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
     let both = by_durations.zip(by_earth);

@@ -213,7 +213,7 @@ pub(crate) enum Drawing {
 }
 
 impl Picture {
-    /// Whether it stands by itself.
+    /// True if it stands by itself.
     pub(crate) fn is_wide(&self) -> bool {
         matches!(self.drawing, Drawing::Panels(_))
     }

@@ -128,9 +128,9 @@ impl fmt::Display for Format {
 pub struct Layout {
     /// Columns of the terminal; `None` for no limit.
     pub width: Option<u16>,
-    /// Whether headings and verdicts are styled with ANSI codes.
+    /// True if headings and verdicts are styled with ANSI codes.
     pub color: bool,
-    /// Whether there is nothing but ASCII: lines are drawn so, and other characters written as `\u{e9}`.
+    /// True if there is nothing but ASCII: lines are drawn so, and other characters written as `\u{e9}`.
     pub ascii: bool,
 }
 
@@ -305,7 +305,7 @@ pub fn design_figures(d: &Design) -> Result<Vec<File>, ReportError> {
     Ok(design::figures(d)?)
 }
 
-/// Whether this build can write a PDF.
+/// True if this build can write a PDF.
 pub const HAS_PDF: bool = cfg!(feature = "pdf");
 
 /// A format of a design review.

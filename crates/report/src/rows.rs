@@ -25,7 +25,7 @@ pub(crate) struct Chart {
     pub(crate) remark: &'static str,
     /// Along the axis.
     pub(crate) label: String,
-    /// Whether the axis is that of orders, 0, 1, 2; logarithmic otherwise.
+    /// True if the axis is that of orders, 0, 1, 2; logarithmic otherwise.
     pub(crate) orders: bool,
     /// A line through all rows: better is to the right of it.
     pub(crate) threshold: Option<f64>,

@@ -43,7 +43,7 @@ impl Table {
     }
 }
 
-/// Whether the way leads to an empty list.
+/// True if the way leads to an empty list.
 pub(crate) fn is_empty_list(answer: &Value, path: &str) -> bool {
     let pointer = format!("/{}", path.replace('.', "/"));
     answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty))

@@ -41,7 +41,7 @@ pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usiz
     }
 }
 
-/// Whether a row of the answer has something to say of the dwell.
+/// True if a row of the answer has something to say of the dwell.
 pub(crate) fn dwell_matters(a: &Analysis) -> bool {
     let unknowns = a.quantities.iter().map(|q| (q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (c.degree, c.accuracy_order));
@@ -149,7 +149,7 @@ fn differences(all: &[Difference]) -> String {
     groups.iter().map(group).collect::<Vec<_>>().join("; ")
 }
 
-/// Whether numbers in words follow each other.
+/// True if numbers in words follow each other.
 fn consecutive(positions: &[&str]) -> bool {
     let numbers: Option<Vec<usize>> = positions.iter().map(|p| p.parse().ok()).collect();
     numbers.is_some_and(|n| n.windows(2).all(|pair| pair[1] == pair[0] + 1))
@@ -410,7 +410,7 @@ pub(crate) fn null_vector(v: &[Component]) -> String {
     format!("{}{turned}", v.iter().map(part).collect::<Vec<_>>().join(", "))
 }
 
-/// Whether a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd
+/// True if a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd
 /// part: what a rotation of the platform axes does to them.
 fn rotates_the_axes(v: &[Component]) -> bool {
     let number = |name: &str| {

@@ -191,7 +191,7 @@ fn requirements_on_psi_count() {
     assert!(error.to_string().contains("`psi_x@1`"), "{error}");
 }
 
-/// Whether psi is what misses most in some sequence that is determined.
+/// True if psi is what misses most in some sequence that is determined.
 fn psi_decides(seen: &[Vec<(String, Option<f64>)>], worst: &[f64], asked: &dyn Fn(&str) -> f64) -> bool {
     seen.iter().zip(worst).any(|(of, worst)| {
         let psi = of.iter().filter(|(name, _)| name.starts_with("psi"));

@@ -56,7 +56,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Whether a blank follows that multiplies, and takes it.
+    /// True if a blank follows that multiplies, and takes it.
     fn multiplies(&mut self) -> bool {
         let next = self.rest.strip_prefix(' ').and_then(|r| r.chars().next());
         let found = next.is_some_and(|c| c.is_alphanumeric() || c == '(' || c == '[');

@@ -35,7 +35,7 @@ impl Value {
         (0..exponent.abs()).fold(Self::of(1.0), |product, _| product.times(base))
     }
 
-    /// Whether it is `expected` up to `tolerance` times what went into it.
+    /// True if it is `expected` up to `tolerance` times what went into it.
     pub(crate) fn is(self, expected: f64, tolerance: f64) -> bool {
         (self.value - expected).abs() <= tolerance * self.size.max(expected.abs())
     }

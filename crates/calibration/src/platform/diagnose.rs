@@ -193,7 +193,7 @@ struct Asked {
     unit: &'static str,
     status: Status,
     degree: Option<usize>,
-    /// Whether scheme and records determine it.
+    /// True if scheme and records determine it.
     determined: bool,
     /// True if they do so only with a prior that is stated.
     from_prior: bool,

@@ -243,7 +243,7 @@ impl Forces {
         }
     }
 
-    /// Whether `force` is that of the samples of one g that are nearest to a suspect in the record.
+    /// True if `force` is that of the samples of one g that are nearest to a suspect in the record.
     fn is_beside(
         &self,
         &(p, line, _): &(usize, u64, [f64; 3]),

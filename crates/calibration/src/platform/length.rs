@@ -37,7 +37,7 @@ pub(crate) struct Length {
 pub(crate) struct Wrong {
     /// The positions with the least and the greatest length.
     pub ends: [usize; 2],
-    /// Whether all are alike.
+    /// True if all are alike.
     pub alike: bool,
     /// Each of these alone explains them.
     pub causes: Vec<ForceCause>,

@@ -229,7 +229,7 @@ impl From<SchemeError> for CalibrationError {
 pub struct Options {
     /// What one g is, in m/s^2.
     pub gravity_m_s2: f64,
-    /// Whether the noise is estimated from the records.
+    /// True if the noise is estimated from the records.
     pub estimate_noise: bool,
     /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out.
     pub gate: f64,

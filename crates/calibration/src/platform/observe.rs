@@ -190,7 +190,7 @@ struct Layout {
     wanted: Vec<Wanted>,
     azimuth: bool,
     sigmas: bool,
-    /// Whether forces are increments of velocity, which are read in g s.
+    /// True if forces are increments of velocity, which are read in g s.
     increments: bool,
     /// The first of the three gimbal angles among what is wanted.
     gimbals: Option<usize>,
@@ -302,7 +302,7 @@ impl Layout {
         })
     }
 
-    /// Whether the record has the column `i` of the three that are observed: where it has none, the number is
+    /// True if the record has the column `i` of the three that are observed: where it has none, the number is
     /// that of the time.
     fn own(&self, i: usize) -> bool {
         self.wanted[i + 1].column != self.wanted[0].column

@@ -39,7 +39,7 @@ pub(super) struct Problem<'a> {
     pub(super) going: &'a dyn Fn(Going<'_>) -> bool,
     /// How many there were.
     pub(super) passes: usize,
-    /// Whether it said no.
+    /// True if it said no.
     pub(super) stopped: bool,
 }
 

@@ -402,7 +402,7 @@ impl<'a> Calibrating<'a> {
         std::iter::once(own.clone()).chain(before.cloned()).collect()
     }
 
-    /// Whether the calibration before rests on the same record.
+    /// True if the calibration before rests on the same record.
     fn shared(&self) -> bool {
         let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
         self.options.prior.as_ref().is_some_and(|b| own.among(&b.rests_on).is_some())

@@ -35,7 +35,7 @@ fn apart<'a>(ends: &'a [Settled], counts: &dyn Fn(usize) -> bool) -> Vec<(&'a Se
     out
 }
 
-/// Whether no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w -
+/// True if no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w -
 /// 2) < w + 1/2 (C. G. E. Boender, A. H. G. Rinnooy Kan, Math. Programming 37, 1987, doi:10.1007/BF02591684).
 fn enough(found: usize, starts: usize) -> bool {
     let (w, n) = (found as f64, starts as f64);

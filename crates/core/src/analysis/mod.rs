@@ -38,13 +38,13 @@ pub const SCHEMA: &str = "obsdeg.analysis/1";
 pub struct AnalysisOptions {
     /// Seed of all random choices.
     pub seed: u64,
-    /// Whether solving expressions are wanted.
+    /// True if solving expressions are wanted.
     pub solutions: bool,
-    /// Whether the formulas of Z and its derivatives are wanted.
+    /// True if the formulas of Z and its derivatives are wanted.
     pub formulas: bool,
     /// Axes of Z in solutions.
     pub frame: Frame,
-    /// Whether the exact classes of the errors that are not estimated are wanted.
+    /// True if the exact classes of the errors that are not estimated are wanted.
     pub omitted: bool,
 }
 

@@ -108,7 +108,7 @@ pub(crate) fn recover_radical(fields: &[RootField; 2], images: &[[u64; 4]; 2]) -
 }
 
 impl Coefficient {
-    /// Whether the coefficient is zero.
+    /// True if the coefficient is zero.
     pub fn is_zero(&self) -> bool {
         match &self.number {
             Number::Radical(r) => r.terms() == 0,
@@ -131,7 +131,7 @@ impl Coefficient {
         }
     }
 
-    /// Whether the number is exact and longer than [`READABLE`] as text.
+    /// True if the number is exact and longer than [`READABLE`] as text.
     pub(crate) fn is_unreadable(&self) -> bool {
         matches!(self.number, Number::Radical(_)) && self.without_rates().to_string().len() > READABLE
     }
@@ -220,7 +220,7 @@ impl Number {
     }
 }
 
-/// Whether a text has a sum outside of all brackets.
+/// True if a text has a sum outside of all brackets.
 fn has_sum(text: &str) -> bool {
     let mut depth = 0;
     let mut previous = ' ';

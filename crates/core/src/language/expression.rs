@@ -414,7 +414,7 @@ pub(crate) fn among(name: &str, known: &[String]) -> String {
     }
 }
 
-/// Whether `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
+/// True if `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
 pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
     let start = longer.get(..name.len()).filter(|_| name.len() > 2);
     start.is_some_and(|s| s.eq_ignore_ascii_case(name)) && longer[name.len()..].starts_with('_')

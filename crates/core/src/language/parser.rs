@@ -21,7 +21,7 @@ struct Reading<'a> {
     expression: Expression,
     names: Names,
     shapes: &'a Shapes,
-    /// Whether anything was no scalar.
+    /// True if anything was no scalar.
     vectors: bool,
 }
 

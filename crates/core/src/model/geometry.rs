@@ -120,7 +120,7 @@ impl Accelerometers {
         [self.X, self.Y, self.Z]
     }
 
-    /// Whether they are along the platform axes.
+    /// True if they are along the platform axes.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }

@@ -164,12 +164,12 @@ impl Gimbals {
         turns.filter_map(of).collect()
     }
 
-    /// Whether nothing is limited.
+    /// True if nothing is limited.
     pub fn are_free(&self) -> bool {
         self.limits.iter().all(Option::is_none)
     }
 
-    /// Whether the gimbals reach an attitude; one with a generic angle is taken as reached.
+    /// True if the gimbals reach an attitude; one with a generic angle is taken as reached.
     pub fn reach(&self, angles: &Euler) -> bool {
         if self.are_free() || angles.iter().any(|a| a.generic().is_some()) {
             return true;

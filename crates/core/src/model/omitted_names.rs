@@ -13,7 +13,7 @@ pub const SITE_FAMILIES: [(&str, &str); 5] = [
     ("attitude", "arcsec"),
 ];
 
-/// Whether some scheme can have an error or a family of errors of this name.
+/// True if some scheme can have an error or a family of errors of this name.
 pub fn may_be_omitted(name: &str) -> bool {
     let attitude = |name: &str| {
         let own = name.split('@').next().unwrap_or(name);

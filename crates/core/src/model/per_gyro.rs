@@ -29,7 +29,7 @@ impl PerGyro {
         Self([x; 3])
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     pub fn is_none(&self) -> bool {
         self.0 == [0.0; 3]
     }

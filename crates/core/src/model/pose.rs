@@ -28,7 +28,7 @@ pub struct Pose {
 pub struct Way {
     /// The turns in order; none where the attitude stays.
     pub turns: Vec<Turn>,
-    /// Whether the scheme says so. Where it does not this is the shortest turn.
+    /// True if the scheme says so. Where it does not this is the shortest turn.
     pub stated: bool,
 }
 

@@ -51,7 +51,7 @@ pub const BENCH: Range = range(0.0, 1e9, "");
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 
 impl Range {
-    /// Whether it holds `x`; never for NaN.
+    /// True if it holds `x`; never for NaN.
     pub fn admits(&self, x: f64) -> bool {
         (self.low..=self.high).contains(&x)
     }

@@ -20,7 +20,7 @@ pub trait Ring {
     fn mul(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
     /// `-a`.
     fn neg(&self, a: &Self::Element) -> Self::Element;
-    /// Whether `a` is zero for certain.
+    /// True if `a` is zero for certain.
     fn is_zero(&self, a: &Self::Element) -> bool;
 
     /// `sum a_i b_i`.

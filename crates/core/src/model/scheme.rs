@@ -52,12 +52,12 @@ impl Latitude {
         self.nanodeg as f64 / 1e9
     }
 
-    /// Whether `wN = 0`.
+    /// True if `wN = 0`.
     pub fn is_pole(self) -> bool {
         self.nanodeg.abs() == 90_000_000_000
     }
 
-    /// Whether `wU = 0`.
+    /// True if `wU = 0`.
     pub(crate) fn is_equator(self) -> bool {
         self.nanodeg == 0
     }
@@ -97,7 +97,7 @@ pub struct Scheme {
     pub geometry: Geometry,
     /// What is unknown besides psi.
     pub unknowns: Unknowns,
-    /// Whether `psi_y^n` is measured too.
+    /// True if `psi_y^n` is measured too.
     pub measured_azimuth: bool,
     /// Linear combinations of unknowns to be judged, as written by the user.
     pub combinations: Vec<String>,
@@ -415,7 +415,7 @@ impl Scheme {
         Ok(other)
     }
 
-    /// Whether it says that turning to a position takes time.
+    /// True if it says that turning to a position takes time.
     pub fn slews(&self) -> bool {
         let own = |p: &Position| p.slew.as_ref().is_some_and(|s| s.rate_deg_s.is_some());
         self.simulation.slew_rate_deg_s.is_some() || self.positions.iter().any(own)
@@ -443,12 +443,12 @@ impl Scheme {
         name
     }
 
-    /// Whether a segment rotates.
+    /// True if a segment rotates.
     pub fn rotates(&self) -> bool {
         self.positions.iter().any(|p| p.rotation.is_some())
     }
 
-    /// Whether rotations are judged by the course of Z while they go on, not at attitudes of the arc: where
+    /// True if rotations are judged by the course of Z while they go on, not at attitudes of the arc: where
     /// not only drifts are unknown.
     pub fn by_course(&self) -> bool {
         self.rotates() && (self.unknowns.have(Source::Rate) || self.unknowns.have(Source::Force))
@@ -494,7 +494,7 @@ impl Scheme {
         out
     }
 
-    /// Whether verdicts depend on how positions are reached: torquer errors act while psi^n is carried.
+    /// True if verdicts depend on how positions are reached: torquer errors act while psi^n is carried.
     pub fn torquers_act(&self) -> bool {
         self.carry == Carry::Inertial && self.unknowns.have(Source::Rate) && self.positions.len() > 1
     }

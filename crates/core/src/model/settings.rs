@@ -311,7 +311,7 @@ impl Settings {
     }
 }
 
-/// Whether an assignment to `pattern` concerns the unknown `name`.
+/// True if an assignment to `pattern` concerns the unknown `name`.
 pub fn concerns(pattern: &str, name: &str) -> bool {
     let base = name.split('@').next().unwrap_or(name);
     let base = base.strip_suffix("^n").unwrap_or(base);
@@ -321,7 +321,7 @@ pub fn concerns(pattern: &str, name: &str) -> bool {
     pattern == name || pattern == base || family || kind
 }
 
-/// Whether some scheme has an unknown or family of this name.
+/// True if some scheme has an unknown or family of this name.
 pub(crate) fn may_be_unknown(name: &str) -> bool {
     let axis = |name: &str| matches!(name, "psi_x" | "psi_y" | "psi_z" | "eps_x" | "eps_y" | "eps_z");
     let number = |i: &str| i.len() <= 4 && !i.starts_with('0') && i.bytes().all(|b| b.is_ascii_digit());
@@ -332,7 +332,7 @@ pub(crate) fn may_be_unknown(name: &str) -> bool {
     is_family(name) || axis(name.strip_suffix("^n").unwrap_or(name)) || at(name)
 }
 
-/// Whether a gyro model may have it, even if the scheme at hand does not.
+/// True if a gyro model may have it, even if the scheme at hand does not.
 pub fn is_family(name: &str) -> bool {
     families().chain(coefficients()).any(|known| known == name)
 }

@@ -20,7 +20,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// Whether the opposite turn ends at the same attitude.
+    /// True if the opposite turn ends at the same attitude.
     pub fn is_half(&self) -> bool {
         self.angle_deg == 180.0
     }
@@ -101,7 +101,7 @@ fn norm(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Whether a rotation by so many rad leads as well the other way round.
+/// True if a rotation by so many rad leads as well the other way round.
 fn is_half_turn(angle: f64) -> bool {
     (angle.abs() - std::f64::consts::PI).abs() <= SAME
 }

@@ -98,7 +98,7 @@ impl Symbols {
         Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes, turns: Vec::new() }
     }
 
-    /// Whether the sine and cosine of an angle are among the symbols.
+    /// True if the sine and cosine of an angle are among the symbols.
     pub fn has(&self, angle: &Angle) -> bool {
         let base = octant(angle).0;
         let name = angle.generic().map(|(name, _)| name);

@@ -463,7 +463,7 @@ impl Unknowns {
         }
     }
 
-    /// Whether a term of this source is among them.
+    /// True if a term of this source is among them.
     pub fn have(&self, source: Source) -> bool {
         self.terms().iter().any(|t| t.source() == source)
     }

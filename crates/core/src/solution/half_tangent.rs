@@ -37,7 +37,7 @@ impl Rounded {
 pub(super) struct Roots {
     /// In degrees from 0 to 360, rising.
     pub(super) deg: Vec<f64>,
-    /// Whether these are certainly all; otherwise rounding, the degree, or roots very close together left
+    /// True if these are certainly all; otherwise rounding, the degree, or roots very close together left
     /// some undecided.
     pub(super) all: bool,
 }

@@ -452,7 +452,7 @@ impl Place {
     }
 }
 
-/// Whether a polynomial is a sum of products of squares, as far as its text shows.
+/// True if a polynomial is a sum of products of squares, as far as its text shows.
 fn never_negative(e: &Expression) -> bool {
     let mut out: Vec<bool> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {

@@ -131,7 +131,7 @@ pub(super) struct Used {
 }
 
 impl Solver<'_> {
-    /// Whether the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
+    /// True if the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
     /// replaced by its row, at rest or turning, in all tables; terms with decimals in floating point.
     fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {

@@ -120,12 +120,12 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Whether formulas in sines and cosines are out of question: too many different angles.
+    /// True if formulas in sines and cosines are out of question: too many different angles.
     pub(crate) fn too_many_angles(&self) -> bool {
         self.symbols.angles() > MAX_SYMBOLIC_ANGLES
     }
 
-    /// Whether a formula was too much work, so that no other was attempted.
+    /// True if a formula was too much work, so that no other was attempted.
     pub(crate) fn given_up(&self) -> bool {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }
@@ -245,7 +245,7 @@ impl<'a> Solver<'a> {
         recover_radical(&self.tables.fields(), &[*first, *second])
     }
 
-    /// Whether the text solves the system in the prime fields too: it must have the images of the
+    /// True if the text solves the system in the prime fields too: it must have the images of the
     /// solution there (in the order of `all_tables`, other rates apart).
     pub(super) fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
         self.tables_at_the_rates()

@@ -10,7 +10,7 @@ pub struct Term {
     pub station: usize,
     /// 1, 2, 3: component in n or platform axis; of a measured azimuth its number.
     pub component: usize,
-    /// Whether this is the measured azimuth.
+    /// True if this is the measured azimuth.
     pub azimuth: bool,
     /// Derivative order; at a rotation, of the platform that turns.
     pub order: usize,

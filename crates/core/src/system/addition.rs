@@ -75,7 +75,7 @@ pub(super) fn written_apart(compiled: &Compiled) -> Option<Compiled> {
     Some(compiled.with(dag, &nodes))
 }
 
-/// Whether there is an addition theorem.
+/// True if there is an addition theorem.
 fn is_function_of_sums(function: Function) -> bool {
     use Function::{Cos, Exp, Sin, Tan, Tanh};
     matches!(function, Sin | Cos | Tan | Exp | Tanh)

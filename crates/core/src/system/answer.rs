@@ -210,7 +210,7 @@ impl From<ByDigits> for DigitsReport {
 pub struct SystemOptions {
     /// Seed of all random choices.
     pub seed: u64,
-    /// Whether solving expressions and the number of solutions are wanted.
+    /// True if solving expressions and the number of solutions are wanted.
     pub solutions: bool,
     /// How much work counting solutions may take: millions of products of two coefficients, at each of two
     /// points.

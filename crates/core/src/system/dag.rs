@@ -69,12 +69,12 @@ pub struct Dag {
 }
 
 impl Dag {
-    /// Whether there is no function in it, so that a prime field knows every value.
+    /// True if there is no function in it, so that a prime field knows every value.
     pub fn is_rational(&self) -> bool {
         !self.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi))
     }
 
-    /// Whether a function of a node is there.
+    /// True if a function of a node is there.
     pub(super) fn has(&self, function: Function, of: usize) -> bool {
         self.functions.contains_key(&(function, of))
     }

@@ -394,7 +394,7 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Whether an expression holds no unknown of a higher degree than its own, and no derivative of an order
+    /// True if an expression holds no unknown of a higher degree than its own, and no derivative of an order
     /// too far beyond that.
     fn is_solution(&self, unknown: usize, e: &Fraction) -> bool {
         let Some(degree) = self.system.degrees[unknown] else { return false };

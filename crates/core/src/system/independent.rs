@@ -77,7 +77,7 @@ pub(super) fn independent_functions(
     free.then_some(functions.len())
 }
 
-/// Whether there is a real point at which rates and outputs are defined: then they are around it.
+/// True if there is a real point at which rates and outputs are defined: then they are around it.
 fn is_somewhere(
     model: &SystemModel,
     compiled: &Compiled,
@@ -132,7 +132,7 @@ fn functions(compiled: &Compiled) -> Vec<(usize, Function, usize)> {
     out
 }
 
-/// Whether what an argument depends on is at a generic value wherever a run or a segment begins, and the same
+/// True if what an argument depends on is at a generic value wherever a run or a segment begins, and the same
 /// in all of them; or a number that never changes.
 fn is_generic(model: &SystemModel, role: Role) -> bool {
     let changes = |name: &str| model.segments.iter().any(|s| s.constants.iter().any(|c| c.0 == name));
@@ -149,7 +149,7 @@ fn is_generic(model: &SystemModel, role: Role) -> bool {
     }
 }
 
-/// Whether no combination of these nodes is constant: their gradients by all that is generic, at some points
+/// True if no combination of these nodes is constant: their gradients by all that is generic, at some points
 /// side by side, have full rank.
 fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &mut SplitMix64) -> bool {
     let compiled = maker.compiled;

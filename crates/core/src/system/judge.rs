@@ -86,7 +86,7 @@ pub struct ByDigits {
 }
 
 impl Judgement {
-    /// Whether an unknown is spoken of: of arbitrary inputs only the signal itself is of interest.
+    /// True if an unknown is spoken of: of arbitrary inputs only the signal itself is of interest.
     pub fn shown(&self, model: &SystemModel, unknown: usize) -> bool {
         let u = &self.layout.unknowns[unknown];
         match u.role {
@@ -128,9 +128,9 @@ pub(crate) struct At<S: Values> {
     pub(crate) span: S::Space,
     /// The value of every unknown there, then of every known constant.
     pub(crate) values: Vec<S::Element>,
-    /// Whether the last order is proven to be the last.
+    /// True if the last order is proven to be the last.
     ended: bool,
-    /// Whether the point is generic, so that an order that adds nothing is the last.
+    /// True if the point is generic, so that an order that adds nothing is the last.
     closed: bool,
     gap: Gap,
     steps: Steps<S>,

@@ -382,7 +382,7 @@ impl Reader<'_> {
     }
 }
 
-/// Whether a text is meant as a model, not a scheme.
+/// True if a text is meant as a model, not a scheme.
 pub fn is_model(text: &str) -> bool {
     text.lines().map(str::trim_start).any(|l| l.starts_with("[states") || l.starts_with("[outputs"))
 }

@@ -37,7 +37,7 @@ pub(super) struct Formulas {
 }
 
 impl Formulas {
-    /// Whether it is the number 0.
+    /// True if it is the number 0.
     fn is_zero(&self) -> bool {
         let zero =
             |p: &PlacedExpression| matches!(p.expression.nodes[..], [Node::Number { mantissa: 0, .. }]);

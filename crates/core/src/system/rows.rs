@@ -621,12 +621,12 @@ impl<'a, S: Values> SystemRows<'a, S> {
         self.runs.iter().fold(self.gap, |gap, run| gap.and(run.own.gap()))
     }
 
-    /// Whether every run starts at a generic point.
+    /// True if every run starts at a generic point.
     pub(crate) fn is_generic(&self) -> bool {
         self.runs.iter().all(|r| r.end == End::Stagnation)
     }
 
-    /// Whether the end of every run is proven, as far as its orders were asked for.
+    /// True if the end of every run is proven, as far as its orders were asked for.
     pub(crate) fn is_done(&self) -> bool {
         self.runs.iter().all(|r| r.done)
     }
@@ -660,7 +660,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         }
     }
 
-    /// Whether a node depends on no unknown in a run.
+    /// True if a node depends on no unknown in a run.
     pub(super) fn is_known(&self, run: usize, node: usize) -> bool {
         self.runs[run].taylor.is_known(node)
     }

@@ -491,7 +491,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.lanes
     }
 
-    /// Whether a node takes part.
+    /// True if a node takes part.
     pub(super) fn takes_part(&self, a: usize) -> bool {
         self.needed[a]
     }
@@ -501,7 +501,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         &self.values[a]
     }
 
-    /// Whether a node depends on no unknown.
+    /// True if a node depends on no unknown.
     pub(crate) fn is_known(&self, a: usize) -> bool {
         self.known[a]
     }
@@ -511,7 +511,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.value(a, 0)
     }
 
-    /// Whether a node takes part and depends on the time itself.
+    /// True if a node takes part and depends on the time itself.
     pub(crate) fn depends_on_time(&self) -> bool {
         let is_time = |s: usize| matches!(self.signals[s], Signal::Time { .. });
         self.dag
@@ -521,7 +521,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             .any(|(op, needed)| *needed && matches!(*op, Op::Slot(s) if is_time(s)))
     }
 
-    /// Whether nothing moves: every rate is zero and every signal constant.
+    /// True if nothing moves: every rate is zero and every signal constant.
     pub(crate) fn is_at_rest(&self) -> bool {
         self.dag.ops.iter().zip(&self.needed).all(|(op, needed)| match *op {
             Op::Slot(s) if *needed => match self.signals[s] {

@@ -143,7 +143,7 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
 struct Told {
     names: Vec<String>,
     single: Vec<bool>,
-    /// Whether the differences of the D_I are in it.
+    /// True if the differences of the D_I are in it.
     differences: bool,
 }
 

@@ -62,7 +62,7 @@ const EPS: [&str; 3] = ["cx", "cy", "cz"];
 const GRAVITY: [&str; 3] = ["gx", "gy", "gz"];
 const RATES: [&str; 3] = ["wN", "wU", "0"];
 
-/// Whether the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with
+/// True if the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with
 /// `omega_c` has, in the first order of psi and eps, the derivative of psi that (2) says.
 fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;

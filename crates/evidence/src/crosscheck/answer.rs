@@ -93,7 +93,7 @@ impl Agreement {
         if agrees { Self::Agrees } else { Self::Disagrees }
     }
 
-    /// Whether it is for or against the verdict.
+    /// True if it is for or against the verdict.
     pub fn is_resolved(self) -> bool {
         matches!(self, Self::Agrees | Self::Disagrees)
     }
@@ -158,7 +158,7 @@ impl Check {
         Self { predicted, measured, outcome }
     }
 
-    /// Whether something was measured that disagrees.
+    /// True if something was measured that disagrees.
     pub fn fails(&self) -> bool {
         self.outcome == Agreement::Disagrees
     }

@@ -45,9 +45,9 @@ pub(super) enum Course {
 pub(super) struct Question {
     /// `(unknown, coefficient)`, drifts in rad/s.
     pub(super) terms: Vec<(usize, f64)>,
-    /// Whether its coefficients are exact, or rounded to doubles.
+    /// True if its coefficients are exact, or rounded to doubles.
     pub(super) exact: bool,
-    /// Whether its psi is that of the end.
+    /// True if its psi is that of the end.
     pub(super) at_end: bool,
 }
 

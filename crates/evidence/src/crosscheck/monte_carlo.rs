@@ -164,7 +164,7 @@ impl<'a> Prepared<'a> {
         Ok(Self { experiment, gains, start, truth_start, checkpoints, nees, observable, first_step, kind })
     }
 
-    /// Whether filter and truth have the same unknowns, so that errors can be taken.
+    /// True if filter and truth have the same unknowns, so that errors can be taken.
     fn comparable(&self) -> bool {
         self.experiment.filter.platform.names() == self.experiment.truth.platform.names()
     }
@@ -193,7 +193,7 @@ impl<'a> Prepared<'a> {
         self.kind
     }
 
-    /// Whether runs have the scheme's own truth, from initial estimates about it: an exact truth, and a
+    /// True if runs have the scheme's own truth, from initial estimates about it: an exact truth, and a
     /// filter of its unknowns. Others have truths drawn about the initial estimate.
     pub fn is_about_the_truth(&self) -> bool {
         self.experiment.conditions.truth == Truth::Exact && self.comparable()

@@ -457,7 +457,7 @@ pub fn shown_unit(unit: &str) -> &str {
     if unit == "rad" { "deg" } else { unit }
 }
 
-/// Whether an unknown of this unit is a rate.
+/// True if an unknown of this unit is a rate.
 pub fn is_rate(unit: &str) -> bool {
     unit.starts_with("deg/h")
 }

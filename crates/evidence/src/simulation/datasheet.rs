@@ -42,7 +42,7 @@ impl GyroNoise {
         ]
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     pub fn is_none(&self) -> bool {
         self.lists().iter().all(|(_, x)| x.is_none())
     }

@@ -125,7 +125,7 @@ pub enum SimulationError {
 }
 
 impl SimulationError {
-    /// Whether admitted numbers went beyond what doubles resolve.
+    /// True if admitted numbers went beyond what doubles resolve.
     pub fn is_numeric(&self) -> bool {
         match self {
             Self::Unresolvable { .. } => true,

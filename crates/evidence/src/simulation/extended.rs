@@ -371,7 +371,7 @@ pub struct Ended {
     pub covariance: Covariance,
     /// Linearisations of the whole run: 1 of a filter that goes through it once.
     pub passes: usize,
-    /// Whether they settled.
+    /// True if they settled.
     pub converged: bool,
 }
 

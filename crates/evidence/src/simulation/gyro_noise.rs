@@ -24,7 +24,7 @@ impl Plan {
         self.platform.scheme().geometry.gyros()[gyro].I.vector().map(f64::from)
     }
 
-    /// Whether sensors have biases that go on, or gyros white drift of their own.
+    /// True if sensors have biases that go on, or gyros white drift of their own.
     pub(super) fn is_noisy(&self) -> bool {
         !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
     }
@@ -138,7 +138,7 @@ impl Gyros {
         Self { h, steps: plan.gyros.iter().map(of).collect() }
     }
 
-    /// Whether it is for parts of `h` s.
+    /// True if it is for parts of `h` s.
     pub(super) fn is_for(&self, h: f64) -> bool {
         self.h == h
     }

@@ -123,7 +123,7 @@ struct Settled {
 }
 
 impl Settled {
-    /// Whether it is to be preferred: one that settled, then one that fits.
+    /// True if it is to be preferred: one that settled, then one that fits.
     fn is_better_than(&self, other: &Self) -> bool {
         (self.converged, -self.misfit) > (other.converged, -other.misfit)
     }

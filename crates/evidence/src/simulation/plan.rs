@@ -603,7 +603,7 @@ impl Plan {
         }
     }
 
-    /// Whether torquer errors act in turns at once: full attitudes have no such turns.
+    /// True if torquer errors act in turns at once: full attitudes have no such turns.
     pub fn torqued_at_once(&self) -> bool {
         self.point.turns.iter().any(|turns| !turns.is_empty())
     }
@@ -658,7 +658,7 @@ impl Plan {
         integration_steps(turn).unwrap_or(MAX_INTEGRATION)
     }
 
-    /// Whether the unknowns are coefficients, not the drift itself.
+    /// True if the unknowns are coefficients, not the drift itself.
     pub(crate) fn has_coefficients(&self) -> bool {
         self.platform.scheme().unknowns != Unknowns::Drift
     }

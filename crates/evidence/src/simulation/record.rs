@@ -368,7 +368,7 @@ pub(crate) fn choose(
     }
 }
 
-/// Whether sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose
+/// True if sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose
 /// model is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
 fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity, psi_prior: f64) -> bool {
     match kind {

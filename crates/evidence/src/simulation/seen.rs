@@ -45,7 +45,7 @@ impl Seen {
     }
 }
 
-/// Whether the wider prior leaves the standard deviation of a combination, but for a factor.
+/// True if the wider prior leaves the standard deviation of a combination, but for a factor.
 fn determined(roots: &[DMatrix<f64>; 2], terms: &[(usize, f64)], factor: f64) -> bool {
     let sigma = |root: &DMatrix<f64>| {
         let zero = nalgebra::RowDVector::zeros(root.ncols());

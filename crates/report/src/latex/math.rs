@@ -63,7 +63,7 @@ pub(crate) fn symbol(name: &str) -> String {
     format!("{body}{frame}{position}")
 }
 
-/// Whether a text names one or two sensors.
+/// True if a text names one or two sensors.
 fn sensors(axes: &str) -> bool {
     (1..=2).contains(&axes.len()) && axes.bytes().all(|b| b"XYZ".contains(&b))
 }
@@ -338,7 +338,7 @@ fn dotted(math: &str, order: usize) -> String {
     }
 }
 
-/// Whether an exponent can be set on it: a letter with an index at most.
+/// True if an exponent can be set on it: a letter with an index at most.
 fn plain(math: &str) -> bool {
     !math.contains('^') && !["\\frac", "\\sqrt", "("].iter().any(|c| math.contains(c))
 }

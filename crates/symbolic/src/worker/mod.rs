@@ -115,7 +115,7 @@ fn write(output: &mut impl Write, response: &Response) -> std::io::Result<()> {
     output.flush()
 }
 
-/// Whether a job has spent so many seconds on the processor before it was done.
+/// True if a job has spent so many seconds on the processor before it was done.
 fn watch(done: &Receiver<()>, seconds: u64) -> bool {
     let start = processor_time();
     while done.recv_timeout(WATCH) == Err(RecvTimeoutError::Timeout) {

@@ -202,7 +202,7 @@ impl Reader<'_> {
     }
 }
 
-/// Whether a text is meant as a scheme.
+/// True if a text is meant as a scheme.
 pub fn is_scheme(text: &str) -> bool {
     text.lines().map(str::trim_start).any(|l| {
         l.starts_with("[[position]]")

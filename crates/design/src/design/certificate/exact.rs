@@ -162,7 +162,7 @@ impl Exact {
         }
     }
 
-    /// Whether every principal sigma of what counts is below this.
+    /// True if every principal sigma of what counts is below this.
     pub(super) fn covariance_is_below(&self, sigma: f64) -> bool {
         let limit = real(sigma).mul(&real(self.dph));
         let limit = limit.mul(&limit);

@@ -324,7 +324,7 @@ impl Evaluator {
         out
     }
 
-    /// Whether the order of positions makes a difference.
+    /// True if the order of positions makes a difference.
     pub(crate) fn ordered(&self) -> bool {
         self.carry() != Carry::Reset || self.bias.is_some()
     }
@@ -352,7 +352,7 @@ fn add_square(sum: &mut [[f64; LOCAL]; LOCAL], row: &[f64; LOCAL], weight: f64) 
 }
 
 impl Prior {
-    /// Whether psi is known as well about every axis.
+    /// True if psi is known as well about every axis.
     pub(crate) fn is_alike(&self) -> bool {
         self.psi.iter().all(|p| *p == self.psi[0])
     }

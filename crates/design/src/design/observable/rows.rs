@@ -403,7 +403,7 @@ impl Unseen {
         Self { field: f, vectors, wanted }
     }
 
-    /// Whether `rows` leave no required component unseen: what they make of v_1 .. v_m spans `wanted`.
+    /// True if `rows` leave no required component unseen: what they make of v_1 .. v_m spans `wanted`.
     fn is_seen(&self, rows: &[Vec<u64>], scratch: &mut Vec<u64>) -> bool {
         let (f, m) = (self.field, self.vectors.len());
         if rows.len() < self.wanted.len() {

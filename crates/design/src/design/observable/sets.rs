@@ -65,12 +65,12 @@ impl Sets {
         self.bits[place / 64].fetch_or(1 << (place % 64), Ordering::Relaxed);
     }
 
-    /// Whether an ascending set of at least one is among them.
+    /// True if an ascending set of at least one is among them.
     pub(crate) fn contains(&self, set: &[usize]) -> bool {
         self.bit(self.place(set))
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub(crate) fn is_empty(&self) -> bool {
         self.bits.iter().all(|word| word.load(Ordering::Relaxed) == 0)
     }

@@ -469,7 +469,7 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
     (neighbours, tour)
 }
 
-/// Whether the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets
+/// True if the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets
 /// does.
 pub fn is_walk(base: &Scheme) -> bool {
     base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)

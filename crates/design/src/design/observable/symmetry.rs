@@ -112,7 +112,7 @@ fn rotations(f: &Field) -> Vec<Matrix3<u64>> {
     out
 }
 
-/// Whether turning the platform axes by `p` renames the coefficients, those that count alike among
+/// True if turning the platform axes by `p` renames the coefficients, those that count alike among
 /// themselves. The columns (of the drift and of Z) are polynomials in C: equal at a random matrix, they are
 /// equal.
 fn renames(f: &Field, platform: &Platform, p: &Matrix3<u64>, same: &dyn Fn(usize, usize) -> bool) -> bool {

@@ -47,7 +47,7 @@ pub struct DesignOptions {
     /// at all. `None`: they are not searched, and the answer says how far that scheme is from the bound at
     /// most. 0: all are searched, however many they are, under any carry.
     pub within: Option<f64>,
-    /// Whether the bound over all attitudes is sought too (reset carry).
+    /// True if the bound over all attitudes is sought too (reset carry).
     pub everywhere: bool,
     /// The candidates are where the search for the best attitudes of all begins; these take their place, with
     /// angles rounded to multiples of so many 1e-9 degrees (reset carry).

@@ -78,11 +78,11 @@ pub(crate) struct Task<'a> {
     conditions: &'a Conditions,
     pub(crate) rows: Rows,
     pub(crate) symmetry: Symmetry,
-    /// Whether repositioning takes time.
+    /// True if repositioning takes time.
     slews: bool,
     /// The units of all coefficients.
     units: Vec<&'static str>,
-    /// Whether torquer errors act on the way between positions: sets have no verdict then.
+    /// True if torquer errors act on the way between positions: sets have no verdict then.
     pub(crate) walks: bool,
 }
 

@@ -27,7 +27,7 @@ pub struct Best {
 }
 
 impl Best {
-    /// Whether a sequence would be kept.
+    /// True if a sequence would be kept.
     pub(crate) fn wants(&self, keep: usize, worth: &Worth, seconds: f64) -> bool {
         worth.is_valid()
             && (self.found.len() < keep
@@ -42,7 +42,7 @@ impl Best {
                 && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
     }
 
-    /// Whether an equal one of the front comes later in lexicographic order: then the new one takes its
+    /// True if an equal one of the front comes later in lexicographic order: then the new one takes its
     /// place, so that the front does not depend on the order in which sequences come.
     fn is_before_its_equal(&self, new: &Scored) -> bool {
         let equal = |f: &&Scored| {

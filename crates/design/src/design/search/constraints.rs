@@ -20,7 +20,7 @@ pub struct Constraints {
 }
 
 impl Constraints {
-    /// Whether the degrees of the required coefficients are within the caps.
+    /// True if the degrees of the required coefficients are within the caps.
     pub(crate) fn cap(&self, degrees: &[usize]) -> bool {
         self.degrees.as_ref().is_none_or(|caps| degrees.iter().zip(caps).all(|(d, cap)| d <= cap))
     }
@@ -45,7 +45,7 @@ impl Constraints {
         over + evaluator.not_immune(state, root)
     }
 
-    /// Whether times and sigmas of a sequence are within the limits.
+    /// True if times and sigmas of a sequence are within the limits.
     pub(crate) fn keep(&self, evaluator: &Evaluator, sequence: &[Stop]) -> bool {
         self.violation(evaluator, sequence, &evaluator.state_of(sequence), &mut Vec::new()) == 0.0
     }

@@ -234,7 +234,7 @@ impl<'a> Screen<'a> {
         gone
     }
 
-    /// Whether a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number
+    /// True if a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number
     /// says nothing.
     fn is_worse(&self, most: f64, energy: f64, limit: f64) -> bool {
         // of n logarithms up to 100 (D), or n squares

@@ -56,7 +56,7 @@ impl Ties {
         self.counts.keys().next().map_or(f64::INFINITY, |k| f64::from_bits(k.0) * (1.0 + TIE))
     }
 
-    /// Whether a sequence of this worth is as good as the best so far, or better.
+    /// True if a sequence of this worth is as good as the best so far, or better.
     pub(crate) fn wants(&self, worth: &Worth) -> bool {
         self.counts.is_empty()
             || worth.degree < self.degree

@@ -34,7 +34,7 @@ fn figures(of: &OmittedEffects, family: &str, s: f64) -> [f64; 2] {
     [worst, f.worst_in_sigmas.unwrap_or(0.0) * s]
 }
 
-/// Whether a figure is that of the table: within half a unit of its last digit, and four units of the fourth
+/// True if a figure is that of the table: within half a unit of its last digit, and four units of the fourth
 /// digit of two computations.
 fn is_printed(x: f64, like: &str) -> bool {
     let decimals = like.split_once('.').map_or(0, |(_, d)| d.len()) as i32;
