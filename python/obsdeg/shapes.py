@@ -2908,7 +2908,7 @@ class FindingSuspect(Record):
 
     kind: Literal["suspect"]
     errors: list[str]
-    """Names of the errors: one, or a pair where no single one explains the residuals."""
+    """Names of the errors: one, or a pair where a second one explains more than chance would."""
     chi_square_fall: float
     """Fall of chi-square with them among the unknowns, dimensionless."""
 
@@ -3419,7 +3419,7 @@ class Omitted(Record):
     tried: int
     """Number of errors that were tried, each by a score test on the residuals: those that a record can show."""
     suspicion: Suspicion | None
-    """Error or pair that explains the residuals; null where chance is enough."""
+    """Error or pair that explains residuals better than chance; null where chance is enough."""
     silent: list[SilentError]
     """Errors that no record of this scheme shows and that change a coefficient."""
     limits: list[FamilyLimit]
@@ -3495,8 +3495,9 @@ class Calibration(Shape):
     quantities: list[Estimated]
     """Estimates of the unknowns, psi of the start of each record."""
     requirements: Requirements | None
-    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small; null if none is
-    stated. Requirements on psi are not judged: a calibration estimates psi of the start of a record.
+    """Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are too small, with what a bench
+    adds and what a suspected error would change; null if none is stated. Requirements on psi are not judged: a calibration estimates
+    psi of the start of a record.
     """
     next_runs: list[NextRun]
     """Further runs that bring coefficients to requirements they miss; empty if none is missed."""
