@@ -322,6 +322,34 @@ fn the_bench_of_a_run_counts_by_its_own_weights() {
     assert!((run / predicted - 1.0).abs() < 1e-6, "{run} {predicted}");
 }
 
+/// Two values of one name in one option are refused with both of them; the family and one of its axes, and an
+/// option beside a file, are not in conflict.
+#[test]
+fn one_name_has_one_value() {
+    for (option, twice) in [
+        ("--bench", ["K0=20", "K0=30"]),
+        ("--prior", ["D_F=20", "D_F=2"]),
+        ("--requirement", ["D=0.1", "D=0.2"]),
+        ("--value", ["D_FX=1", "D_FX=2"]),
+        ("--estimate", ["D_FX=1", "D_FX=2"]),
+    ] {
+        let output = run(&["simulate", "--scheme", BENCH, option, twice[0], option, twice[1], "-q"]);
+        assert_eq!(output.status.code(), Some(2), "{option}");
+        let name = twice[0].split('=').next().expect("a name");
+        let expected = format!("{option} {} and {}: expected one value of {name}", twice[0], twice[1]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains(&expected), "{said}");
+    }
+    let sizes = |bench: &str| -> Vec<f64> {
+        let answer = json(&["simulate", "--scheme", BENCH, "--bench", bench, "-q", "--format", "json"]);
+        let terms = answer["omitted"]["terms"].as_array().expect("a list").clone();
+        let own = terms.iter().filter(|t| t["family"] == "K0");
+        own.map(|t| t["size"].as_f64().expect("a size")).collect()
+    };
+    assert_eq!(sizes("K0=21,K0_Y=7"), [21.0, 7.0, 21.0]);
+    assert_eq!(sizes("K0_Y=7,K0=21,K0=21"), [21.0, 7.0, 21.0]);
+}
+
 /// A size that has no computed effect is refused, one of an unknown is said to count nothing, and a
 /// cross-check says that it has no bench.
 #[test]

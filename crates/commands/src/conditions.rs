@@ -214,6 +214,20 @@ fn filter_words(filter: FilterKind) -> &'static str {
     }
 }
 
+/// Refuses two values of one name in the same option: one of them would not count.
+///
+/// # Errors
+/// The name, and both values.
+fn stated_once(option: &str, given: &[Assignment]) -> Result<(), Problem> {
+    for (i, a) in given.iter().enumerate() {
+        if let Some(before) = given[..i].iter().find(|b| b.name == a.name && b.value != a.value) {
+            let found = format!("{option} {}={} and {}={}", a.name, before.value, a.name, a.value);
+            return Err(Problem::input(format!("{found}: expected one value of {}", a.name)));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.
 ///
 /// # Errors
@@ -223,6 +237,7 @@ pub(crate) fn concern_some<'a>(
     given: &[Assignment],
     schemes: impl Iterator<Item = &'a Scheme> + Clone,
 ) -> Result<(), Problem> {
+    stated_once(option, given)?;
     for a in given {
         let mut hint = None;
         for scheme in schemes.clone() {
@@ -258,6 +273,7 @@ impl MeasurementOptions {
                 "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it",
             ));
         }
+        stated_once("--bench", &self.bench)?;
         concern_some("--prior", &self.prior, schemes.clone())?;
         concern_some("--requirement", &self.requirement, schemes)
     }
