@@ -259,6 +259,53 @@ fn errors_that_are_not_estimated_are_shown() {
     quiet(b);
 }
 
+/// With a bench a requirement is held against the total, in words, in the bar and beside sigma; without one
+/// the summary of met requirements carries its condition, and the table the size that uses up a margin. The
+/// totals are those of the command line.
+#[test]
+fn requirements_are_judged_by_the_total() {
+    let Some((mut browser, _)) = opened(1280) else { return };
+    let b = &mut browser;
+    let summary = "document.getElementById('summary').textContent";
+    write(b, "#requirements", "D_IY = 0.2");
+    let met = "requirements met, 1 of 1, while no error uses up a margin (Errors that are not estimated)";
+    wait(b, "met", &format!("{summary}.endsWith({met:?})"));
+    click(b, "#not-estimated summary");
+    let head = b.value("[...document.querySelectorAll('#omitted th')].at(-1).textContent");
+    assert_eq!(head, json!("uses up a margin at"));
+    let k0 = b.value(
+        "[...document.querySelectorAll('#omitted tbody tr')].find(r => r.cells[0].textContent == 'K0 (3)').cells[6].textContent",
+    );
+    let pair =
+        ["--angles", "0,0,0", "--angles", "180,0,0", "--requirement", "D_IY=0.2", "--format", "json", "-q"];
+    let of = |more: &[&str]| -> Value {
+        serde_json::from_slice(&run(&[&["simulate"], &pair[..], more].concat()).stdout).expect("JSON")
+    };
+    let alone = of(&[]);
+    let family =
+        alone["omitted"]["families"].as_array().expect("families").iter().find(|f| f["family"] == "K0");
+    let limit = family.expect("K0")["uses_up"]["size"].as_f64().expect("a size");
+    let shown = k0.as_str().and_then(|t| t.strip_suffix(" ug (D_IY)")?.parse::<f64>().ok()).expect("a size");
+    assert!((shown / limit - 1.0).abs() < 0.05, "{k0} {limit}");
+    write(b, "#bench", "K0_X = 20");
+    wait(b, "missed", &format!("{summary}.endsWith('requirements NOT met, 0 of 1')"));
+    let row = "document.querySelector('#verdicts tr[data-name=D_IY]')";
+    let label = b.value(&format!("{row}.querySelector('.against').getAttribute('aria-label')"));
+    let said = b.value(&format!("{row}.querySelector('.against').parentNode.textContent"));
+    let benched = of(&["--bench", "K0_X=20"]);
+    let budget =
+        benched["omitted"]["budgets"].as_array().expect("budgets").iter().find(|x| x["unknown"] == "D_IY");
+    let total = budget.expect("D_IY")["total"].as_f64().expect("a total");
+    let ratio = label.as_str().and_then(|l| {
+        l.strip_prefix("misses its requirement: ")?.strip_suffix(" times")?.parse::<f64>().ok()
+    });
+    assert!((ratio.expect("a ratio") * 0.2 / total - 1.0).abs() < 0.05, "{label} {total}");
+    let shown =
+        said.as_str().and_then(|t| t.split_once(", total ")?.1.strip_suffix(" deg/h/g")?.parse::<f64>().ok());
+    assert!((shown.expect("a total") / total - 1.0).abs() < 0.05, "{said} {total}");
+    quiet(b);
+}
+
 #[test]
 fn the_best_positions_are_found() {
     let Some((mut browser, _)) = opened(1400) else { return };

@@ -72,7 +72,9 @@ function askRest() {
       const { quantities, requirements, omitted } = JSON.parse(run.text);
       drawOmitted(omitted);
       const missed = new Map(requirements.missed.map((m) => [m.name, m.why]));
-      verdicts.sigmas = new Map(quantities.map((q) => [q.name, { ...q, missed: missed.get(q.name) }]));
+      const totals = new Map((omitted?.budgets ?? []).map((b) => [b.unknown, b.total]));
+      verdicts.sigmas = new Map(quantities.map((q) => [q.name, { ...q, missed: missed.get(q.name), total: totals.get(q.name) }]));
+      verdicts.limited = (omitted?.families ?? []).some((f) => f.uses_up);
       verdicts.requirements = requirements;
     }
     drawVerdicts();

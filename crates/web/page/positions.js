@@ -196,7 +196,7 @@ function wireConditions() {
   field('noise', 'simulation.accelerometer_noise_g', numberIn);
   field('drift-noise', 'simulation.drift_noise', text);
   field('latitude-number', 'latitude_deg', numberIn);
-  field('requirements', 'requirements', (e) => (e.value.trim() ? assignments(e.value) : undefined));
+  for (const table of ['requirements', 'bench']) field(table, table, (e) => (e.value.trim() ? assignments(e.value) : undefined));
   $('latitude').addEventListener('pointerdown', () => { gesture = null; });
   $('latitude').addEventListener('input', () => setKey('latitude_deg', Number($('latitude').value), 'latitude'));
   $('generic').addEventListener('click', () => setKey('latitude_deg', undefined));
@@ -248,5 +248,5 @@ function drawConditions() {
   $('latitude').value = s.latitude_deg ?? 28.2;
   $('latitude-note').textContent = s.latitude_deg === undefined ? 'Verdicts hold at nearly every latitude; sigmas and the arrow of the earth rate are of 28.2 deg.' : '';
   $('latitude').setAttribute('aria-valuetext', s.latitude_deg === undefined ? 'generic' : `${s.latitude_deg} degrees`);
-  put('requirements', Object.entries(s.requirements ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
+  for (const table of ['requirements', 'bench']) put(table, Object.entries(s[table] ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
 }

@@ -83,7 +83,7 @@ function drawVerdicts() {
   const alone = rows.length - open.length, more = answer.rank - alone;
   const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
   const judged = verdicts.sigmasOf === asked && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
-  const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}` : '';
+  const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}${!judged.missed.length && verdicts.limited ? ', while no error uses up a margin (Errors that are not estimated)' : ''}` : '';
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
   drawSentences($('sentences'), verdicts.now.sentences);
   offerStrip(rows);
@@ -100,10 +100,12 @@ function classes(f) {
 function drawOmitted(omitted) {
   $('not-estimated').hidden = !omitted;
   if (!omitted) return;
-  const head = ['family (terms)', 'class', 'worst change', 'of', 'as large as sigma at', 'seen from (3 sigma)'];
+  const used = omitted.families.some((f) => f.uses_up);
+  const head = ['family (terms)', 'class', 'worst change', 'of', 'as large as sigma at', 'seen from (3 sigma)', ...(used ? ['uses up a margin at'] : [])];
+  const usedUp = (f) => (f.uses_up ? `${two(f.uses_up.size)} ${f.unit} (${f.uses_up.unknown})` : '\u2013');
   const rows = omitted.families.map((f) => [`${f.family} (${f.terms})`, classes(f),
     f.worst ? `${Math.abs(f.worst.per_unit).toPrecision(4)} ${f.worst.unit} per ${f.unit}` : '\u2013', f.worst?.unknown ?? '\u2013',
-    f.worst_in_sigmas ? `${two(1 / f.worst_in_sigmas)} ${f.unit}` : '\u2013', f.visible_from === null ? '\u2013' : `${two(f.visible_from)} ${f.unit}`]);
+    f.worst_in_sigmas ? `${two(1 / f.worst_in_sigmas)} ${f.unit}` : '\u2013', f.visible_from === null ? '\u2013' : `${two(f.visible_from)} ${f.unit}`, ...(used ? [usedUp(f)] : [])]);
   const row = (cells, kind, more = {}) => element('tr', {}, ...cells.map((textContent) => element(kind, { textContent, ...more })));
   const table = element('table', {}, element('thead', {}, row(head, 'th', { scope: 'col' })), element('tbody', {}, ...rows.map((cells) => row(cells, 'td'))));
   $('omitted').replaceChildren(table);
@@ -149,18 +151,20 @@ const two = (x) => (x >= 100 && x < 1e7 ? String(Number(x.toPrecision(2))) : x.t
 
 function drawSigma(td, name) {
   const s = name && verdicts.sigmas?.get(name);
-  const key = s ? `${s.predicted_sigma} ${s.required_sigma} ${s.missed}` : '';
+  const key = s ? `${s.predicted_sigma} ${s.total} ${s.required_sigma} ${s.missed}` : '';
   if (td.dataset.of === key) return;
   td.dataset.of = key;
   if (!s) return td.replaceChildren();
-  const sigma = s.predicted_sigma;
-  const said = sigma === null ? 'not determined' : `${two(sigma)} ${s.unit}`;
+  // a requirement is held against what decides: with a bench the total
+  const sigma = s.predicted_sigma, decides = s.total ?? sigma;
+  const total = s.total !== undefined && two(s.total) !== two(sigma) ? `, total ${two(s.total)}` : '';
+  const said = sigma === null ? 'not determined' : `${two(sigma)}${total} ${s.unit}`;
   if (s.required_sigma === null || sigma === null) {
     td.title = s.required_sigma === null ? 'no requirement is stated' : `misses its requirement, ${s.required_sigma} ${s.unit}: the samples do not determine it`;
     return td.replaceChildren(said);
   }
   td.title = '';
-  const ratio = sigma / s.required_sigma;
+  const ratio = decides / s.required_sigma;
   // three decades, two of them below the requirement
   const part = Math.max(0.01, Math.min(1, (Math.log10(ratio) + 2) / 3));
   const over = s.missed !== undefined;
