@@ -18,6 +18,8 @@ from ._request import plain as plain_option
 
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
 _NUMBER = re.compile(_DECIMAL.pattern + r"([eE][+-]?\d{1,4})?", re.ASCII)
+# a drift noise: its blanks do not count, none needs no unit
+_WITH_UNIT = re.compile(rf"({_NUMBER.pattern})(deg/h|deg/sqrt\(h\))", re.ASCII)
 
 
 def plain(value: Any) -> Any:
@@ -113,6 +115,8 @@ def _canonical(name: str, value: Any) -> Any:
     if name in ("scheme", "model", "tags"):
         return value
     try:
+        if name == "drift_noise":
+            return _drift_noise(str(plain_option(value)))
         return _by_value(READ.get(name, plain_option)(value))
     except (TypeError, ValueError):
         # what no option can be is an error when it is judged; until then it is what it was written as
@@ -136,6 +140,15 @@ def _part(text: str) -> str:
     # angles are read without exponents, values of unknowns with
     name, equals, value = text.rpartition("=")
     return name.strip() + equals + _number(value.strip(), _NUMBER if equals else _DECIMAL)
+
+
+def _drift_noise(text: str) -> str:
+    compact = "".join(text.split())
+    found = _WITH_UNIT.fullmatch(compact)
+    if found is None:
+        return _number(compact, _NUMBER)
+    number = _number(found[1], _NUMBER)
+    return number if number == "0" else f"{number} {found[found.re.groups]}"
 
 
 def _number(text: str, form: re.Pattern[str]) -> str:

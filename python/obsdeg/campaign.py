@@ -160,6 +160,7 @@ def design(
     Raises:
         CampaignError: a part failed too often, or the scheduler of a cluster does not answer.
         obsdeg.ProblemError: what is wrong with the options.
+        OSError: a part that cannot be written, by its number; those that are there stay.
     """
     check_main()
     _check("parts", parts, 1)
@@ -179,7 +180,10 @@ def design(
         if end.error is not None:
             raise _failed(end, f"part {i} of {parts}", work)
         text, complete = end.result
-        place(files[i], text.encode())
+        try:
+            place(files[i], text.encode())
+        except OSError as e:
+            raise OSError(e.errno, f"part {i} of {parts} cannot be written: {e.strerror}", str(files[i])) from e
         if not complete:
             # what is searched at once may take longer than until the next checkpoint
             left.append((options, i, parts, text, 2 * seconds if text == before else seconds))

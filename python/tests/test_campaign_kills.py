@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
@@ -191,6 +192,28 @@ def test_a_task_is_its_values(tmp_path: Path) -> None:
         assert len(_rows(tmp_path)) == 5 * 6
     campaign.sweep(tmp_path, [dict(angles=[("0.000000001", 0, 0), (180, 0, 0)], latitude=10, terms="F")])
     assert len(_rows(tmp_path)) == 6 * 6
+
+
+def test_a_drift_noise_is_its_value_with_its_unit() -> None:
+    from obsdeg._asked import key
+
+    one = {key(dict(angles=PAIR, drift_noise=text)) for text in ("0.01 deg/h", "0.010deg/h", "1e-2 deg/h", " 0.01  deg/h ")}
+    assert len(one) == 1
+    none = {key(dict(angles=PAIR, drift_noise=text)) for text in (0, "0", "0.0", "0 deg/h")}
+    assert len(none) == 1
+    others = {key(dict(angles=PAIR, drift_noise=text)) for text in ("0.01 deg/sqrt(h)", "0.02 deg/h", "0.01 deg", "0.01", "1 deg/h")}
+    assert len(others | one | none) == 5 + 1 + 1
+
+
+def test_a_part_that_cannot_be_written_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, text: bytes) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    options = dict(positions=3, carry="inertial", executor=lambda: ThreadPoolExecutor(1))
+    monkeypatch.setattr(campaign, "place", full)
+    with pytest.raises(OSError, match="part 1 of 2 cannot be written: No space left on device") as said:
+        campaign.design(tmp_path, 2, **options)
+    assert said.value.errno == errno.ENOSPC and "-1-of-2.json" in str(said.value.filename)
 
 
 def test_one_sweep_at_a_time(tmp_path: Path) -> None:
