@@ -322,6 +322,10 @@ pub struct Estimated {
     /// Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with
     /// the times and the noise of the records (and prior knowledge); null if not determined.
     pub predicted_sigma: Option<f64>,
+    /// Total uncertainty that requirements are judged by, in the unit of `unit`: the larger sigma, what the
+    /// bench adds, and how far a suspected error moves the estimate; null where these add nothing.
+    #[serde(default)]
+    pub total: Option<f64>,
     /// Largest sigma that the scheme requires, in the unit of `unit`; null if none is stated.
     #[serde(default)]
     pub required_sigma: Option<f64>,

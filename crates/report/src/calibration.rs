@@ -251,16 +251,19 @@ fn verdict(e: &Estimated) -> String {
     }
 }
 
-fn row(e: &Estimated) -> Vec<String> {
+fn row(e: &Estimated, totals: bool) -> Vec<String> {
     let influence =
         e.prior_shift.zip(e.prior_factor).filter(|(s, f)| s.abs() >= 0.005 || (f - 1.0).abs() >= 0.005);
-    vec![
+    let mut out = vec![
         e.name.clone(),
         e.unit.clone(),
         words::degree(e.degree),
         estimate(e.estimate, e.sigma),
         optional(e.sigma),
         optional(e.sigma_rescaled),
+    ];
+    out.extend(totals.then(|| optional(e.total)));
+    out.extend([
         optional(e.predicted_sigma),
         match (influence, e.determined) {
             (Some((shift, factor)), _) => format!("{shift:+.2}, x{factor:.2}"),
@@ -268,7 +271,8 @@ fn row(e: &Estimated) -> Vec<String> {
             (None, false) => "-".into(),
         },
         verdict(e),
-    ]
+    ]);
+    out
 }
 
 /// The column of the force among those of a position.
@@ -584,24 +588,26 @@ impl Answer for Calibration {
         lead.extend(left_open(self));
         lead.extend(by_default(&self.assumed));
         lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
-        let columns = [
+        let totals = self.quantities.iter().any(|e| e.total.is_some());
+        let mut columns = vec![
             left("unknown"),
             left("unit"),
             right("degree"),
             right("estimate"),
             right("sigma"),
             right("rescaled"),
-            right("predicted"),
-            right("prior"),
-            left("status"),
         ];
-        let mut blocks = vec![Block::table(
-            "Estimates (degree: exact verdict; predicted: sigma by the linear model, at the times and with the noise of the record; prior: what that of the program would do, in sigma and to sigma, where none is stated)",
-            columns.clone(),
-            self.quantities.iter().map(row),
-        )];
+        columns.extend(totals.then(|| right("total")));
+        columns.extend([right("predicted"), right("prior"), left("status")]);
+        let total = if totals { "total: with the bench and what a suspected error changes; " } else { "" };
+        let heading = format!(
+            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and with the noise of the record; \
+             prior: what that of the program would do, in sigma and to sigma, where none is stated)"
+        );
+        let mut blocks =
+            vec![Block::table(heading, columns.clone(), self.quantities.iter().map(|e| row(e, totals)))];
         if !self.combinations.is_empty() {
-            let rows = self.combinations.iter().map(row);
+            let rows = self.combinations.iter().map(|e| row(e, totals));
             blocks.push(Block::table(
                 "Combinations of what is not told apart, and those asked for",
                 columns,

@@ -525,9 +525,15 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
 fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
     let row = |p: &BiasPoint| vec![p.positions.join(" "), number(p.sigma), number(p.bias), number(p.total)];
     let unit = s.unit.as_ref().map_or_else(|| "over what is required".into(), |u| format!("in {u}"));
+    let how = match d.bias_front_complete {
+        true => "of all sequences",
+        false => "by exchange with other sizes of the bench, not proven",
+    };
+    // the largest sigma and the largest bias of the best may be those of different coefficients
+    let best = d.found.first().filter(|f| !d.bias_front.iter().any(|p| p.positions == f.positions));
+    let best = best.map_or("", |_| "; the best by the total is not on it");
     let heading = format!(
-        "Front of sigma against bias by the bench: criterion {} of each and of the total, {unit} (by exchange with other sizes of the \
-         bench, not proven)",
+        "Front of sigma against bias by the bench: criterion {} of each and of the total, {unit} ({how}{best})",
         s.criterion
     );
     let columns = [left("positions"), right("sigma"), right("bias"), right("total")];

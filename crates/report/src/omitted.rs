@@ -1,12 +1,13 @@
 //! Effects of errors that a scheme does not estimate, as tables and sentences.
 
 use obsdeg_calibration::Calibration;
-use obsdeg_calibration::answer::{FamilyLimit, Omitted, SilentError};
+use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_evidence::simulation::omitted::{
     Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
     SAMPLES, SuspectedChange,
 };
+use obsdeg_evidence::simulation::si_per_shown;
 
 use crate::document::{Block, left, number, right};
 use crate::words;
@@ -43,6 +44,33 @@ fn below(x: f64) -> String {
     }
 }
 
+/// Largest size of an error that counts as small: 0.05 g, 5 % of a rate or a scale, 0.05 rad. Beyond it the
+/// change of first order says nothing.
+const SMALL: f64 = 0.05;
+
+/// True if a change of first order holds up to this size.
+fn is_small(size: f64, unit: &str) -> bool {
+    size * si_per_shown(unit) < SMALL
+}
+
+/// Limits of families (name, size, unit, and what else there is to say), those of no small size by name only.
+fn limits<'a>(all: impl Iterator<Item = (&'a str, f64, &'a str, String)>) -> Option<String> {
+    let (small, other): (Vec<_>, Vec<_>) = all.partition(|(_, size, unit, _)| is_small(*size, unit));
+    let limit = |(family, size, unit, more): &(&str, f64, &str, String)| {
+        format!("{family} < {} {unit}{more}", below(*size))
+    };
+    let listed = small.iter().map(limit).collect::<Vec<_>>().join(", ");
+    let names = other.iter().map(|o| o.0).collect::<Vec<_>>().join(", ");
+    match (small.is_empty(), other.is_empty()) {
+        (true, true) => None,
+        (false, true) => Some(listed),
+        (true, false) => {
+            Some(format!("no small size (up to 0.05 g, 5 %, 0.05 rad) of {names} uses up a margin"))
+        }
+        (false, false) => Some(format!("{listed}; no small size (up to 0.05 g, 5 %, 0.05 rad) of {names}")),
+    }
+}
+
 /// Class of a family in words: the classes of its terms.
 fn class(f: &FamilyEffect) -> String {
     let (Some(no_effect), Some(silent)) = (f.no_effect, f.silent) else { return "-".into() };
@@ -66,7 +94,10 @@ fn row(f: &FamilyEffect) -> Vec<String> {
         f.worst.as_ref().map_or_else(none, |w| w.unknown.clone()),
         f.worst_in_sigmas.map_or_else(none, |x| format!("{} {}", short(1.0 / x), f.unit)),
         f.visible_from.map_or_else(none, |x| format!("{} {}", short(x), f.unit)),
-        f.uses_up.as_ref().map_or_else(none, |u| format!("{} {} ({})", below(u.size), f.unit, u.unknown)),
+        f.uses_up.as_ref().map_or_else(none, |u| match is_small(u.size, &f.unit) {
+            true => format!("{} {} ({})", below(u.size), f.unit, u.unknown),
+            false => "no small size".into(),
+        }),
     ]
 }
 
@@ -287,31 +318,43 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
 /// not state would use up a margin.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
     let estimated = of.estimated.join(", ");
-    let not_counted = || format!("Of the bench, {estimated} is estimated: its size does not count.");
+    let (is, does) = match of.estimated.len() {
+        1 => ("is", "its size does"),
+        _ => ("are", "their sizes do"),
+    };
+    let not_counted = || format!("Of the bench, {estimated} {is} estimated: {does} not count.");
     let not_counted = (!of.estimated.is_empty()).then(not_counted);
     if !all_met {
         return not_counted;
     }
     let stated = match (bench, of.estimated.is_empty()) {
         (false, true) => Some("No bench is stated (--bench).".to_string()),
-        (false, false) => Some(format!("No size of the bench counts: {estimated} is estimated.")),
+        (false, false) => Some(format!("No size of the bench counts: {estimated} {is} estimated.")),
         (true, _) => not_counted,
     };
     // a family of which the bench states every term, zero too, counts as stated
     let open = |f: &&FamilyEffect| of.terms.iter().any(|t| t.family == f.family && t.size.is_none());
-    let limit = |f: &FamilyEffect| {
-        let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| below(u.size));
-        let alone = if one == all { String::new() } else { format!(" (one term alone: {one})") };
-        Some(format!("{} < {all} {}{alone}", f.family, f.unit))
+    let limit = |f: &'_ FamilyEffect| {
+        let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| u.size);
+        let alone = if below(one) == below(all) {
+            String::new()
+        } else {
+            format!(" (one term alone: {})", below(one))
+        };
+        Some((all, alone))
     };
-    let listed: Vec<String> = of.families.iter().filter(open).filter_map(limit).collect();
-    if listed.is_empty() {
+    let open = of.families.iter().filter(open);
+    let listed = limits(open.filter_map(|f| {
+        let (size, more) = limit(f)?;
+        Some((f.family.as_str(), size, f.unit.as_str(), more))
+    }));
+    let Some(listed) = listed else {
         return if bench { stated } else { None };
-    }
+    };
     let met = format!(
         "{}, each family by itself, 1 sigma of each of its terms: {}{}.",
         if bench { "Met while, of what the bench does not state" } else { "Met while" },
-        listed.join(", "),
+        listed,
         if of.attitudes { "" } else { "; attitudes are not computed here" }
     );
     Some(stated.into_iter().chain([met]).collect::<Vec<_>>().join(" "))
@@ -414,15 +457,12 @@ pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
             names.join(" and ")
         )
     }));
-    let limit = |l: &FamilyLimit| format!("{} < {} {}", l.family, below(l.size), l.unit);
-    let limits: Vec<String> = c.omitted.limits.iter().map(limit).collect();
-    out.extend((!limits.is_empty()).then(|| {
+    let all = c.omitted.limits.iter();
+    let listed = limits(all.map(|l| (l.family.as_str(), l.size, l.unit.as_str(), String::new())));
+    out.extend(listed.map(|listed| {
         let of = if r.with_bench { ", of what the bench does not state" } else { "" };
         let bench = if r.with_bench { "" } else { "No bench is stated. " };
-        format!(
-            "{bench}Met while{of}, each family by itself, 1 sigma of each of its terms: {}.",
-            limits.join(", ")
-        )
+        format!("{bench}Met while{of}, each family by itself, 1 sigma of each of its terms: {listed}.")
     }));
     out
 }

@@ -314,6 +314,7 @@ impl Answer for Simulation {
         if !required.is_empty() {
             assumed.push(format!("required sigma {}", required.join(", ")));
         }
+        assumed.extend(self.conditions.bench.as_deref().map(words::bench));
         blocks.push(Block::list("Assumed", assumed));
         let positions = self.timeline.iter().filter(|t| !t.slew).count();
         Document {

@@ -7,7 +7,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::number;
-use crate::words::{accelerometer_bias, gyro_noise, names};
+use crate::words::{self, accelerometer_bias, gyro_noise, names};
 
 /// Largest part by which the sigmas of a run may differ from the predicted ones to be called equal to them.
 const EQUAL: f64 = 0.01;
@@ -300,9 +300,7 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
     out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
     out.extend(m.gyro_noise.as_ref().map(gyro_noise));
-    out.extend(
-        m.bench.as_ref().map(|bench| format!("bench {bench} (1 sigma; ug, ppm, arcsec, ... as stated)")),
-    );
+    out.extend(m.bench.as_deref().map(words::bench));
     out.extend(m.prior.as_ref().map(|prior| format!("prior {prior} (deg, deg/h, ... as stated)")));
     out
 }

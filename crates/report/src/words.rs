@@ -181,6 +181,11 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
     out
 }
 
+/// The bench of some conditions: sizes in the units of their errors.
+pub(crate) fn bench(sizes: &str) -> String {
+    format!("bench {sizes} (1 sigma; ug, ppm, arcsec, ... as stated)")
+}
+
 /// `gyros X: I=+x O=-z S=+y, Y: ...`.
 pub(crate) fn gyros(geometry: &Geometry) -> String {
     let gyros = ["X", "Y", "Z"].iter().zip(geometry.gyros());

@@ -17,7 +17,7 @@ use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
 use super::gross::Why;
 use super::observe::{By, channel_name};
-use super::offset::Offset;
+use super::offset::{Later, Offset};
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options, STRICT};
@@ -181,6 +181,8 @@ pub(crate) struct Parts<'a> {
     pub found: &'a Diagnosed,
     /// By run: the moment at which the scheme begins, where it was estimated.
     pub offsets: &'a [Option<Offset>],
+    /// What a later beginning does to the measurements of each run where labels leave it open.
+    pub later: &'a [Option<Later>],
     pub too_many: Option<usize>,
     pub known: Vec<String>,
     pub rests_on: Vec<setup::Basis>,
@@ -315,6 +317,7 @@ impl Parts<'_> {
                 degree: a.degree,
                 determined: a.stands(),
                 left_open: a.left_open,
+                total: None,
                 estimate: there(a.terms.iter().map(|&(i, k)| k * values[i]).sum::<f64>() / scale),
                 sigma: there(sigma / scale),
                 sigma_rescaled: there(between(a, a).max(0.0).sqrt()),
@@ -353,7 +356,7 @@ impl Parts<'_> {
         let outliers = self.outliers();
         let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
         let asked = (&self.conditions.bench[..], self.options.seed);
-        let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, asked)?;
+        let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, self.later, asked)?;
         let mut out = Calibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -387,6 +390,9 @@ impl Parts<'_> {
         };
         out.findings = self.findings(&out);
         out.consistent = out.findings.is_empty();
+        for e in out.quantities.iter_mut().filter(|e| outside.adds_to(&e.name)) {
+            e.total = total(e, &outside);
+        }
         out.requirements = self.requirements(&out.quantities, &outside);
         if out.requirements.as_ref().is_some_and(Requirements::all_met) {
             out.omitted.limits = limits(&out.quantities, &outside);

@@ -411,6 +411,7 @@ pub fn calibrate(
                 *root = std::mem::take(root).insert_column(columns, 0.0);
                 root.set_column(columns, &(&o.direction * o.sigma));
             }
+            let later = problem.later(&estimate, &lay)?;
             let parts = diagnose::Parts {
                 scheme,
                 conditions,
@@ -423,6 +424,7 @@ pub fn calibrate(
                 bent: &bent,
                 found: &found,
                 offsets: &offsets,
+                later: &later,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
                 rests_on,

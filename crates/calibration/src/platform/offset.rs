@@ -36,6 +36,15 @@ pub(super) struct Offset {
     pub direction: DVector<f64>,
 }
 
+/// What a later beginning of a run does to its measurements, unknowns as they are.
+#[derive(Debug, Clone)]
+pub(super) struct Later {
+    /// Change of every residual per second, in the order of the rows.
+    pub column: Vec<f64>,
+    /// What labels say of the beginning: one over its variance, in 1/s^2.
+    pub weight: f64,
+}
+
 impl Problem<'_> {
     /// The beginning of run `r` that fits best between `from` and `to` (s of its clock) when all unknowns
     /// follow; `lay` lays a reading on the timeline.
@@ -86,6 +95,33 @@ impl Problem<'_> {
     ) -> Result<Vec<Option<Offset>>, CalibrationError> {
         let of = |(r, run): (usize, &Run)| {
             run.reading.open.map(|window| self.offset(estimate, r, window, lay)).transpose()
+        };
+        self.runs.iter().enumerate().map(of).collect()
+    }
+
+    /// What later beginnings of the runs do where labels leave them open. `None` too where a shift moves
+    /// measurements to other bins.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn later(
+        &self,
+        estimate: &Estimate,
+        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+    ) -> Result<Vec<Option<Later>>, CalibrationError> {
+        let of = |(r, own): (usize, &Run)| -> Result<Option<Later>, CalibrationError> {
+            let Some((from, to)) = own.reading.open else { return Ok(None) };
+            let step = MOVED * (to - from);
+            let residuals = |by: f64| {
+                let mut run = lay(own.reading.later(by))?;
+                run.counts.clone_from(&own.counts);
+                let (along, keys) = run.along(self.conditions, &self.sigmas, &estimate.at.x[r])?;
+                Ok::<_, CalibrationError>((along.residuals, keys))
+            };
+            let [(low, keys), (high, others)] = [residuals(-step)?, residuals(step)?];
+            let column = low.iter().zip(&high).map(|(low, high)| (high - low) / (2.0 * step)).collect();
+            let same = keys == others && keys == estimate.at.runs[r].1;
+            Ok(same.then(|| Later { column, weight: 12.0 / (to - from).powi(2) }))
         };
         self.runs.iter().enumerate().map(of).collect()
     }

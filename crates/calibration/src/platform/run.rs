@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
 use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
-use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind};
+use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind, Tilt};
 
 use super::CalibrationError;
 use super::clock::words;
@@ -143,6 +143,21 @@ impl Run {
             let means = b.channels.iter().enumerate();
             means.filter_map(move |(channel, m)| Some((Key { position, bin, channel }, (*m)?, b)))
         })
+    }
+
+    /// Tilts of the platform along the trajectory from `x0`, step by step.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] when a number is none.
+    pub(super) fn tilts(
+        &self,
+        conditions: &Conditions,
+        x0: &PlatformState,
+    ) -> Result<Vec<Tilt>, CalibrationError> {
+        let filter = Extended::new(&self.plan, conditions, Update::default())?;
+        let mut x = x0.clone();
+        let tilt = |(k, s): (usize, &Segment)| filter.motion(k).tilt(0.0, s.dt, &mut x);
+        Ok(self.plan.segments.iter().enumerate().map(tilt).collect::<Result<_, _>>()?)
     }
 
     /// Linearised along the trajectory from `x0`, with all of its bins that count; `sigmas` are those of a

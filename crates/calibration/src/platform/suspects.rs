@@ -2,8 +2,9 @@
 //!
 //! Residuals and the column of every omitted error go through the same filter, whose start says nothing: its
 //! whitened innovations are residuals from which every change of the unknowns is taken out, with the random
-//! drift of the run. Columns are those of small angles at the attitudes of the scheme. Of several records
-//! each has unknowns of its own.
+//! drift of the run. Columns are those at the estimated attitudes: beside a tilt of degrees those of the
+//! scheme would be no combination of the unknowns where the true ones are. Where labels leave the beginning
+//! of the scheme open, it is one more unknown. Of several records each has unknowns of its own.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::Assignment;
@@ -15,11 +16,12 @@ use obsdeg_evidence::simulation::omitted::{
     Bench, ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
 use obsdeg_evidence::simulation::{
-    Attained, Conditions, SegmentKind, SimulationError, is_rate, shown_unit, si_per_shown,
+    Attained, Conditions, SegmentKind, SimulationError, Tilt, is_rate, shown_unit, si_per_shown,
 };
 
 use super::CalibrationError;
 use super::estimate::{Estimate, Problem};
+use super::offset::Later;
 use super::run::{Key, Run};
 use crate::answer::{Estimated, Omitted, SilentError};
 
@@ -38,6 +40,13 @@ pub(super) struct Outside {
     pub suspected: Vec<(String, f64)>,
     /// Families that the bench does not state in full.
     pub families: Vec<FamilyChange>,
+}
+
+impl Outside {
+    /// True if a bench or a suspected error adds to the uncertainty of this coefficient.
+    pub(super) fn adds_to(&self, name: &str) -> bool {
+        self.bench.iter().chain(&self.suspected).any(|(own, x)| own == name && *x != 0.0)
+    }
 }
 
 /// Change of every coefficient by a family of errors, all terms one unit large (root of the sum of squares).
@@ -62,6 +71,7 @@ pub(super) fn omitted(
     problem: &Problem<'_>,
     estimate: &Estimate,
     quantities: &[Estimated],
+    later: &[Option<Later>],
     (bench, seed): (&[Assignment], u64),
 ) -> Result<(Omitted, Outside), CalibrationError> {
     let Some(first) = problem.runs.first() else { return Ok(Default::default()) };
@@ -70,7 +80,7 @@ pub(super) fn omitted(
     let classes = omitted_verdicts(platform, &model, seed).ok();
     let class = |j: usize| classes.as_ref().map(|v| v.terms[j].class);
     let shown = (0..model.terms().len()).map(|j| class(j).is_none_or(|c| c == OmittedClass::Visible));
-    let tested = tested(problem, estimate, &model, shown.collect())?;
+    let tested = tested(problem, estimate, &model, shown.collect(), later)?;
     let exact = Silent::of(&first.plan.platform, &model, classes.as_ref(), seed).ok();
     let silent = classes.iter().flat_map(|v| v.terms.iter().enumerate());
     let silent = silent.filter(|(_, t)| t.class == OmittedClass::Silent).map(|(j, t)| SilentError {
@@ -187,6 +197,7 @@ fn tested(
     estimate: &Estimate,
     model: &OmittedModel,
     shown: Vec<bool>,
+    later: &[Option<Later>],
 ) -> Result<Tested, CalibrationError> {
     let m = model.terms().len();
     let mut score = Score {
@@ -198,7 +209,7 @@ fn tested(
     };
     let mut changes = Vec::new();
     for (r, (run, (linear, keys))) in problem.runs.iter().zip(&estimate.at.runs).enumerate() {
-        let columns = columns(run, model, keys)?;
+        let columns = columns(run, model, keys, run.tilts(problem.conditions, &estimate.at.x[r])?)?;
         let prior = problem.unknowns.index[r]
             .iter()
             .enumerate()
@@ -217,9 +228,26 @@ fn tested(
             state_pass(&linear.stages, &gains, &mut x, measure, |_, _, w| whitened.extend_from_slice(w))?;
             Ok((x, whitened))
         };
-        let (_, own) = through(&linear.residuals)?;
-        let passed = columns.iter().map(|z| through(z)).collect::<Result<Vec<_>, _>>()?;
+        let (_, mut own) = through(&linear.residuals)?;
+        let mut passed = columns.iter().map(|z| through(z)).collect::<Result<Vec<_>, _>>()?;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        score.chi_square += dot(&own, &own);
+        let unknowns = run.plan.unknowns() + usize::from(later[r].is_some());
+        score.degrees_of_freedom += own.len() as f64 - unknowns as f64;
+        if let Some(later) = &later[r] {
+            let (x, mut of_beginning) = through(&later.column)?;
+            // one more measurement: what labels say of the beginning. The fit has settled with it
+            let known = later.weight.sqrt();
+            own.push(-dot(&of_beginning, &own) / known);
+            of_beginning.push(known);
+            let squares = dot(&of_beginning, &of_beginning);
+            for (of, column) in &mut passed {
+                column.push(0.0);
+                let share = dot(column, &of_beginning) / squares;
+                column.iter_mut().zip(&of_beginning).for_each(|(c, w)| *c -= share * w);
+                of.iter_mut().zip(&x).for_each(|(c, x)| *c -= share * x);
+            }
+        }
         for (j, (_, column)) in passed.iter().enumerate() {
             score.against[j] += dot(column, &own);
             for (k, (_, other)) in passed.iter().enumerate().take(j + 1) {
@@ -230,8 +258,6 @@ fn tested(
                 }
             }
         }
-        score.chi_square += dot(&own, &own);
-        score.degrees_of_freedom += own.len() as f64 - run.plan.unknowns() as f64;
         if r == 0 {
             let platform = &run.plan.platform;
             let coefficients = run.plan.unknowns() - platform.coefficients()..run.plan.unknowns();
@@ -246,11 +272,16 @@ fn tested(
     Ok(Tested { score, changes })
 }
 
-/// The columns of all errors in the measurements of a run, in their order.
-fn columns(run: &Run, model: &OmittedModel, keys: &[Key]) -> Result<Vec<Vec<f64>>, CalibrationError> {
+/// The columns of all errors in the measurements of a run, in their order, at these tilts.
+fn columns(
+    run: &Run,
+    model: &OmittedModel,
+    keys: &[Key],
+    tilts: Vec<Tilt>,
+) -> Result<Vec<Vec<f64>>, CalibrationError> {
     let m = model.terms().len();
     let mut of_bins: Vec<Vec<f64>> = Vec::new();
-    let mut columns = OmittedColumns::new(&run.plan, model);
+    let mut columns = OmittedColumns::of_tilted(&run.plan, model, tilts);
     for (segment, bin) in run.plan.segments.iter().zip(&run.bins) {
         let mut last = Vec::new();
         for _ in 0..segment.steps {

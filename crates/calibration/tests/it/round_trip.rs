@@ -9,7 +9,7 @@ use obsdeg_core::model::{Carry, Path, Recording, Scheme, Still, parse_attitude};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::Conditions;
 
-use crate::simulator::{Bench, Sample, csv};
+use crate::simulator::{AtOnce, Bench, Sample, csv};
 
 /// The scheme that a bench runs.
 pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
@@ -18,7 +18,11 @@ pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
         .iter()
         .map(|(_, a, _)| parse_attitude(&format!("{},{},{}", a[0], a[1], a[2])).expect("an attitude"));
     let mut scheme = Scheme::of_angles(angles);
-    scheme.carry = Carry::Inertial;
+    scheme.carry = match bench.carry {
+        AtOnce::Inertial => Carry::Inertial,
+        AtOnce::Platform => Carry::Platform,
+        AtOnce::Reset(_) => Carry::Reset,
+    };
     scheme.latitude = Some(bench.latitude_deg.to_string().parse().expect("a latitude"));
     scheme.unknowns = terms.parse().expect("terms");
     // torquers act on turns that are exact

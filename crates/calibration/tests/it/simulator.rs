@@ -37,6 +37,8 @@ pub(crate) struct Bench {
     pub(crate) psi: Vector,
     /// D_F, D_I, D_O, D_S of the gyros X, Y, Z in deg/h (per g).
     pub(crate) drift: [Vector; 4],
+    /// D_II, D_OO, D_SS of the gyros X, Y, Z in deg/h/g^2.
+    pub(crate) squares: [Vector; 3],
     /// K0 (g), K1, K2 (1/g) of the accelerometers.
     pub(crate) accelerometers: [Vector; 3],
     /// What the output of each accelerometer has of the force along each platform axis besides its own, in
@@ -71,6 +73,7 @@ impl Default for Bench {
             carry: AtOnce::Inertial,
             psi: [0.1, 0.1, 0.1].map(f64::to_radians),
             drift: [[11.0, 12.0, 13.0], [5.0; 3], [5.0; 3], [5.0; 3]],
+            squares: [[0.0; 3]; 3],
             accelerometers: [[0.0; 3]; 3],
             mounting: [[0.0; 3]; 3],
             torquer: [[0.0; 3]; 3],
@@ -163,12 +166,15 @@ impl Bench {
     /// The drift in platform axes, in rad/s, where gravity is `g` there: the paper's mounting.
     fn drift(&self, g: &Vector) -> Vector {
         let [f, i, o, s] = &self.drift;
-        [
+        let linear = [
             f[0] + i[0] * g[0] + s[0] * g[1] - o[0] * g[2],
             f[1] + i[1] * g[1] - s[1] * g[0] - o[1] * g[2],
             f[2] + i[2] * g[2] + s[2] * g[1] + o[2] * g[0],
-        ]
-        .map(|x| x * DPH)
+        ];
+        // along I, O and S of each
+        let along = [[g[0], g[2], g[1]], [g[1], g[2], g[0]], [g[2], g[0], g[1]]];
+        let squared = |x: usize| (0..3).map(|k| self.squares[k][x] * along[x][k] * along[x][k]).sum::<f64>();
+        std::array::from_fn(|x| (linear[x] + squared(x)) * DPH)
     }
 
     /// The record.

@@ -133,6 +133,10 @@ pub struct ConditionsReport {
     pub propagation: Propagation,
     /// Factor on the true drifts and their priors, dimensionless.
     pub drift_scale: f64,
+    /// Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out
+    /// where none is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bench: Option<String>,
     /// Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg,
     /// accelerometer_noise_g, step_s, dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values
     /// and other_priors where they are stated for some of the unknowns only.

@@ -239,17 +239,26 @@ impl Conditions {
         (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
     }
 
-    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error; `None` where none is
-    /// stated.
+    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error, and which sizes give way
+    /// to a family that is stated later; `None` where none is stated.
     pub fn bench_in_words(&self) -> Option<String> {
         // of two sizes of the same error the later one counts
         let counts = |i: &usize| {
             let own = &self.bench[*i].name;
             !self.bench[i + 1..].iter().any(|later| later.name == *own || concerns(&later.name, own))
         };
-        let counting = (0..self.bench.len()).filter(counts).map(|i| &self.bench[i]);
-        let listed: Vec<String> = counting.map(|a| format!("{} {}", a.name, a.value)).collect();
-        (!listed.is_empty()).then(|| listed.join(", "))
+        let named = |i: usize| format!("{} {}", self.bench[i].name, self.bench[i].value);
+        let listed: Vec<String> = (0..self.bench.len()).filter(counts).map(named).collect();
+        let family = |i: usize| {
+            let own = &self.bench[i].name;
+            (i + 1..self.bench.len())
+                .rfind(|&k| self.bench[k].name != *own && concerns(&self.bench[k].name, own))
+        };
+        let gone = (0..self.bench.len()).filter(|i| !counts(i));
+        let gone: Vec<String> =
+            gone.filter_map(|i| Some(format!("{} gives way to {}", named(i), named(family(i)?)))).collect();
+        let gone = if gone.is_empty() { String::new() } else { format!(" ({})", gone.join("; ")) };
+        (!listed.is_empty()).then(|| format!("{}{gone}", listed.join(", ")))
     }
 
     /// The random drift with its unit; `None` where there is none.

@@ -92,6 +92,17 @@ struct Moving {
     rows: Vec<f64>,
 }
 
+/// Tilt of the platform in one step: where it is, and where an error of the attitude goes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tilt {
+    /// `E = C_p^n C_n^c` at the start of the step.
+    pub from: Matrix3<f64>,
+    /// `E` at its end.
+    pub to: Matrix3<f64>,
+    /// Error `delta` (rad, in n) at the end by that at the start: `E_true = exp([delta x]) E`.
+    pub transition: Matrix3<f64>,
+}
+
 /// One step of a segment as the extended filter sees it.
 pub struct PlatformMotion<'a> {
     plan: &'a Plan,
@@ -205,11 +216,35 @@ impl PlatformMotion<'_> {
     /// As [`Motion::advance`].
     pub fn carry(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<(), EkfError> {
         self.integrate(t, dt, x, Vec::new())?;
+        self.fade(dt, x);
+        Ok(())
+    }
+
+    /// Biases of `x` fade over `dt`.
+    fn fade(&self, dt: f64, x: &mut PlatformState) {
         let behind = x.constants.len() - self.plan.biases.len();
         for (bias, x) in self.plan.biases.iter().zip(&mut x.constants[behind..]) {
             *x *= (-bias.process.decay * dt).exp();
         }
-        Ok(())
+    }
+
+    /// `E = C_p^n C_n^c` of `x`.
+    fn tilted(&self, x: &PlatformState) -> Matrix3<f64> {
+        times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)))
+    }
+
+    /// Moves `x` on by `dt`, and says how the platform is tilted meanwhile.
+    ///
+    /// # Errors
+    /// As [`Motion::advance`].
+    pub fn tilt(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<Tilt, EkfError> {
+        let (from, width) = (self.tilted(x), 3 + x.constants.len());
+        let mut moved = vec![0.0; 3 * width];
+        (0..3).for_each(|i| moved[i * width + i] = 1.0);
+        let moved = self.integrate(t, dt, x, moved)?;
+        self.fade(dt, x);
+        let transition = std::array::from_fn(|i| std::array::from_fn(|j| moved[i * width + j]));
+        Ok(Tilt { from, to: self.tilted(x), transition })
     }
 
     /// Turns the psi of `x` that moves by `dt`, and the `rows` of local coordinates with it (in n, as
@@ -311,7 +346,7 @@ impl Measurement<PlatformState> for PlatformMotion<'_> {
     }
 
     fn h(&self, _: f64, x: &PlatformState) -> DVector<f64> {
-        let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
+        let e = self.tilted(x);
         let seen = apply(&transpose(&e), &G_N);
         let (c, errors, _) = self.accelerometers(&e, x);
         let added = apply(&c, &errors.sum);
@@ -321,7 +356,7 @@ impl Measurement<PlatformState> for PlatformMotion<'_> {
     }
 
     fn jacobian(&self, _: f64, x: &PlatformState) -> DMatrix<f64> {
-        let e = times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)));
+        let e = self.tilted(x);
         let horizontal = times(&transpose(&e), &cross(&G_N));
         let (attitude, errors, by_k) = self.accelerometers(&e, x);
         // f^p = -C_n^p g^n turns with delta

@@ -34,6 +34,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         gyro_noise: (!conditions.gyro_noise.is_none()).then_some(conditions.gyro_noise),
         propagation: conditions.propagation,
         drift_scale: conditions.drift_scale,
+        bench: conditions.bench_in_words(),
         by_default: chosen_for_run(scheme, plan.platform.names(), conditions),
     }
 }

@@ -75,6 +75,7 @@ pub(crate) fn answered(
             found: Vec::new(),
             front: Vec::new(),
             bias_front: Vec::new(),
+            bias_front_complete: false,
             omitted: None,
             other_carries: Vec::new(),
             not_judged: not_judged(stated, conditions),
@@ -131,7 +132,7 @@ pub(crate) fn answered(
         let certified = bound.filter(|_| !task.is_noisy());
         let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
-            out.bias_front = task.bias_front(evaluator, &search, k, &best);
+            (out.bias_front, out.bias_front_complete) = task.bias_front(evaluator, &search, k, &best);
             let of = (k, conditions.dwell_s);
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
             let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();

@@ -104,6 +104,23 @@ impl Small {
         Some((degree, value))
     }
 
+    /// Criterion of the sigmas alone and of what the bench adds alone, for the worst, A and margin.
+    fn sigma_and_bias(&self, sequence: &[usize]) -> [f64; 2] {
+        let attained = Attained::new(&self.scheme(sequence), &self.conditions, 1).expect("sigmas");
+        let first = attained.plan.platform.names().len() - attained.plan.platform.coefficients();
+        let of = |x: Vec<f64>| match self.options.criterion {
+            CriterionName::A => (x.iter().map(|t| t * t).sum::<f64>() / x.len() as f64).sqrt(),
+            CriterionName::Margin => {
+                x.iter().fold(0.0, |w: f64, t| w.max(t / self.conditions.requirements[0].value))
+            }
+            _ => x.into_iter().fold(0.0, f64::max),
+        };
+        let own = |of: &[Option<f64>]| of[first..].iter().map(|x| x.expect("a number")).collect::<Vec<f64>>();
+        let (sigmas, totals) = (own(&attained.sigmas), own(&attained.totals));
+        let biases = totals.iter().zip(&sigmas).map(|(t, s)| (t * t - s * s).max(0.0).sqrt()).collect();
+        [of(sigmas), of(biases)]
+    }
+
     /// The best by `worth` of the sequences that `allowed` lets through.
     fn brute_force(&self, allowed: impl Fn(&[usize]) -> bool) -> Option<(usize, f64)> {
         let all = self.sequences();
@@ -200,6 +217,19 @@ fn check_front(small: &Small, found: &Design, task: usize) {
         // of the largest, or of a mean: a total is at most that of both together
         assert!(p.total <= p.sigma.hypot(p.bias) * (1.0 + 1e-9), "task {task}: {p:?}");
         assert!(p.total >= p.sigma.max(p.bias) * (1.0 - 1e-9), "task {task}: {p:?}");
+    }
+    // few sequences: the front is that of all of them
+    assert!(found.bias_front_complete, "task {task}");
+    let mut all: Vec<[f64; 2]> = small
+        .sequences()
+        .iter()
+        .filter_map(|s| (small.worth(s)?.0 == found.found[0].worst_degree).then(|| small.sigma_and_bias(s)))
+        .collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    for [sigma, bias] in all {
+        let near = |x: f64| x * (1.0 + 1e-5);
+        let not_above = |p: &BiasPoint| p.sigma <= near(sigma) && p.bias <= near(bias) + 1e-9 * sigma;
+        assert!(found.bias_front.iter().any(not_above), "task {task}: {sigma} {bias} {:?}", found.bias_front);
     }
     let falls = |p: &[BiasPoint]| p[0].sigma < p[1].sigma && p[0].bias > p[1].bias;
     assert!(found.bias_front.windows(2).all(falls), "task {task}: {:?}", found.bias_front);

@@ -239,3 +239,73 @@ pub fn design_part(
         Ok(out.sealed())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::Carry;
+
+    use super::*;
+    use crate::design::Candidates;
+    use crate::design::search::exhaust::MOST_BEHIND;
+
+    fn task(carry: Carry, candidates: usize, positions: usize) -> (Scheme, Conditions, DesignOptions) {
+        let base = Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() };
+        let mut all = Candidates::cardinals();
+        all.names.truncate(candidates);
+        all.attitudes.truncate(candidates);
+        let options = DesignOptions {
+            candidates: all,
+            positions: Some(positions),
+            keep: 5,
+            everywhere: false,
+            ..DesignOptions::default()
+        };
+        (base, Conditions::default(), options)
+    }
+
+    /// Longer starts begin the same sequences: those found and the number examined are the same.
+    #[test]
+    fn sequences_do_not_depend_on_the_length_of_starts() {
+        for (carry, candidates, k) in [(Carry::Reset, 24, 6), (Carry::Reset, 24, 7), (Carry::Inertial, 24, 5)]
+        {
+            let (base, conditions, options) = task(carry, candidates, k);
+            let prepared = Prepared::new(&base, &conditions, &options, &|| true).expect("a task");
+            let search = prepared.search(&|_| true);
+            let levels = search.levels_of(k).expect("all sets");
+            let symmetry = &prepared.task.symmetry;
+            let of = |depth: usize| -> Vec<String> {
+                let starts = search.starts_of(depth, symmetry);
+                let found = levels.iter().map(|level| {
+                    let best = search.exhaust_starts(&starts, symmetry, k, level, None);
+                    format!("{} {:?}", best.examined, best.found)
+                });
+                found.collect()
+            };
+            let two = of(2);
+            assert!(two.iter().any(|t| !t.starts_with("0 ")), "{carry}: {two:?}");
+            for depth in [1, 3, 4] {
+                assert_eq!(of(depth), two, "{carry} {depth}");
+            }
+        }
+    }
+
+    /// Behind every start is a bounded number of sequences, under every carry and for many positions.
+    #[test]
+    fn a_start_is_a_bounded_amount_of_work() {
+        for (carry, k) in [(Carry::Reset, 8), (Carry::Reset, 12), (Carry::Reset, 15), (Carry::Inertial, 9)] {
+            let (base, conditions, options) = task(carry, 24, k);
+            let prepared = Prepared::new(&base, &conditions, &options, &|| true).expect("a task");
+            let search = prepared.search(&|_| true);
+            let starts = search.starts(&prepared.task.symmetry, k);
+            let most = match carry {
+                Carry::Reset => search.work(&starts, k).into_iter().fold(0.0, f64::max),
+                _ => 24f64.powi((k - starts[0].len()) as i32),
+            };
+            assert!(
+                most <= MOST_BEHIND && starts.len() <= 1_000_000 * 24,
+                "{carry} {k}: {most} {}",
+                starts.len()
+            );
+        }
+    }
+}

@@ -1,5 +1,5 @@
-//! The front of sigma against what the bench adds: the schemes that are best with the bench scaled, from none
-//! of it to far more.
+//! The front of sigma against what the bench adds: of all schemes where there are few, else of those that are
+//! best with the bench scaled, from none of it to far more.
 
 use std::sync::Arc;
 
@@ -10,38 +10,50 @@ use crate::design::measure::stop::Stop;
 use crate::design::run::task::Task;
 use crate::design::search::best::Best;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::{Search, Trial};
 
 /// Factors on all sizes of the bench.
 const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
+/// Most sequences that are all held against each other.
+const MOST: f64 = 2e4;
 /// Restarts of the exchange at each of them, besides those from the schemes found.
 const RESTARTS: u64 = 4;
 
 impl Task<'_> {
-    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma; empty where the
-    /// search does not count a bench, and for D and E, which are of no single coefficient.
+    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, and true if these
+    /// are all; empty where the search does not count a bench, and for D and E, which are of no single
+    /// coefficient.
     pub(crate) fn bias_front(
         &self,
         evaluator: &Evaluator,
         search: &Search<'_>,
         k: usize,
         main: &Best,
-    ) -> Vec<BiasPoint> {
+    ) -> (Vec<BiasPoint>, bool) {
         let single = matches!(self.criterion, Criterion::Worst | Criterion::A | Criterion::Margin(_));
         let sized = self.omitted.as_ref().filter(|o| o.has_sizes());
         let (Some(omitted), true, Some(first)) = (sized, single, main.found.first()) else {
-            return Vec::new();
+            return (Vec::new(), false);
         };
         // none of a larger worst degree is listed
         let same = |s: &&Scored| s.worth.degree == first.worth.degree;
+        let every = search.few(&self.symmetry, k, MOST).map(|all| {
+            let mut trial = Trial::new(evaluator);
+            let start = evaluator.start();
+            let scored = all.into_iter().map(|s| search.worth_behind((&start, 0), &s, &mut trial));
+            let valid = scored.filter(|s| s.worth.is_valid()).filter(|s| same(&s));
+            valid.map(|s| s.sequence).collect::<Vec<_>>()
+        });
+        let all = every.is_some();
         let mut sequences: Vec<Vec<Stop>> =
             main.found.iter().filter(same).map(|s| s.sequence.clone()).collect();
-        for factor in FACTORS {
+        sequences.extend(every.into_iter().flatten());
+        for factor in FACTORS.into_iter().filter(|_| !all) {
             let there = Evaluator { omitted: Some(Arc::new(omitted.scaled(factor))), ..evaluator.clone() };
             let scaled = Search { evaluator: &there, keep: 1, ..*search };
             let best = scaled.exchange(k, &sequences, RESTARTS, self.options.seed);
             if !best.complete {
-                return Vec::new();
+                return (Vec::new(), false);
             }
             for s in best.found.iter().filter(same) {
                 if !sequences.contains(&s.sequence) {
@@ -58,7 +70,7 @@ impl Task<'_> {
             least = least.min(p.bias);
             better
         });
-        points
+        (points, all)
     }
 
     /// Figures of a sequence; `None` where rounding hides them.

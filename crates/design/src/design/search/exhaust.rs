@@ -19,8 +19,9 @@ use crate::design::search::screen::{Scratch, Screen};
 
 /// Restarts of the exchange that finds what an exhaustive search is pruned by.
 const KNOWN_RESTARTS: u64 = 24;
-/// Most sequences behind a start, as long as there are not too many starts.
-const MOST_BEHIND: f64 = 2e8;
+/// Most sequences behind a start, as long as there are not too many starts: some 20 s of work, so that a part
+/// that is interrupted or killed goes on from what it found minutes before.
+pub(crate) const MOST_BEHIND: f64 = 2e7;
 /// Most starts of more than two positions.
 const MOST_STARTS: f64 = 1e6;
 
@@ -273,8 +274,32 @@ impl Search<'_> {
     }
 
     /// What every sequence of an exhaustive search begins with, in order: its first one or two positions, or
-    /// more where order matters and too many sequences would be behind a start to be searched at once.
+    /// more where too many sequences would be behind a start to be searched at once.
     pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
+        self.starts_of(self.depth(symmetry.representatives().len(), k), symmetry)
+    }
+
+    /// All sequences of `k` positions where there are at most so many, the first ones up to symmetry; whether
+    /// they are observable is not asked.
+    pub(crate) fn few(&self, symmetry: &Symmetry, k: usize, most: f64) -> Option<Vec<Vec<Stop>>> {
+        let firsts = symmetry.representatives().len() as f64;
+        let all = || self.starts_of(k, symmetry);
+        (firsts * self.behind(k - 1) <= most && !self.walks)
+            .then(all)
+            .filter(|s| s.len() as f64 <= 8.0 * most)
+    }
+
+    /// Number of sequences of so many further positions.
+    fn behind(&self, positions: usize) -> f64 {
+        let n = self.rows.candidates();
+        match self.evaluator.ordered() {
+            true => (n as f64).powi(positions as i32),
+            false => multisets(n, positions),
+        }
+    }
+
+    /// Starts of so many positions.
+    pub(crate) fn starts_of(&self, depth: usize, symmetry: &Symmetry) -> Vec<Vec<Stop>> {
         let ordered = self.evaluator.ordered();
         let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
             let last = start.last().map(|s| s.candidate);
@@ -285,21 +310,14 @@ impl Search<'_> {
             stops.into_iter().map(|stop| [start, &[stop]].concat()).collect()
         };
         let firsts: Vec<Vec<Stop>> = symmetry.representatives().into_iter().map(|a| vec![a.into()]).collect();
-        let depth = self.depth(firsts.len(), k);
         (1..depth).fold(firsts, |starts, _| starts.iter().flat_map(|start| longer(start)).collect())
     }
 
     /// Number of positions of a start, of so many first ones.
     fn depth(&self, firsts: usize, k: usize) -> usize {
-        let n = self.rows.candidates() as f64;
+        let starts = |depth: usize| firsts as f64 * self.behind(depth - 1);
         let mut depth = k.min(2);
-        let behind = |depth: usize| n.powi((k - depth) as i32);
-        let starts = |depth: usize| firsts as f64 * n.powi(depth as i32 - 1);
-        while self.evaluator.ordered()
-            && depth + 2 < k
-            && behind(depth) > MOST_BEHIND
-            && starts(depth + 1) <= MOST_STARTS
-        {
+        while depth + 2 < k && self.behind(k - depth) > MOST_BEHIND && starts(depth + 1) <= MOST_STARTS {
             depth += 1;
         }
         depth
@@ -313,8 +331,7 @@ impl Search<'_> {
             let choices = start.last().map_or(n, |last| n - last.candidate);
             match self.evaluator.ordered() {
                 true => 1.0,
-                // multisets of so many
-                false => (0..left).map(|i| (choices + i) as f64 / (i + 1) as f64).product(),
+                false => multisets(choices, left),
             }
         };
         starts.iter().map(behind).collect()
@@ -430,6 +447,11 @@ impl Search<'_> {
             sizes.map(|size| (0..candidates).into_par_iter().all(|first| going() && behind(first, size)));
         (all.all(|done| done) && going()).then_some(levels)
     }
+}
+
+/// Number of sets of so many out of `n`, each as often as one likes.
+fn multisets(n: usize, positions: usize) -> f64 {
+    (0..positions).map(|i| (n + i) as f64 / (i + 1) as f64).product()
 }
 
 /// The candidates of a sequence, each once and ascending, to `members`.

@@ -3,16 +3,20 @@
 //!
 //! `psi^n` of an error obeys the equations of the platform by itself: `psi' = psi x omega_ie + eps`,
 //! integrated over each step (exactly while a position lasts), carried between positions as the scheme says.
-//! Nothing of the filter's model enters.
+//! Nothing of the filter's model enters. Of a platform that is known to be tilted by E ([`Tilt`]) it is the
+//! error `delta` of its attitude: excitations are those where the platform is, and what errors of the site do
+//! to the commands is the same in platform axes.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::slew::{Slew, apply, transpose};
+use obsdeg_core::model::slew::{Slew, apply, rotation, rotation_vector, times, transpose};
 use obsdeg_core::model::{
-    AZIMUTH, Carry, Columns, Float, LOCAL, Matrix3, OmittedModel, Platform, Point, local_dynamics,
+    AZIMUTH, Carry, Columns, Float, LOCAL, Matrix3, OmittedEffect, OmittedModel, OmittedTerm, Platform,
+    Point, local_dynamics,
 };
 use obsdeg_ekf::integrate::van_loan;
 
-use crate::simulation::{Plan, SegmentKind, SimulationError};
+use crate::simulation::state::inverse_left_jacobian;
+use crate::simulation::{Plan, SegmentKind, SimulationError, Tilt};
 
 /// Three numbers of every error.
 type Vectors = Vec<[f64; 3]>;
@@ -23,6 +27,10 @@ pub struct OmittedColumns<'a> {
     model: &'a OmittedModel,
     /// Turns at once on which torquer errors act.
     turning: Option<Point<Float>>,
+    /// Tilts of the platform, step by step; empty where it is where the scheme has it.
+    tilts: Vec<Tilt>,
+    /// Number of steps that are done, of all segments.
+    done: usize,
     segment: usize,
     /// Steps of the segment that are done.
     step: usize,
@@ -36,10 +44,12 @@ pub struct OmittedColumns<'a> {
     ends: Vec<(usize, Vec<f64>)>,
 }
 
-/// One step at a position: `psi+ = phi psi + added`, and the errors of the accelerometers.
+/// One step at a position: `psi+ = phi psi + gamma eps`.
 struct Dwelt {
     phi: Matrix3<f64>,
-    added: Vectors,
+    gamma: Matrix3<f64>,
+    /// Drifts and errors of the accelerometers where the platform is where the scheme has it.
+    drifts: Vectors,
     outputs: Vectors,
 }
 
@@ -53,8 +63,13 @@ fn sum(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
 }
 
 impl<'a> OmittedColumns<'a> {
-    /// Columns at the start of `plan`.
+    /// Columns at the start of `plan`, of a platform that is where the scheme has it.
     pub fn new(plan: &'a Plan, model: &'a OmittedModel) -> Self {
+        Self::of_tilted(plan, model, Vec::new())
+    }
+
+    /// Columns of a platform that is tilted as `tilts` say, one of every step of `plan`.
+    pub fn of_tilted(plan: &'a Plan, model: &'a OmittedModel, tilts: Vec<Tilt>) -> Self {
         let turning = model.turning().and_then(|s| Platform::new(s.clone()).ok());
         let [w_n, w_u, _] = plan.earth_rate();
         let zero = vec![[0.0; 3]; model.terms().len()];
@@ -62,6 +77,8 @@ impl<'a> OmittedColumns<'a> {
             plan,
             model,
             turning: turning.map(|p| Point::in_floats(&p, w_n, w_u)),
+            tilts,
+            done: 0,
             segment: 0,
             step: 0,
             psi: zero.clone(),
@@ -93,6 +110,7 @@ impl<'a> OmittedColumns<'a> {
             SegmentKind::Rotation(slew) => self.turn(slew, segment.dt, true),
         }
         self.step += 1;
+        self.done += 1;
         if self.step == segment.steps {
             self.leave();
         }
@@ -120,12 +138,21 @@ impl<'a> OmittedColumns<'a> {
         }
         if before.is_none_or(|b| b.position != position || matches!(b.kind, SegmentKind::Slew(_))) {
             self.offset = vectors(&self.model.offsets(&Float, position, &c));
-            self.psi.iter_mut().zip(&self.offset).for_each(|(p, o)| *p = sum(p, o));
+            let tilt = self.tilts.get(self.done).map(|t| t.from);
+            self.add_offset(1.0, tilt);
         }
         if segment.kind == SegmentKind::Dwell {
             self.current = Some(self.dwelt(&c, segment.dt)?);
         }
         Ok(())
+    }
+
+    /// Adds the offsets of a position, turned with the platform.
+    fn add_offset(&mut self, sign: f64, tilt: Option<Matrix3<f64>>) {
+        for (p, offset) in self.psi.iter_mut().zip(&self.offset) {
+            let own = tilt.map_or(*offset, |e| apply(&e, offset));
+            *p = sum(p, &own.map(|x| sign * x));
+        }
     }
 
     /// From one position to the next without a slew.
@@ -140,7 +167,9 @@ impl<'a> OmittedColumns<'a> {
             Carry::Inertial => {
                 let left = self.turning.as_ref().and_then(|p| self.model.turned(p, position));
                 if let Some(left) = left {
-                    self.psi.iter_mut().zip(vectors(&left)).for_each(|(p, l)| *p = sum(p, &l));
+                    let tilt = self.tilts.get(self.done).map(|t| t.from);
+                    let there = |l: [f64; 3]| tilt.map_or(l, |e| apply(&e, &l));
+                    self.psi.iter_mut().zip(vectors(&left)).for_each(|(p, l)| *p = sum(p, &there(l)));
                 }
             }
         }
@@ -156,7 +185,8 @@ impl<'a> OmittedColumns<'a> {
             if next.is_none() || plan.platform.scheme().carry == Carry::Reset {
                 self.end_of(position);
             }
-            self.psi.iter_mut().zip(&self.offset).for_each(|(p, o)| *p = sum(p, &o.map(|x| -x)));
+            let tilt = self.done.checked_sub(1).and_then(|k| self.tilts.get(k)).map(|t| t.to);
+            self.add_offset(-1.0, tilt);
             self.offset.fill([0.0; 3]);
         }
         self.segment += 1;
@@ -181,25 +211,52 @@ impl<'a> OmittedColumns<'a> {
         let part = |first: usize| -> Matrix3<f64> {
             std::array::from_fn(|i| std::array::from_fn(|j| local[(i, first + j)]))
         };
-        let drift = vectors(&self.drift(c, None));
-        let gamma = part(3);
+        let drifts = self.drifts(c, None, None);
         let outputs = vectors(&self.model.output_rows(&Float, c));
-        Ok(Dwelt { phi: part(0), added: drift.iter().map(|d| apply(&gamma, d)).collect(), outputs })
+        Ok(Dwelt { phi: part(0), gamma: part(3), drifts, outputs })
     }
 
-    fn drift(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> Columns<f64> {
+    /// Drifts `eps^n` where the platform should be at `c` and is tilted by `e`.
+    fn drifts(&self, c: &Matrix3<f64>, slew: Option<&Slew>, e: Option<&Matrix3<f64>>) -> Vectors {
         let [w_n, w_u, _] = self.plan.earth_rate();
-        self.model.drift_rows(&Float, c, self.plan.torqued_rate(c, slew), [&w_n, &w_u])
+        let rate = self.plan.torqued_rate(c, slew);
+        let Some(e) = e else { return vectors(&self.model.drift_rows(&Float, c, rate, [&w_n, &w_u])) };
+        let there = vectors(&self.model.drift_rows(&Float, &times(e, c), rate, [&w_n, &w_u]));
+        // a wrong command is the same in platform axes
+        let turned = |(d, t): ([f64; 3], &OmittedTerm)| match t.effect {
+            OmittedEffect::Coefficient => d,
+            _ => apply(e, &d),
+        };
+        there.into_iter().zip(self.model.terms()).map(turned).collect()
     }
 
     fn dwell(&mut self) {
         let Some(step) = &self.current else { return };
-        for (p, added) in self.psi.iter_mut().zip(&step.added) {
-            *p = sum(&apply(&step.phi, p), added);
+        let tilt = self.tilts.get(self.done);
+        let c = self.plan.attitudes[self.plan.segments[self.segment].position];
+        let (phi, drifts, outputs) = match tilt {
+            None => (step.phi, None, None),
+            Some(t) => {
+                let e = middle(t);
+                let there = times(&t.to, &c);
+                let back = transpose(&t.to);
+                let outputs = vectors(&self.model.output_rows(&Float, &there));
+                let outputs: Vectors = outputs.iter().map(|a| apply(&back, a)).collect();
+                (t.transition, Some(self.drifts(&c, None, Some(&e))), Some(outputs))
+            }
+        };
+        let drifts = drifts.as_ref().unwrap_or(&step.drifts);
+        for (p, drift) in self.psi.iter_mut().zip(drifts) {
+            *p = sum(&apply(&phi, p), &apply(&step.gamma, drift));
         }
+        let outputs = outputs.as_ref().unwrap_or(&step.outputs);
         self.rows.clear();
         for &component in &self.plan.components {
-            self.rows.extend(self.psi.iter().zip(&step.outputs).map(|(p, a)| output(component, p, a)));
+            let of = |(p, a): (&[f64; 3], &[f64; 3])| match tilt {
+                Some(t) => tilted_output(component, p, a, &t.to),
+                None => output(component, p, a),
+            };
+            self.rows.extend(self.psi.iter().zip(outputs).map(of));
         }
     }
 
@@ -209,7 +266,8 @@ impl<'a> OmittedColumns<'a> {
         let h = dt / parts as f64;
         for i in 0..parts {
             let t = i as f64 * h;
-            let at = |t: f64| vectors(&self.drift(&slew.at(t), Some(slew)));
+            let e = self.tilts.get(self.done).map(middle);
+            let at = |t: f64| self.drifts(&slew.at(t), Some(slew), e.as_ref());
             let drifts = [at(t), at(t + h / 2.0), at(t + h)];
             let w = self.plan.earth_rate();
             for (k, p) in self.psi.iter_mut().enumerate() {
@@ -231,6 +289,22 @@ impl<'a> OmittedColumns<'a> {
             }
         }
     }
+}
+
+/// `E` in the middle of a step.
+fn middle(tilt: &Tilt) -> Matrix3<f64> {
+    let turn = rotation_vector(&times(&tilt.to, &transpose(&tilt.from)));
+    times(&rotation(&turn.map(|x| x / 2.0)), &tilt.from)
+}
+
+/// One component of Z of a platform tilted by `e`: `-E^T [g^n x] delta` and the error of the accelerometers,
+/// or of the azimuth.
+fn tilted_output(component: usize, delta: &[f64; 3], accelerometers: &[f64; 3], e: &Matrix3<f64>) -> f64 {
+    if component == AZIMUTH {
+        return apply(&inverse_left_jacobian(&rotation_vector(e)), delta)[1];
+    }
+    let tilt = apply(&transpose(e), &[delta[2], 0.0, -delta[0]]);
+    tilt[component - 1] + accelerometers[component - 1]
 }
 
 /// One component of Z: `(psi_z, 0, -psi_x)` and the error of the accelerometers, or `psi_y`.
