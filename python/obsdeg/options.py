@@ -74,7 +74,17 @@ class GyroNoise(TypedDict, total=False):
     """Its correlation time in s [default: 3600]."""
 
 
-class Measured(TypedDict, total=False):
+class Judged(TypedDict, total=False):
+    """What estimates are judged by."""
+
+    requirement: ByName
+    """Largest standard deviation allowed at the end, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: none, so that nothing is judged]."""
+    bench: ByName
+    """Standard deviations of errors that are not estimated, in ug, ppm, arcsec: ``{"K0": 20, "latitude": 10}`` [default: none]. Sigmas that are
+    judged are then total."""
+
+
+class Measured(Judged, total=False):
     """How long and how well is measured."""
 
     dwell: Real
@@ -89,11 +99,6 @@ class Measured(TypedDict, total=False):
     """Its correlation time in s [default: 3600]."""
     azimuth_noise: Real
     """Noise of a measured azimuth per sample in deg [default: 0.001]."""
-    requirement: ByName
-    """Largest standard deviation allowed at the end, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: none, so that nothing is judged]."""
-    bench: ByName
-    """Standard deviations of errors that are not estimated, in ug, ppm, arcsec: ``{"K0": 20, "latitude": 10}`` [default: none]. Sigmas that are
-    judged are then total."""
     drift_noise: str
     """Random drift with its unit: ``"0.01 deg/h"`` is a bias held for one step, ``"0.001 deg/sqrt(h)"`` a random walk [default: none in
     predictions, 0.01 deg/h in simulated runs]."""
@@ -163,7 +168,7 @@ class Compare(Seeded, Assumed, Measured, GyroNoise, total=False):
     """The options of :func:`obsdeg.compare`."""
 
 
-class Calibrate(Seeded, Assumed, GyroNoise, total=False):
+class Calibrate(Seeded, Assumed, Judged, GyroNoise, total=False):
     """The options of :func:`obsdeg.calibrate`."""
 
     starts: int

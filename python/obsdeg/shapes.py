@@ -1726,6 +1726,8 @@ class Design(Shape):
     """Schemes that no scheme found beats in both total time and criterion, by total time."""
     bias_front: list[BiasPoint]
     """Schemes that no scheme found beats in both sigma and bias by the bench, by sigma; left out where the search counts no bench."""
+    bias_front_complete: bool
+    """True if `bias_front` is of all sequences; false where it is of those that are best with other sizes of the bench, by exchange."""
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
     omitted: OmittedEffects | None
@@ -1964,6 +1966,8 @@ class ConditionsReport(Record):
     """Propagation of the filter: exponential or rk4."""
     drift_scale: float
     """Factor on the true drifts and their priors, dimensionless."""
+    bench: str | None
+    """Bench that is stated: sizes (one sigma) of errors that are not estimated, in their units; left out where none is."""
     by_default: list[str]
     """Keys of the conditions that nobody states, so that the run has those of the program: latitude_deg, accelerometer_noise_g, step_s,
     dwell_s, azimuth_noise_deg, drift_noise, values, priors; other_values and other_priors where they are stated for some of the
@@ -2968,6 +2972,10 @@ class Estimated(Record):
     predicted_sigma: float | None
     """Standard deviation, in the unit of `unit`, by the linear model at the attitudes of the scheme, with the times and the noise of the
     records (and prior knowledge); null if not determined.
+    """
+    total: float | None
+    """Total uncertainty that requirements are judged by, in the unit of `unit`: the larger sigma, what the bench adds, and how far a
+    suspected error moves the estimate; null where these add nothing.
     """
     required_sigma: float | None
     """Largest sigma that the scheme requires, in the unit of `unit`; null if none is stated."""

@@ -9,7 +9,7 @@ const COMMANDS: [(&str, usize); 14] = [
     ("analyze", 48),
     ("simulate", 65),
     ("crosscheck", 70),
-    ("calibrate", 48),
+    ("calibrate", 51),
     ("allan", 24),
     ("compare", 46),
     ("design", 71),

@@ -271,6 +271,17 @@ fn nothing_is_met_that_the_bench_uses_up() {
             "{bench} {of}"
         );
         assert_eq!(of["with_bench"].as_bool().unwrap_or(false), !bench.is_empty(), "{of}");
+        // options say the same beside a scheme that states none
+        let plain = folder.path().join("plain.toml").display().to_string();
+        std::fs::write(&plain, TWO).expect("written");
+        let required_by = format!("D_FZ={required}");
+        let bench_by = bench.replace(' ', "");
+        let mut arguments =
+            vec!["calibrate", &plain, &record, "--requirement", &required_by, "-q", "--format", "json"];
+        if !bench.is_empty() {
+            arguments.extend(["--bench", &bench_by]);
+        }
+        assert_eq!(json(&arguments)["requirements"], *of, "{bench}");
         if bench == "K0_Z = 3000" {
             let own = found["quantities"].as_array().expect("a list").iter().find(|q| q["name"] == "D_FZ");
             let [sigma, rescaled] = ["sigma", "sigma_rescaled"].map(|k| own.expect("D_FZ")[k].as_f64());
@@ -438,7 +449,12 @@ fn a_partial_bench_leaves_limits_of_the_rest() {
     let said = asked("K0=100");
     let limits = said.split("Met while, of what the bench does not state").nth(1).expect(&said);
     let limits = limits.split('.').take(40).collect::<Vec<_>>().join(".");
-    assert!(!limits.contains("K0 <") && limits.contains("latitude <"), "{limits}");
+    assert!(
+        !limits.contains("K0 <")
+            && limits.contains("no small size (up to 0.05 g, 5 %, 0.05 rad) of")
+            && limits.contains("latitude"),
+        "{limits}"
+    );
     let limit = number(limits.split(", M < ").nth(1).expect(&limits));
     let sentence = |m: f64| asked(&format!("K0=100,M={m}"));
     let met = "With the bench every requirement is met";

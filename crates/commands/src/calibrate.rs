@@ -23,7 +23,7 @@ use obsdeg_report::{
 use serde::{Deserialize, Serialize};
 
 use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
-use crate::conditions::{GyroNoiseOptions, within};
+use crate::conditions::{GyroNoiseOptions, RequirementOptions, within};
 use crate::host::Host;
 use crate::problem::{Kind, Problem};
 use crate::source::{Input, ModelFile, Named, Source};
@@ -88,6 +88,11 @@ pub struct Calibrate {
     #[arg(long, value_name = "NOISE")]
     pub drift_noise: Option<DriftNoise>,
 
+    /// What is required, and the bench.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub judged: RequirementOptions,
+
     /// The datasheet of the gyros.
     #[command(flatten)]
     #[serde(flatten)]
@@ -126,6 +131,7 @@ impl Default for Calibrate {
             step: None,
             slew_rate: None,
             drift_noise: None,
+            judged: RequirementOptions::default(),
             gyro_noise: GyroNoiseOptions::default(),
             gravity: STANDARD_GRAVITY,
             gate: GATE,
@@ -273,6 +279,7 @@ pub fn calibrate(
         Input::Model(file) => return of_model(a, &file, records, before, &going),
     };
     a.assumptions.apply(&mut scheme);
+    a.judged.concern(std::iter::once(&*scheme))?;
     let options = Options {
         gravity_m_s2: a.gravity,
         estimate_noise: a.estimate_noise,
@@ -327,6 +334,7 @@ impl Calibrate {
             drift_noise: self.drift_noise,
             ..self.gyro_noise.settings()
         });
+        self.judged.add_to(&mut out);
         out
     }
 }

@@ -79,6 +79,17 @@ pub struct MeasurementOptions {
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,
 
+    /// What is required, and the bench.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub judged: RequirementOptions,
+}
+
+/// What estimates are judged by.
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[serde(default)]
+#[command(next_help_heading = "Measurement")]
+pub struct RequirementOptions {
     /// Largest standard deviation allowed at the end for an unknown or family in deg, deg/h, deg/h/g, ppm,
     /// arcsec, ug: D=0.05, D_FX=0.01, K1=5 (default: none, so that nothing is judged; 1e-12 to 1e9)
     #[arg(long, value_name = "NAME=X", value_parser = assigned(ranges::REQUIREMENT))]
@@ -92,6 +103,23 @@ pub struct MeasurementOptions {
     #[arg(long, value_name = "NAME=X", value_delimiter = ',', value_parser = benched)]
     #[serde(with = "text::list")]
     pub bench: Vec<Assignment>,
+}
+
+impl RequirementOptions {
+    /// Checks that every requirement concerns an unknown of some scheme, and that no name has two values.
+    ///
+    /// # Errors
+    /// The assignment that does not, and what it might mean.
+    pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
+        stated_once("--bench", &self.bench)?;
+        concern_some("--requirement", &self.requirement, schemes)
+    }
+
+    /// Adds them to what is stated.
+    pub(crate) fn add_to(&self, conditions: &mut Conditions) {
+        conditions.requirements.extend(general_first(self.requirement.clone()));
+        conditions.bench.extend(general_first(self.bench.clone()));
+    }
 }
 
 /// Reads a size of a bench: `K0=20`.
@@ -273,9 +301,8 @@ impl MeasurementOptions {
                 "--accelerometer-correlation-time does nothing here: expected --accelerometer-instability with it",
             ));
         }
-        stated_once("--bench", &self.bench)?;
         concern_some("--prior", &self.prior, schemes.clone())?;
-        concern_some("--requirement", &self.requirement, schemes)
+        self.judged.concern(schemes)
     }
 
     /// The options that are given.
@@ -289,8 +316,8 @@ impl MeasurementOptions {
             ("--azimuth-noise", self.azimuth_noise.is_some()),
             ("--drift-noise", self.drift_noise.is_some()),
             ("--prior", !self.prior.is_empty()),
-            ("--requirement", !self.requirement.is_empty()),
-            ("--bench", !self.bench.is_empty()),
+            ("--requirement", !self.judged.requirement.is_empty()),
+            ("--bench", !self.judged.bench.is_empty()),
         ];
         all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
@@ -309,8 +336,7 @@ impl MeasurementOptions {
             ..Settings::default()
         });
         out.priors.extend(general_first(self.prior.clone()));
-        out.requirements.extend(general_first(self.requirement.clone()));
-        out.bench.extend(general_first(self.bench.clone()));
+        self.judged.add_to(&mut out);
         out
     }
 }

@@ -37,7 +37,7 @@ pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions
 pub use calibrate::{Calibrate, Calibrated, calibrate};
 pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_calibrate, call_json};
 pub use compare::{Compare, compare};
-pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions};
+pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions, RequirementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
 pub use design::{
     DegreeCap, Designed, Search, SearchFiles, Searched, Walked, WantedOptions, design, is_word,
