@@ -48,8 +48,8 @@ pub struct OmittedColumns<'a> {
 struct Dwelt {
     phi: Matrix3<f64>,
     gamma: Matrix3<f64>,
-    /// Drifts and errors of the accelerometers where the platform is where the scheme has it.
-    drifts: Vectors,
+    /// `gamma eps` and errors of the accelerometers where the platform is where the scheme has it.
+    added: Vectors,
     outputs: Vectors,
 }
 
@@ -211,9 +211,10 @@ impl<'a> OmittedColumns<'a> {
         let part = |first: usize| -> Matrix3<f64> {
             std::array::from_fn(|i| std::array::from_fn(|j| local[(i, first + j)]))
         };
-        let drifts = self.drifts(c, None, None);
+        let (phi, gamma) = (part(0), part(3));
+        let added = self.drifts(c, None, None).iter().map(|d| apply(&gamma, d)).collect();
         let outputs = vectors(&self.model.output_rows(&Float, c));
-        Ok(Dwelt { phi: part(0), gamma: part(3), drifts, outputs })
+        Ok(Dwelt { phi, gamma, added, outputs })
     }
 
     /// Drifts `eps^n` where the platform should be at `c` and is tilted by `e`.
@@ -234,20 +235,19 @@ impl<'a> OmittedColumns<'a> {
         let Some(step) = &self.current else { return };
         let tilt = self.tilts.get(self.done);
         let c = self.plan.attitudes[self.plan.segments[self.segment].position];
-        let (phi, drifts, outputs) = match tilt {
+        let (phi, added, outputs) = match tilt {
             None => (step.phi, None, None),
             Some(t) => {
-                let e = middle(t);
-                let there = times(&t.to, &c);
+                let drifts = self.drifts(&c, None, Some(&middle(t)));
+                let added: Vectors = drifts.iter().map(|d| apply(&step.gamma, d)).collect();
+                let outputs = vectors(&self.model.output_rows(&Float, &times(&t.to, &c)));
                 let back = transpose(&t.to);
-                let outputs = vectors(&self.model.output_rows(&Float, &there));
                 let outputs: Vectors = outputs.iter().map(|a| apply(&back, a)).collect();
-                (t.transition, Some(self.drifts(&c, None, Some(&e))), Some(outputs))
+                (t.transition, Some(added), Some(outputs))
             }
         };
-        let drifts = drifts.as_ref().unwrap_or(&step.drifts);
-        for (p, drift) in self.psi.iter_mut().zip(drifts) {
-            *p = sum(&apply(&phi, p), &apply(&step.gamma, drift));
+        for (p, added) in self.psi.iter_mut().zip(added.as_ref().unwrap_or(&step.added)) {
+            *p = sum(&apply(&phi, p), added);
         }
         let outputs = outputs.as_ref().unwrap_or(&step.outputs);
         self.rows.clear();
