@@ -223,7 +223,8 @@ fn check_front(small: &Small, found: &Design, task: usize) {
     let mut all: Vec<[f64; 2]> = small
         .sequences()
         .iter()
-        .filter_map(|s| (small.worth(s)?.0 == found.found[0].worst_degree).then(|| small.sigma_and_bias(s)))
+        .filter(|s| small.worth(s).is_some_and(|w| w.0 == found.found[0].worst_degree))
+        .map(|s| small.sigma_and_bias(s))
         .collect();
     all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     for [sigma, bias] in all {
