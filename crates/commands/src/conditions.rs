@@ -7,7 +7,7 @@ use obsdeg_core::model::ranges::{self, Range};
 use obsdeg_core::model::settings::{
     Assignment, AssignmentError, DriftNoise, FilterKind, Propagation, Settings, Truth, concerns, known,
 };
-use obsdeg_core::model::{PerGyro, Platform, Scheme, may_be_omitted};
+use obsdeg_core::model::{PerGyro, Platform, Scheme, may_be_omitted, omitted_meant};
 use obsdeg_evidence::simulation::{Conditions, general_first};
 use serde::{Deserialize, Serialize};
 
@@ -128,10 +128,7 @@ fn benched(text: &str) -> Result<Assignment, String> {
         return Err("expected NAME=NUMBER in the unit of the error, as in K0=20 or latitude=10".into());
     }
     let a = assigned(ranges::BENCH)(text)?;
-    if may_be_omitted(&a.name) {
-        return Ok(a);
-    }
-    Err("expected an error such as K0, K0_X, M, GS, latitude, azimuth, earth_rate, gravity, attitude".into())
+    if may_be_omitted(&a.name) { Ok(a) } else { Err(omitted_meant(&a.name)) }
 }
 
 /// The datasheet of the gyros; a scheme file may give it too.
