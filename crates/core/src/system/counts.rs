@@ -276,7 +276,8 @@ impl Counting<'_> {
         let two = counts.iter().zip(degrees).any(|(c, d)| d.is_some() && *c == Ok(2));
         let pairs = maps.is_empty() && two;
         let mut found = [Err(NotCounted::OverLimit), Err(NotCounted::OverLimit)];
-        if pairs || !self.functions.is_empty() {
+        // where less is not decided all is not
+        if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
             let stage = Stage { whole: true, ..Stage::new(0, limit) };
             found = self.both(stage, [&Known::default(); 2]);
         }

@@ -26,6 +26,8 @@ const LISTED: usize = 200_000;
 const POINTS: usize = 250;
 /// Points with other verdicts before one is taken all the same: what it gives does not hold at the first.
 const ELSEWHERE: usize = 24;
+/// Operations of all points and eliminations of a search.
+const OPERATIONS: u64 = 200_000_000;
 /// Most terms of a function that is kept.
 const TERMS: usize = 12;
 /// Highest degree among the unknowns that the functions found before do not express.
@@ -78,7 +80,7 @@ pub(super) fn identifiable_functions(
         search.known.insert(&gradient);
     }
     let weights = weights(symmetries);
-    for family in families(judged) {
+    for family in families(judged, &search.shown) {
         if search.missing() == 0 {
             break;
         }
@@ -135,9 +137,10 @@ fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
 }
 
 /// Of parameters alone first, then with states, then with what is observable; polynomials first.
-fn families(judged: &Judgement) -> Vec<Family> {
+fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
     let degrees = &judged.findings.degrees;
-    let all: Vec<usize> = (0..judged.layout.unknowns.len()).filter(|&c| degrees.excited[c]).collect();
+    let all: Vec<usize> =
+        (0..judged.layout.unknowns.len()).filter(|&c| degrees.excited[c] && shown[c]).collect();
     let moved: Vec<usize> = all.iter().copied().filter(|&c| degrees.degree[c].is_none()).collect();
     let is_parameter = |c: &usize| matches!(judged.layout.unknowns[*c].role, Role::Parameter(_));
     let parameters: Vec<usize> = moved.iter().copied().filter(is_parameter).collect();
@@ -207,6 +210,8 @@ struct Search<'a> {
     all: usize,
     /// True of the unknowns that are shown: functions hold no others.
     shown: Vec<bool>,
+    /// Operations so far.
+    spent: Spent,
     found: Vec<IdentifiableFunction>,
 }
 
@@ -231,6 +236,7 @@ impl<'a> Search<'a> {
             known,
             all: 0,
             shown: Vec::new(),
+            spent: Spent::default(),
             found: Vec::new(),
         };
         out.draw()?;
@@ -242,7 +248,7 @@ impl<'a> Search<'a> {
     }
 
     fn draw(&mut self) -> Result<(), ModelError> {
-        let spent = &mut Spent::default();
+        let spent = &mut self.spent;
         let mut at = climb_at(self.model, self.compiled, &self.judged.layout, self.f, &mut self.rng, spent)?;
         for _ in 0..ELSEWHERE {
             // constraints that hold in several ways have points with other verdicts
@@ -274,7 +280,7 @@ impl<'a> Search<'a> {
         let mut basis = Echelon::new(f, products.len());
         let (mut rank, mut still, mut k) = (0, 0, 0);
         while still < 2 {
-            if k == POINTS {
+            if k == POINTS || self.spent.operations > OPERATIONS {
                 return Ok(());
             }
             if k == self.points.len() {
@@ -291,6 +297,7 @@ impl<'a> Search<'a> {
                     });
                     f.mul(m, along)
                 };
+                self.spent.operations += (products.len() * (2 + basis.rank())) as u64;
                 basis.insert(&products.iter().zip(&values).map(entry).collect::<Vec<_>>());
             }
             still = if basis.rank() == rank { still + 1 } else { 0 };
@@ -324,7 +331,8 @@ impl<'a> Search<'a> {
     /// Unknowns without one for each function found so far, which expresses it by the others.
     fn not_expressed(&self, listed: &[Terms]) -> Vec<usize> {
         let degrees = &self.judged.findings.degrees;
-        let mut left: Vec<usize> = (0..degrees.degree.len()).filter(|&c| degrees.excited[c]).collect();
+        let mut left: Vec<usize> =
+            (0..degrees.degree.len()).filter(|&c| degrees.excited[c] && self.shown[c]).collect();
         for terms in listed.iter().chain(self.found.iter().map(|f| &f.terms)) {
             let holds = |c: usize| terms.iter().filter(|t| t.1.iter().any(|p| p.0 == c)).count();
             let alone = |c: &usize| {
