@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, title};
+use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, reduced_model, title};
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
@@ -54,13 +54,19 @@ pub(crate) struct Arguments {
     /// checkers that share no code with obsdeg
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     certificate: Option<PathBuf>,
+
+    /// Write an equivalent model that is fully observable (TOML): some unknowns of the model with fixed
+    /// numbers, the others in place of identifiable functions
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    reduced: Option<PathBuf>,
 }
 
 pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     interrupt::ends()?;
     let target = &a.output.target;
     a.output.check()?;
-    if let Some(path) = a.certificate.as_ref().filter(|path| path.exists() && !target.force) {
+    let new = [&a.certificate, &a.reduced];
+    if let Some(path) = new.into_iter().flatten().find(|path| path.exists() && !target.force) {
         return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
     }
     a.asked.input.given = given;
@@ -73,6 +79,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let certificate =
         a.certificate.as_ref().map(|path| Ok::<_, Failure>((path, certificate(&a.asked, &read)?)));
     let certificate = certificate.transpose()?;
+    let reduced = a.reduced.as_ref().map(|path| Ok::<_, Failure>((path, reduced_model(&a.asked, &read)?)));
+    let reduced = reduced.transpose()?;
     let read = Arc::new(read);
     let (judged, banner) = a.engine.lend(message, target.quiet, verdicts(&a.asked, &read), |worker| {
         Ok(analyze(&a.asked, &read, &mut Host { worker, ..Host::silent() })?)
@@ -89,7 +97,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
         }
         write_files(folder, &figures, target.force)?;
     }
-    if let Some((path, file)) = certificate {
+    for (path, file) in certificate.into_iter().chain(reduced) {
         write_file(path, &file.bytes)?;
     }
     a.output.write(&judged)?;

@@ -66,7 +66,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// The observable degree of every unknown of a torquing scheme, and how it is solved
+    /// The observable degree of every unknown of a scheme or model, and whether it is identifiable
     Analyze(analyze::Arguments),
     /// Run a Kalman filter against a simulated truth: the paper's run, or any scheme
     Simulate(simulate::Arguments),

@@ -132,6 +132,8 @@ class Analyze(Seeded, Positions, total=False):
     """The highest order of derivatives to look at in a model that has no proven end."""
     count_limit: int
     """Limit of the work of counting the solutions of a model: millions of products at each of two points."""
+    relation_limit: int
+    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 0]."""
     solutions: bool
     """Solving expressions and numbers of solutions [default: True]."""
     frame: Literal["n", "platform"]
@@ -145,6 +147,8 @@ class Analyze(Seeded, Positions, total=False):
     that the scheme states [default: False]."""
     certificate: bool
     """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
+    reduced: bool
+    """``reduced.toml`` among the files of the answer: an equivalent model that is fully observable."""
 
 
 class Simulate(Seeded, Positions, Filtered, total=False):

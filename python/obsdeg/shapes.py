@@ -927,6 +927,13 @@ NumberOfSolutions = Union[Literal["one_by_expression"], NumberOfSolutionsCounted
 on outputs, inputs, constants and unknowns that have one solution.
 """
 
+Identifiability = Literal["globally_identifiable", "locally_identifiable", "not_identifiable", "not_decided"]
+"""Identifiability of an unknown (of a state: observability), in the usual terms. globally_identifiable: Globally identifiable: the
+outputs of a generic point have one solution for the unknown. locally_identifiable: Locally identifiable: no other value nearby gives
+the same outputs; several solutions, or their number is not decided. not_identifiable: Not identifiable: values as near as one likes
+give the same outputs. not_decided: Not decided: the unknown is not observable up to the bound on the order, where no end is proven.
+"""
+
 
 class SystemQuantity(Record):
     """Verdict on one unknown of a system."""
@@ -955,6 +962,10 @@ class SystemQuantity(Record):
     """
     number_of_solutions: NumberOfSolutions | None
     """Number of solutions for the unknown; null if it is not observable, or if solutions were not sought."""
+    identifiability: Identifiability
+    """Identifiability of the unknown in the usual terms: `globally_identifiable`, `locally_identifiable` (the number of solutions is in
+    `number_of_solutions`), `not_identifiable` or `not_decided`.
+    """
 
 
 class ConstraintFactor(Record):
@@ -983,6 +994,10 @@ class SystemCombination(Record):
     """Combination as written in the model, or `b*x1`."""
     degree: int | None
     """Observable degree of the combination; null if it is not observable."""
+    number_of_solutions: NumberOfSolutions | None
+    """Number of values of an identifiable function among all points with the same outputs; null of combinations that were asked for, and
+    if solutions were not sought.
+    """
 
 
 class SymmetryReport(Record):
@@ -1072,6 +1087,10 @@ class SystemAnalysis(Shape):
     """Unknowns affected by each remaining unobservable direction: at a generic point, no polynomial that was found describes it."""
     invariants: list[SystemCombination]
     """Observable combinations of unobservable unknowns."""
+    missing_functions: int
+    """Number of independent identifiable functions of unobservable unknowns that exist beyond `invariants`: the rank less the observable
+    unknowns less those listed.
+    """
     last_order: int
     """Highest order of derivatives that was examined."""
     bound: int
@@ -1092,6 +1111,10 @@ class SystemAnalysis(Shape):
     """Changes that make the unobservable unknowns observable."""
     note: str | None
     """Reason why solving expressions were not sought, or not all of them; null otherwise."""
+    solution_maps: list[str]
+    """Maps that take every solution to another with the same outputs: `negate q1, q2`, `swap k1 and k2`. Sought among changes of signs
+    and exchanges of places, then, of two solutions, among short expressions; empty if none was found.
+    """
     counting_order: int | None
     """Order of the derivatives with which solutions were counted by elimination; null if none were."""
     independent_functions: int | None

@@ -81,6 +81,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "work-limit" => &["1", "700", "0", "1000000001", "x"],
         "check" => &["0", "1", "-1", "x"],
         "solutions" | "omitted" => &["off", "maybe"],
+        "relation-limit" => &["0", "1", "-1", "x"],
         "frame" => &["n", "p", "q"],
         "seed" => &["0", "1", "18446744073709551615", "18446744073709551616", "-1"],
         "symbolic-limit" => &["0", "1", "1000", "18446744073709551615", "-1"],
@@ -168,7 +169,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "beta=-1e300:1e300",
         ],
         "figures" => &["pictures", ".", "s.toml"],
-        "certificate" => &["new.json", "s.toml", ".", ""],
+        "certificate" | "reduced" => &["new.json", "s.toml", ".", ""],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "sensitivities" | "minimum" | "refine" | "divide" | "meet"
         | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
@@ -296,7 +297,7 @@ fn record() -> String {
 /// Beside a model an option is about models too, or is refused: none is passed over.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 14] = [
+    const TAKEN: [&str; 16] = [
         "ascii",
         "certificate",
         "count-limit",
@@ -306,6 +307,8 @@ fn a_model_refuses_what_is_about_schemes() {
         "order",
         "output",
         "quiet",
+        "reduced",
+        "relation-limit",
         "seed",
         "solutions",
         "symbolic-limit",

@@ -26,6 +26,7 @@ mod functions;
 mod grammar;
 mod help;
 mod hostile;
+mod identifiability;
 mod language;
 mod laws;
 mod licences;

@@ -289,7 +289,10 @@ fn table(text: &str) -> String {
 fn what_is_not_counted_has_no_number() {
     for output in ["sin(th)", "th^2"] {
         let text = table(&format!("name='m'\n[states]\nth='0'\n[outputs]\ny='{output}'"));
-        assert!(text.contains("locally unique; not counted") && !text.contains("finitely many"), "{text}");
+        assert!(
+            text.contains("locally identifiable (solutions not counted)") && !text.contains("finitely many"),
+            "{text}"
+        );
         for k in [-1.0, 1.0] {
             // another value with the same output
             let (own, other) =

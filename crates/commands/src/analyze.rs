@@ -7,7 +7,9 @@ use obsdeg_core::analysis::AnalysisOptions;
 use obsdeg_core::certificate::{CertificateError, certify, certify_model};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
-use obsdeg_core::system::{COUNT_LIMIT, SystemAnalysis, SystemOptions, analyze_system};
+use obsdeg_core::system::{
+    COUNT_LIMIT, RELATION_LIMIT, ReducedError, SystemAnalysis, SystemOptions, analyze_system, reduced,
+};
 use obsdeg_evidence::simulation::{Conditions, SchemeAnalysis, sensitivities};
 use obsdeg_report::{Answer, Document, File, Several, Table};
 use serde::{Deserialize, Serialize};
@@ -40,6 +42,11 @@ pub struct Analyze {
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
     pub count_limit: Option<u64>,
 
+    /// Limit of the work of relations among output derivatives, sought where counting does not decide how
+    /// many solutions there are: millions of products at each of two points (5 ms each); 0: none [default: 0]
+    #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
+    pub relation_limit: Option<u64>,
+
     /// Solving expressions and numbers of solutions
     #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
     pub solutions: bool,
@@ -66,6 +73,11 @@ pub struct Analyze {
     /// the file.
     #[arg(skip)]
     pub certificate: bool,
+
+    /// True if `reduced.toml` is among the files of the answer; on the command line `--reduced` names the
+    /// file.
+    #[arg(skip)]
+    pub reduced: bool,
 }
 
 /// The orders that may be asked for.
@@ -78,12 +90,14 @@ impl Default for Analyze {
             input: InputOptions::default(),
             order: None,
             count_limit: None,
+            relation_limit: None,
             solutions: true,
             frame: Frame::default(),
             formulas: false,
             omitted: true,
             sensitivities: false,
             certificate: false,
+            reduced: false,
         }
     }
 }
@@ -258,6 +272,22 @@ pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
     Ok(File { name: "certificate.json".into(), bytes: text.into_bytes() })
 }
 
+/// The reduced model of the one model that was read, under its name `reduced.toml`: fully observable, with
+/// the same outputs.
+///
+/// # Errors
+/// [`Problem`] of a model that has none, or of which none is written.
+pub fn reduced_model(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
+    let [(_, Input::Model(file))] = read else {
+        return Err(Problem::input("a reduced model is of one model"));
+    };
+    match reduced(&file.model, options.seed, options.order.map(|order| order as usize)) {
+        Ok(found) => Ok(File { name: "reduced.toml".into(), bytes: found.text.into_bytes() }),
+        Err(ReducedError::Model(e)) => Err(file.wrong(&e)),
+        Err(e) => Err(Problem::input(e.to_string())),
+    }
+}
+
 /// The SHA-256 of the certificate of a scheme, in hexadecimal digits. It does not depend on a seed.
 ///
 /// # Errors
@@ -268,7 +298,8 @@ pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
-    let &Analyze { seed, solutions, formulas, frame, omitted, count_limit, order, .. } = options;
+    let &Analyze { seed, solutions, formulas, frame, omitted, count_limit, relation_limit, order, .. } =
+        options;
     Ok(match input {
         Input::Scheme(scheme) => {
             // a record that can not be predicted says so before anything is solved
@@ -283,7 +314,9 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
         }
         Input::Model(file) => {
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
-            let options = SystemOptions { seed, solutions, count_limit, order: order.map(Into::into) };
+            let relation_limit = relation_limit.unwrap_or(RELATION_LIMIT);
+            let order = order.map(Into::into);
+            let options = SystemOptions { seed, solutions, count_limit, relation_limit, order };
             let found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
             Judged::Model(Box::new(found))
         }

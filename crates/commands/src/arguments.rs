@@ -44,7 +44,8 @@ const OF_BOTH: [&str; 19] = [
 ];
 
 /// Options that concern models alone; all others of a command are about schemes.
-const OF_MODELS: [&str; 5] = ["order", "count_limit", "work_limit", "starts", "profile"];
+const OF_MODELS: [&str; 7] =
+    ["order", "count_limit", "relation_limit", "work_limit", "reduced", "starts", "profile"];
 
 /// The options on the command line that concern one kind of file only, as they are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::allan::{Allan, allan, files as allan_files};
-use crate::analyze::{Analyze, analyze, certificate};
+use crate::analyze::{Analyze, analyze, certificate, reduced_model};
 use crate::arguments::Given;
 use crate::calibrate::{Calibrate, calibrate};
 use crate::compare::{Compare, compare};
@@ -232,8 +232,10 @@ fn answered<W: Wanted>(
             let judged = analyze(&asked.options, &read, host)?;
             let wanted = asked.options.certificate;
             let certificate = wanted.then(|| certificate(&asked.options, &read)).transpose()?;
+            let reduced = asked.options.reduced.then(|| reduced_model(&asked.options, &read)).transpose()?;
             W::whole(judged, true, move |_| {
-                Ok(position_figures(&read).into_iter().chain(certificate.clone()).collect())
+                let own = certificate.clone().into_iter().chain(reduced.clone());
+                Ok(position_figures(&read).into_iter().chain(own).collect())
             })
         }
         "simulate" => {

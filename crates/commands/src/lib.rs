@@ -32,7 +32,7 @@ mod source;
 mod text;
 
 pub use allan::{Allan, allan, files as allan_files};
-pub use analyze::{Analyze, Judged, Judgements, analyze, certificate};
+pub use analyze::{Analyze, Judged, Judgements, analyze, certificate, reduced_model};
 pub use arguments::{ANY, Assumptions, Attitude, Given, InputOptions, TermOptions, Word, one_of, whole};
 pub use calibrate::{Calibrate, Calibrated, calibrate};
 pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_calibrate, call_json};

@@ -16,6 +16,8 @@
 //! - [`polynomial`]: roots of small polynomials in the field;
 //! - [`multivariate`], [`groebner`]: polynomials in several variables, and bases of their ideals;
 //! - [`divisor`], [`fraction`]: common divisors of these, and rational functions;
+//! - [`dense`]: dependencies among the columns of a dense matrix;
+//! - [`reconstruct`]: rational functions of one variable through points;
 //! - [`certainty`]: the bound on the error probability;
 //! - [`interrupt`]: the end of work for which nobody waits any longer.
 //!
@@ -27,6 +29,7 @@
 
 pub mod ball;
 pub mod certainty;
+pub mod dense;
 pub mod divisor;
 pub mod echelon;
 mod elementary;
@@ -41,6 +44,7 @@ pub mod polynomial;
 pub mod prime;
 pub mod radical;
 pub mod reals;
+pub mod reconstruct;
 pub mod rng;
 pub mod scalars;
 pub mod series;

@@ -21,8 +21,8 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
             format!("from {from} themselves; {}", solutions(q))
         }
         (Status::Observable, _) => solutions(q),
-        (Status::Inseparable, _) => words::not_told_from(&q.partners),
-        (Status::NotExcited, _) => "moves no output".into(),
+        (Status::Inseparable, _) => format!("not identifiable: {}", words::not_told_from(&q.partners)),
+        (Status::NotExcited, _) => "not identifiable: moves no output".into(),
         (Status::NotSeen, _) => "a higher order may still solve it: no end is proven here".into(),
     }
 }
@@ -50,16 +50,14 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     }
 }
 
-/// How many solutions an observable unknown has.
+/// How many solutions an observable unknown has, and where its expression stands.
 fn solutions(q: &SystemQuantity) -> String {
-    let number = match q.number_of_solutions {
-        Some(NumberOfSolutions::OneByExpression) => return "one solution: see below".into(),
-        Some(NumberOfSolutions::Counted(1)) => "one solution".into(),
-        Some(NumberOfSolutions::Counted(k)) => format!("{k} solutions"),
-        Some(NumberOfSolutions::Undecided(_)) => "locally unique; number of solutions not decided".into(),
-        None => "locally unique; not counted".into(),
-    };
-    if q.solution.is_some() { format!("{number}; in terms of others: see below") } else { number }
+    let words = q.identifiability_words();
+    match (&q.number_of_solutions, &q.solution) {
+        (Some(NumberOfSolutions::OneByExpression), _) => format!("{words}: see below"),
+        (_, Some(_)) => format!("{words}; in terms of others: see below"),
+        (_, None) => words,
+    }
 }
 
 /// What the numbers of solutions rest on, and why some are missing.
@@ -86,11 +84,23 @@ fn counting(a: &SystemAnalysis) -> Vec<String> {
     out
 }
 
+/// The verdict on an observable combination, with the number of its values where they were counted.
+fn values_of(c: &SystemCombination) -> String {
+    match &c.number_of_solutions {
+        None => "observable".into(),
+        Some(NumberOfSolutions::Counted(1) | NumberOfSolutions::OneByExpression) => {
+            "globally identifiable".into()
+        }
+        Some(NumberOfSolutions::Counted(k)) => format!("locally identifiable ({k} values)"),
+        Some(NumberOfSolutions::Undecided(_)) => "locally identifiable (number of values not decided)".into(),
+    }
+}
+
 /// Combinations with their verdicts; `unproven` is the order up to which was looked, where no end is proven.
 fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> Block {
     let row = |c: &SystemCombination| {
         let verdict = match (c.degree, unproven) {
-            (Some(_), _) => "observable".into(),
+            (Some(_), _) => values_of(c),
             (None, None) => "not observable".into(),
             (None, Some(order)) => format!("not seen up to order {order}"),
         };
@@ -197,8 +207,19 @@ impl Answer for SystemAnalysis {
             };
             blocks.extend(Block::list_if_any(&heading, lines));
         }
+        blocks.extend(Block::list_if_any(
+            "Every solution has another one with the same outputs, which appears when you",
+            self.solution_maps.clone(),
+        ));
         blocks.push(Block::list("The system", self.equations.clone()));
         let mut assumed = Vec::new();
+        if self.missing_functions > 0 {
+            assumed.push(format!(
+                "identifiable combinations are not all listed: {} independent one{} more of unobservable unknowns exist, and no short sum of products of powers was found",
+                self.missing_functions,
+                if self.missing_functions == 1 { "" } else { "s" }
+            ));
+        }
         if !self.known.is_empty() {
             assumed.push(format!("known starts: {}", self.known.join(", ")));
         }
@@ -279,7 +300,7 @@ impl Answer for SystemAnalysis {
             assumed.push(branch(self));
         }
         if !self.combinations.is_empty() {
-            assumed.push("the number of solutions of a combination is not counted".into());
+            assumed.push("the number of solutions of a combination that is asked for is not counted".into());
         }
         assumed.extend(counting(self));
         assumed.extend(self.note.clone());

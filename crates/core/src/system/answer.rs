@@ -5,11 +5,13 @@ use serde::Serialize;
 
 use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
+use super::counts::{Count, Limits, Solutions, values_taken};
 use super::error::ModelError;
-use super::fibre::{Count, values_taken};
 use super::functions::gcd;
+use super::identifiable::{identifiable_functions, terms_of};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
 use super::model::{Compiled, Role, StartTime, StateStart, SystemModel};
+use super::quotients::Terms;
 use super::remedies::remedies;
 use super::rows::Unknown;
 use super::solutions::solutions;
@@ -19,6 +21,9 @@ use crate::remedies::Remedies;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
+
+/// Default of [`SystemOptions::relation_limit`]: relations are sought only where they are asked for.
+pub const RELATION_LIMIT: u64 = 0;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -67,6 +72,9 @@ pub struct SystemAnalysis {
     pub other_directions: Vec<Vec<String>>,
     /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<SystemCombination>,
+    /// Number of independent identifiable functions of unobservable unknowns that exist beyond `invariants`:
+    /// the rank less the observable unknowns less those listed.
+    pub missing_functions: usize,
     /// Highest order of derivatives that was examined.
     pub last_order: usize,
     /// Order of derivatives at which the search ends at the latest.
@@ -86,6 +94,10 @@ pub struct SystemAnalysis {
     pub to_resolve: Remedies,
     /// Reason why solving expressions were not sought, or not all of them; null otherwise.
     pub note: Option<String>,
+    /// Maps that take every solution to another with the same outputs: `negate q1, q2`, `swap k1 and k2`.
+    /// Sought among changes of signs and exchanges of
+    /// places, then, of two solutions, among short expressions; empty if none was found.
+    pub solution_maps: Vec<String>,
     /// Order of the derivatives with which solutions were counted by elimination; null if none were.
     pub counting_order: Option<usize>,
     /// Number of functions whose values are proven to be independent of each other at a generic point (Ax
@@ -140,6 +152,62 @@ pub struct SystemQuantity {
     pub solution: Option<String>,
     /// Number of solutions for the unknown; null if it is not observable, or if solutions were not sought.
     pub number_of_solutions: Option<NumberOfSolutions>,
+    /// Identifiability of the unknown in the usual terms: `globally_identifiable`, `locally_identifiable`
+    /// (the number of solutions is in `number_of_solutions`), `not_identifiable` or `not_decided`.
+    pub identifiability: Identifiability,
+}
+
+/// Identifiability of an unknown (of a state: observability), in the usual terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Identifiability {
+    /// Globally identifiable: the outputs of a generic point have one solution for the unknown.
+    GloballyIdentifiable,
+    /// Locally identifiable: no other value nearby gives the same outputs; several solutions, or their number
+    /// is not decided.
+    LocallyIdentifiable,
+    /// Not identifiable: values as near as one likes give the same outputs.
+    NotIdentifiable,
+    /// Not decided: the unknown is not observable up to the bound on the order, where no end is proven.
+    NotDecided,
+}
+
+impl SystemQuantity {
+    /// With the identifiability that its verdict and its number of solutions state.
+    fn with_identifiability(self) -> Self {
+        Self { identifiability: self.identifiability(), ..self }
+    }
+
+    /// The identifiability that the verdict and the number of solutions state.
+    fn identifiability(&self) -> Identifiability {
+        match (self.status, &self.number_of_solutions) {
+            (
+                Status::Observable,
+                Some(NumberOfSolutions::OneByExpression | NumberOfSolutions::Counted(1)),
+            ) => Identifiability::GloballyIdentifiable,
+            (Status::Observable, _) => Identifiability::LocallyIdentifiable,
+            (Status::NotSeen, _) => Identifiability::NotDecided,
+            (Status::Inseparable | Status::NotExcited, _) => Identifiability::NotIdentifiable,
+        }
+    }
+
+    /// The identifiability in words, with the number of solutions: `locally identifiable (2 solutions)`.
+    pub fn identifiability_words(&self) -> String {
+        match (self.identifiability, &self.number_of_solutions) {
+            (Identifiability::GloballyIdentifiable, _) => "globally identifiable".into(),
+            (Identifiability::LocallyIdentifiable, Some(NumberOfSolutions::Counted(k))) => {
+                format!("locally identifiable ({k} solutions)")
+            }
+            (Identifiability::LocallyIdentifiable, Some(_)) => {
+                "locally identifiable (number of solutions not decided)".into()
+            }
+            (Identifiability::LocallyIdentifiable, None) => {
+                "locally identifiable (solutions not counted)".into()
+            }
+            (Identifiability::NotIdentifiable, _) => "not identifiable".into(),
+            (Identifiability::NotDecided, _) => "identifiability not decided".into(),
+        }
+    }
 }
 
 /// Number of values of an unknown among all points with the same outputs.
@@ -162,6 +230,9 @@ pub struct SystemCombination {
     pub expression: String,
     /// Observable degree of the combination; null if it is not observable.
     pub degree: Option<usize>,
+    /// Number of values of an identifiable function among all points with the same outputs; null of
+    /// combinations that were asked for, and if solutions were not sought.
+    pub number_of_solutions: Option<NumberOfSolutions>,
 }
 
 /// Symmetry of the system, in words.
@@ -215,6 +286,9 @@ pub struct SystemOptions {
     /// How much work counting solutions may take: millions of products of two coefficients, at each of two
     /// points.
     pub count_limit: u64,
+    /// How much work relations among derivatives of the outputs may take where counting leaves a number
+    /// undecided: millions of products of two coefficients, at each of two points; 0: none are sought.
+    pub relation_limit: u64,
     /// The highest order of derivatives to look at; left out: n for each experiment where chains end by
     /// themselves, else 2n+4, and at least 60 without arbitrary inputs.
     pub order: Option<usize>,
@@ -222,7 +296,13 @@ pub struct SystemOptions {
 
 impl Default for SystemOptions {
     fn default() -> Self {
-        Self { seed: 1, solutions: true, count_limit: COUNT_LIMIT, order: None }
+        Self {
+            seed: 1,
+            solutions: true,
+            count_limit: COUNT_LIMIT,
+            relation_limit: RELATION_LIMIT,
+            order: None,
+        }
     }
 }
 
@@ -237,6 +317,16 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries);
     out.note = symmetries.stopped.clone();
+    let (functions, missing) = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?;
+    let name = |c: usize| name_of(model, &judged, c);
+    out.invariants.extend(functions.iter().map(|f| SystemCombination {
+        expression: f.text(&name),
+        degree: Some(f.degree),
+        number_of_solutions: None,
+    }));
+    let own = symmetries.invariants.iter().map(terms_of);
+    let listed: Vec<Terms> = own.chain(functions.into_iter().map(|f| f.terms)).collect();
+    out.missing_functions = missing;
     out.branches = branches(&compiled);
     out.to_resolve = remedies(model, &compiled, &judged, (seed, symmetries.work), order);
     out.time = compiled.uses_time().then(|| match model.time {
@@ -246,8 +336,16 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     if !options.solutions {
         return Ok(out);
     }
-    let (counts, counting_order) =
-        values_taken(model, &compiled, &judged, seed, options.count_limit.saturating_mul(1_000_000));
+    let limits = Limits {
+        count: options.count_limit.saturating_mul(1_000_000),
+        relations: options.relation_limit.saturating_mul(1_000_000),
+    };
+    let Solutions { counts, of_functions, order: counting_order, maps } =
+        values_taken(model, &compiled, &judged, &listed, (seed, limits));
+    out.solution_maps = maps;
+    for (function, count) in out.invariants.iter_mut().zip(of_functions) {
+        function.number_of_solutions = Some(number_of_solutions(count, false));
+    }
     let single: Vec<bool> = counts.iter().map(|c| *c == Some(Ok(1))).collect();
     let (found, missing) = solutions(model, &compiled, &judged, seed, &single);
     let notes: Vec<String> =
@@ -260,6 +358,7 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
             let unique = shown.is_some() || found.as_ref().is_some_and(|e| e.unique);
             q.solution = found.map(|e| e.text).or(shown);
             q.number_of_solutions = count.map(|count| number_of_solutions(count, unique));
+            q.identifiability = q.identifiability();
         }
     }
     let counted = |q: &SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(_)));
@@ -319,8 +418,10 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             partners: findings.partners[c].iter().map(|&p| name(p)).collect(),
             solution: None,
             number_of_solutions: None,
+            identifiability: Identifiability::NotDecided,
         }
     });
+    let quantities = quantities.map(SystemQuantity::with_identifiability);
     let asked = model.combinations.iter().zip(judged.asked());
     let primes = match judged.certainty {
         SystemCertainty::Primes(primes) => Some(primes),
@@ -343,11 +444,16 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         constraints: model.constraint_texts(),
         constraint_factors: model.factors.clone(),
         combinations: asked
-            .map(|(c, verdict)| SystemCombination { expression: c.text.clone(), degree: verdict.degree })
+            .map(|(c, verdict)| SystemCombination {
+                expression: c.text.clone(),
+                degree: verdict.degree,
+                number_of_solutions: None,
+            })
             .collect(),
         unobservable_directions: judged.layout.unknowns.len() - findings.degrees.rank(),
         other_directions: named(&symmetries.unexplained, &name),
         invariants: invariant_reports(model, judged, symmetries),
+        missing_functions: 0,
         symmetries: symmetry_reports(model, judged, symmetries),
         last_order: findings.degrees.rank_profile.len().saturating_sub(1),
         bound: judged.layout.bound,
@@ -357,6 +463,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         branch_sides: judged.sides.clone(),
         to_resolve: Remedies::default(),
         note: None,
+        solution_maps: Vec::new(),
         counting_order: None,
         independent_functions: judged.independent_functions,
         primes: primes.map(|p| p.primes_as_text()),
@@ -540,6 +647,7 @@ pub fn invariant_reports(
     let report = |i: &Invariant| SystemCombination {
         expression: if i.product { product(i) } else { sum(i) },
         degree: Some(i.degree),
+        number_of_solutions: None,
     };
     symmetries.invariants.iter().map(report).collect()
 }

@@ -12,131 +12,30 @@
 //! 2020, doi:10.1002/cpa.21921). It needs a derivation of the unknowns, hence one segment, a generic start
 //! and no arbitrary input; elsewhere one solution is one, and more may become fewer. Orders beyond h+1 change
 //! nothing but make the equations easier to solve.
+//!
+//! Where inputs are generic, runs from the same start with other inputs add equations of low order: almost
+//! every input distinguishes every pair of points that any input distinguishes (Sussmann 1979, "Single-input
+//! observability of continuous-time systems", Math. Systems Theory 12, 371), so that no solution is lost.
 
 use std::collections::BTreeSet;
 
-use obsdeg_exact::groebner::{Basis, OverLimit, Work};
+use obsdeg_exact::groebner::{Basis, Work};
 use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
+use super::global::Known;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
+use super::quotients::{Quotients, Terms};
 use super::rows::{Layout, SystemRows, Unknown};
+use super::undecided::{LONGEST, NotCounted};
 use super::work;
 
-/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are
-/// decided.
-const BEYOND: usize = 3;
-/// Most solutions that are counted.
-const SOLUTIONS: usize = 64;
-/// Most unknowns: what has more is far beyond any limit of work, and its rows take memory.
-const UNKNOWNS: usize = 60;
-/// A polynomial of more terms is not formed.
-const TERMS: usize = 400;
 /// Higher powers are not formed: a basis has none above 255.
 const POWER: u64 = 1 << 16;
 /// The least weight of a state; parameters have weight one.
 const STATE: u32 = 2;
-/// The work that one remainder by an unfinished basis may take.
-const REMAINDER: u64 = 100_000;
-
-/// Why the number of solutions is not decided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(super) enum NotCounted {
-    /// A function in an equation.
-    #[error("solutions are counted for models without functions only")]
-    NotRational,
-    /// Decided in real numbers.
-    #[error(
-        "solutions are counted in prime fields, and the verdicts were decided in real numbers (constraints that follow from each other, \
-         or hold in no prime field)"
-    )]
-    InDigits,
-    /// Too many unknowns.
-    #[error("there are more than {UNKNOWNS} unknowns")]
-    TooLarge,
-    /// Too long an equation.
-    #[error("an equation has more than {TERMS} terms")]
-    TooLong,
-    /// Beyond the limit.
-    #[error(
-        "the elimination takes more products of coefficients than --count-limit allows; a larger --count-limit allows more"
-    )]
-    OverLimit,
-    /// A power that the elimination does not form.
-    #[error("the elimination would form powers above 255, whatever --count-limit")]
-    TooHigh,
-    /// More than counted.
-    #[error("there are more than {SOLUTIONS}")]
-    TooMany,
-    /// The start or an input is special.
-    #[error(
-        "starts, inputs, segments or constraints are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
-    )]
-    NotClosed,
-    /// Two points disagree.
-    #[error("two random points disagree")]
-    Disagree,
-    /// No point was found.
-    #[error("no random point could be used")]
-    NoPoint,
-}
-
-impl From<OverLimit> for NotCounted {
-    fn from(_: OverLimit) -> Self {
-        Self::OverLimit
-    }
-}
-
-/// The number of values of an unknown, or why it is not decided.
-pub(super) type Count = Result<usize, NotCounted>;
-
-/// The number of values that every unknown takes, in the order of the layout, as two random points in the two
-/// fields agree; with derivatives of the outputs up to the order that comes with it. At most `limit` products
-/// a point. What is not observable has no number.
-pub(super) fn values_taken(
-    model: &SystemModel,
-    compiled: &Compiled,
-    judged: &Judgement,
-    seed: u64,
-    limit: u64,
-) -> (Vec<Option<Count>>, usize) {
-    let degrees = &judged.findings.degrees;
-    let last = degrees.rank_profile.iter().position(|&r| r == degrees.rank()).unwrap_or(0);
-    let order =
-        (last + BEYOND).min(if judged.layout.closed { usize::MAX } else { judged.layout.bound.max(last) });
-    // a relation between derivatives that holds on one component of the constraints need not hold on another
-    let proven = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
-    let at = |i: usize| -> Vec<Count> {
-        let Some(fields) = judged.fields else {
-            let why = if compiled.dag.is_rational() { NotCounted::InDigits } else { NotCounted::NotRational };
-            return vec![Err(why); degrees.degree.len()];
-        };
-        if degrees.degree.len() > UNKNOWNS {
-            return vec![Err(NotCounted::TooLarge); degrees.degree.len()];
-        }
-        let mut rng = model.random(seed, &format!("solutions, field {i}"));
-        let mut work = Work::new(limit);
-        let counts = at_point(model, compiled, judged, (fields[i], &mut rng), order, &mut work)
-            .unwrap_or_else(|e| vec![Err(e); degrees.degree.len()]);
-        let why = |e: NotCounted| match e {
-            NotCounted::OverLimit if !work.used_up => NotCounted::TooHigh,
-            e => e,
-        };
-        counts.into_iter().map(|count| count.map_err(why)).collect()
-    };
-    let first = at(0);
-    let second = if first.iter().any(Result::is_ok) { at(1) } else { first.clone() };
-    let agreed = first.into_iter().zip(second).map(|counts| match counts {
-        (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
-        (Ok(a), Ok(_)) if a > 1 && !proven => Err(NotCounted::NotClosed),
-        (Ok(a), Ok(_)) => Ok(a),
-        (Err(e), _) | (_, Err(e)) => Err(e),
-    });
-    let observable = agreed.zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
-    (observable.collect(), order)
-}
 
 /// The equations at a point.
 struct Equations<'a> {
@@ -185,7 +84,7 @@ impl Equations<'_> {
             return Err(NotCounted::TooHigh);
         }
         sum.add_product(&self.f, a, b);
-        if sum.len() > TERMS { Err(NotCounted::TooLong) } else { Ok(()) }
+        if sum.len() > LONGEST { Err(NotCounted::TooLong) } else { Ok(()) }
     }
 
     /// Coefficient `k` of the nodes that are `needed`, in a run that has those before.
@@ -382,13 +281,13 @@ fn equations<'a>(
     model: &SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    (f, rng, verdict): (Field, &mut SplitMix64, &'a work::Work),
-    order: usize,
+    Counted { f, order, others, known, .. }: Counted<'_>,
+    (rng, verdict): (&mut SplitMix64, &'a work::Work),
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
     let layout = &judged.layout;
-    let mut rows =
-        SystemRows::new(model, compiled, layout, f, rng, verdict).map_err(|_| NotCounted::NoPoint)?;
+    let mut rows = SystemRows::with_inputs(model, compiled, layout, f, (rng, others), verdict)
+        .map_err(|_| NotCounted::NoPoint)?;
     let segments = compiled.segments.len().max(1);
     let experiments = model.experiments.max(1);
     for e in 0..experiments {
@@ -397,7 +296,9 @@ fn equations<'a>(
         rows.coefficient(e * segments, 0, highest);
     }
     let values = rows.values(compiled, layout, 0);
-    let free = |lane: usize| judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane));
+    let free = |lane: usize| {
+        known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
+    };
     let lane = |(lane, &value): (usize, &u64)| match free(lane) {
         true => Polynomial::constant(value),
         false => Polynomial::variable(&f, lane as u32),
@@ -418,7 +319,7 @@ fn equations<'a>(
         state_weights,
         lanes: values.iter().enumerate().map(lane).collect(),
         values,
-        zero: Vec::new(),
+        zero: known.zero.clone(),
         runs: Vec::new(),
     };
     for experiment in 0..experiments {
@@ -448,6 +349,10 @@ fn equations<'a>(
             out.jump(r, jumps)?;
             initial = out.runs[r].initial.clone();
         }
+    }
+    for _ in 0..others {
+        let initial = out.runs[0].initial.clone();
+        out.runs.push(Run { experiment: 0, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
     }
     let needed: Vec<Vec<bool>> = (0..experiments)
         .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
@@ -495,22 +400,58 @@ fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynom
     }
 }
 
-/// The number of values of every unknown at one random point.
-fn at_point(
+/// Where solutions are counted: a random point in one of the two fields, with what is known there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counted<'a> {
+    pub(super) f: Field,
+    /// Highest order of the derivatives of the outputs.
+    pub(super) order: usize,
+    /// Runs from the same start with other values of the generic inputs.
+    pub(super) others: usize,
+    /// What relations say.
+    pub(super) known: &'a Known,
+    /// Functions whose values are counted too, and with them all unknowns: of those that are not observable
+    /// the values where as many keep theirs as there are directions. `None`: only what is observable.
+    pub(super) functions: Option<&'a [Terms]>,
+}
+
+/// The values of the unknowns among all points with the same outputs as one.
+#[derive(Debug, Clone)]
+pub(super) struct Fibre {
+    /// Values of the unknowns at the point itself.
+    pub(super) values: Vec<u64>,
+    /// By unknown: a polynomial whose roots are the values that the unknown takes, constant term first.
+    pub(super) polynomials: Vec<Result<Vec<u64>, NotCounted>>,
+    /// True if all unknowns together take two values.
+    pub(super) is_pair: bool,
+    /// Numbers of values of the functions.
+    pub(super) functions: Vec<Result<usize, NotCounted>>,
+}
+
+/// The values that every unknown takes at one random point.
+pub(super) fn at_point(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
-    (f, rng): (Field, &mut SplitMix64),
-    order: usize,
+    at: Counted<'_>,
+    rng: &mut SplitMix64,
     work: &mut Work,
-) -> Result<Vec<Count>, NotCounted> {
+) -> Result<Fibre, NotCounted> {
+    let f = at.f;
     let verdict = work::Work::new(model.work_limit);
     let Equations { zero, values, weights, lanes, .. } =
-        equations(model, compiled, judged, (f, rng, &verdict), order, &mut *work)?;
-    let observable = judged.findings.degrees.degree.iter().map(Option::is_some);
-    let wanted: Vec<Polynomial> =
-        lanes.into_iter().zip(observable).map(|(p, o)| if o { p } else { Polynomial::default() }).collect();
+        equations(model, compiled, judged, at, (&mut *rng, &verdict), &mut *work)?;
+    let degree = &judged.findings.degrees.degree;
+    let counted = |lane: usize| degree[lane].is_some() || at.functions.is_some();
+    let own: Vec<u64> = values[..lanes.len()].to_vec();
+    let shown =
+        |(lane, p): (usize, &Polynomial)| if counted(lane) { p.clone() } else { Polynomial::default() };
+    let mut wanted: Vec<Polynomial> = lanes.iter().enumerate().map(shown).collect();
     let zero = without_lonely(zero, values.len(), &wanted);
+    // all together, by a random combination
+    let mut joint = Polynomial::default();
+    wanted.iter().for_each(|p| joint.add_scaled(&f, p, rng.below(f.modulus())));
+    wanted.push(joint);
     // the latest variables are the largest: they go first
     let used: Vec<usize> = (0..values.len())
         .filter(|&v| zero.iter().chain(&wanted).any(|p| p.terms_with(v as u32) > 0))
@@ -520,22 +461,25 @@ fn at_point(
     for (i, &v) in used.iter().enumerate() {
         place[v] = Some(i as u32);
     }
-    let renamed = |list: Vec<Polynomial>| -> Option<Vec<Polynomial>> {
+    let renamed = |list: &[Polynomial]| -> Option<Vec<Polynomial>> {
         list.iter().map(|p| p.renamed(|v| place[v as usize])).collect()
     };
-    let (Some(zero), Some(wanted)) = (renamed(zero), renamed(wanted)) else {
+    let (Some(zero), Some(mut wanted)) = (renamed(&zero), renamed(&wanted)) else {
         return Err(NotCounted::NoPoint);
     };
+    let joint = wanted.pop().unwrap_or_default();
     let weights: Vec<u32> = used.iter().map(|&v| weights[v]).collect();
     let mut basis = Basis::new(&f, &weights, &zero, work);
-    let count = |p: &Polynomial| -> Count {
-        if !basis.is_complete() {
-            // what is a number in an ideal is one in every larger one
-            let number = basis.remainder(p, &mut Work::new(REMAINDER))?.as_constant().is_some();
-            return if number { Ok(1) } else { Err(NotCounted::OverLimit) };
-        }
-        let minimal = basis.minimal_polynomial(p, SOLUTIONS, work)?.ok_or(NotCounted::TooMany)?;
-        Ok(polynomial::distinct_roots(&f, &minimal))
+    let mut ring = Quotients { f, basis: &mut basis };
+    let polynomials: Vec<Result<Vec<u64>, NotCounted>> =
+        wanted.iter().map(|p| ring.values(p, work)).collect();
+    let two =
+        |p: &Result<Vec<u64>, NotCounted>| p.as_ref().is_ok_and(|p| polynomial::distinct_roots(&f, p) == 2);
+    let is_pair = polynomials.iter().any(two) && two(&ring.values(&joint, work));
+    let mut of_function = |terms: &Terms| -> Result<usize, NotCounted> {
+        let element = ring.function(terms, &wanted, work)?;
+        Ok(polynomial::distinct_roots(&f, &ring.values(&element, work)?))
     };
-    Ok(wanted.iter().map(count).collect())
+    let functions = at.functions.unwrap_or_default().iter().map(&mut of_function).collect();
+    Ok(Fibre { values: own, polynomials, is_pair, functions })
 }

@@ -10,6 +10,7 @@ mod answer;
 mod branches;
 mod canonical;
 pub(crate) mod constraints;
+mod counts;
 pub(crate) mod dag;
 mod elimination;
 mod error;
@@ -18,23 +19,31 @@ mod factors;
 mod fibre;
 mod formula;
 mod functions;
+mod global;
 mod held;
+mod identifiable;
 mod independent;
 mod intervals;
 pub mod json;
 pub(crate) mod judge;
+mod lie;
+mod maps;
 pub(crate) mod model;
 pub mod model_file;
 mod newton;
 mod nominal;
+mod quotients;
 mod reader;
 pub(crate) mod real_points;
+mod reduced;
 mod remedies;
 pub(crate) mod rows;
 mod solutions;
 pub(crate) mod symmetry;
 pub(crate) mod taylor;
 mod text;
+mod twins;
+mod undecided;
 pub(crate) mod values;
 pub(crate) mod work;
 
@@ -48,6 +57,7 @@ pub use model::{
     Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, Named, Nominal, Place,
     PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
+pub use reduced::{Reduced, ReducedError, reduced};
 pub use rows::{Layout, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
 pub use work::WorkLimit;

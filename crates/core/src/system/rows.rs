@@ -168,11 +168,25 @@ const SIDES: usize = 200;
 pub(super) type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
 
 /// What the runs of one experiment share at a point.
+#[derive(Clone)]
 pub(super) struct Point<S: Values> {
     pub(super) signals: Vec<Signal<S::Element>>,
     pub(super) initial: Vec<Option<Initial<S::Element>>>,
     pub(super) seed: u64,
     pub(super) experiment: usize,
+}
+
+impl<S: Values> Point<S> {
+    /// The point with known inputs that are generic at constant values.
+    fn with_constant_inputs(&self, mut constant: impl FnMut() -> S::Element) -> Self {
+        let mut out = self.clone();
+        for signal in &mut out.signals {
+            if let Signal::Known { value, degree: degree @ None } = signal {
+                (*value, *degree) = (constant(), Some(0));
+            }
+        }
+        out
+    }
 }
 
 /// Everything a point is made from.
@@ -499,11 +513,27 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
+        Self::with_inputs(model, compiled, layout, field, (rng, 0), work)
+    }
+
+    /// The rows of a system at a random point, then those of so many runs from the same start with other
+    /// values of the generic inputs: the first with zeros, the others with random constants.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn with_inputs(
+        model: &SystemModel,
+        compiled: &'a Compiled,
+        layout: &Layout,
+        field: S,
+        (rng, others): (&mut SplitMix64, usize),
+        work: &'a Work,
+    ) -> Result<Self, Singular> {
         let mut last = Singular::Division(0);
         let maker = Maker { model, compiled, layout, field, work };
         let (mut attempt, mut tries, mut elsewhere) = (0, 0, None);
         while attempt < S::ATTEMPTS {
-            match Self::at(&maker, work, rng, attempt) {
+            match Self::at(&maker, work, (rng, others), attempt) {
                 Err(singular) if singular != Singular::Refused => {
                     last = singular;
                     attempt += 1;
@@ -527,7 +557,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
     fn at(
         maker: &Maker<'a, '_, S>,
         work: &'a Work,
-        rng: &mut SplitMix64,
+        (rng, others): (&mut SplitMix64, usize),
         attempt: usize,
     ) -> Result<Self, Singular> {
         let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
@@ -597,6 +627,14 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 let adjoint = maker.adjoint(&point, lanes);
                 let known = known.clone();
                 runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
+                for number in 0..others {
+                    let other = point.with_constant_inputs(|| match number {
+                        0 => f.zero(),
+                        _ => f.random(rng, attempt),
+                    });
+                    let taylor = maker.series(&other, lanes)?;
+                    runs.push(Run { taylor, ..runs[0].clone() });
+                }
             }
         }
         Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, work, gap })

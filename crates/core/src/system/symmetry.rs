@@ -152,14 +152,14 @@ fn cost_of_point<S: Values>(verdict: u64, rows: usize, columns: usize) -> u64 {
 }
 
 /// The vector as small rationals, one at its first entry.
-fn rationals<S: Values>(f: &S, v: &[S::Element]) -> Option<Vec<(i64, i64)>> {
+pub(super) fn rationals<S: Values>(f: &S, v: &[S::Element]) -> Option<Vec<(i64, i64)>> {
     let lead = v.iter().find(|x| !f.is_zero(x))?;
     let inverse = f.inverse(lead)?;
     v.iter().map(|x| f.rational(&f.mul(x, &inverse))).collect()
 }
 
 /// Rationals times their common denominator.
-fn integers(v: &[(i64, i64)]) -> Vec<i64> {
+pub(super) fn integers(v: &[(i64, i64)]) -> Vec<i64> {
     let common = v.iter().filter(|x| x.0 != 0).fold(1, |l, x| l / gcd(l, x.1) * x.1);
     let scaled: Vec<i64> = v.iter().map(|x| x.0 * (common / x.1)).collect();
     let divisor = scaled.iter().fold(0, |g, x| gcd(g, *x)).max(1);

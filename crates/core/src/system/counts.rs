@@ -1,0 +1,386 @@
+//! The number of solutions of every unknown, by stages: equations in the unknowns, relations among
+//! derivatives of the outputs, and maps between solutions where derivatives of a higher order might leave
+//! fewer.
+
+use obsdeg_exact::groebner::Work;
+use obsdeg_exact::{Field, SplitMix64, polynomial};
+
+use super::dag::{Dag, Op};
+use super::fibre::{Counted, Fibre, at_point};
+use super::global::{self, Found, Known};
+use super::judge::Judgement;
+use super::maps::second_solution;
+use super::model::{Compiled, KnownInput, Role, SystemModel};
+use super::quotients::Terms;
+use super::rows::SystemRows;
+use super::twins::{Twin, images, twins};
+use super::undecided::{NotCounted, UNKNOWNS};
+use super::work;
+
+/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are
+/// decided.
+const BEYOND: usize = 3;
+/// Runs from the same start with other values of generic inputs, where one run does not decide.
+const OTHERS: usize = 2;
+
+/// The number of values of an unknown, or why it is not decided.
+pub(super) type Count = Result<usize, NotCounted>;
+
+/// Limits of work, in products of two coefficients at each of two points.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Of counting solutions of the equations in the unknowns.
+    pub(super) count: u64,
+    /// Of relations among derivatives of the outputs, and of counting once more, where the first leaves
+    /// something undecided; zero: nothing more is done.
+    pub(super) relations: u64,
+}
+
+/// What is known of the number of solutions.
+pub(super) struct Solutions {
+    /// The number of values that every unknown takes, in the order of the layout, as two random points in the
+    /// two fields agree. What is not observable has no number.
+    pub(super) counts: Vec<Option<Count>>,
+    /// The number of values that every function takes, likewise.
+    pub(super) of_functions: Vec<Count>,
+    /// The order of the derivatives of the outputs with which they were counted.
+    pub(super) order: usize,
+    /// Maps that take every solution to another, in words, where there are several.
+    pub(super) maps: Vec<String>,
+}
+
+/// Where solutions are counted.
+struct Counting<'a> {
+    model: &'a SystemModel,
+    compiled: &'a Compiled,
+    judged: &'a Judgement,
+    fields: [Field; 2],
+    seed: u64,
+    order: usize,
+    /// Functions whose values are counted beside those of the unknowns.
+    functions: &'a [Terms],
+}
+
+/// Equations that are tried.
+#[derive(Clone, Copy)]
+struct Stage {
+    others: usize,
+    limit: u64,
+    /// True if functions and all unknowns are counted, not only those that are observable.
+    whole: bool,
+}
+
+impl Stage {
+    fn new(others: usize, limit: u64) -> Self {
+        Self { others, limit, whole: false }
+    }
+}
+
+impl Counting<'_> {
+    /// The random numbers of the point in a field: always the same ones.
+    fn random(&self, i: usize) -> SplitMix64 {
+        self.model.random(self.seed, &format!("solutions, field {i}"))
+    }
+
+    /// The solutions in a field, with what is known beforehand.
+    fn fibre(&self, i: usize, stage: Stage, known: &Known) -> Result<Fibre, NotCounted> {
+        let Self { model, compiled, judged, order, .. } = *self;
+        if judged.findings.degrees.degree.len() > UNKNOWNS {
+            return Err(NotCounted::TooLarge);
+        }
+        let mut work = Work::new(stage.limit);
+        let functions = stage.whole.then_some(self.functions);
+        let at = Counted { f: self.fields[i], order, others: stage.others, known, functions };
+        let found = at_point(model, compiled, judged, at, &mut self.random(i), &mut work);
+        let used_up = work.used_up;
+        let why = |e: NotCounted| match e {
+            NotCounted::OverLimit if !used_up => NotCounted::TooHigh,
+            e => e,
+        };
+        let mut fibre = found.map_err(why)?;
+        fibre
+            .polynomials
+            .iter_mut()
+            .for_each(|p| *p = std::mem::replace(p, Err(NotCounted::NoPoint)).map_err(why));
+        Ok(fibre)
+    }
+
+    /// The numbers in a field.
+    fn counts(&self, i: usize, fibre: &Result<Fibre, NotCounted>) -> Vec<Count> {
+        let roots = |p: &Result<Vec<u64>, NotCounted>| {
+            p.as_ref().map(|p| polynomial::distinct_roots(&self.fields[i], p)).map_err(|e| *e)
+        };
+        match fibre {
+            Ok(fibre) => fibre.polynomials.iter().map(roots).collect(),
+            Err(e) => vec![Err(*e); self.judged.findings.degrees.degree.len()],
+        }
+    }
+
+    /// A number that both fields agree on.
+    fn agreed_number(&self, both: (Count, Count)) -> Count {
+        match both {
+            (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
+            (Ok(a), Ok(_)) if a > 1 && !self.is_proven() => Err(NotCounted::NotClosed(a)),
+            (Ok(a), Ok(_)) => Ok(a),
+            (Err(e), _) | (_, Err(e)) => Err(e),
+        }
+    }
+
+    /// What both fields agree on.
+    fn agreed(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
+        let both = self.counts(0, &fibres[0]).into_iter().zip(self.counts(1, &fibres[1]));
+        both.map(|both| self.agreed_number(both)).collect()
+    }
+
+    /// The same of the functions.
+    fn agreed_functions(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
+        let [first, second] = fibres;
+        let of = |i: usize| -> Count {
+            self.agreed_number((
+                first.as_ref().map_err(|e| *e)?.functions[i],
+                second.as_ref().map_err(|e| *e)?.functions[i],
+            ))
+        };
+        (0..self.functions.len()).map(of).collect()
+    }
+
+    /// Both fields; the second only where the first says something.
+    fn both(&self, stage: Stage, known: [&Known; 2]) -> [Result<Fibre, NotCounted>; 2] {
+        let first = self.fibre(0, stage, known[0]);
+        let second = match &first {
+            Ok(fibre) if fibre.polynomials.iter().any(Result::is_ok) => self.fibre(1, stage, known[1]),
+            _ => first.clone(),
+        };
+        [first, second]
+    }
+
+    /// True if the derivatives up to the order hold all that the outputs say: see `fibre`; of a system that
+    /// is linear in its states by Cayley and Hamilton, whatever its start.
+    fn is_proven(&self) -> bool {
+        let Self { compiled, judged, order, .. } = *self;
+        // a relation between derivatives that holds on one component of the constraints need not hold on
+        // another
+        let alone = compiled.segments.len() <= 1 && compiled.constraints.is_empty();
+        let linear = linear_order(self.model, compiled).is_some_and(|last| order >= last);
+        alone && (judged.layout.closed || linear)
+    }
+
+    /// Maps between solutions, where there are several. Where derivatives of a higher order might leave fewer
+    /// than were counted, as many as the maps prove are the number.
+    fn confirmed(&self, counts: &mut [Count]) -> Vec<Twin> {
+        let Self { model, compiled, judged, seed, fields, .. } = *self;
+        let (layout, degrees) = (&judged.layout, &judged.findings.degrees);
+        let several = |c: &Count| matches!(c, Ok(2..) | Err(NotCounted::NotClosed(_)));
+        if !counts.iter().zip(&degrees.degree).any(|(c, d)| d.is_some() && several(c)) {
+            return Vec::new();
+        }
+        let mut rng = model.random(seed, "maps between solutions");
+        let found = twins(compiled, layout, &degrees.degree, fields, &mut rng);
+        let verdict = work::Work::new(model.work_limit);
+        let point = SystemRows::new(model, compiled, layout, fields[0], &mut rng, &verdict);
+        if let Ok(point) = point
+            && degrees.rank() == layout.unknowns.len()
+        {
+            let at = point.values(compiled, layout, 0);
+            for (lane, count) in counts.iter_mut().enumerate() {
+                if let Err(NotCounted::NotClosed(k)) = *count
+                    && images(&found, compiled, layout, &fields[0], &at, lane) == k
+                {
+                    *count = Ok(k);
+                }
+            }
+        }
+        found
+    }
+
+    /// What relations say in both fields, where they say something.
+    fn by_relations(&self, limit: u64) -> Option<[Known; 2]> {
+        let Self { model, compiled, judged, seed, fields, .. } = *self;
+        let mut found = Found::default();
+        let mut known = |i: usize| -> Option<Known> {
+            let verdict = work::Work::new(model.work_limit);
+            let mut own = self.random(i);
+            let point =
+                SystemRows::new(model, compiled, &judged.layout, fields[i], &mut own, &verdict).ok()?;
+            let values = point.values(compiled, &judged.layout, model.constants.len());
+            let mut rng = model.random(seed, &format!("relations, field {i}"));
+            let system = (model, compiled, judged);
+            let known =
+                global::known(system, fields[i], &values, &mut found, &mut rng, &mut Work::new(limit));
+            (known != Known::default()).then_some(known)
+        };
+        Some([known(0)?, known(1)?])
+    }
+
+    /// Runs with other inputs that may be added.
+    fn others(&self) -> usize {
+        let Self { model, compiled, judged, .. } = *self;
+        let generic = |role: &Role| matches!(*role, Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic));
+        let alone = judged.layout.closed
+            && compiled.segments.len() <= 1
+            && compiled.constraints.is_empty()
+            && model.experiments <= 1
+            && model.unknown_inputs.is_empty();
+        if alone && compiled.roles.iter().any(generic) { OTHERS } else { 0 }
+    }
+}
+
+impl Counting<'_> {
+    /// The numbers as far as the limits allow.
+    fn by_stages(&self, limits: Limits) -> Vec<Count> {
+        let nothing = Known::default();
+        let mut counts = self.agreed(&self.both(Stage::new(0, limits.count), [&nothing; 2]));
+        let others = self.others();
+        if self.is_open(&counts) && others > 0 {
+            self.again(&mut counts, Stage::new(others, limits.count), [&nothing; 2]);
+        }
+        if !self.is_open(&counts) || limits.relations == 0 || !self.compiled.dag.is_rational() {
+            return counts;
+        }
+        if global::applies(self.model, self.compiled, self.judged)
+            && let Some([first, second]) = self.by_relations(limits.relations)
+        {
+            self.again(&mut counts, Stage::new(others, limits.count), [&first, &second]);
+        }
+        for others in if others > 0 { vec![0, others] } else { vec![0] } {
+            if self.is_open(&counts) && limits.relations > limits.count {
+                self.again(&mut counts, Stage::new(others, limits.relations), [&nothing; 2]);
+            }
+        }
+        counts
+    }
+
+    /// True if a number is open that more work may decide.
+    fn is_open(&self, counts: &[Count]) -> bool {
+        let decided = |c: &Count| matches!(c, Ok(_) | Err(NotCounted::NotClosed(_) | NotCounted::TooMany));
+        let degrees = &self.judged.findings.degrees.degree;
+        counts.iter().zip(degrees).any(|(c, d)| !decided(c) && d.is_some())
+    }
+
+    /// Counts once more, and takes over what was not decided before.
+    fn again(&self, counts: &mut [Count], stage: Stage, known: [&Known; 2]) {
+        let mut new = self.agreed(&self.both(stage, known));
+        let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
+        unique.for_each(|&lane| new[lane] = Ok(1));
+        for (count, new) in counts.iter_mut().zip(new) {
+            if count.is_err() && new.is_ok() {
+                *count = new;
+            }
+        }
+    }
+
+    /// What is counted with all unknowns: a map between two solutions where `maps` has none, and the numbers
+    /// of values of the functions.
+    fn of_all(&self, counts: &[Count], mut maps: Vec<String>, limit: u64) -> (Vec<String>, Vec<Count>) {
+        let degrees = &self.judged.findings.degrees.degree;
+        let two = counts.iter().zip(degrees).any(|(c, d)| d.is_some() && *c == Ok(2));
+        let pairs = maps.is_empty() && two;
+        let mut found = [Err(NotCounted::OverLimit), Err(NotCounted::OverLimit)];
+        // where less is not decided all is not
+        if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
+            let stage = Stage { whole: true, ..Stage::new(0, limit) };
+            found = self.both(stage, [&Known::default(); 2]);
+        }
+        let name = |lane: usize| self.judged.layout.unknowns[lane].name.clone();
+        if pairs && let [Ok(first), Ok(second)] = &found {
+            maps.extend(second_solution(self.fields, [first, second], &name));
+        }
+        (maps, self.agreed_functions(&found))
+    }
+}
+
+/// The number of values that every unknown takes.
+pub(super) fn values_taken(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    functions: &[Terms],
+    (seed, limits): (u64, Limits),
+) -> Solutions {
+    let degrees = &judged.findings.degrees;
+    let last = degrees.rank_profile.iter().position(|&r| r == degrees.rank()).unwrap_or(0);
+    let wanted = match linear_order(model, compiled) {
+        Some(linear) if !judged.layout.closed => linear.max(last + BEYOND),
+        _ => last + BEYOND,
+    };
+    let order = wanted.min(if judged.layout.closed { usize::MAX } else { judged.layout.bound.max(last) });
+    let Some(fields) = judged.fields else {
+        let why = if compiled.dag.is_rational() { NotCounted::InDigits } else { NotCounted::NotRational };
+        let none = degrees.degree.iter().map(|degree| degree.and(Some(Err(why))));
+        let (counts, of_functions) = (none.collect(), vec![Err(why); functions.len()]);
+        return Solutions { counts, of_functions, order, maps: Vec::new() };
+    };
+    let counting = Counting { model, compiled, judged, fields, seed, order, functions };
+    let mut counts = counting.by_stages(limits);
+    let twins = counting.confirmed(&mut counts);
+    let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
+    let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
+    let observable = counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
+    let counts: Vec<Option<Count>> = observable.collect();
+    let of_functions = with_single(functions, of_functions, &counts);
+    Solutions { counts, of_functions, order, maps }
+}
+
+fn role_name(model: &SystemModel, role: Role) -> String {
+    match role {
+        Role::State(i) => model.states[i].named.name.clone(),
+        Role::Parameter(i) => model.parameters[i].name.clone(),
+        Role::UnknownInput(i) => model.unknown_inputs[i].0.name.clone(),
+        Role::Constant(i) => model.constants[i].0.name.clone(),
+        Role::KnownInput(i) => model.known_inputs[i].0.name.clone(),
+        Role::Time => "t".into(),
+    }
+}
+
+/// The counts of functions; what is made of unknowns with one value has one.
+fn with_single(functions: &[Terms], counted: Vec<Count>, unknowns: &[Option<Count>]) -> Vec<Count> {
+    let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| unknowns[p.0] == Some(Ok(1)));
+    functions.iter().zip(counted).map(|(terms, count)| if single(terms) { Ok(1) } else { count }).collect()
+}
+
+/// Of a model that is linear in its states (constants beside them), without inputs other than polynomials in
+/// time, with one segment: the order of the last derivative that can distinguish two of its points. Both side
+/// by side are a linear system of twice its states with the inputs' derivatives and a constant: by Cayley and
+/// Hamilton their outputs agree if that many derivatives do.
+fn linear_order(model: &SystemModel, compiled: &Compiled) -> Option<usize> {
+    if compiled.segments.len() > 1 || compiled.uses_time() || !model.unknown_inputs.is_empty() {
+        return None;
+    }
+    let mut signals = 1;
+    for e in 0..compiled.experiments.len() {
+        let mut own = 1;
+        for i in 0..model.known_inputs.len() {
+            match model.known_input(e, i) {
+                KnownInput::Polynomial(degree) => own += degree + 1,
+                KnownInput::Generic | KnownInput::Function(_) => return None,
+            }
+        }
+        signals = signals.max(own);
+        let degrees = degrees_in_states(&compiled.dag, &compiled.roles);
+        let roots = compiled.rates(e).iter().chain(compiled.outputs(e));
+        if roots.into_iter().any(|&r| degrees[r].is_none_or(|d| d > 1)) {
+            return None;
+        }
+    }
+    Some(2 * model.states.len() + signals - 1)
+}
+
+/// By node: its degree in states and known inputs together; `None` where it is no polynomial in them.
+fn degrees_in_states(dag: &Dag, roles: &[Role]) -> Vec<Option<usize>> {
+    let mut out: Vec<Option<usize>> = Vec::with_capacity(dag.ops.len());
+    for op in &dag.ops {
+        let degree = match *op {
+            Op::Number { .. } | Op::Pi => Some(0),
+            Op::Slot(s) => match roles[s] {
+                Role::State(_) | Role::KnownInput(_) | Role::UnknownInput(_) | Role::Time => Some(1),
+                Role::Parameter(_) | Role::Constant(_) => Some(0),
+            },
+            Op::Add(a, b) | Op::Subtract(a, b) => out[a].zip(out[b]).map(|(a, b)| a.max(b)),
+            Op::Multiply(a, b) => out[a].zip(out[b]).map(|(a, b)| a + b),
+            Op::Divide(a, b) => out[a].filter(|_| out[b] == Some(0)),
+            Op::Primitive { .. } => None,
+        };
+        out.push(degree);
+    }
+    out
+}

@@ -1,0 +1,247 @@
+//! Derivatives of outputs and known inputs ("jets") at random points of a model, and which of them are
+//! independent.
+
+use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::{Echelon, Field, SplitMix64};
+
+use super::super::dag::Op;
+use super::super::model::{Compiled, KnownInput, Role, SystemModel};
+use super::super::rows::Layout;
+use super::super::taylor::{Initial, Signal, Taylor};
+use super::super::work;
+
+/// Orders beyond the last independent one to which an output is followed.
+pub(super) const BEYOND: usize = 3;
+
+/// The derivative of an output or of a known input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Jet {
+    /// The order.
+    pub(super) order: usize,
+    /// True of an output.
+    pub(super) is_output: bool,
+    /// Number of the output or known input in the model.
+    pub(super) index: usize,
+}
+
+/// A model whose quantities that do not change in time (parameters, and states with the rate zero) are
+/// chosen, and whose states and inputs are random.
+pub(super) struct Source<'a> {
+    pub(super) f: Field,
+    model: &'a SystemModel,
+    compiled: &'a Compiled,
+    layout: &'a Layout,
+    /// Slots of the states that move.
+    moving: Vec<usize>,
+    /// Unknowns that do not change in time.
+    pub(super) constants: Vec<usize>,
+}
+
+/// The jets of the outputs that are independent of those before them, as functions of the states that move.
+pub(super) struct Structure {
+    /// By output: the first order that depends on the jets before it.
+    pub(super) first_dependent: Vec<usize>,
+    /// By output: true if it does not change in time.
+    pub(super) still: Vec<bool>,
+    /// `inputs[output][order]`: jets of inputs in that derivative.
+    inputs: Vec<Vec<Vec<Jet>>>,
+}
+
+impl<'a> Source<'a> {
+    /// Of a model with one experiment and one segment, generic starts, no unknown input, no time.
+    pub(super) fn new(model: &'a SystemModel, compiled: &'a Compiled, layout: &'a Layout, f: Field) -> Self {
+        let is_zero =
+            |i: usize| matches!(compiled.dag.ops[compiled.rates(0)[i]], Op::Number { mantissa: 0, .. });
+        let moves = |role: &Role| matches!(*role, Role::State(i) if !is_zero(i));
+        let slots = compiled.roles.iter().enumerate();
+        let moving = slots.filter(|(_, role)| moves(role)).map(|(slot, _)| slot).collect();
+        let constants = (0..layout.unknowns.len()).filter(|&l| !moves(&layout.unknowns[l].role)).collect();
+        Self { f, model, compiled, layout, moving, constants }
+    }
+
+    /// A series at random states and inputs; `values` are those of the unknowns, then of the known constants.
+    /// With lanes for the states that move and for `orders` jets of every input where `lanes`.
+    fn series(
+        &self,
+        values: &[u64],
+        orders: Option<usize>,
+        rng: &mut SplitMix64,
+    ) -> Option<Taylor<'a, Field>> {
+        let (f, unknowns) = (self.f, self.layout.unknowns.len());
+        let mut initial: Vec<Option<Initial<u64>>> = vec![None; self.compiled.roles.len()];
+        let mut lane = self.moving.len();
+        let mut signals = Vec::new();
+        for (slot, role) in self.compiled.roles.iter().enumerate() {
+            let place = self.layout.unknowns.iter().position(|u| u.role == *role);
+            signals.push(match *role {
+                Role::State(i) if self.moving.contains(&slot) => {
+                    let own = self.moving.iter().position(|&s| s == slot).map(|l| (l, f.one()));
+                    let start = rng.below(f.modulus());
+                    initial[slot] = Some((start, own.filter(|_| orders.is_some()).into_iter().collect()));
+                    Signal::State { rate: self.compiled.rates(0)[i] }
+                }
+                Role::State(_) | Role::Parameter(_) => Signal::Constant { value: values[place?], lane: None },
+                Role::Constant(i) => Signal::Constant { value: values[unknowns + i], lane: None },
+                Role::KnownInput(i) => {
+                    let degree = match self.model.known_input(0, i) {
+                        KnownInput::Polynomial(d) => Some(*d),
+                        _ => None,
+                    };
+                    let value = rng.below(f.modulus());
+                    match orders {
+                        None => Signal::Known { value, degree },
+                        Some(orders) => {
+                            let count = degree.map_or(orders, |d| orders.min(d + 1));
+                            lane += orders;
+                            Signal::Unknown { value, lane: lane - orders, count }
+                        }
+                    }
+                }
+                // nothing that takes part holds the time
+                Role::Time => Signal::Time { value: 0 },
+                Role::UnknownInput(_) => return None,
+            });
+        }
+        let lanes = orders.map_or(0, |_| lane);
+        let seed = SplitMix64::new(rng.next_u64());
+        let outputs = self.compiled.outputs(0);
+        let work = work::Work::new(self.model.work_limit);
+        Taylor::new(&self.compiled.dag, f, lanes, signals, &initial, outputs, true, seed, &work).ok()
+    }
+
+    fn node(&self, jet: &Jet) -> Option<usize> {
+        match jet.is_output {
+            true => self.compiled.outputs(0).get(jet.index).copied(),
+            false => self.compiled.node_of(Role::KnownInput(jet.index)),
+        }
+    }
+
+    /// The work of a series up to an order, in products.
+    fn cost(&self, order: usize) -> u64 {
+        (self.compiled.dag.ops.len() * (order + 2) * (order + 2)) as u64
+    }
+
+    /// The values of jets at random states and inputs.
+    ///
+    /// # Errors
+    /// [`OverLimit`]. `None` where the series is not defined.
+    pub(super) fn point(
+        &self,
+        values: &[u64],
+        jets: &[Jet],
+        rng: &mut SplitMix64,
+        work: &mut Work,
+    ) -> Result<Option<Vec<u64>>, OverLimit> {
+        let highest = jets.iter().map(|j| j.order).max().unwrap_or(0);
+        work.take(self.cost(highest))?;
+        let Some(mut series) = self.series(values, None, rng) else { return Ok(None) };
+        while series.length <= highest {
+            series.advance();
+        }
+        let mut factorials = vec![self.f.one()];
+        for k in 1..=highest as u64 {
+            factorials.push(self.f.mul(factorials[k as usize - 1], self.f.from_u64(k)));
+        }
+        let value = |j: &Jet| Some(self.f.mul(series.value(self.node(j)?, j.order), factorials[j.order]));
+        Ok(jets.iter().map(value).collect())
+    }
+
+    /// The first `length` Taylor coefficients of jets along one random trajectory.
+    ///
+    /// # Errors
+    /// [`OverLimit`]. `None` where the series is not defined.
+    pub(super) fn trajectory(
+        &self,
+        values: &[u64],
+        jets: &[Jet],
+        length: usize,
+        rng: &mut SplitMix64,
+        work: &mut Work,
+    ) -> Result<Option<Vec<Vec<u64>>>, OverLimit> {
+        let f = self.f;
+        let highest = jets.iter().map(|j| j.order).max().unwrap_or(0) + length;
+        work.take(self.cost(highest) / 2)?;
+        let Some(mut series) = self.series(values, None, rng) else { return Ok(None) };
+        while series.length <= highest {
+            series.advance();
+        }
+        // (i + k)!/i! of the coefficient i + k
+        let rising =
+            |i: usize, k: usize| (i + 1..=i + k).fold(f.one(), |x, j| f.mul(x, f.from_u64(j as u64)));
+        let coefficients = |j: &Jet| {
+            let node = self.node(j)?;
+            let one = |i: usize| f.mul(series.value(node, i + j.order), rising(i, j.order));
+            Some((0..length).map(one).collect::<Vec<u64>>())
+        };
+        Ok(jets.iter().map(coefficients).collect())
+    }
+
+    /// Which jets are independent, at a random point. `None` where there is none.
+    pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<Structure> {
+        let (f, n) = (self.f, self.moving.len());
+        let orders = n + BEYOND + 2;
+        let mut series = self.series(values, Some(orders), rng)?;
+        let outputs = self.compiled.outputs(0);
+        let lane_of_input: Vec<usize> = (self.compiled.roles.iter())
+            .filter_map(|r| if let Role::KnownInput(i) = *r { Some(i) } else { None })
+            .collect();
+        let mut space = Echelon::new(f, n);
+        let mut out = Structure {
+            first_dependent: vec![usize::MAX; outputs.len()],
+            still: vec![false; outputs.len()],
+            inputs: vec![Vec::new(); outputs.len()],
+        };
+        for order in 0..orders {
+            while series.length <= order {
+                series.advance();
+            }
+            for (j, &node) in outputs.iter().enumerate() {
+                let mut row = vec![0; n + lane_of_input.len() * orders];
+                for (&lane, &x) in series.lanes_of(node).iter().zip(series.dual(node, order)) {
+                    row[lane as usize] = x;
+                }
+                let used = (n..row.len()).filter(|&l| row[l] != 0).map(|l| Jet {
+                    order: (l - n) % orders,
+                    is_output: false,
+                    index: lane_of_input[(l - n) / orders],
+                });
+                out.inputs[j].push(used.collect());
+                if order == 0 {
+                    out.still[j] = row.iter().all(|&x| x == 0);
+                }
+                if out.first_dependent[j] == usize::MAX && !space.insert(&row[..n]) {
+                    out.first_dependent[j] = order;
+                }
+            }
+            let followed = out.first_dependent.iter().all(|&k| k.saturating_add(BEYOND) <= order);
+            if followed {
+                return Some(out);
+            }
+        }
+        None
+    }
+}
+
+impl Structure {
+    /// Outputs that change in time, up to their first dependent order and `beyond` of output `leader` (of all
+    /// without one), with the inputs in them; by order, outputs last.
+    pub(super) fn jets(&self, leader: Option<usize>, beyond: usize) -> Vec<Jet> {
+        let mut out = Vec::new();
+        let highest = leader.map(|l| self.first_dependent[l] + beyond);
+        for (index, &dependent) in self.first_dependent.iter().enumerate() {
+            let leads = leader.is_none_or(|l| l == index);
+            if self.still[index] && leader != Some(index) {
+                continue;
+            }
+            let last = if leads { dependent + beyond } else { dependent.saturating_sub(1) };
+            let last = highest.map_or(last, |h| last.min(h));
+            for order in (0..=last).take_while(|_| leads || dependent > 0) {
+                out.push(Jet { order, is_output: true, index });
+                out.extend(self.inputs[index].get(order).into_iter().flatten());
+            }
+        }
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+}

@@ -1,0 +1,276 @@
+//! What relations among derivatives of outputs say of the constants: which are unique, and equations that
+//! every solution satisfies.
+//!
+//! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution, and where one
+//! trajectory determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output.
+//! Ratios of low degree are interpolated; that they have the values of the base point is a system in the
+//! constants alone. A constant with one value among its solutions is unique, whatever other ratios say;
+//! several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
+//! doi:10.1016/0005-1098(94)90029-9; relations by evaluation instead of elimination).
+//!
+//! Constants that a symmetry moves keep their values: the solutions for all others are conjugate over them.
+
+mod jets;
+mod ratios;
+mod relation;
+
+use obsdeg_exact::groebner::{Basis, OverLimit, Work};
+use obsdeg_exact::multivariate::Polynomial;
+use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
+
+use super::judge::Judgement;
+use super::model::{Compiled, SystemModel};
+use jets::Source;
+use ratios::{Pool, Ratio, ratios};
+use relation::{Relation, relations};
+
+/// Most evaluations of a relation for one ratio, in steps: what is found with few makes the next ratios
+/// cheaper.
+const EVALUATIONS: [usize; 5] = [30, 100, 300, 700, 1500];
+/// Ratios beyond those that raise the rank, at each step.
+const EXTRAS: usize = 6;
+/// Work of one Groebner basis in the constants.
+const BASIS: u64 = 20_000_000;
+/// Highest degree of a minimal polynomial of a constant that is looked at.
+const SOLUTIONS: usize = 24;
+
+/// What relations say of the unknowns at a point.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Known {
+    /// Unknowns with one value among all points with the same outputs.
+    pub(super) unique: Vec<usize>,
+    /// Polynomials in the unknowns (numbered as in the layout) that are zero at all those points.
+    pub(super) zero: Vec<Polynomial>,
+}
+
+/// The relations of a model, which are the same at every point and in every field.
+#[derive(Debug, Default)]
+pub(super) struct Found(Option<Vec<Relation>>);
+
+/// Whether relations among derivatives decide anything: one experiment and segment, generic starts and
+/// inputs, no function.
+pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgement) -> bool {
+    let generic = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
+    // with the time in it a relation would hold at one time only
+    let autonomous = compiled.dag.is_rational() && !compiled.uses_time();
+    generic
+        && autonomous
+        && model.experiments <= 1
+        && model.unknown_inputs.is_empty()
+        && judged.fields.is_some()
+}
+
+/// What relations say of the constants at the point `at` (values of the unknowns, then of the known
+/// constants).
+pub(super) fn known(
+    (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
+    f: Field,
+    at: &[u64],
+    found: &mut Found,
+    rng: &mut SplitMix64,
+    work: &mut Work,
+) -> Known {
+    let source = Source::new(model, compiled, &judged.layout, f);
+    let Some(span) = &judged.span else { return Known::default() };
+    let (open, added) = open_constants(span, &source.constants);
+    if found.0.is_none() {
+        let structure = source.structure(at, rng);
+        found.0 = Some(structure.map_or_else(Vec::new, |s| relations(&source, &s, at, rng, work)));
+    }
+    let relations = found.0.as_deref().unwrap_or_default();
+    let mut fibre = Fibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
+    // what was found before the work ended holds
+    let _ended = fibre.narrow(&source, relations, rng, work);
+    let is_observable = |lane: usize| judged.findings.degrees.degree[lane].is_some();
+    let unique = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v) && is_observable(*v));
+    // where more constants were kept than elsewhere the equations hold only beside them
+    let zero = if added { Vec::new() } else { fibre.zero() };
+    Known { unique: unique.collect(), zero }
+}
+
+/// The constants without as many as the symmetries move: no pivots of the span first, then any that is
+/// independent of it; and whether there were any of these.
+fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
+    let mut space = span.clone();
+    let (mut open, mut added) = (Vec::new(), false);
+    let is_pivot = |c: &usize| span.pivot_row(*c).is_some();
+    let unit =
+        |c: usize, one: u64| (0..span.columns()).map(|i| if i == c { one } else { 0 }).collect::<Vec<_>>();
+    for &c in constants.iter().filter(|c| !is_pivot(c)) {
+        space.insert(&unit(c, span.field().one()));
+    }
+    for &c in constants.iter().filter(|c| is_pivot(c)) {
+        match space.insert(&unit(c, span.field().one())) {
+            true => added = true,
+            false => open.push(c),
+        }
+    }
+    (open, added)
+}
+
+/// The constants with the same values of ratios.
+struct Fibre {
+    f: Field,
+    at: Vec<u64>,
+    /// All constants that were open at first.
+    variables: Vec<usize>,
+    /// Those that are not yet known to be unique.
+    open: Vec<usize>,
+    /// Ratios as functions, with their gradients.
+    equations: Vec<Equation>,
+}
+
+/// A ratio that has its value at the base point.
+struct Equation {
+    above: Polynomial,
+    below: Polynomial,
+    gradient: Vec<u64>,
+}
+
+impl Fibre {
+    /// Interpolates ratios, cheap ones first, as long as they make constants unique.
+    fn narrow(
+        &mut self,
+        source: &Source<'_>,
+        relations: &[Relation],
+        rng: &mut SplitMix64,
+        work: &mut Work,
+    ) -> Result<(), OverLimit> {
+        let mut all: Vec<Ratio> = Vec::new();
+        for numbered in relations.iter().enumerate() {
+            all.extend(ratios(source, numbered, &self.at, &self.variables, rng, work)?);
+        }
+        for limit in EVALUATIONS {
+            while !self.open.is_empty() {
+                let chosen = self.chosen(&mut all, limit, rng);
+                let mut pool = Pool::new(source, relations, &self.at, self.open.clone());
+                let places = self.places();
+                for ratio in &chosen {
+                    if let Some([above, below]) = pool.function(ratio, &places, rng, work)? {
+                        let gradient = ratio.gradient.clone();
+                        self.equations.push(Equation { above, below, gradient });
+                    }
+                }
+                let unique = if chosen.is_empty() { Vec::new() } else { self.unique(work) };
+                if unique.is_empty() {
+                    break;
+                }
+                self.fix(&unique);
+            }
+        }
+        Ok(())
+    }
+
+    /// The places of the open constants among the variables.
+    fn places(&self) -> Vec<usize> {
+        let open = |k: &usize| self.open.contains(&self.variables[*k]);
+        (0..self.variables.len()).filter(open).collect()
+    }
+
+    /// The space of the gradients of the equations, by the open constants.
+    fn space(&self, places: &[usize]) -> Echelon {
+        let mut space = Echelon::new(self.f, places.len());
+        for e in &self.equations {
+            space.insert(&places.iter().map(|&k| e.gradient[k]).collect::<Vec<_>>());
+        }
+        space
+    }
+
+    /// Takes ratios out of the list that cost at most `limit` evaluations: those that raise the rank, the
+    /// cheapest first, and some others at random.
+    fn chosen(&self, all: &mut Vec<Ratio>, limit: usize, rng: &mut SplitMix64) -> Vec<Ratio> {
+        let places = self.places();
+        let depends = |r: &Ratio| places.iter().any(|&k| r.gradient[k] != 0);
+        let mut left: Vec<(usize, usize)> = (all.iter().enumerate())
+            .filter(|(_, r)| depends(r))
+            .map(|(i, r)| (r.cost(&places), i))
+            .filter(|r| r.0 <= limit)
+            .collect();
+        left.sort_unstable();
+        let mut space = self.space(&places);
+        let mut taken = Vec::new();
+        left.retain(|&(_, i)| {
+            let row: Vec<u64> = places.iter().map(|&k| all[i].gradient[k]).collect();
+            let new = space.insert(&row);
+            if new {
+                taken.push(i);
+            }
+            !new
+        });
+        // without one of a few constants alone the others would be sought in vain
+        for _ in 0..EXTRAS.min(left.len()) {
+            let at = rng.below(left.len() as u64) as usize;
+            taken.push(left.swap_remove(at).1);
+        }
+        taken.sort_unstable();
+        let mut out: Vec<Ratio> = taken.into_iter().rev().map(|i| all.remove(i)).collect();
+        out.reverse();
+        out
+    }
+
+    /// What is zero: every ratio less its value.
+    fn zero(&self) -> Vec<Polynomial> {
+        let f = self.f;
+        let less = |e: &Equation| {
+            let mut out = e.above.scaled(&f, e.below.at(&f, &self.at));
+            out.add_scaled(&f, &e.below, f.neg(e.above.at(&f, &self.at)));
+            out
+        };
+        self.equations.iter().map(less).filter(|p| !p.is_empty()).collect()
+    }
+
+    /// The open constants with one value.
+    fn unique(&self, work: &mut Work) -> Vec<usize> {
+        let f = self.f;
+        let places = self.places();
+        let space = self.space(&places);
+        let name = |v: u32| self.open.iter().position(|&o| o == v as usize).map(|i| i as u32);
+        let mut ideal: Vec<Polynomial> = self.zero().iter().filter_map(|p| p.renamed(name)).collect();
+        // nothing is divided by zero
+        let mut below: Vec<&Polynomial> = Vec::new();
+        for e in self.equations.iter().filter(|e| e.below.as_constant().is_none()) {
+            if !below.contains(&&e.below) {
+                below.push(&e.below);
+            }
+        }
+        for (k, p) in below.iter().enumerate() {
+            let Some(p) = p.renamed(name) else { continue };
+            let mut zero = Polynomial::constant(f.neg(f.one()));
+            let inverse = Polynomial::variable(&f, (self.open.len() + k) as u32);
+            zero.add_product(&f, &inverse, &p);
+            ideal.push(zero);
+        }
+        let weights = vec![1; self.open.len() + below.len()];
+        let mut own = Work::new(work.left.min(BASIS));
+        let before = own.left;
+        let mut basis = Basis::new(&f, &weights, &ideal, &mut own);
+        let mut out = Vec::new();
+        for (i, &v) in self.open.iter().enumerate().filter(|(i, _)| space.has_unit(*i)) {
+            let x = Polynomial::variable(&f, i as u32);
+            let one = match basis.is_complete() {
+                true => match basis.minimal_polynomial(&x, SOLUTIONS, &mut own) {
+                    Ok(Some(minimal)) => polynomial::distinct_roots(&f, &minimal) == 1,
+                    _ => false,
+                },
+                false => basis.remainder(&x, &mut own).is_ok_and(|r| r.as_constant().is_some()),
+            };
+            if one {
+                out.push(v);
+            }
+        }
+        work.left -= before - own.left;
+        out
+    }
+
+    /// Gives constants their values.
+    fn fix(&mut self, unique: &[usize]) {
+        for &v in unique {
+            let value = Polynomial::constant(self.at[v]);
+            for e in &mut self.equations {
+                e.above = e.above.replaced(&self.f, v as u32, &value);
+                e.below = e.below.replaced(&self.f, v as u32, &value);
+            }
+        }
+        self.open.retain(|v| !unique.contains(v));
+    }
+}

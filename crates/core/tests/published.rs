@@ -1,0 +1,177 @@
+//! Verdicts on 36 published systems against those that another program printed (tests/data/identifiability).
+#![allow(clippy::print_stdout, reason = "a table of systems")]
+
+use std::time::Instant;
+
+use obsdeg_core::system::{NumberOfSolutions, SystemOptions, analyze_system, model_file};
+use serde_json::Value;
+
+/// Limit of the work of relations, in millions of products at each point.
+const LIMIT: u64 = 300;
+
+/// Unknowns with a number of solutions within the default limits, and with relations.
+const DECIDED: usize = 250;
+const DECIDED_BY_RELATIONS: usize = 339;
+
+/// What was found of a system.
+#[derive(Default)]
+struct Found {
+    observable: usize,
+    /// Unknowns with a number of solutions.
+    decided: usize,
+    /// Published as global, and one solution here.
+    agree: usize,
+    /// Published as global, and not decided here.
+    open: usize,
+    /// What contradicts the published verdicts.
+    differ: Vec<String>,
+}
+
+fn systems() -> Vec<Value> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/identifiability/published.json");
+    let text = std::fs::read_to_string(path).expect("the published results");
+    let all: Value = serde_json::from_str(&text).expect("JSON");
+    all["models"].as_array().expect("a list").clone()
+}
+
+fn names(list: &Value) -> Vec<&str> {
+    list.as_array().expect("a list").iter().map(|n| n.as_str().expect("a name")).collect()
+}
+
+fn compared(system: &Value, options: SystemOptions) -> Found {
+    let model = model_file::read(system["toml"].as_str().expect("a model")).expect("a model");
+    let a = analyze_system(&model, options).expect("a verdict");
+    let (locally, globally) = (names(&system["locally"]), names(&system["globally"]));
+    let mut out = Found::default();
+    if a.rank != system["rank"].as_u64().expect("a number") as usize {
+        out.differ.push(format!("rank {}", a.rank));
+    }
+    for q in &a.quantities {
+        let name = q.name.as_str();
+        if q.degree.is_some() != locally.contains(&name) {
+            out.differ.push(format!("{name} locally"));
+        }
+        let number = match q.number_of_solutions {
+            None => continue,
+            Some(NumberOfSolutions::OneByExpression) => Some(1),
+            Some(NumberOfSolutions::Counted(k)) => Some(k),
+            Some(NumberOfSolutions::Undecided(_)) => None,
+        };
+        out.observable += 1;
+        out.decided += usize::from(number.is_some());
+        match (number, globally.contains(&name)) {
+            (Some(1), true) => out.agree += 1,
+            (Some(k), true) => out.differ.push(format!("{name}: {k} solutions")),
+            (None, true) => out.open += 1,
+            (_, false) => {}
+        }
+    }
+    out
+}
+
+fn table(chosen: &dyn Fn(&str) -> bool, options: SystemOptions) -> Vec<(String, Found)> {
+    let mut out = Vec::new();
+    for system in systems() {
+        let name = system["model"].as_str().expect("a name").to_string();
+        if !chosen(&name) {
+            continue;
+        }
+        let started = Instant::now();
+        let found = compared(&system, options);
+        println!(
+            "{name:32} observable {:3} decided {:3} agree {:3} open {:3} differ {:?} {:.1} s",
+            found.observable,
+            found.decided,
+            found.agree,
+            found.open,
+            found.differ,
+            started.elapsed().as_secs_f64()
+        );
+        out.push((name, found));
+    }
+    out
+}
+
+fn sum(all: &[(String, Found)], of: impl Fn(&Found) -> usize) -> usize {
+    all.iter().map(|f| of(&f.1)).sum()
+}
+
+fn nothing_differs(all: &[(String, Found)]) {
+    for (name, found) in all {
+        assert!(found.differ.is_empty(), "{name}: {:?}", found.differ);
+    }
+}
+
+/// All systems, within the default limits of work.
+#[test]
+fn nothing_contradicts_the_published_verdicts() {
+    let all = table(&|_| true, SystemOptions::default());
+    nothing_differs(&all);
+    let found = (all.len(), sum(&all, |f| f.observable), sum(&all, |f| f.decided));
+    assert_eq!(found, (36, 420, DECIDED));
+}
+
+/// Systems that equations in the unknowns do not decide within their limit, but relations do.
+#[test]
+fn relations_decide_what_counting_does_not() {
+    const QUICK: [&str; 2] = ["SLIQR", "SEIR 36 ref"];
+    let chosen = |name: &str| QUICK.contains(&name);
+    let without = table(&chosen, SystemOptions::default());
+    let with = table(&chosen, SystemOptions { relation_limit: LIMIT, ..SystemOptions::default() });
+    assert_eq!(with.len(), QUICK.len());
+    nothing_differs(&with);
+    for ((name, before), (_, after)) in without.iter().zip(&with) {
+        assert!(after.decided > before.decided, "{name}");
+        assert_eq!((after.open, after.decided), (0, after.observable), "{name}");
+    }
+}
+
+/// Both ways: every published generator is observable here, and as their differentials span a space of the
+/// dimension of the rank, every function found here depends on them.
+#[test]
+fn published_generators_are_identifiable() {
+    let mut asked = 0;
+    for system in systems() {
+        let generators = names(&system["identifiable_functions"]);
+        // `//` are quotients there
+        let quoted = |g: &&str| serde_json::to_string(&g.replace("//", "/")).expect("a text");
+        let list = generators.iter().map(quoted).collect::<Vec<_>>();
+        let text = system["toml"].as_str().expect("a model");
+        let (first, rest) = text.split_once('\n').expect("lines");
+        let text = format!("{first}\ncombinations = [{}]\n{rest}", list.join(", "));
+        let model = model_file::read(&text).unwrap_or_else(|e| panic!("{}: {e}", system["model"]));
+        let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+        let a = analyze_system(&model, options).expect("a verdict");
+        assert_eq!(a.rank as u64, system["rank"].as_u64().expect("a number"));
+        assert!(generators.len() >= a.rank, "{}", system["model"]);
+        for c in &a.combinations {
+            assert!(c.degree.is_some(), "{}: {}", system["model"], c.expression);
+            asked += 1;
+        }
+    }
+    assert!(asked > 490, "{asked}");
+}
+
+/// All of them, with a table: `cargo test --release -p obsdeg-core --test published -- --ignored
+/// --nocapture`; `ONLY=name` chooses those with a name like it, `LIMIT=millions` limits the work.
+#[test]
+#[ignore = "minutes"]
+fn all_published_systems() {
+    let only = std::env::var("ONLY").unwrap_or_default();
+    let limit = std::env::var("LIMIT").ok().and_then(|l| l.parse().ok());
+    let options = SystemOptions { relation_limit: limit.unwrap_or(LIMIT), ..SystemOptions::default() };
+    let all = table(&|name| name.contains(&only), options);
+    println!(
+        "{} systems: {} observable unknowns, {} decided, {} agree, {} open, {} differ",
+        all.len(),
+        sum(&all, |f| f.observable),
+        sum(&all, |f| f.decided),
+        sum(&all, |f| f.agree),
+        sum(&all, |f| f.open),
+        sum(&all, |f| f.differ.len())
+    );
+    nothing_differs(&all);
+    if only.is_empty() && limit.is_none() {
+        assert!(sum(&all, |f| f.decided) >= DECIDED_BY_RELATIONS);
+    }
+}

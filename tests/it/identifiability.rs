@@ -1,0 +1,248 @@
+//! Numbers of solutions, maps between them, identifiable functions and reduced models.
+
+use std::collections::BTreeMap;
+
+use obsdeg_core::system::{
+    Identifiability, NumberOfSolutions, ReducedError, SystemAnalysis, SystemOptions, analyze_system, json,
+    judge, model_file, reduced,
+};
+use serde_json::Value;
+
+use crate::models::models;
+
+fn analyzed(text: &str) -> SystemAnalysis {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+fn number(n: Option<&NumberOfSolutions>) -> Option<usize> {
+    match n? {
+        NumberOfSolutions::OneByExpression => Some(1),
+        NumberOfSolutions::Counted(k) => Some(*k),
+        NumberOfSolutions::Undecided(_) => None,
+    }
+}
+
+/// The number of solutions by name, of those that are decided.
+fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
+    let of = |q| number(Option::as_ref(q));
+    a.quantities.iter().filter_map(|q| Some((q.name.as_str(), of(&q.number_of_solutions)?))).collect()
+}
+
+/// Systems with numbers that Groebner bases of another program gave (`tests/data/identifiability/oracle.py`):
+/// how many unknowns are decided, and how many are not. What is decided must agree.
+fn held_against_groebner_bases(chosen: impl Fn(usize) -> bool) -> (usize, usize) {
+    let text = include_str!("../data/identifiability/counts.json");
+    let systems: Value = serde_json::from_str(text).expect("JSON");
+    let (mut decided, mut open) = (0, 0);
+    for (i, system) in systems.as_array().expect("a list").iter().enumerate().filter(|s| chosen(s.0)) {
+        let texts = |key: &str| -> Vec<&str> {
+            system[key].as_array().expect("a list").iter().map(|t| t.as_str().expect("a text")).collect()
+        };
+        let [rates, outputs, parameters] = ["rates", "outputs", "parameters"].map(texts);
+        let outputs: String = outputs.iter().enumerate().map(|(i, y)| format!("y{i} = \"{y}\"\n")).collect();
+        let a = analyzed(&format!(
+            "name = \"s\"\nparameters = {parameters:?}\n[states]\nx1 = \"{}\"\nx2 = \"{}\"\n[outputs]\n{outputs}",
+            rates[0], rates[1]
+        ));
+        let numbers = numbers(&a);
+        for (unknown, expected) in system["numbers"].as_object().expect("numbers") {
+            match numbers.get(unknown.as_str()) {
+                Some(&k) => {
+                    assert_eq!(k as u64, expected.as_u64().expect("a number"), "{i}: {unknown}, {system}")
+                }
+                None => open += 1,
+            }
+            decided += usize::from(numbers.contains_key(unknown.as_str()));
+        }
+    }
+    (decided, open)
+}
+
+#[test]
+fn numbers_are_those_of_groebner_bases() {
+    let (decided, open) = held_against_groebner_bases(|i| i % 11 == 0);
+    assert!(decided > 30 && open == 0, "{decided}, {open}");
+}
+
+#[test]
+#[ignore = "full length: 110 systems"]
+fn numbers_are_those_of_groebner_bases_of_all_systems() {
+    let (decided, open) = held_against_groebner_bases(|_| true);
+    assert!(decided > 380 && open * 20 <= decided, "{decided}, {open}");
+}
+
+/// A system, the numbers of solutions of its unknowns, and the maps between these.
+type Case<'a> = (&'a str, &'a [(&'a str, usize)], &'a [&'a str]);
+
+/// Several solutions where starts are known, constraints hold, or states jump; numbers and maps by hand.
+#[test]
+fn several_solutions_where_points_are_special() {
+    let cases: [Case<'_>; 11] = [
+        // q and -q are one attitude
+        (
+            "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\ny='R(q)'",
+            &[("q[1]", 2), ("q[2]", 2), ("q[3]", 2), ("q[4]", 2)],
+            &["negate q[1], q[2], q[3], q[4]"],
+        ),
+        (
+            "constraints=['norm(v) = 1']\n[states]\n'v[3]'='0*v'\n[outputs]\ny1='v[1]'\ny2='v[2]'",
+            &[("v[1]", 1), ("v[2]", 1), ("v[3]", 2)],
+            &["negate v[3]"],
+        ),
+        (
+            "constraints=['m1^2 + m2^2 + m3^2 = 4']\n[known_inputs]\nw='generic'\n[states]\nm1='w*m2'\nm2='-w*m1'\nm3=0\n[outputs]\ny1='m1'\ny2='m2'",
+            &[("m1", 1), ("m2", 1), ("m3", 2)],
+            &["negate m3"],
+        ),
+        // a heading as cosine and sine, and the speed along it
+        (
+            "parameters=['v']\nconstraints=['c^2 + s^2 = 1']\n[known_inputs]\nw='generic'\n[states]\nx='v*c'\nc='-w*s'\ns='w*c'\n[outputs]\ny='x'",
+            &[("c", 2), ("s", 2), ("v", 2), ("x", 1)],
+            &["negate c, s, v"],
+        ),
+        (
+            "parameters=['a']\n[states]\nx={equation='a^2*x', initial='known'}\n[outputs]\ny='x'",
+            &[("a", 2)],
+            &["negate a"],
+        ),
+        (
+            "parameters=['a']\n[states]\nx={equation='a^2*x', initial=1}\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + 1'}",
+            &[("a", 2)],
+            &["negate a"],
+        ),
+        (
+            "parameters=['b']\n[constants]\nc=1\n[states]\nx={equation='c*b*z', initial=0}\nz={equation='b*x', initial=1}\n[outputs]\ny='z'\n[[segment]]\n[[segment]]\nconstants={c=-1}",
+            &[("b", 2)],
+            &["negate x, b"],
+        ),
+        // absorption and elimination change places, and the volume with them: y = D ka/(V (ka - ke)) (e^(-ke
+        // t) - e^(-ka t))
+        (
+            "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\nx2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
+            &[("V", 2), ("ka", 2), ("ke", 2)],
+            &["replace ka by ke, ke by ka, V by V*ke/ka"],
+        ),
+        (
+            "parameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\n[outputs]\ny='x1 + x2'",
+            &[("k1", 2), ("k2", 2)],
+            &["swap x1 and x2, k1 and k2"],
+        ),
+        // the rates of three decays in any order: each is one of three
+        (
+            "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
+            &[("k1", 3), ("k2", 3), ("k3", 3)],
+            &["swap x1 and x2, k1 and k2", "swap x1 and x3, k1 and k3", "swap x2 and x3, k2 and k3"],
+        ),
+        (
+            "parameters=['r1', 'r2']\n[states]\nx1={equation='r1*x1*(1 - x1 - x2)', initial='0.25'}\nx2={equation='r2*x2*(1 - x1 - x2)', initial='0.25'}\n[outputs]\ny='x1 + x2'",
+            &[("r1", 2), ("r2", 2)],
+            &["swap x1 and x2, r1 and r2"],
+        ),
+    ];
+    for (text, expected, maps) in cases {
+        let a = analyzed(&format!("name='m'\n{text}"));
+        assert_eq!(numbers(&a), expected.iter().copied().collect(), "{text}");
+        assert_eq!(a.solution_maps, maps, "{text}");
+    }
+    // by different starts the decays are told from each other
+    let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
+    assert_eq!(numbers(&analyzed(one)), BTreeMap::from([("k1", 1), ("k2", 1)]));
+}
+
+/// The words of each unknown follow from verdict and number.
+#[test]
+fn words_of_identifiability() {
+    let a = analyzed(
+        "name='m'\nparameters=['a', 'b', 'c', 'd']\n[states]\nx='a^2 + b*c'\n[outputs]\ny='x + 0*d'\nz='b^3*c^3'\nw='a^2'",
+    );
+    let of = |name: &str| {
+        let q = a.quantities.iter().find(|q| q.name == name).expect("an unknown");
+        (q.identifiability, q.identifiability_words())
+    };
+    assert_eq!(of("x"), (Identifiability::GloballyIdentifiable, "globally identifiable".into()));
+    assert_eq!(of("a"), (Identifiability::LocallyIdentifiable, "locally identifiable (2 solutions)".into()));
+    assert_eq!(of("b"), (Identifiability::NotIdentifiable, "not identifiable".into()));
+    assert_eq!(of("d"), (Identifiability::NotIdentifiable, "not identifiable".into()));
+    let function = |text: &str| a.invariants.iter().find(|c| c.expression == text).expect("a function");
+    // x' - a^2 is b c itself: one value
+    assert_eq!(number(function("b*c").number_of_solutions.as_ref()), Some(1));
+}
+
+/// By hand: functions beyond those of scalings, with the number of their values.
+#[test]
+fn functions_by_hand() {
+    // only a/b and its square are seen through y' and z: f = a*b has two values, with its square once seen
+    let a = analyzed("name='m'\nparameters=['a', 'b']\n[states]\nx='-x'\n[outputs]\ny='x'\nz='(a*b)^2 + 1'");
+    let [f] = &a.invariants[..] else { panic!("{:?}", a.invariants) };
+    assert_eq!((f.expression.as_str(), f.degree), ("a*b", Some(0)));
+    assert_eq!(number(f.number_of_solutions.as_ref()), Some(2));
+    // S, E, U, I of an epidemic with unknown transmission, whose confirmation is asking for them
+    let (_, _, text) = models().into_iter().find(|m| m.0 == "seuir").expect("the model");
+    let model = json::read(&text).expect("a model");
+    let found = analyze_system(&model, SystemOptions::default()).expect("judged");
+    let listed: Vec<(&str, Option<usize>, Option<usize>)> = found
+        .invariants
+        .iter()
+        .map(|f| (f.expression.as_str(), f.degree, number(f.number_of_solutions.as_ref())))
+        .collect();
+    let six = |text| (text, Some(6), Some(1));
+    assert_eq!(listed, [six("N*w/beta"), six("S*w"), six("E*w"), six("w*(U + I)")]);
+}
+
+/// Of all reference models: as many functions as the rank is more than the number of observable unknowns, or
+/// the answer says how many are missing; and each is observable with the same degree where it is asked for.
+#[test]
+fn functions_are_complete_or_said_to_be_missing() {
+    let (mut incomplete, mut missing, mut asked) = (Vec::new(), 0, 0);
+    for (name, reference, text) in models() {
+        let model = json::read(&text).expect("a model");
+        let options = SystemOptions { solutions: false, ..SystemOptions::default() };
+        let a = analyze_system(&model, options).expect("judged");
+        if a.missing_functions > 0 {
+            missing += a.missing_functions;
+            incomplete.push(name.clone());
+        } else if model.unknown_inputs.is_empty() {
+            let observable = a.quantities.iter().filter(|q| q.degree.is_some()).count();
+            assert_eq!(observable + a.invariants.len(), a.rank, "{name}");
+        }
+        // asking for those that are short and whose names may stand in a formula
+        if a.invariants.is_empty() || a.invariants.len() > 8 {
+            continue;
+        }
+        let mut asking = reference.clone();
+        asking["observable_combinations"] = a.invariants.iter().map(|f| f.expression.as_str()).collect();
+        let Ok(model) = json::read(&asking.to_string()) else { continue };
+        let again = judge(&model, 1, None).expect("judged");
+        for (verdict, f) in again.asked().zip(&a.invariants) {
+            assert_eq!(verdict.degree, f.degree, "{name}: {}", f.expression);
+            asked += 1;
+        }
+    }
+    assert_eq!((incomplete.len(), missing), (11, 19), "{incomplete:?}");
+    assert!(asked > 100, "{asked}");
+}
+
+/// Reduced models of all reference models that have one: judged again they are fully observable, with the
+/// rank.
+#[test]
+fn reduced_models_are_fully_observable() {
+    let (mut made, mut refused) = (0, 0);
+    for (name, reference, text) in models() {
+        let model = json::read(&text).expect("a model");
+        match reduced(&model, 1, None) {
+            Ok(found) => {
+                let again = model_file::read(&found.text).unwrap_or_else(|e| panic!("{name}: {e}"));
+                let judged = judge(&again, 7, None).expect("judged");
+                let rank = judged.findings.degrees.rank();
+                assert_eq!(rank, judged.layout.unknowns.len(), "{name}");
+                assert_eq!(rank as u64, reference["expected_rank"].as_u64().unwrap_or(rank as u64), "{name}");
+                made += 1;
+            }
+            Err(ReducedError::FullyObservable) => {}
+            Err(ReducedError::NotCovered(_)) => refused += 1,
+            Err(e) => panic!("{name}: {e}"),
+        }
+    }
+    assert_eq!((made, refused), (71, 22));
+}
