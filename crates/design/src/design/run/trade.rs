@@ -16,12 +16,14 @@ use crate::design::search::scoring::{Search, Trial};
 const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
 /// Most sequences that are all held against each other.
 const MOST: f64 = 2e4;
+/// Totals beyond so many times the best one are of no scheme that anybody wants.
+const WORST: f64 = 100.0;
 /// Restarts of the exchange at each of them, besides those from the schemes found.
 const RESTARTS: u64 = 4;
 
 impl Task<'_> {
-    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, and true if these
-    /// are all; empty where the search does not count a bench, and for D and E, which are of no single
+    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, up to 100 times the
+    /// least total, and true if these are all; empty where the search does not count a bench, and for D and E, which are of no single
     /// coefficient.
     pub(crate) fn bias_front(
         &self,
@@ -63,6 +65,8 @@ impl Task<'_> {
         }
         let mut points: Vec<BiasPoint> = sequences.iter().filter_map(|s| self.point(evaluator, s)).collect();
         points.sort_by(|a, b| a.sigma.total_cmp(&b.sigma).then(a.bias.total_cmp(&b.bias)));
+        let best = points.iter().map(|p| p.total).fold(f64::INFINITY, f64::min);
+        points.retain(|p| p.total <= WORST * best);
         let mut least = f64::INFINITY;
         // what differs by rounding only is no other point
         points.retain(|p| {

@@ -18,6 +18,8 @@ pub const LEVEL: f64 = 0.01;
 const UNEXPLAINED: f64 = 0.999;
 /// Fall of chi-square, of the size found, by which errors of a group differ at most: three sigma.
 const SAME: f64 = 9.0;
+/// Part of a fall that linearisation at a fit displaced by the error may miss.
+const BENT: f64 = 0.05;
 /// Part of a column that counts as rounding, squared.
 const ROUNDING: f64 = 1e-20;
 
@@ -168,15 +170,18 @@ impl Score {
         Some(([[x, sigmas[0]], [y, sigmas[1]]], x * u + y * v))
     }
 
-    /// Errors whose columns the residuals do not distinguish from that of `j` at the size found.
+    /// Errors that the residuals do not distinguish from `j` at the size found: by their columns, or by how
+    /// much they explain.
     fn group(&self, j: usize, tried: &[usize]) -> Vec<usize> {
-        let fall = self.fall(j) / self.left_over(self.fall(j), 1.0);
-        let differs = |&&k: &&usize| {
+        let left_over = self.left_over(self.fall(j), 1.0);
+        let fall = self.fall(j) / left_over;
+        let same = |&&k: &&usize| {
             let product = self.products[(j, k)];
             let alike = product * product / (self.products[(j, j)] * self.products[(k, k)]);
-            k != j && fall * (1.0 - alike) < SAME
+            let less = fall - self.fall(k) / left_over;
+            k != j && (fall * (1.0 - alike) < SAME || less < SAME + BENT * fall)
         };
-        tried.iter().filter(differs).copied().collect()
+        tried.iter().filter(same).copied().collect()
     }
 
     /// What explains the residuals best: a single error, or a pair where no single one does; nothing where
