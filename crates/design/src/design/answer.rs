@@ -48,8 +48,8 @@ pub struct Design {
     /// search counts no bench.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bias_front: Vec<BiasPoint>,
-    /// True if `bias_front` is of all sequences whose total is at most 100 times the best; false where it is of
-    /// those that are best with other sizes of the bench, by exchange.
+    /// True if `bias_front` is of all sequences whose total is at most 100 times the best; false where it is
+    /// of those that are best with other sizes of the bench, by exchange.
     #[serde(default)]
     pub bias_front_complete: bool,
     /// Unknowns and families with a stated requirement that is not judged, since only some coefficients are

@@ -22,9 +22,9 @@ const WORST: f64 = 100.0;
 const RESTARTS: u64 = 4;
 
 impl Task<'_> {
-    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, up to 100 times the
-    /// least total, and true if these are all; empty where the search does not count a bench, and for D and E, which are of no single
-    /// coefficient.
+    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, up to 100 times
+    /// the least total, and true if these are all; empty where the search does not count a bench, and for D
+    /// and E, which are of no single coefficient.
     pub(crate) fn bias_front(
         &self,
         evaluator: &Evaluator,
