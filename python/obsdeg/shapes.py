@@ -1750,7 +1750,9 @@ class Design(Shape):
     bias_front: list[BiasPoint]
     """Schemes that no scheme found beats in both sigma and bias by the bench, by sigma; left out where the search counts no bench."""
     bias_front_complete: bool
-    """True if `bias_front` is of all sequences; false where it is of those that are best with other sizes of the bench, by exchange."""
+    """True if `bias_front` is of all sequences whose total is at most 100 times the best; false where it is of those that are best with
+    other sizes of the bench, by exchange.
+    """
     not_judged: list[str]
     """Unknowns and families with a stated requirement that is not judged, since only some coefficients are asked for."""
     omitted: OmittedEffects | None
