@@ -55,8 +55,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     certificate: Option<PathBuf>,
 
-    /// Write an equivalent model that is fully observable (TOML): some unknowns of the model with fixed
-    /// numbers, the others in place of identifiable functions
+    /// Write a model with the same outputs over complex numbers that is fully observable (TOML): some
+    /// unknowns of the model with fixed numbers, the others in place of identifiable functions
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     reduced: Option<PathBuf>,
 }

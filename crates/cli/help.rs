@@ -143,7 +143,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("figures", OUTPUT, "Folder for a picture of the positions of every scheme"),
     ("design.certificate", OUTPUT, "File for a proof of the best sequence, which obsdeg verify checks"),
     ("certificate", OUTPUT, "File for a proof of the verdicts, which obsdeg verify checks"),
-    ("reduced", OUTPUT, "File for an equivalent model that is fully observable"),
+    ("reduced", OUTPUT, "File for a model with the same outputs that is fully observable"),
     ("blocks", None, "Blocks of the certificate of an optimum that are searched again"),
     ("man.force", None, "Replace files in the folder"),
     ("force", OUTPUT, "Replace files that are there"),

@@ -150,6 +150,39 @@ fn several_solutions_where_points_are_special() {
     assert_eq!(numbers(&analyzed(one)), BTreeMap::from([("k1", 1), ("k2", 1)]));
 }
 
+/// A known start is a number that no map changes: the sign of its state stays, and no number of solutions
+/// rests on a change of it. By hand: the fifth derivative of the first shows p x(0), lower ones p^2 alone.
+#[test]
+fn known_starts_are_not_mapped() {
+    let cases: [(&str, &[&str]); 5] = [
+        (
+            "parameters=['p']\n[states]\nw={equation='p^2 + w^2', initial=0}\nx={equation='x^3', initial='known'}\nz1={equation='z2', initial=0}\nz2={equation='z3', initial=0}\nz3={equation='z4', initial=0}\nz4={equation='z5', initial=0}\nz5={equation='p*x', initial=0}\n[outputs]\ny='w + z1'",
+            &[],
+        ),
+        (
+            "parameters=['a', 'b']\n[states]\nx={equation='a', initial='known'}\n[outputs]\ny='(b*x)^2'",
+            &["negate b"],
+        ),
+        (
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='b^3*x', initial=0}\n[outputs]\ny='z'",
+            &[],
+        ),
+        (
+            "parameters=['a', 'k']\n[states]\nx={equation='a*x^2', initial='known'}\n[outputs]\ny='k^2*x^2'",
+            &["negate k"],
+        ),
+        (
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='-b*z', initial='known'}\n[outputs]\ny='x + z'",
+            &[],
+        ),
+    ];
+    for (text, maps) in cases {
+        let a = analyzed(&format!("name='m'\n{text}"));
+        assert_eq!(a.solution_maps, maps, "{text}");
+        assert!(!numbers(&a).iter().any(|(name, n)| ["p", "a"].contains(name) && *n > 1), "{text}");
+    }
+}
+
 /// The words of each unknown follow from verdict and number.
 #[test]
 fn words_of_identifiability() {

@@ -171,8 +171,9 @@ impl Written<'_> {
     fn head(&self) -> String {
         let list = self.fixed.iter().map(|(name, x)| format!("{name} = {x}")).collect::<Vec<_>>().join(", ");
         let name = &self.model.name;
-        let description =
-            format!("Reduced model, with the outputs of {name} and {list}: every unknown is observable");
+        let description = format!(
+            "Reduced model, with the outputs of {name} over complex numbers and {list}: every unknown is observable"
+        );
         let time = match self.model.time {
             StartTime::Zero => String::new(),
             StartTime::Generic => "time = \"generic\"\n".into(),

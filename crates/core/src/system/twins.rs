@@ -45,8 +45,13 @@ pub(super) fn twins(
         let role = compiled.roles[*slot];
         layout.unknowns.iter().zip(degrees).any(|(u, d)| u.role == role && d.is_some())
     };
-    let unknown = |slot: &usize| {
-        matches!(compiled.roles[*slot], Role::State(_) | Role::Parameter(_) | Role::UnknownInput(_))
+    // a known start without a formula is a number that no map changes
+    let unknown = |slot: &usize| match compiled.roles[*slot] {
+        role @ Role::State(s) => {
+            compiled.starts[s].is_some() || layout.unknowns.iter().any(|u| u.role == role)
+        }
+        Role::Parameter(_) | Role::UnknownInput(_) => true,
+        _ => false,
     };
     let slots: Vec<usize> = (0..compiled.roles.len()).filter(unknown).collect();
     let mut out: Vec<Twin> = Vec::new();
