@@ -88,7 +88,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "NOISE")]
     pub drift_noise: Option<DriftNoise>,
 
-    /// What is required, and the bench.
+    /// Requirements, and the bench.
     #[command(flatten)]
     #[serde(flatten)]
     pub judged: RequirementOptions,

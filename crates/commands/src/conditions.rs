@@ -79,13 +79,13 @@ pub struct MeasurementOptions {
     #[serde(with = "text::list")]
     pub prior: Vec<Assignment>,
 
-    /// What is required, and the bench.
+    /// Requirements, and the bench.
     #[command(flatten)]
     #[serde(flatten)]
     pub judged: RequirementOptions,
 }
 
-/// What estimates are judged by.
+/// Requirements and bench that estimates are judged by.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 #[command(next_help_heading = "Measurement")]

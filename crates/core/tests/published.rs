@@ -13,7 +13,7 @@ const LIMIT: u64 = 300;
 const DECIDED: usize = 250;
 const DECIDED_BY_RELATIONS: usize = 339;
 
-/// What was found of a system.
+/// Verdicts and numbers of a system.
 #[derive(Default)]
 struct Found {
     observable: usize,
@@ -23,7 +23,7 @@ struct Found {
     agree: usize,
     /// Published as global, and not decided here.
     open: usize,
-    /// What contradicts the published verdicts.
+    /// Contradictions to the published verdicts.
     differ: Vec<String>,
 }
 

@@ -61,14 +61,11 @@ fn limits<'a>(all: impl Iterator<Item = (&'a str, f64, &'a str, String)>) -> Opt
     };
     let listed = small.iter().map(limit).collect::<Vec<_>>().join(", ");
     let names = other.iter().map(|o| o.0).collect::<Vec<_>>().join(", ");
-    match (small.is_empty(), other.is_empty()) {
-        (true, true) => None,
-        (false, true) => Some(listed),
-        (true, false) => {
-            Some(format!("no small size (up to 0.05 g, 5 %, 0.05 rad) of {names} uses up a margin"))
-        }
-        (false, false) => Some(format!("{listed}; no small size (up to 0.05 g, 5 %, 0.05 rad) of {names}")),
-    }
+    let other = (!other.is_empty())
+        .then(|| format!("no small size (up to 0.05 g, 5 %, 0.05 rad) of {names} uses up a margin"));
+    let small = (!small.is_empty()).then_some(listed);
+    let all: Vec<String> = small.into_iter().chain(other).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// Class of a family in words: the classes of its terms.

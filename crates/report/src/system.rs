@@ -50,7 +50,7 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     }
 }
 
-/// How many solutions an observable unknown has, and where its expression stands.
+/// Number of solutions of an observable unknown, and the place of its expression.
 fn solutions(q: &SystemQuantity) -> String {
     let words = q.identifiability_words();
     match (&q.number_of_solutions, &q.solution) {

@@ -181,7 +181,7 @@ pub(crate) struct Parts<'a> {
     pub found: &'a Diagnosed,
     /// By run: the moment at which the scheme begins, where it was estimated.
     pub offsets: &'a [Option<Offset>],
-    /// What a later beginning does to the measurements of each run where labels leave it open.
+    /// Change of the measurements of each run with its beginning, where labels leave that open.
     pub later: &'a [Option<Later>],
     pub too_many: Option<usize>,
     pub known: Vec<String>,

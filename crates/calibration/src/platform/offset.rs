@@ -36,12 +36,12 @@ pub(super) struct Offset {
     pub direction: DVector<f64>,
 }
 
-/// What a later beginning of a run does to its measurements, unknowns as they are.
+/// Change of the measurements of a run with its beginning, unknowns as they are.
 #[derive(Debug, Clone)]
 pub(super) struct Later {
     /// Change of every residual per second, in the order of the rows.
     pub column: Vec<f64>,
-    /// What labels say of the beginning: one over its variance, in 1/s^2.
+    /// Weight of the labels: one over the variance that they leave the beginning, in 1/s^2.
     pub weight: f64,
 }
 
@@ -99,7 +99,7 @@ impl Problem<'_> {
         self.runs.iter().enumerate().map(of).collect()
     }
 
-    /// What later beginnings of the runs do where labels leave them open. `None` too where a shift moves
+    /// Changes with the beginnings of the runs where labels leave them open. `None` too where a shift moves
     /// measurements to other bins.
     ///
     /// # Errors

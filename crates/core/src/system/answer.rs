@@ -286,7 +286,7 @@ pub struct SystemOptions {
     /// How much work counting solutions may take: millions of products of two coefficients, at each of two
     /// points.
     pub count_limit: u64,
-    /// How much work relations among derivatives of the outputs may take where counting leaves a number
+    /// Limit of the work of relations among derivatives of the outputs, where counting leaves a number
     /// undecided: millions of products of two coefficients, at each of two points; 0: none are sought.
     pub relation_limit: u64,
     /// The highest order of derivatives to look at; left out: n for each experiment where chains end by

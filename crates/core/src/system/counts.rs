@@ -36,7 +36,7 @@ pub(super) struct Limits {
     pub(super) relations: u64,
 }
 
-/// What is known of the number of solutions.
+/// Numbers of solutions, and maps between them.
 pub(super) struct Solutions {
     /// The number of values that every unknown takes, in the order of the layout, as two random points in the
     /// two fields agree. What is not observable has no number.
@@ -49,7 +49,7 @@ pub(super) struct Solutions {
     pub(super) maps: Vec<String>,
 }
 
-/// Where solutions are counted.
+/// Model, fields and order that solutions are counted with.
 struct Counting<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
@@ -126,7 +126,7 @@ impl Counting<'_> {
         }
     }
 
-    /// What both fields agree on.
+    /// Numbers that both fields agree on.
     fn agreed(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
         let both = self.counts(0, &fibres[0]).into_iter().zip(self.counts(1, &fibres[1]));
         both.map(|both| self.agreed_number(both)).collect()
@@ -193,7 +193,7 @@ impl Counting<'_> {
         found
     }
 
-    /// What relations say in both fields, where they say something.
+    /// Consequences of relations in both fields, where there are any.
     fn by_relations(&self, limit: u64) -> Option<[Known; 2]> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
         let mut found = Found::default();
@@ -269,8 +269,8 @@ impl Counting<'_> {
         }
     }
 
-    /// What is counted with all unknowns: a map between two solutions where `maps` has none, and the numbers
-    /// of values of the functions.
+    /// Results of counting with all unknowns: a map between two solutions where `maps` has none, and the
+    /// numbers of values of the functions.
     fn of_all(&self, counts: &[Count], mut maps: Vec<String>, limit: u64) -> (Vec<String>, Vec<Count>) {
         let degrees = &self.judged.findings.degrees.degree;
         let two = counts.iter().zip(degrees).any(|(c, d)| d.is_some() && *c == Ok(2));

@@ -400,7 +400,7 @@ fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynom
     }
 }
 
-/// Where solutions are counted: a random point in one of the two fields, with what is known there.
+/// Random point in one of the two fields at which solutions are counted, with what is known there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counted<'a> {
     pub(super) f: Field,
@@ -408,7 +408,7 @@ pub(super) struct Counted<'a> {
     pub(super) order: usize,
     /// Runs from the same start with other values of the generic inputs.
     pub(super) others: usize,
-    /// What relations say.
+    /// Consequences of relations.
     pub(super) known: &'a Known,
     /// Functions whose values are counted too, and with them all unknowns: of those that are not observable
     /// the values where as many keep theirs as there are directions. `None`: only what is observable.

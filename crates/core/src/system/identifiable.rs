@@ -47,7 +47,7 @@ struct Family {
     variables: Vec<usize>,
     /// Largest sum of the sizes of the exponents.
     degree: u32,
-    /// Whether exponents may be negative.
+    /// True if exponents may be negative.
     negative: bool,
 }
 
@@ -126,7 +126,7 @@ pub(super) fn terms_of(i: &Invariant) -> Terms {
     }
 }
 
-/// What a scaling multiplies unknowns with, as integer exponents.
+/// Factors of a scaling on the unknowns, as integer exponents.
 fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
     let plain = symmetries.found.iter().filter(|s| s.translation.is_empty());
     let weights = plain.map(|s| {

@@ -1,8 +1,8 @@
 //! The map that takes the one of two solutions to the other, as expressions of few unknowns.
 //!
-//! Where an unknown has two values, the second root of its polynomial is its value at the other solution.
-//! What it is of the values of the first is sought among quotients `a b/c` of unknowns, and sums of two or
-//! three of these; an expression counts if it has that value at a random point of both fields.
+//! Where an unknown has two values, the second root of its polynomial is its value at the other solution. As
+//! an expression of the values of the first it is sought among quotients `a b/c` of unknowns, and sums of two
+//! or three of these; an expression counts if it has that value at a random point of both fields.
 
 use std::collections::BTreeMap;
 

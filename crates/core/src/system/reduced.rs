@@ -1,5 +1,6 @@
-//! An equivalent model that is fully observable: as many unknowns as there are unobservable directions take
-//! fixed numbers, and the others stand for identifiable functions.
+//! A fully observable model with the outputs of another one over complex numbers: as many unknowns as there
+//! are unobservable directions take fixed numbers, and the others stand for identifiable functions. Of real
+//! outputs it may lack some: those of `a b^2 < 0` where `a` is fixed at 1.
 //!
 //! The unknowns that are fixed are independent of all that the outputs determine. Where the model that is
 //! left is fully observable, it has as many unknowns as the rank of the first, so that the outputs of both
@@ -20,7 +21,7 @@ use super::model_file;
 use super::quotients::Terms;
 use super::symmetry::symmetries;
 
-/// Why there is no reduced model.
+/// Reason that there is no reduced model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ReducedError {
     /// The model has a fault.
@@ -29,7 +30,7 @@ pub enum ReducedError {
     /// Nothing is to be reduced.
     #[error("the model is fully observable: there is nothing to reduce")]
     FullyObservable,
-    /// What reduced models are not written for.
+    /// Kind of model that no reduced one is written for.
     #[error("no reduced model is written for a model {0}")]
     NotCovered(&'static str),
     /// No numbers were found.
@@ -44,7 +45,8 @@ pub struct Reduced {
     pub text: String,
     /// Unknowns with a fixed number, as `(name, number)`.
     pub fixed: Vec<(String, i64)>,
-    /// What unknowns that are left stand for, as `(name, identifiable function)`, where it was found.
+    /// Functions that unknowns which are left stand for, as `(name, identifiable function)`, where it was
+    /// found.
     pub stands_for: Vec<(String, String)>,
 }
 
@@ -121,7 +123,8 @@ fn fixed_lanes(judged: &Judgement, span: &Echelon) -> Vec<usize> {
     order
 }
 
-/// What an unknown stands for where the fixed ones are one: a product in which it is the only other factor.
+/// Function that an unknown stands for where the fixed ones are one: a product in which it is the only other
+/// factor.
 fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Option<(String, String)> {
     let [(1, powers)] = &terms[..] else { return None };
     let is_fixed = |lane: usize| fixed.iter().any(|f| f.0 == lane);
@@ -147,7 +150,7 @@ fn quoted(text: &str) -> String {
     serde_json::Value::String(text.into()).to_string()
 }
 
-/// What a model file is written from.
+/// Contents of a model file.
 struct Written<'a> {
     model: &'a SystemModel,
     fixed: &'a [(String, i64)],

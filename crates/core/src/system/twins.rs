@@ -195,7 +195,7 @@ impl Tested {
         Some(Self { f, point, nodes })
     }
 
-    /// Whether everything goes along with an exchange of places.
+    /// True if everything goes along with an exchange of places.
     fn holds(&self, compiled: &Compiled, twin: &Twin) -> bool {
         let image = |slot: usize| twin.images.get(&slot).map_or(slot, |i| i.0);
         let moved: Vec<u64> = (0..self.point.len()).map(|s| self.point[image(s)]).collect();
@@ -267,7 +267,7 @@ fn in_slot(compiled: &Compiled, layout: &Layout, u: &Unknown, slot: usize) -> Op
 }
 
 impl Twin {
-    /// What takes the place of an unknown: another or itself, and true if with the other sign.
+    /// Slot that takes the place of an unknown, its own or another, and true if with the other sign.
     fn image(&self, compiled: &Compiled, layout: &Layout, lane: usize) -> Option<(usize, bool)> {
         let u = &layout.unknowns[lane];
         let slot = compiled.roles.iter().position(|r| *r == u.role)?;
@@ -288,7 +288,7 @@ impl Twin {
     }
 }
 
-/// How many different values the maps give an unknown at a point (values by unknown): at least so many
+/// Number of different values that the maps give an unknown at a point (values by unknown): at least so many
 /// solutions it has.
 pub(super) fn images(
     twins: &[Twin],

@@ -1,4 +1,4 @@
-//! Why a number of solutions is not decided, and the limits that do not depend on the work.
+//! Reasons that a number of solutions is not decided, and the limits that do not depend on the work.
 
 use obsdeg_exact::groebner::OverLimit;
 
@@ -9,7 +9,7 @@ pub(super) const UNKNOWNS: usize = 60;
 /// A polynomial of more terms is not formed.
 pub(super) const LONGEST: usize = 400;
 
-/// Why the number of solutions is not decided.
+/// Reason that the number of solutions is not decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NotCounted {
     /// A function in an equation.

@@ -176,7 +176,7 @@ impl<'a> Source<'a> {
         Ok(jets.iter().map(coefficients).collect())
     }
 
-    /// Which jets are independent, at a random point. `None` where there is none.
+    /// Independent jets at a random point; `None` where no point was found.
     pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<Structure> {
         let (f, n) = (self.f, self.moving.len());
         let orders = n + BEYOND + 2;

@@ -1,5 +1,5 @@
-//! What relations among derivatives of outputs say of the constants: which are unique, and equations that
-//! every solution satisfies.
+//! Consequences of relations among derivatives of outputs for the constants: those that are unique, and
+//! equations that every solution satisfies.
 //!
 //! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution, and where one
 //! trajectory determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output.
@@ -34,7 +34,7 @@ const BASIS: u64 = 20_000_000;
 /// Highest degree of a minimal polynomial of a constant that is looked at.
 const SOLUTIONS: usize = 24;
 
-/// What relations say of the unknowns at a point.
+/// Consequences of relations for the unknowns at a point.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Known {
     /// Unknowns with one value among all points with the same outputs.
@@ -47,7 +47,7 @@ pub(super) struct Known {
 #[derive(Debug, Default)]
 pub(super) struct Found(Option<Vec<Relation>>);
 
-/// Whether relations among derivatives decide anything: one experiment and segment, generic starts and
+/// True if relations among derivatives decide anything: one experiment and segment, generic starts and
 /// inputs, no function.
 pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgement) -> bool {
     let generic = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
@@ -60,7 +60,7 @@ pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgeme
         && judged.fields.is_some()
 }
 
-/// What relations say of the constants at the point `at` (values of the unknowns, then of the known
+/// Consequences of relations for the constants at the point `at` (values of the unknowns, then of the known
 /// constants).
 pub(super) fn known(
     (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
@@ -208,7 +208,7 @@ impl Fibre {
         out
     }
 
-    /// What is zero: every ratio less its value.
+    /// Polynomials that are zero: every ratio less its value.
     fn zero(&self) -> Vec<Polynomial> {
         let f = self.f;
         let less = |e: &Equation| {

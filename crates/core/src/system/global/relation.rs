@@ -36,7 +36,7 @@ fn degrees(e: &[u8], weights: &[usize]) -> (usize, usize) {
     (degree, e.iter().zip(weights).map(|(&k, w)| usize::from(k) * w).sum())
 }
 
-/// How many exponents there are of a degree up to `degree`, by their largest weighted degree up to
+/// Number of exponents of a degree up to `degree`, by their largest weighted degree up to
 /// `weighted`.
 fn counts(weights: &[usize], degree: usize, weighted: usize) -> Vec<usize> {
     // by degree and weighted degree
@@ -58,7 +58,7 @@ fn counts(weights: &[usize], degree: usize, weighted: usize) -> Vec<usize> {
     (0..=weighted).map(&mut up_to).collect()
 }
 
-/// How many exponents there are of a degree and a weighted degree up to a limit.
+/// Number of exponents of a degree and a weighted degree up to a limit.
 fn count(weights: &[usize], degree: usize, weighted: usize) -> usize {
     counts(weights, degree, weighted)[weighted]
 }
@@ -266,7 +266,7 @@ impl Relation {
         Ok((echelon.free() == [size - 1]).then(|| echelon.dependency(size - 1)))
     }
 
-    /// Whether one trajectory determines the coefficients: the products are series in time whose only
+    /// True if one trajectory determines the coefficients: the products are series in time whose only
     /// dependency is the relation. (Coefficients that only several trajectories determine say nothing of one
     /// experiment.)
     fn determined_by_one_trajectory(

@@ -50,17 +50,19 @@ impl Task<'_> {
         let mut sequences: Vec<Vec<Stop>> =
             main.found.iter().filter(same).map(|s| s.sequence.clone()).collect();
         sequences.extend(every.into_iter().flatten());
+        // from the best of the search and of the factor before
+        let mut starts: Vec<Vec<Stop>> = sequences.first().cloned().into_iter().collect();
         for factor in FACTORS.into_iter().filter(|_| !all) {
             let there = Evaluator { omitted: Some(Arc::new(omitted.scaled(factor))), ..evaluator.clone() };
             let scaled = Search { evaluator: &there, keep: 1, ..*search };
-            let best = scaled.exchange(k, &sequences, RESTARTS, self.options.seed);
+            let best = scaled.exchange(k, &starts, RESTARTS, self.options.seed);
             if !best.complete {
                 return (Vec::new(), false);
             }
             for s in best.found.iter().filter(same) {
-                if !sequences.contains(&s.sequence) {
-                    sequences.push(s.sequence.clone());
-                }
+                starts.truncate(1);
+                starts.push(s.sequence.clone());
+                sequences.push(s.sequence.clone());
             }
         }
         let mut points: Vec<BiasPoint> = sequences.iter().filter_map(|s| self.point(evaluator, s)).collect();

@@ -44,11 +44,9 @@ pub struct OmittedColumns<'a> {
     ends: Vec<(usize, Vec<f64>)>,
 }
 
-/// One step at a position: `psi+ = phi psi + gamma eps`.
+/// One step at a position: `psi+ = phi psi + added`, and the errors of the accelerometers.
 struct Dwelt {
     phi: Matrix3<f64>,
-    gamma: Matrix3<f64>,
-    /// `gamma eps` and errors of the accelerometers where the platform is where the scheme has it.
     added: Vectors,
     outputs: Vectors,
 }
@@ -105,7 +103,7 @@ impl<'a> OmittedColumns<'a> {
             self.enter()?;
         }
         match &segment.kind {
-            SegmentKind::Dwell => self.dwell(),
+            SegmentKind::Dwell => self.dwell()?,
             SegmentKind::Slew(slew) => self.turn(slew, segment.dt, false),
             SegmentKind::Rotation(slew) => self.turn(slew, segment.dt, true),
         }
@@ -141,8 +139,8 @@ impl<'a> OmittedColumns<'a> {
             let tilt = self.tilts.get(self.done).map(|t| t.from);
             self.add_offset(1.0, tilt);
         }
-        if segment.kind == SegmentKind::Dwell {
-            self.current = Some(self.dwelt(&c, segment.dt)?);
+        if segment.kind == SegmentKind::Dwell && self.tilts.is_empty() {
+            self.current = Some(self.dwelt(&c, segment.dt, None)?);
         }
         Ok(())
     }
@@ -203,7 +201,7 @@ impl<'a> OmittedColumns<'a> {
     }
 
     /// One step of `dt` seconds at an attitude.
-    fn dwelt(&self, c: &Matrix3<f64>, dt: f64) -> Result<Dwelt, SimulationError> {
+    fn dwelt(&self, c: &Matrix3<f64>, dt: f64, tilt: Option<&Tilt>) -> Result<Dwelt, SimulationError> {
         let [w_n, w_u, _] = self.plan.earth_rate();
         let f = local_dynamics(&Float, &w_n, &w_u);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
@@ -211,10 +209,18 @@ impl<'a> OmittedColumns<'a> {
         let part = |first: usize| -> Matrix3<f64> {
             std::array::from_fn(|i| std::array::from_fn(|j| local[(i, first + j)]))
         };
-        let (phi, gamma) = (part(0), part(3));
-        let added = self.drifts(c, None, None).iter().map(|d| apply(&gamma, d)).collect();
-        let outputs = vectors(&self.model.output_rows(&Float, c));
-        Ok(Dwelt { phi, gamma, added, outputs })
+        let gamma = part(3);
+        let drifts = self.drifts(c, None, tilt.map(middle).as_ref());
+        let outputs = |c: &Matrix3<f64>| vectors(&self.model.output_rows(&Float, c));
+        let (phi, outputs) = match tilt {
+            None => (part(0), outputs(c)),
+            Some(t) => {
+                let back = transpose(&t.to);
+                let there = outputs(&times(&t.to, c));
+                (t.transition, there.iter().map(|a| apply(&back, a)).collect())
+            }
+        };
+        Ok(Dwelt { phi, added: drifts.iter().map(|d| apply(&gamma, d)).collect(), outputs })
     }
 
     /// Drifts `eps^n` where the platform should be at `c` and is tilted by `e`.
@@ -231,33 +237,25 @@ impl<'a> OmittedColumns<'a> {
         there.into_iter().zip(self.model.terms()).map(turned).collect()
     }
 
-    fn dwell(&mut self) {
-        let Some(step) = &self.current else { return };
+    fn dwell(&mut self) -> Result<(), SimulationError> {
         let tilt = self.tilts.get(self.done);
-        let c = self.plan.attitudes[self.plan.segments[self.segment].position];
-        let (phi, added, outputs) = match tilt {
-            None => (step.phi, None, None),
-            Some(t) => {
-                let drifts = self.drifts(&c, None, Some(&middle(t)));
-                let added: Vectors = drifts.iter().map(|d| apply(&step.gamma, d)).collect();
-                let outputs = vectors(&self.model.output_rows(&Float, &times(&t.to, &c)));
-                let back = transpose(&t.to);
-                let outputs: Vectors = outputs.iter().map(|a| apply(&back, a)).collect();
-                (t.transition, Some(added), Some(outputs))
-            }
-        };
-        for (p, added) in self.psi.iter_mut().zip(added.as_ref().unwrap_or(&step.added)) {
-            *p = sum(&apply(&phi, p), added);
+        if tilt.is_some() {
+            let segment = &self.plan.segments[self.segment];
+            self.current = Some(self.dwelt(&self.plan.attitudes[segment.position], segment.dt, tilt)?);
         }
-        let outputs = outputs.as_ref().unwrap_or(&step.outputs);
+        let Some(step) = &self.current else { return Ok(()) };
+        for (p, added) in self.psi.iter_mut().zip(&step.added) {
+            *p = sum(&apply(&step.phi, p), added);
+        }
         self.rows.clear();
         for &component in &self.plan.components {
             let of = |(p, a): (&[f64; 3], &[f64; 3])| match tilt {
                 Some(t) => tilted_output(component, p, a, &t.to),
                 None => output(component, p, a),
             };
-            self.rows.extend(self.psi.iter().zip(outputs).map(of));
+            self.rows.extend(self.psi.iter().zip(&step.outputs).map(of));
         }
+        Ok(())
     }
 
     /// One step while the platform turns, by Runge and Kutta.
