@@ -15,6 +15,7 @@ import obsdeg
 from ._files import Text
 from ._request import READ
 from ._request import plain as plain_option
+from ._texts import _fraction, _of_fraction
 
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
 _NUMBER = re.compile(_DECIMAL.pattern + r"([eE][+-]?\d{1,4})?", re.ASCII)
@@ -30,6 +31,10 @@ def plain(value: Any) -> Any:
     """
     if isinstance(value, Text):
         return value.text
+    fraction = None if isinstance(value, (int, float, Decimal)) else _fraction(value)
+    if fraction is not None:
+        # by the rule of analyze
+        value = Decimal(_of_fraction(*fraction, 9))
     if isinstance(value, Decimal):
         # a number, unless a double would lose digits
         number = float(value)

@@ -10,12 +10,14 @@ import sys
 import time
 from concurrent.futures import Executor, ThreadPoolExecutor
 from decimal import Decimal
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import obsdeg
 import pytest
+import sympy
 from obsdeg import campaign
 
 PAIR = [(0, 0, 0), (180, 0, 0)]
@@ -302,3 +304,14 @@ def test_decimals_are_numbers(tmp_path: Path) -> None:
     campaign.sweep(tmp_path, [refused], executor=campaign.threads, errors="record")
     campaign.sweep(tmp_path, [{**refused, "noise": Decimal("0.00001")}], executor=campaign.threads)
     assert len(campaign.read(tmp_path)) == 31
+
+
+def test_fractions_are_rounded_as_analyze_rounds_them() -> None:
+    """Fractions and rationals of SymPy are the decimals that `analyze` takes them for, alone and in lists."""
+    latitudes: list[Any] = [Fraction(1, 2), Fraction(100, 3), sympy.Rational(100, 3)]
+    rows = campaign.table([dict(angles=PAIR, latitude=x) for x in latitudes], executor=campaign.threads)
+    for x in latitudes:
+        taken = float(obsdeg.analyze(PAIR, latitude=x).latitude_deg)
+        assert taken in set(rows.latitude.astype(float))
+    turned = campaign.table([dict(angles=[(0, 0, Fraction(90)), (180, 0, 0)])], executor=campaign.threads)
+    assert len(turned) == 15

@@ -309,6 +309,10 @@ fn monsters_do_no_harm() {
     let long = model(&format!("{}x", "a*x + ".repeat(200_000)));
     let error = model_file::read(&long).and_then(|m| judge(&m, 1, None)).expect_err("too many operations");
     assert!(error.to_string().contains("operations"), "{error}");
+    // 8 MB that would take 2 GB are refused before they are read
+    let longer = model(&format!("{}x", "x+".repeat(4_000_000)));
+    let error = model_file::read(&longer).expect_err("too many signs");
+    assert_eq!(error.to_string(), "the model file: more than 400000 signs + - * / ^");
     let sum = model(&format!("{}x", "a*x + ".repeat(20_000)));
     assert_eq!(judged(&sum).findings.degrees.rank(), 2);
     let error = model_file::read(&model("x^123456")).and_then(|m| judge(&m, 1, None)).expect_err("too high");

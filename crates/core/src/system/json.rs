@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 use super::error::ModelError;
 use super::model::{
     Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, Place, PlacedExpression, Segment, State,
-    StateStart, SystemModel,
+    StateStart, SystemModel, check_signs,
 };
 use crate::language::file_error::{json_kind, words};
 use crate::language::{Names, parse_with};
@@ -147,6 +147,7 @@ fn named(name: &str) -> Named {
 /// # Errors
 /// [`ModelError`] with the byte range of the offender where it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
+    check_signs(text)?;
     let file = File(text);
     // a key, at its first mention in quotes
     let key = |name: &str| text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);

@@ -206,6 +206,17 @@ const MAX_UNIT: usize = 256;
 const MAX_DESCRIPTION: usize = 4000;
 /// Most operations of a system.
 pub(crate) const MAX_NODES: usize = 200_000;
+/// Most signs `+ - * /` and powers in the text of a system, which are counted before it is read: of these
+/// operations some are written more than once.
+const MAX_SIGNS: usize = 2 * MAX_NODES;
+
+/// Refuses a text with more signs of operations than a system may have.
+pub(super) fn check_signs(text: &str) -> Result<(), ModelError> {
+    let mut signs = text.bytes().enumerate().filter(|(_, b)| b"+-*/^".contains(b));
+    let Some((at, _)) = signs.nth(MAX_SIGNS) else { return Ok(()) };
+    let message = format!("more than {MAX_SIGNS} signs + - * / ^");
+    Err(ModelError { what: "the model file".into(), message, span: Some(at..at + 1) })
+}
 
 impl Nominal {
     /// What `map` says of `x@2`, or else of `x`.

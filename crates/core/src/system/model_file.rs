@@ -11,7 +11,7 @@ use toml::Value;
 use super::error::ModelError;
 use super::model::{
     Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, PlacedExpression, Segment,
-    StartTime, State, StateStart, SystemModel,
+    StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
 use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
@@ -392,6 +392,7 @@ pub fn is_model(text: &str) -> bool {
 /// # Errors
 /// [`ModelError`] with the byte range of the offender where it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
+    check_signs(text)?;
     let file: ModelFile = toml::from_str(text).map_err(|e| {
         let (message, span) = explain::<ModelFile>(text, &e);
         ModelError { what: "the model file".into(), message, span }
