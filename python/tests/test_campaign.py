@@ -306,12 +306,11 @@ def test_decimals_are_numbers(tmp_path: Path) -> None:
     assert len(campaign.read(tmp_path)) == 31
 
 
-def test_fractions_are_rounded_as_analyze_rounds_them() -> None:
-    """Fractions and rationals of SymPy are the decimals that `analyze` takes them for, alone and in lists."""
+def test_fractions_are_numbers() -> None:
+    """Fractions and rationals of SymPy are taken, alone and in lists, as `analyze` takes them."""
     latitudes: list[Any] = [Fraction(1, 2), Fraction(100, 3), sympy.Rational(100, 3)]
     rows = campaign.table([dict(angles=PAIR, latitude=x) for x in latitudes], executor=campaign.threads)
-    for x in latitudes:
-        taken = float(obsdeg.analyze(PAIR, latitude=x).latitude_deg)
-        assert taken in set(rows.latitude.astype(float))
+    assert len(rows) == 45
+    assert all(abs(rows.latitude[15 * i] - float(x)) < 1e-9 for i, x in enumerate(latitudes))
     turned = campaign.table([dict(angles=[(0, 0, Fraction(90)), (180, 0, 0)])], executor=campaign.threads)
     assert len(turned) == 15
