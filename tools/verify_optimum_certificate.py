@@ -590,7 +590,10 @@ def told(search, value, firsts, chosen, found):
     by_seed = f", chosen by seed {seed}" if seed is not None else ""
     none = f"none below {least * (1 - 1e-6):.6e}{search.unit}" if counted else "none of this degree within the caps"
     how = base.by_primes(search.primes, search.error)
-    yield f"{replayed} of {len(blocks)} blocks searched again{by_seed}: {total} sequences, {counted} of worst degree {degree}, none of a smaller one, {none}; {len(search.space.known)} sets judged {how}."
+    if replayed == 0:
+        yield f"No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."
+    else:
+        yield f"{replayed} of {len(blocks)} blocks searched again{by_seed}: {total} sequences, {counted} of worst degree {degree}, none of a smaller one, {none}; {len(search.space.known)} sets judged {how}."
     left = len(blocks) - replayed
     if left:
         yield f"Believed only: the bounds of the other {left} blocks, {all_of_them - total} sequences."

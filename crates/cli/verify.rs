@@ -1,5 +1,6 @@
 //! `obsdeg verify`: certificates, checked by a crate that shares no code with the engine.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -39,7 +40,7 @@ pub(crate) struct Arguments {
     /// Number of blocks of the certificate of an optimum that are searched again, chosen at random (default:
     /// all up to two million sequences, otherwise as many blocks as these fill)
     #[arg(long, value_name = "N")]
-    blocks: Option<usize>,
+    blocks: Option<NonZeroUsize>,
 
     /// Seed of this choice (default: a number of the system, which is printed)
     #[arg(long, value_name = "N")]
@@ -51,7 +52,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     one_on_stdin([Some(&a.certificate), a.scheme.as_ref()].into_iter().flatten())?;
     let certificate = read(&a.certificate, "certificate")?;
     let scheme = a.scheme.as_ref().map(|path| read(path, "scheme")).transpose()?;
-    let replay = Replay { blocks: a.blocks, seed: a.seed };
+    let replay = Replay { blocks: a.blocks.map(NonZeroUsize::get), seed: a.seed };
     let text = scheme.as_ref().map(|s| s.text.as_str());
     let verified = verify_with(certificate.text.as_bytes(), text, &replay);
     if let Some(refused) = verified.as_ref().err().filter(|refused| refused.is_unreadable()) {

@@ -279,7 +279,7 @@ fn interruptions_leave_nothing(count: u64) {
 
 #[test]
 fn interruptions_leave_no_litter() {
-    interruptions_leave_nothing(15);
+    interruptions_leave_nothing(8);
 }
 
 #[test]

@@ -360,7 +360,7 @@ fn hold_refinement(
 /// Both searches order alike, and as a search through every sequence does; what they say is so.
 #[test]
 fn both_searches_order_as_brute_force() {
-    searches_order_as_brute_force(40);
+    searches_order_as_brute_force(12);
 }
 
 /// Both searches against brute force, 200 tasks.
@@ -422,7 +422,7 @@ fn searches_order_as_brute_force(tasks: usize) {
 /// leave sequences out.
 #[test]
 fn what_a_bound_leaves_out_is_not_missed() {
-    bounds_miss_nothing(80);
+    bounds_miss_nothing(24);
 }
 
 /// Bounds against exhaustion, 400 tasks.

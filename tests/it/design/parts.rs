@@ -59,14 +59,14 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 
 #[test]
 fn parts_together_are_the_whole() {
-    parts_are_the_whole(&[1, 3, 7]);
+    parts_are_the_whole(&[3]);
 }
 
 /// Parts against the whole, with more parts than some tasks have starts.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn parts_together_are_the_whole_at_length() {
-    parts_are_the_whole(&[2, 64]);
+    parts_are_the_whole(&[1, 2, 7, 64]);
 }
 
 fn parts_are_the_whole(numbers: &[usize]) {

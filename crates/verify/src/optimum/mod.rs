@@ -491,10 +491,13 @@ impl Search {
             0 => "none of this degree within the caps".into(),
             _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
         };
-        out.push(format!(
+        out.push(match replayed {
+            0 => format!("No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."),
+            _ => format!(
             "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of a smaller one, {least}; {} sets judged {how}.",
             file.blocks.len(), found.sequences, found.counted, file.degree, self.space.judged_sets()
-        ));
+        ),
+        });
         out.push(match file.blocks.len() - replayed {
             0 => {
                 format!(

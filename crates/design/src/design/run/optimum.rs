@@ -132,6 +132,7 @@ pub fn check_certifiable(
     let psi = || conditions.requirements.iter().any(|r| r.name.starts_with("psi"));
     let limits_psi = options.criterion == CriterionName::Margin && options.required.is_empty() && psi();
     let cardinal = |angles: &Euler| cardinal_name(angles).is_some();
+    let noisy = !conditions.gyro_noise.is_none() || conditions.as_stated().drift_noise.amount() > 0.0;
     let found = [
         (options.positions.is_none(), "a search for the fewest positions"),
         (!options.candidates.attitudes.iter().all(cardinal), "candidates that are not cardinal"),
@@ -146,6 +147,7 @@ pub fn check_certifiable(
         (conditions.slew_rate_deg_s.is_some(), "slews that take time (--slew-rate)"),
         (!conditions.bench.is_empty(), "a bench of errors that are not estimated (--bench)"),
         (!conditions.stated_priors().is_empty(), "a stated prior (--prior)"),
+        (noisy, "random drift (--drift-noise, [simulation])"),
         (conditions.accelerometer_instability_ug > 0.0, "a bias instability of the accelerometers"),
         (limits_psi, "a requirement on psi"),
     ];
