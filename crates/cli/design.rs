@@ -1,4 +1,4 @@
-//! `obsdeg design`: the fewest positions, and the best of a number of positions.
+//! `obsdeg design`: the fewest positions, the best of a number of positions, and sets of outputs of a model.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -32,6 +32,8 @@ Examples:
   obsdeg design --positions 7 --carry inertial --part 2/40 -o part-2.json
   obsdeg design --merge part-*.json --check 3
   obsdeg design scheme.toml --candidates grid:45        with carry, dwell, noise, requirements and gimbals of the file
+  obsdeg design model.toml --measure states             the fewest outputs that make all unknowns of a model observable
+  obsdeg design model.toml --measure \"x1, x1 + x3\" --own-outputs --observable k1,k2 --max-degree 4
 
 Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random \
 starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch \
@@ -40,6 +42,9 @@ differ (--terms all) the criterion is d or margin; where torquer errors act on s
 half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json, \
 winner.toml (a scheme file), its positions as a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 
+Of a model the answer is which of the candidates to measure: minimal sets, the front of their number or cost against the largest degree, and the \
+cheapest set of each unknown, each with its proof.
+
 Exit codes: 0 done (with --minimum also when no positions do), 1 the first scheme misses a requirement (with --require-met), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
 
 #[derive(Debug, Args)]
@@ -47,7 +52,7 @@ Exit codes: 0 done (with --minimum also when no positions do), 1 the first schem
 pub(crate) struct Arguments {
     /// Scheme file whose carry, latitude, geometry, terms, conditions, requirements and gimbal limits hold; -
     /// is stdin. Its positions are not chosen from (--candidates), and as many are searched where no number
-    /// is asked for
+    /// is asked for. Or a model file: sets of outputs are chosen (--measure)
     #[arg(value_name = "SCHEME", id = "conditions", conflicts_with = "merge")]
     scheme: Option<PathBuf>,
 
@@ -126,6 +131,10 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         }
         Designed::Walks(found) => {
             a.output.write_folder(&*found, "walks.json", || Ok::<_, Failure>(found.files()))
+        }
+        Designed::Outputs(found) => {
+            a.met.check(None)?;
+            a.output.write_folder(&*found, "sensors.json", || Ok::<_, Failure>(Vec::new()))
         }
         Designed::Part(part) => write_part(&part, a),
     }

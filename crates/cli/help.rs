@@ -45,7 +45,7 @@ const LINES: &[(&str, Section, &str)] = &[
     (
         "conditions",
         None,
-        "Scheme file whose conditions hold; its number of positions where no other is asked for",
+        "Scheme file whose conditions hold; model file whose outputs are chosen (--measure)",
     ),
     ("candidates", None, "Attitudes: cardinal, free, grid:45 or a scheme file"),
     ("carry", ASSUMED, "What goes on between positions: platform, inertial or reset"),
@@ -113,6 +113,9 @@ const LINES: &[(&str, Section, &str)] = &[
     ("part", PARTS, "Search part I of N of all sequences, and write it to the file of -o"),
     ("merge", PARTS, "Put parts together to the answer of the whole; they know their options"),
     ("check", PARTS, "With --merge: search N blocks of the parts again, chosen at random"),
+    ("measure", MODELS, "Candidates for outputs of a model: states, or \"x1, x1 + x3\""),
+    ("own_outputs", MODELS, "The outputs of the model stay, and candidates are added"),
+    ("cost", MODELS, "Cost of a candidate: x1=2.5 (default: 1)"),
     ("order", MODELS, "Highest order of derivatives where a model has no proven end"),
     ("count_limit", MODELS, "Work of counting the solutions of a model (default: 3)"),
     ("work_limit", MODELS, "Work of a verdict: millions of operations (default: 600)"),

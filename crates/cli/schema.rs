@@ -8,6 +8,7 @@ use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
 use obsdeg_design::design::{Design, OptimumCertificate, Part, Walks};
+use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
@@ -48,6 +49,8 @@ enum Kind {
     Part,
     /// The JSON of `obsdeg design --minimum` where torquer errors make schemes walks
     Walks,
+    /// The JSON of `obsdeg design` of a model
+    Sensors,
     /// Scheme files
     Scheme,
     /// The JSON of `obsdeg analyze` of a model
@@ -85,6 +88,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Kind::Design => written::<Design>(),
         Kind::Part => written::<Part>(),
         Kind::Walks => written::<Walks>(),
+        Kind::Sensors => written::<Sensors>(),
         Kind::Scheme => schema_for!(SchemeFile),
         Kind::System => written::<SystemAnalysis>(),
         Kind::SystemRun => written::<SystemRun>(),

@@ -25,6 +25,7 @@ from ._results import (
     Part,
     Progress,
     Report,
+    Sensors,
     Simulation,
     SystemAnalysis,
     SystemCalibration,
@@ -431,6 +432,60 @@ def design(
         options["positions"] = positions
     kinds = (Part,) if part is not None else (Design, Walks) if positions is None else (Design,)
     return ask(kinds, "design", request(options, digits, log, **files), log, progress)
+
+
+@named(options.Measure)
+def measure(
+    model: Model | File,
+    candidates: str | Iterable[str] | None = None,
+    *,
+    own_outputs: bool = False,
+    progress: Progress | bool | None = None,
+    **options: Unpack[options.Measure],
+) -> Sensors:
+    """Which quantities to measure so that the unknowns of a model are observable: minimal sets, with proof.
+
+    Parameters
+    ----------
+    model : Model or path
+        The model.
+    candidates : str or iterable of str
+        What sets are chosen from: ``"states"``, ``"outputs"``, ``"inputs"``, ``"parameters"``, ``"candidates"`` (those of the file), names and
+        expressions such as ``"x1 + x3"`` [default: candidates if the file has any, else states].
+    own_outputs : bool
+        The outputs of the model stay, and candidates are added; by default candidates replace them.
+    progress : callable or bool
+        Called ten times a second; True for a bar of tqdm. Where it returns False the search ends.
+    **options
+        In :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``, ``order``, ``work_limit``, ``seed``.
+
+    Returns
+    -------
+    Sensors
+        ``front`` from the cheapest set to that of the smallest degree, ``sets``, ``unknowns``, and what proves them.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> chain = obsdeg.Model(states={"a": "-k*a", "b": "k*a - b"}, parameters=["k"], outputs={"y": "b"})
+    >>> found = obsdeg.measure(chain, "states")
+    >>> [(s.outputs, s.degree) for s in found.front]
+    [(['b'], 2), (['a', 'b'], 1)]
+    >>> found["b"].cheapest.outputs
+    ['b']
+    """
+    asked: dict[str, Any] = dict(options)
+    if candidates is not None:
+        asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(candidates)
+    log: list[Rounded] = []
+    given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
+    answer: Sensors = ask((Sensors,), "design", given, log, progress)
+    return answer
 
 
 def _part(part: Part | str, name: str) -> dict[str, str]:

@@ -59,6 +59,7 @@ READ: dict[str, Callable[[Any], Any]] = {
     "value": assignments,
     "prior": assignments,
     "estimate": assignments,
+    "cost": assignments,
     "max_degree": _max_degree,
     "immune": _immune,
     "terms": lambda value: ",".join(_texts(value)),

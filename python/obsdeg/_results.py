@@ -510,6 +510,15 @@ def _winner(of: Answer) -> Scheme:
     return Scheme.from_text(files["winner.toml"].decode("utf-8"), name="winner.toml")
 
 
+class Sensors(Named[shapes.SensorUnknown], Answer, shapes.Sensors):
+    """Sets of outputs of a model that make its unknowns observable, with proof.
+
+    ``found["k1"]`` is the cheapest set of an unknown, ``found.front`` the sets from the cheapest to that of the smallest degree.
+    """
+
+    _main = "front"
+
+
 class Part(Answer, shapes.Part):
     """A part of a search, to be put together with the others by ``design(merge=...)``."""
 
@@ -591,6 +600,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.comparison/2": Comparison,
     "obsdeg.design/2": Design,
     "obsdeg.walks/1": Walks,
+    "obsdeg.sensors/1": Sensors,
     "obsdeg.part/2": Part,
     "obsdeg.simulation/2": Simulation,
     "obsdeg.system-run/1": SystemRun,

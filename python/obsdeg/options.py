@@ -255,6 +255,23 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     gamma the inner one, about Z_p. Schemes have angles within the limits."""
 
 
+class Measure(Seeded, total=False):
+    """The options of :func:`obsdeg.measure` beside those that it names itself."""
+
+    observable: Names
+    """Unknowns that must be observable [default: all]."""
+    max_degree: int | ByName
+    """Largest degree, of all required unknowns or by name: ``4``, ``{"k1": 4}``."""
+    cost: ByName
+    """Costs of candidates by their names, above 0 [default: those of the file, or 1]: ``{"x1": 2.5}``."""
+    keep: int
+    """How many minimal sets are listed [default: 10]."""
+    order: int
+    """The highest order of derivatives to look at in a model that has no proven end."""
+    work_limit: int
+    """Limit of the work of a verdict, in millions of operations [default: 600]; the search may take fifty times as much."""
+
+
 class Report(Seeded, Assumed, Filtered, total=False):
     """The options of :func:`obsdeg.report`."""
 

@@ -1820,6 +1820,152 @@ class Walks(Shape):
     """Seed of all random choices."""
 
 
+class SensorCandidate(Record):
+    """Quantity that can be measured."""
+
+    __slots__ = ()
+
+    name: str
+    """Name: that of a state, input or parameter, the key in the file, or the expression itself."""
+    expression: str
+    """Expression of the candidate, as written."""
+    unit: str
+    """Unit, as in the model file."""
+    description: str
+    """Description, as in the model file."""
+    cost: float
+    """Cost of measuring it, dimensionless."""
+    degree: int | None
+    """Worst degree of the required unknowns if it alone is measured; null if one of them is not observable."""
+    observable: int
+    """Number of required unknowns that are observable if it alone is measured."""
+    degrees: list[int | None]
+    """Degrees of the unknowns if it alone is measured, in the order of `quantities`; null of one that is not observable."""
+
+
+class Unattainable(Record):
+    """Unknown that no set makes observable as asked for."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown, as in the model."""
+    degree: int | None
+    """Observable degree if all candidates are measured; null if it is not observable."""
+
+
+class FrontSet(Record):
+    """Set of outputs on the front, with the proof that no cheaper one does."""
+
+    __slots__ = ()
+
+    outputs: list[str]
+    """Candidates that are measured."""
+    cost: float
+    """Sum of the costs of these candidates, dimensionless."""
+    degree: int
+    """Worst degree: the largest one of the required unknowns."""
+    below: int | None
+    """Observable degree up to which no cheaper set makes all required unknowns observable; null if no cheaper set does so with any
+    degree.
+    """
+    one_of_each: list[list[str]]
+    """Proof: every set with degrees of at most `below` holds a candidate of each of these groups, since all candidates outside a group
+    fail together; the cheapest choice has the cost of this set if `examined` is 0.
+    """
+    examined: int
+    """Number of sets that hold a candidate of each group, cost less than this set, and were judged one by one: all of them fail."""
+
+
+class SensorSet(Record):
+    """Set of outputs that are measured together."""
+
+    __slots__ = ()
+
+    outputs: list[str]
+    """Candidates that are measured."""
+    cost: float
+    """Sum of the costs of these candidates, dimensionless."""
+    degree: int
+    """Worst degree: the largest one of the required unknowns."""
+
+
+class SensorUnknown(Record):
+    """Cheapest set for one unknown."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown, as in the model."""
+    unit: str
+    """Unit of the unknown, as in the model file."""
+    required: bool
+    """True if it is one of the required unknowns."""
+    cheapest: SensorSet | None
+    """Cheapest set that makes the unknown observable, of the smallest degree at this cost; null if all candidates together do not, or if
+    the search ended before.
+    """
+    least_degree: int | None
+    """Observable degree of the unknown if all candidates are measured; null if it is not observable."""
+
+
+class Sensors(Shape):
+    """Sets of outputs of a model that make its unknowns observable."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.sensors/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    name: str
+    """Name of the system, as in its file."""
+    own_outputs: list[str]
+    """Outputs of the model that are measured in every set; empty if sets replace the outputs."""
+    candidates: list[SensorCandidate]
+    """Quantities that sets are chosen from."""
+    required: list[str]
+    """Unknowns that every set in `front` and `sets` makes observable: those asked for, or all, without those in `unattainable`."""
+    max_degree: list[str]
+    """Largest degrees that were asked for, as written: `6`, `k1=4`."""
+    unattainable: list[Unattainable]
+    """Unknowns asked for that all candidates together leave unobservable, or observable with a larger degree than asked for."""
+    least_degree: int | None
+    """Worst degree of the required unknowns if all candidates are measured; null if none is required."""
+    front: list[FrontSet]
+    """Front of cost against the largest degree: per cost the set with the smallest, if it is smaller than for every lower cost. Cheapest
+    first.
+    """
+    sets: list[SensorSet]
+    """Minimal sets: without any of its outputs a set fails. Cheapest first, then by degree; at most as many as asked for."""
+    minimal_sets: int | None
+    """Number of minimal sets; null if not all were found."""
+    minimal_sets_found: int
+    """Number of minimal sets that were found, whether or not they are listed."""
+    complete_to: int | None
+    """All minimal sets with up to so many outputs were found; null if all were, whatever their number of outputs."""
+    quantities: list[SensorUnknown]
+    """Per unknown the cheapest set that makes it observable."""
+    judged_sets: int
+    """Number of sets whose degrees were computed, at two points each."""
+    confirmed_sets: int
+    """Number of sets, out of those in this answer and those that its proofs rest on, that `analyze` judged again as a model with these
+    outputs: the degrees are the same.
+    """
+    closed: bool
+    """True if all derivatives that can add to a rank were examined; if false, unobservable verdicts hold up to order `last_order` only."""
+    last_order: int
+    """Order of derivatives at which the search ends at the latest."""
+    stopped: str | None
+    """Reason why the search ended early; null if it did not. What is listed is true, but there may be more, and cheaper sets for lower
+    degrees.
+    """
+    error_bound: float | None
+    """Bound on the probability that the degrees of a judged set are wrong; null for a model judged in real numbers."""
+    digits: DigitsReport | None
+    """Margin of the rank decisions on all candidates together, in real numbers; null for a model judged in prime fields."""
+    seed: int
+    """Seed of all random choices."""
+
+
 class Worth(Record):
     """Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion."""
 

@@ -66,6 +66,8 @@ def answers() -> Iterator[obsdeg.Answer]:
     yield obsdeg.design(5, carry="inertial", criterion="margin", meet=True, requirement={"D": 10, "psi": 10}, dwell=2000, step=100)
     yield obsdeg.design(minimum=True)
     yield obsdeg.design(minimum=True, terms="gyros", carry="inertial")
+    yield obsdeg.measure("examples/sir/model.toml", "states, beta", own_outputs=True, observable="k", max_degree=3)
+    yield obsdeg.measure("examples/lotka-volterra/model.toml")
     yield obsdeg.design(5, carry="inertial", part=(1, 400))
     parts = [obsdeg.design(4, observable="D_F", carry="inertial", part=(i, 2)) for i in (1, 2)]
     yield obsdeg.design(4, observable="D_F", carry="inertial", merge=parts)
@@ -167,6 +169,9 @@ def test_options_are_those_of_the_commands(command: str) -> None:
     mine = set(getattr(options, command.title()).__annotations__)
     files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume"}
     named = {"positions", "candidates", "part"} if command == "design" else set()
+    if command == "design":
+        # those of `measure`, which asks the same command about a model
+        named |= {"measure", "own_outputs", *options.Measure.__annotations__}
     assert mine | named == said(command) - files
 
 

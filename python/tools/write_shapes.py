@@ -21,6 +21,7 @@ SCHEMAS = [
     "comparison",
     "design",
     "walks",
+    "sensors",
     "part",
     "simulation",
     "system-run",

@@ -142,6 +142,10 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
             "none.toml",
             "x",
         ],
+        "measure" => {
+            &["states", "x", "x, k", "x + k", "outputs", "parameters", "inputs", "candidates", "x +", "q", ""]
+        }
+        "cost" => &["x=2", "k=0.5", "x=0", "q=1", "x=nan", "x"],
         "keep" => &["1", "3", "0", "-1", "18446744073709551615"],
         "restarts" => &["2", "1", "0", "-1"],
         "round" => &["5", "0", "x"],
@@ -172,12 +176,17 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "certificate" | "reduced" => &["new.json", "s.toml", ".", ""],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "sensitivities" | "minimum" | "refine" | "divide" | "meet"
-        | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "dry-run" | "ascii" | "texts" => {
+        | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "own-outputs" | "dry-run"
+        | "ascii" | "texts" => {
             return None;
         }
         _ => number,
     })
 }
+
+/// Options of a design that concern models.
+const OF_MODELS: [&str; 9] =
+    ["cost", "own-outputs", "order", "work-limit", "keep", "observable", "max-degree", "seed", "format"];
 
 /// What stands without an option.
 fn operands(command: &str) -> &'static [&'static str] {
@@ -187,7 +196,7 @@ fn operands(command: &str) -> &'static [&'static str] {
         "calibrate" => &["s.toml"],
         "allan" => &["n.csv", "n.csv", "r.csv", "none.csv"],
         "verify" => &["v.json", "s.toml", "none.json"],
-        "schema" => &["analysis", "scheme", "model", "comparison", "design", "nothing"],
+        "schema" => &["analysis", "scheme", "model", "comparison", "design", "sensors", "nothing"],
         "completions" => &["bash", "zsh", "nothing"],
         "licences" => &["uPlot", "nalgebra", "nothing"],
         _ => &[],
@@ -367,13 +376,19 @@ fn pick(rng: &mut SplitMix64, from: &[&str]) -> String {
 /// A command line: what the command cannot do without, then some of its options.
 fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -> Vec<String> {
     let mut out = vec![command.to_string()];
+    // of designs some are about the outputs of a model
+    let of_model = command == "design" && rng.below(4) == 0;
     let always: &[&str] = match command {
+        "design" if of_model => &["measure"],
         "design" => &["positions", "restarts", "step"],
         "report" => &["output", "runs"],
         _ => &[],
     };
     // parts need files of their own
-    let left_out = |name: &&str| ["help", "part", "merge"].contains(name) || always.contains(name);
+    let left_out = |name: &&str| {
+        let schemes = of_model && !OF_MODELS.contains(name);
+        ["help", "part", "merge"].contains(name) || always.contains(name) || schemes
+    };
     let some = options.keys().map(String::as_str).filter(|name| !left_out(name));
     // of many options as many at once as of few
     let one_of = (options.len() as u64 / 3).max(10);
@@ -387,6 +402,9 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     let several = if ["compare", "report"].contains(&command) { 2 } else { 1 };
     let operands = operands(command);
     out.extend((0..several.min(operands.len())).map(|_| pick(rng, operands)));
+    if of_model {
+        out.push(pick(rng, &["m.toml", "m.toml", "s.toml"]));
+    }
     if command == "calibrate" {
         out.push(pick(rng, &["r.csv", "-", "none.csv"]));
     }

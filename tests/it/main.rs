@@ -46,6 +46,7 @@ mod schemas;
 mod scheme_schema;
 mod schemes;
 mod second_path;
+mod sensors;
 mod sentences;
 mod simulation;
 mod small_models;

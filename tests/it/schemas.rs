@@ -8,7 +8,7 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// The kinds of `obsdeg schema`.
-const KINDS: [&str; 19] = [
+const KINDS: [&str; 20] = [
     "allan",
     "analysis",
     "audit",
@@ -22,6 +22,7 @@ const KINDS: [&str; 19] = [
     "optimum-certificate",
     "part",
     "scheme",
+    "sensors",
     "simulation",
     "system",
     "system-calibration",
@@ -132,6 +133,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["design", "--positions", "4", "--observable", "D_F", "--carry", "inertial"],
         &["design", "--positions", "6", "--carry", "reset"],
         &["design", "--minimum"],
+        &["design", "examples/lotka-volterra/model.toml", "--measure", "states, parameters"],
         &["design", "--minimum", "--terms", "gyros", "--carry", "inertial"],
     ] {
         answer(&json(&[line, &["--format", "json"]].concat()), &line.join(" "));

@@ -148,7 +148,7 @@ pub struct InputOptions {
 }
 
 /// Limits of the work of a verdict, in millions of operations.
-const WORK: RangeInclusive<u64> = 1..=1_000_000_000;
+pub(crate) const WORK: RangeInclusive<u64> = 1..=1_000_000_000;
 
 /// The words of `--path`.
 const PATHS: [Word<Path>; 2] = [

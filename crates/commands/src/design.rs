@@ -14,6 +14,7 @@ use obsdeg_design::design::{
     WalkOptions, Walks, asked as asked_conditions, certify_optimum, check_certifiable, design_merged,
     design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
+use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,7 @@ use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
+use crate::measure::{MeasureOptions, Wanted, measured};
 use crate::problem::Problem;
 use crate::source::Source;
 use crate::text;
@@ -95,7 +97,7 @@ pub struct Search {
     #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
     pub max_turn: Option<f64>,
 
-    /// How many schemes are listed (default: 10)
+    /// How many schemes, or sets of outputs, are listed (default: 10)
     #[arg(long, value_name = "N", value_parser = whole::<u16>(KEPT))]
     pub keep: Option<u16>,
 
@@ -150,6 +152,11 @@ pub struct Search {
     #[command(flatten)]
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
+
+    /// Of a model: what its outputs are chosen from.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub outputs: MeasureOptions,
 }
 
 /// What a scheme must be.
@@ -157,12 +164,12 @@ pub struct Search {
 #[command(next_help_heading = "What is wanted")]
 #[serde(default)]
 pub struct WantedOptions {
-    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX
-    /// (default: all)
+    /// Coefficients or families that must be observable and that the criterion is about, such as D_F,D_IX; of
+    /// a model its unknowns (default: all)
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub observable: Vec<String>,
 
-    /// Largest degree, of all required coefficients or of one or a family: 1, D_F=1
+    /// Largest degree, of all required coefficients, or of one, a family or an unknown of a model: 1, D_F=1
     #[arg(long, value_name = "[NAME=]K")]
     #[serde(with = "text::list")]
     pub max_degree: Vec<DegreeCap>,
@@ -227,6 +234,7 @@ impl Default for Search {
             certificate: false,
             wanted: WantedOptions::default(),
             measurement: MeasurementOptions::default(),
+            outputs: MeasureOptions::default(),
         }
     }
 }
@@ -298,6 +306,8 @@ pub enum Designed {
     Walks(Box<Walked>),
     /// A part of a search.
     Part(Box<Part>),
+    /// Sets of outputs of a model.
+    Outputs(Box<Sensors>),
 }
 
 /// Schemes, with what they were searched under.
@@ -365,6 +375,9 @@ impl Answer for Walked {
 /// # Errors
 /// Options that are wrong or do nothing; a search in which nothing was found.
 pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Designed, Problem> {
+    if let Some(found) = of_model(a, files, host)? {
+        return Ok(Designed::Outputs(Box::new(found)));
+    }
     let asked = known(a, files)?;
     let files = &SearchFiles { merge: files.merge.clone(), ..asked.files(files) };
     let a = &asked.options;
@@ -475,6 +488,38 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         a.certificate.then(|| proof(&base, &conditions, &options, &found, &progress)).transpose()?;
     let conditions = asked_conditions(&base, &conditions, &options.required)?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
+}
+
+/// Options that concern models.
+const OF_MODELS: [&str; 9] =
+    ["seed", "keep", "observable", "max_degree", "measure", "own_outputs", "cost", "order", "work_limit"];
+
+/// Sets of outputs, if a model is given or candidates for its outputs are; `None` for schemes.
+fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<Sensors>, Problem> {
+    let file = files.conditions_file.as_ref();
+    let model = file.filter(|file| file.is_model());
+    let outputs = &a.outputs;
+    if *outputs == MeasureOptions::default() && model.is_none() {
+        return Ok(None);
+    }
+    let Some(file) = file else {
+        return Err(Problem::input("nothing to choose outputs of; expected a model file"));
+    };
+    let given = stated(a)?;
+    if let Some(other) = given.keys().find(|name| !OF_MODELS.contains(&name.as_str())) {
+        let option = other.replace('_', "-");
+        return Err(Problem::input(format!(
+            "--{option} is about schemes; outputs of a model are chosen by --measure"
+        )));
+    }
+    a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
+    let wanted = Wanted {
+        required: &a.wanted.observable,
+        max_degree: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
+        keep: a.keep.unwrap_or(10).into(),
+        seed: a.seed,
+    };
+    measured(outputs, &wanted, file, host).map(Some)
 }
 
 /// The certificate of a proven optimum, as a file.

@@ -25,6 +25,11 @@ impl Now {
     pub(crate) fn of(what: impl Into<String>, done: u64, total: u64) -> Self {
         Self { what: what.into(), done, total: Some(total), examined: None, best: None }
     }
+
+    /// Some of an amount that nobody knows.
+    pub(crate) fn open(what: impl Into<String>, done: u64) -> Self {
+        Self { what: what.into(), done, total: None, examined: None, best: None }
+    }
 }
 
 impl From<Progress> for Now {
@@ -40,7 +45,7 @@ impl From<Going<'_>> for Now {
             Going::Reads { record, samples } => (format!("reading {record}"), samples),
             Going::Passes(passes) => ("calibrating, linearisations".into(), passes),
         };
-        Self { what, done: done as u64, total: None, examined: None, best: None }
+        Self::open(what, done as u64)
     }
 }
 

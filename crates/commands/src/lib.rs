@@ -24,6 +24,7 @@ mod conditions;
 mod crosscheck;
 mod design;
 mod host;
+mod measure;
 mod paper;
 mod problem;
 mod report;
@@ -43,6 +44,7 @@ pub use design::{
     DegreeCap, Designed, Search, SearchFiles, Searched, Walked, WantedOptions, design, is_word,
 };
 pub use host::{Host, Now};
+pub use measure::MeasureOptions;
 pub use paper::{Paper, paper};
 pub use problem::{Kind, Place, Problem};
 pub use report::{CalibrationFile, Report, Reviewed, origin, report};

@@ -147,7 +147,7 @@ impl Source {
     }
 
     /// True if it is meant as a model, which may be JSON.
-    fn is_model(&self) -> bool {
+    pub(crate) fn is_model(&self) -> bool {
         self.is_json() || model_file::is_model(&self.text)
     }
 

@@ -3,11 +3,14 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Carry, Scheme};
+use obsdeg_core::system::{OutputRows, gather, json};
 use obsdeg_design::design::{
     Best, Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator, Rows, Search,
     design,
 };
+use obsdeg_design::sensors::{Ordered, Ranks, Set};
 use obsdeg_evidence::simulation::Conditions;
+use rayon::prelude::*;
 
 fn main() {
     divan::main();
@@ -176,4 +179,24 @@ fn the_command_for_five_of_24_with_a_bench() -> Design {
     let bench = ["K0=20", "latitude=10"].map(|text| text.parse().expect("a size")).to_vec();
     let conditions = Conditions { bench, ..Conditions::default() };
     design(&base(Carry::Inertial), &conditions, &options, &|_| true).expect("designed")
+}
+
+/// Degrees of the 34 unknowns of the MAPK cascade under all 4,096 sets of its states, on all cores; items are
+/// sets.
+#[divan::bench]
+fn sets_of_states(bencher: Bencher<'_, '_>) {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/models/mapk_6out.json");
+    let model = json::read(&std::fs::read_to_string(file).expect("a file")).expect("a model");
+    let states = model.candidates_of("states").expect("states");
+    let (whole, _) = model.measuring(&states, false);
+    let gathered = gather(&whole, 1, None, 0).expect("rows");
+    let OutputRows::Primes(points) = &gathered.rows else { return };
+    let columns: Vec<usize> = (0..points[0].columns).collect();
+    let owners: Vec<Set> = (0..states.len()).map(|c| 1 << c).collect();
+    let ranks = Ordered::new(&points[0], &owners, &columns);
+    let sets: Vec<Set> = (0..1 << states.len()).collect();
+    bencher.counter(ItemsCount::new(sets.len())).bench(|| {
+        let degrees = |set: &Set| ranks.degrees(*set).iter().map(|d| usize::from(*d)).max();
+        black_box(sets.par_iter().map(degrees).max())
+    });
 }

@@ -12,7 +12,9 @@
 //! ```
 //!
 //! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information
-//! of their samples. [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
+//! of their samples. [`sensors`] chooses outputs of a model. [`review`] gathers verdicts, a run,
+//! evidence, sweeps and alternatives for a report.
 
 pub mod design;
 pub mod review;
+pub mod sensors;

@@ -39,6 +39,7 @@ mod resolve;
 mod review;
 mod rows;
 mod sensor_noise;
+mod sensors;
 mod series;
 mod simulation;
 mod stated;

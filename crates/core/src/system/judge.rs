@@ -244,7 +244,11 @@ fn climbed<S: Values>(
 }
 
 /// Where the model has no value, in words.
-fn singular<S: Values>(model: &SystemModel, compiled: &Compiled, singular: Singular) -> ModelError {
+pub(super) fn singular<S: Values>(
+    model: &SystemModel,
+    compiled: &Compiled,
+    singular: Singular,
+) -> ModelError {
     let points = S::ATTEMPTS;
     let name = |function| {
         let named = Function::ALL.iter().find(|(_, f)| *f == function);
@@ -391,27 +395,15 @@ fn judge_in_fields(
     spent: &mut Spent,
 ) -> Result<Judgement, ModelError> {
     let before = spent.operations;
-    // long series are multiplied by transforms, which need roots of unity
     let orders = layout.unknowns.len() / model.outputs.len().max(1);
-    let order = if orders < LONG { 1 } else { (4 * orders as u64).next_power_of_two() };
+    let points = Points { model, compiled, layout, orders };
+    let order = points.root_order();
     let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
         let mut judged = |i: usize| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
-            let draw = |rng: &mut SplitMix64| match order {
-                1 => random_field(rng),
-                // it has divisors enough
-                _ => RootField::random(order, rng).map_or_else(|_| random_field(rng), |k| k.field),
-            };
-            let mut field = draw(&mut rng);
-            // constraints that leave points alone have one modulo some primes
             let mut own = model.random(seed, &format!("points of constraints, attempt {attempt}, field {i}"));
-            for _ in 1..PRIMES {
-                if can_hold(model, compiled, layout, field, &mut own, spent) {
-                    break;
-                }
-                field = draw(&mut rng);
-            }
+            let field = points.field(&mut rng, &mut own, spent);
             climb_at(model, compiled, layout, field, &mut rng, spent).map(|at| (field, at))
         };
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
@@ -457,6 +449,42 @@ fn holds_at_real_point(
             asked && at.degrees == judged.findings.degrees
         }
         _ => true,
+    }
+}
+
+/// Prime fields in which points of a model are drawn.
+pub(super) struct Points<'a> {
+    pub(super) model: &'a SystemModel,
+    pub(super) compiled: &'a Compiled,
+    pub(super) layout: &'a Layout,
+    /// Number of orders of derivatives that may be needed, about.
+    pub(super) orders: usize,
+}
+
+impl Points<'_> {
+    /// Order of the roots of unity of a field: long series are multiplied by transforms, which need them.
+    pub(super) fn root_order(&self) -> u64 {
+        if self.orders < LONG { 1 } else { (4 * self.orders as u64).next_power_of_two() }
+    }
+
+    /// A random field in which the constraints hold at a point, as far as one is found; `own` draws these
+    /// points.
+    pub(super) fn field(&self, rng: &mut SplitMix64, own: &mut SplitMix64, spent: &mut Spent) -> Field {
+        let order = self.root_order();
+        let draw = |rng: &mut SplitMix64| match order {
+            1 => random_field(rng),
+            // it has divisors enough
+            _ => RootField::random(order, rng).map_or_else(|_| random_field(rng), |k| k.field),
+        };
+        let mut field = draw(rng);
+        // constraints that leave points alone have one modulo some primes
+        for _ in 1..PRIMES {
+            if can_hold(self.model, self.compiled, self.layout, field, own, spent) {
+                break;
+            }
+            field = draw(rng);
+        }
+        field
     }
 }
 
@@ -523,7 +551,7 @@ fn judge_by_digits(
     Err(refuse(format!("undecided, because {reason}{other}")))
 }
 
-fn refuse(message: String) -> ModelError {
+pub(super) fn refuse(message: String) -> ModelError {
     ModelError { what: "the model".into(), message, span: None }
 }
 
@@ -619,6 +647,19 @@ impl Judgement {
 /// grows by at most `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative
 /// and two products make of them.
 fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
+    // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here
+    // and at a generic point; that no unit vector comes an order early (if the ranks are right none comes
+    // late), and no column or entry of the last basis is zero by chance
+    let decisions = ATTEMPTS
+        * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
+            + 2 * layout.unknowns.len()
+            + 2 * compiled.combinations.len()
+            + degrees.rank() * (layout.unknowns.len() - degrees.rank()));
+    Claim { decisions, ..claim_of(compiled, layout, degrees.rank_profile.len()) }
+}
+
+/// The same of one decision on rows of so many orders.
+pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
     let used: Vec<Fraction> = experiments
@@ -638,7 +679,7 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
     let above = |part: fn(&Fraction) -> f64| used.iter().map(part).fold(0.0, f64::max);
     let (top, top_bits) = (above(|f| f.above.0) + below, above(|f| f.above.1) + below_bits);
     let delta = top.max(below) + below;
-    let (orders, n) = (degrees.rank_profile.len() as f64, layout.unknowns.len() as f64);
+    let (orders, n) = (orders as f64, layout.unknowns.len() as f64);
     // jets of inputs and states are variables too
     let functions = compiled.dag.ops.iter().filter(|op| matches!(op, Op::Primitive { .. })).count();
     let variables = (compiled.roles.len() as f64) * (orders + 1.0) + functions as f64;
@@ -648,14 +689,7 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
     let bits = top_bits + (orders + 1.0) * step + n.max(1.0).log2();
     Claim {
         unknowns: layout.unknowns.len(),
-        // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here
-        // and at a generic point; that no unit vector comes an order early (if the ranks are right none comes
-        // late), and no column or entry of the last basis is zero by chance
-        decisions: ATTEMPTS
-            * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
-                + 2 * layout.unknowns.len()
-                + 2 * compiled.combinations.len()
-                + degrees.rank() * (layout.unknowns.len() - degrees.rank())),
+        decisions: 1,
         order: 1,
         row_degree: degree.min(1e18) as usize,
         row_bits: bits,

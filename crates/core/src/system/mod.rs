@@ -8,6 +8,7 @@ mod addition;
 mod adjoint;
 mod answer;
 mod branches;
+mod candidates;
 mod canonical;
 pub(crate) mod constraints;
 mod counts;
@@ -19,6 +20,7 @@ mod factors;
 mod fibre;
 mod formula;
 mod functions;
+mod gathered;
 mod global;
 mod held;
 mod identifiable;
@@ -49,15 +51,17 @@ pub(crate) mod work;
 
 pub use answer::*;
 pub use branches::BranchSide;
+pub use candidates::{CANDIDATE_WORDS, check_cost};
 pub use constraints::ConstraintFactor;
 pub use dag::{Dag, DagError, Op};
 pub use error::ModelError;
+pub use gathered::{Gathered, OutputRows, gather};
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
-    Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, Named, Nominal, Place,
-    PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
+    Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, Named,
+    Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
-pub use rows::{Layout, Unknown};
+pub use rows::{Layout, OwnRows, PointRows, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
 pub use work::WorkLimit;

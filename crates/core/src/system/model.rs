@@ -84,6 +84,17 @@ pub enum Constant {
     Value(PlacedExpression),
 }
 
+/// Quantity that could be measured.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Candidate {
+    /// Name, unit and description: of an expression its text.
+    pub named: Named,
+    /// Expressions of its entries: one, or those of a vector.
+    pub parts: Vec<PlacedExpression>,
+    /// Cost of measuring it, above 0, dimensionless.
+    pub cost: f64,
+}
+
 /// A part of the timeline with constants of its own and a map of the states at its beginning.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Segment {
@@ -184,6 +195,8 @@ pub struct SystemModel {
     pub not_negative: Vec<PlacedExpression>,
     /// Combinations to be judged.
     pub combinations: Vec<PlacedExpression>,
+    /// Quantities that could be measured.
+    pub candidates: Vec<Candidate>,
     /// Time at which the first segment begins.
     pub time: StartTime,
     /// Numbers for a simulation.

@@ -89,6 +89,11 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     combinations: Vec<Spanned<String>>,
+    /// Quantities that could be measured, for `obsdeg design`: an expression, or a table with expression,
+    /// cost (1 when left out), unit, description. They are no outputs.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    candidates: BTreeMap<String, Spanned<Value>>,
     /// Numbers for `obsdeg simulate --model`, in the units of the model.
     #[serde(default)]
     simulation: SimulationEntry,
@@ -127,7 +132,7 @@ pub struct SegmentEntry {
 
 impl Reader<'_> {
     /// A table's entry, and a check that there is nothing else in it.
-    fn known_keys(
+    pub(super) fn known_keys(
         &self,
         what: &str,
         table: &toml::Table,
@@ -142,7 +147,8 @@ impl Reader<'_> {
         Err(self.at(start..start + wrong.len(), what.into(), message))
     }
 
-    fn named(&self, name: &str, table: Option<&toml::Table>) -> Named {
+    /// A name with what a table says of it.
+    pub(super) fn named(&self, name: &str, table: Option<&toml::Table>) -> Named {
         let text = |key: &str| {
             table.and_then(|t| t.get(key)).and_then(Value::as_str).unwrap_or_default().to_string()
         };
@@ -481,6 +487,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let entries = found.parts.into_iter().zip(texts);
         model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
     }
+    model.candidates = r.file_candidates(&in_order(&file.candidates))?;
     nominal(&r, &outputs, &file.simulation, &mut model)?;
     if let Some(record) = &file.record {
         let inputs: Vec<&str> = model.known_inputs.iter().map(|i| i.0.name.as_str()).collect();
@@ -493,6 +500,9 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let placed =
         |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
     model.check().map_err(placed)?;
+    if !model.candidates.is_empty() {
+        model.measuring(&model.candidates, true).0.compile().map_err(placed)?;
+    }
     // it stands in no equation: what is wrong with these is said first
     if file.name.is_none() {
         model.compile().map_err(placed)?;

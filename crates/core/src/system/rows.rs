@@ -11,6 +11,10 @@ use super::values::Values;
 use super::work::{Cost, Step, Sweeps, Work, product};
 use crate::degree::rows::DerivativeRows;
 
+mod by_output;
+
+pub use by_output::{OwnRows, PointRows};
+
 /// Orders that are followed where no end is proven, at least.
 const ORDERS: usize = 60;
 /// Rows are computed backwards where there are so many lanes for each output: with fewer there are few
@@ -122,17 +126,31 @@ pub(crate) struct SystemRows<'a, S: Values> {
 }
 
 /// Why a run needs to be followed no further.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 enum End {
     /// The point is generic: an order that adds nothing is the last.
     Stagnation,
-    /// No rank beyond this one is possible: it is that at a generic point.
-    Rank(usize),
+    /// No rank beyond this one is possible: it is that at a generic point, of all outputs together, or of
+    /// each alone.
+    Rank(Vec<usize>),
     /// Nothing moves: the rows are `C A^k`, and by Cayley and Hamilton those of this order are the last that
     /// can add anything.
     Order(usize),
     /// Nothing is known.
     Open,
+}
+
+impl End {
+    /// True if a run needs to be followed no further: its rows, or those of one of its outputs, had this rank
+    /// after an order that `grew`.
+    fn is_reached(&self, output: usize, order: usize, grew: bool, rank: usize) -> bool {
+        match self {
+            Self::Stagnation => !grew,
+            Self::Rank(ranks) => ranks.get(output).is_some_and(|most| rank >= *most),
+            Self::Order(last) => order >= *last,
+            Self::Open => false,
+        }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -163,6 +181,15 @@ pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
 
 /// Points that are drawn until one is on the side that is asked for.
 const SIDES: usize = 200;
+
+/// Runs of a system at a point, beyond one for each segment and experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Followed {
+    /// Number of runs from the same start with other values of the generic inputs.
+    others: usize,
+    /// True if every output is followed to the end of its own rows.
+    apart: bool,
+}
 
 /// Rows over the unknowns.
 pub(super) type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
@@ -372,18 +399,21 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
     }
 
-    /// The rank that the rows of a run cannot exceed: the one at a generic point, where every state is an
-    /// unknown, the time is anything, and the first order that adds nothing is the last; seen through the
-    /// derivatives of the run's states by the unknowns. A minor that is not zero at the run's own point is
-    /// not zero there either.
-    fn generic_rank(
+    /// The ranks that the rows of a run cannot exceed, of all outputs together or of each `apart`: those at a
+    /// generic point, where every state is an unknown, the time is anything, and the first order that adds
+    /// nothing is the last; seen through the derivatives of the run's states by the unknowns. A minor that is
+    /// not zero at the run's own point is not zero there either.
+    fn generic_ranks(
         &self,
         point: &Point<S>,
         known: &[Vec<S::Element>],
+        apart: bool,
         rng: &mut SplitMix64,
-    ) -> Option<(usize, Gap)> {
+    ) -> Option<(Vec<usize>, Gap)> {
         let f = &self.field;
         let unknowns = self.layout.unknowns.len();
+        let outputs = self.compiled.outputs(point.experiment);
+        let groups = if apart { outputs.len() } else { 1 };
         let states: Vec<usize> =
             (0..self.model.states.len()).filter_map(|i| self.slot_of(Role::State(i))).collect();
         let lanes = unknowns + states.len();
@@ -412,23 +442,23 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                 Err(_) => continue,
             };
             let mut adjoint = self.adjoint(&generic, lanes);
-            let mut whole = S::Space::new(f.clone(), lanes);
-            let mut seen = S::Space::new(f.clone(), unknowns);
+            let mut whole = vec![S::Space::new(f.clone(), lanes); groups];
+            let mut seen = vec![S::Space::new(f.clone(), unknowns); groups];
             for row in known {
-                seen.insert(row);
+                seen.iter_mut().for_each(|space| _ = space.insert(row));
             }
+            let refined = |spaces: &[S::Space]| spaces.iter().map(RowSpace::refined).sum::<u64>();
             for order in 0..=lanes {
-                let outputs = self.compiled.outputs(point.experiment).len();
                 let sweeps = adjoint.as_ref().map(|a| a.sweeps(order));
-                if !self.work.spend(order, &cost_of(&taylor, sweeps, outputs)) {
+                if !self.work.spend(order, &cost_of(&taylor, sweeps, outputs.len())) {
                     return None;
                 }
                 let mut grew = false;
-                let before = whole.refined() + seen.refined();
-                for row in
-                    rows_of(&mut taylor, adjoint.as_mut(), self.compiled.outputs(point.experiment), order)
+                let before = refined(&whole) + refined(&seen);
+                for (i, row) in rows_of(&mut taylor, adjoint.as_mut(), outputs, order).into_iter().enumerate()
                 {
-                    grew |= whole.insert(&row);
+                    let group = i.min(groups - 1);
+                    grew |= whole[group].insert(&row);
                     // by the unknowns themselves, and through the states
                     let mut through = row[..unknowns].to_vec();
                     for (x, &slot) in row[unknowns..].iter().zip(&states) {
@@ -436,9 +466,9 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                             through[*lane] = f.add(&through[*lane], &f.mul(x, d));
                         }
                     }
-                    seen.insert(&through);
+                    seen[group].insert(&through);
                 }
-                let again = whole.refined() + seen.refined() - before;
+                let again = refined(&whole) + refined(&seen) - before;
                 self.work
                     .take(Step::Derivatives(order), again.saturating_mul(product::<S::Element>()), 0)
                     .ok()?;
@@ -446,7 +476,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                     break;
                 }
             }
-            return Some((seen.rank(), whole.gap().and(seen.gap())));
+            let gap = whole.iter().chain(&seen).fold(Gap::OPEN, |gap, space| gap.and(space.gap()));
+            return Some((seen.iter().map(RowSpace::rank).collect(), gap));
         }
         None
     }
@@ -513,7 +544,8 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        Self::with_inputs(model, compiled, layout, field, (rng, 0), work)
+        let maker = Maker { model, compiled, layout, field, work };
+        Self::drawn(&maker, work, rng, Followed::default())
     }
 
     /// The rows of a system at a random point, then those of so many runs from the same start with other
@@ -529,11 +561,21 @@ impl<'a, S: Values> SystemRows<'a, S> {
         (rng, others): (&mut SplitMix64, usize),
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let mut last = Singular::Division(0);
         let maker = Maker { model, compiled, layout, field, work };
+        Self::drawn(&maker, work, rng, Followed { others, apart: false })
+    }
+
+    fn drawn(
+        maker: &Maker<'a, '_, S>,
+        work: &'a Work,
+        rng: &mut SplitMix64,
+        followed: Followed,
+    ) -> Result<Self, Singular> {
+        let (compiled, layout) = (maker.compiled, maker.layout);
+        let mut last = Singular::Division(0);
         let (mut attempt, mut tries, mut elsewhere) = (0, 0, None);
         while attempt < S::ATTEMPTS {
-            match Self::at(&maker, work, (rng, others), attempt) {
+            match Self::at(maker, work, (rng, followed), attempt) {
                 Err(singular) if singular != Singular::Refused => {
                     last = singular;
                     attempt += 1;
@@ -557,7 +599,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
     fn at(
         maker: &Maker<'a, '_, S>,
         work: &'a Work,
-        (rng, others): (&mut SplitMix64, usize),
+        (rng, followed): (&mut SplitMix64, Followed),
         attempt: usize,
     ) -> Result<Self, Singular> {
         let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
@@ -614,11 +656,11 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     () if arbitrary => End::Open,
                     () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
                     () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
-                    () => match maker.generic_rank(&point, &known, rng) {
+                    () => match maker.generic_ranks(&point, &known, followed.apart, rng) {
                         None => End::Open,
-                        Some((rank, clear)) => {
+                        Some((ranks, clear)) => {
                             gap = gap.and(clear);
-                            End::Rank(rank)
+                            End::Rank(ranks)
                         }
                     },
                 };
@@ -627,7 +669,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 let adjoint = maker.adjoint(&point, lanes);
                 let known = known.clone();
                 runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
-                for number in 0..others {
+                for number in 0..followed.others {
                     let other = point.with_constant_inputs(|| match number {
                         0 => f.zero(),
                         _ => f.random(rng, attempt),
@@ -753,12 +795,7 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
             if self.work.take(Step::Derivatives(order), again, 0).is_err() {
                 return false;
             }
-            run.done = match run.end {
-                End::Stagnation => !grew,
-                End::Rank(rank) => run.own.rank() >= rank,
-                End::Order(last) => order >= last,
-                End::Open => false,
-            };
+            run.done = run.end.is_reached(0, order, grew, run.own.rank());
         }
         true
     }

@@ -1,0 +1,121 @@
+//! The rows of every output of a model at two points, from which verdicts on any set of outputs are ranks.
+
+use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::{Field, Reals, SplitMix64};
+
+use super::addition::written_apart;
+use super::error::ModelError;
+use super::judge::{Judgement, Points, SystemCertainty, claim_of, judge_compiled, refuse, singular};
+use super::model::{Compiled, SystemModel};
+use super::rows::{Layout, PointRows, SystemRows};
+use super::values::Values;
+use super::work::{Spent, Work};
+
+/// Rows of every output of a model at two points, by the kind of numbers.
+#[derive(Debug, Clone)]
+pub enum OutputRows {
+    /// In two prime fields.
+    Primes(Box<[PointRows<Field>; 2]>),
+    /// In real numbers of 192 and 308 digits.
+    Digits(Box<(PointRows<Reals<10>>, PointRows<Reals<16>>)>),
+}
+
+/// Rows of every output of a model, and the verdicts on all outputs together.
+#[derive(Debug, Clone)]
+pub struct Gathered {
+    /// Verdicts on all outputs together.
+    pub judged: Judgement,
+    /// Rows of the outputs.
+    pub rows: OutputRows,
+    /// Bound on the degree of one decision.
+    claim: Claim,
+    /// Number of decisions of the verdicts on one set of outputs.
+    decisions: usize,
+}
+
+impl Gathered {
+    /// Bound on the probability that a verdict on one of so many sets of outputs is wrong, where it is the
+    /// same in both prime fields; `None` in real numbers.
+    pub fn error_bound(&self, sets: usize) -> Option<f64> {
+        let decisions = self.decisions.saturating_mul(sets);
+        let bound = || error_bound(&Claim { decisions, ..self.claim }, 2);
+        matches!(self.rows, OutputRows::Primes(_)).then(bound)
+    }
+
+    /// True if the end of the rows of every output is proven.
+    pub fn ended(&self) -> bool {
+        match &self.rows {
+            OutputRows::Primes(points) => points.iter().all(|p| p.ended),
+            OutputRows::Digits(points) => points.0.ended && points.1.ended,
+        }
+    }
+}
+
+/// Judges all outputs of a model together, and gathers the rows of each at two points. `attempt` draws other
+/// points, `bound` overrides the highest order.
+///
+/// # Errors
+/// [`ModelError`], of work beyond the limit too.
+pub fn gather(
+    model: &SystemModel,
+    seed: u64,
+    bound: Option<usize>,
+    attempt: usize,
+) -> Result<Gathered, ModelError> {
+    let compiled = model.compile()?;
+    let judged = judge_compiled(model, &compiled, seed, bound)?;
+    let (mut spent, mut root_order) = (Spent::default(), 1);
+    let rows = match judged.certainty {
+        SystemCertainty::Primes(_) => {
+            let apart = if compiled.dag.is_rational() { None } else { written_apart(&compiled) };
+            let compiled = apart.as_ref().unwrap_or(&compiled);
+            let layout = &judged.layout;
+            let points = Points { model, compiled, layout, orders: layout.unknowns.len() };
+            root_order = points.root_order();
+            let mut at = |i: usize| {
+                let name = format!("rows of outputs, attempt {attempt}, field {i}");
+                let mut rng = model.random(seed, &name);
+                let field =
+                    points.field(&mut rng, &mut model.random(seed, &format!("{name}, points")), &mut spent);
+                rows_at(model, compiled, layout, field, &mut rng)
+            };
+            OutputRows::Primes(Box::new([at(0)?, at(1)?]))
+        }
+        SystemCertainty::Digits(_) => {
+            let mut rng = model.random(seed, &format!("rows of outputs, attempt {attempt}"));
+            let layout = &judged.layout;
+            let first = rows_at(model, &compiled, layout, Reals::<10>, &mut rng)?;
+            OutputRows::Digits(Box::new((first, rows_at(model, &compiled, layout, Reals::<16>, &mut rng)?)))
+        }
+    };
+    let last = match &rows {
+        OutputRows::Primes(points) => last_order(&points[0]),
+        OutputRows::Digits(points) => last_order(&points.0),
+    };
+    let runs = compiled.segments.len().max(1) * model.experiments.max(1);
+    let unknowns = judged.layout.unknowns.len();
+    let claim = Claim { order: root_order, ..claim_of(&compiled, &judged.layout, last + 1) };
+    let decisions = (last + 2) * (1 + 2 * runs) + 2 * unknowns;
+    Ok(Gathered { judged, rows, claim, decisions })
+}
+
+/// Highest order of a row.
+fn last_order<S: Values>(rows: &PointRows<S>) -> usize {
+    rows.outputs.iter().filter_map(|own| own.last()).map(|row| row.0).max().unwrap_or(0)
+}
+
+fn rows_at<S: Values>(
+    model: &SystemModel,
+    compiled: &Compiled,
+    layout: &Layout,
+    field: S,
+    rng: &mut SplitMix64,
+) -> Result<PointRows<S>, ModelError> {
+    let work = Work::new(model.work_limit);
+    let rows = SystemRows::apart(model, compiled, layout, field, rng, &work);
+    match rows.map(SystemRows::by_output) {
+        Ok(Some(rows)) => Ok(rows),
+        Err(reason) if work.refused().is_none() => Err(singular::<S>(model, compiled, reason)),
+        _ => Err(work.refused().unwrap_or_else(|| refuse("the limit of work".into()))),
+    }
+}

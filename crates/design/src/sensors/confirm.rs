@@ -1,0 +1,64 @@
+//! Sets judged again by the verdicts of a model that has these outputs.
+
+use std::collections::HashSet;
+
+use obsdeg_core::system::{Candidate, judge};
+
+use super::cuts::members;
+use super::ranks::Set;
+use super::{SensorError, Task, degree, names};
+
+/// Most sets that are judged again.
+const MOST: usize = 48;
+
+/// What was judged again.
+pub(super) struct Confirmed {
+    /// Number of sets.
+    pub(super) sets: usize,
+}
+
+impl Confirmed {
+    /// Judges sets in their order, as far as the limit of the work of one verdict goes; empty ones have no
+    /// model of their own.
+    pub(super) fn of(task: &mut Task<'_>, sets: Vec<Set>) -> Result<Self, SensorError> {
+        let (mut seen, mut left, mut alike) = (HashSet::new(), task.model.work_limit.operations(), 0);
+        for set in sets.into_iter().filter(|set| *set != 0 || task.options.own_outputs) {
+            if seen.len() >= MOST || left == 0 {
+                break;
+            }
+            if !seen.insert(set) {
+                continue;
+            }
+            let Ok(found) = task.search.degrees(set).map(<[u16]>::to_vec) else { break };
+            // what has no verdict of its own is not counted
+            let Some(work) = judged_alike(task, set, &found)? else { continue };
+            left = left.saturating_sub(work);
+            alike += 1;
+        }
+        Ok(Self { sets: alike })
+    }
+}
+
+/// Checks the degrees under a set against those of a model with these outputs; the operations that it took,
+/// `None` where that model is not judged.
+fn judged_alike(task: &Task<'_>, set: Set, found: &[u16]) -> Result<Option<u64>, SensorError> {
+    let options = task.options;
+    let chosen: Vec<Candidate> = members(set).map(|c| options.candidates[c].clone()).collect();
+    let (model, _) = task.model.measuring(&chosen, options.own_outputs);
+    let Ok(judged) = judge(&model, options.seed, options.order) else { return Ok(None) };
+    for (u, &found) in task.asked.iter().zip(found) {
+        let own = judged.verdict(&model, &u.name).and_then(|v| v.degree);
+        if own != degree(found) {
+            let word = |d: Option<usize>| d.map_or_else(|| "none".to_string(), |d| d.to_string());
+            let reason = format!(
+                "under the set {} the degree of {} is {} by its rows and {} by the verdict: please report this model",
+                names(set, options).join(", "),
+                u.name,
+                word(degree(found)),
+                word(own)
+            );
+            return Err(SensorError::Undecided { reason });
+        }
+    }
+    Ok(Some(judged.work.max(1)))
+}

@@ -1,0 +1,435 @@
+//! Sets of outputs of a model: which quantities to measure so that its unknowns are observable, with proof.
+//!
+//! The rows of all candidates are computed once, at two random points; what a set determines is a matter of
+//! ranks. An output more never raises a degree, so failing sets exclude all that they hold (`cuts`).
+//!
+//! ```
+//! use obsdeg_core::system::model_file;
+//! use obsdeg_design::sensors::{SensorOptions, sensors};
+//!
+//! let chain = "name='chain'\nparameters=['k']\n[states]\na='-k*a'\nb='k*a-b'\n[outputs]\ny='b'\n";
+//! let model = model_file::read(chain)?;
+//! let options = SensorOptions { candidates: model.candidates_of("states")?, ..SensorOptions::default() };
+//! let found = sensors(&model, &options, &|_| true)?;
+//! assert_eq!((found.front[0].outputs.as_slice(), found.front[0].degree), (&["b".to_string()][..], 2));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod answer;
+mod confirm;
+mod cuts;
+mod ranks;
+mod search;
+
+use obsdeg_core::system::{
+    Candidate, Gathered, Judgement, ModelError, OutputRows, Role, SystemModel, check_cost, gather,
+};
+
+use rayon::prelude::*;
+
+pub use answer::{FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable};
+use confirm::Confirmed;
+use cuts::{cost_of, members};
+use ranks::NONE;
+pub use ranks::{Ordered, Ranks, Set};
+use search::{Best, Goal, Search, Stopped};
+
+/// Most candidates.
+pub const MAX_SENSORS: usize = 64;
+/// Pairs of points that are tried.
+const ATTEMPTS: usize = 5;
+/// Times the limit of the work of a verdict that all sets together may take.
+const LIMITS: u64 = 50;
+/// Sets that are judged whatever the limit.
+const LEAST: u64 = 1000;
+/// Millionths in a unit of cost.
+const MILLION: f64 = 1e6;
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorOptions {
+    /// What sets are chosen from.
+    pub candidates: Vec<Candidate>,
+    /// True if the outputs of the model are measured in every set.
+    pub own_outputs: bool,
+    /// Unknowns that must be observable; none: all.
+    pub required: Vec<String>,
+    /// Largest degrees: of one unknown, or of all.
+    pub max_degree: Vec<(Option<String>, usize)>,
+    /// Most minimal sets that are listed.
+    pub keep: usize,
+    /// Highest order of derivatives, where the model's own bound is not meant.
+    pub order: Option<usize>,
+    /// Seed of all random choices.
+    pub seed: u64,
+}
+
+impl Default for SensorOptions {
+    fn default() -> Self {
+        Self {
+            candidates: Vec::new(),
+            own_outputs: false,
+            required: Vec::new(),
+            max_degree: Vec::new(),
+            keep: 10,
+            order: None,
+            seed: 1,
+        }
+    }
+}
+
+/// Why no sets are found.
+#[derive(Debug, thiserror::Error)]
+pub enum SensorError {
+    /// The model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Too many, or none.
+    #[error("{found} candidates; expected 1 to {MAX_SENSORS}")]
+    Candidates {
+        /// Their number.
+        found: usize,
+    },
+    /// No unknown of this name.
+    #[error("`{name}` is no unknown of the model; expected one of {}", known.join(", "))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// Those that there are.
+        known: Vec<String>,
+    },
+    /// A cost that is none.
+    #[error("the cost of {name}: {expected}")]
+    Cost {
+        /// The candidate.
+        name: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// Points that disagree, or leave ranks undecided.
+    #[error("undecided: {reason}")]
+    Undecided {
+        /// Why.
+        reason: String,
+    },
+    /// Interrupted before anything was found.
+    #[error("interrupted before a set was found")]
+    Interrupted,
+}
+
+/// An unknown in question.
+struct Asked {
+    name: String,
+    unit: String,
+    column: usize,
+}
+
+/// Finds sets of outputs. `going` hears how many sets are judged, and ends the search by false.
+///
+/// # Errors
+/// [`SensorError`].
+pub fn sensors(
+    model: &SystemModel,
+    options: &SensorOptions,
+    going: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<Sensors, SensorError> {
+    let costs = checked(&options.candidates)?;
+    let (whole, ranges) = model.measuring(&options.candidates, options.own_outputs);
+    let mut disagreed = None;
+    for attempt in 0..ATTEMPTS {
+        let gathered = gather(&whole, options.seed, options.order, attempt)?;
+        let owners = owners(whole.outputs.len(), &ranges);
+        let asked = unknowns(&whole, &gathered.judged);
+        let columns: Vec<usize> = asked.iter().map(|u| u.column).collect();
+        let [first, second]: [Box<dyn Ranks>; 2] = match &gathered.rows {
+            OutputRows::Primes(points) => {
+                let [p, q] = &**points;
+                [Box::new(Ordered::new(p, &owners, &columns)), Box::new(Ordered::new(q, &owners, &columns))]
+            }
+            OutputRows::Digits(points) => {
+                let (p, q) = &**points;
+                [Box::new(Ordered::new(p, &owners, &columns)), Box::new(Ordered::new(q, &owners, &columns))]
+            }
+        };
+        let n = gathered.judged.layout.unknowns.len() as u64;
+        let most = (LIMITS * model.work_limit.operations() / (n * n * n / 2 + 1)).max(LEAST);
+        let search = Search::new(&*first, costs.clone(), asked.len(), most, going);
+        let mut task = Task { model, options, gathered: &gathered, asked, search, required: Vec::new() };
+        let answer = task.answer()?;
+        match task.differs(&*second) {
+            None if first.is_clear() && second.is_clear() => return Ok(answer),
+            None => {
+                let reason = "real numbers of 192 and 308 digits leave ranks unclear".into();
+                return Err(SensorError::Undecided { reason });
+            }
+            differs => disagreed = differs,
+        }
+    }
+    let set = disagreed.map_or_else(String::new, |set: Set| names(set, options).join(", "));
+    let reason =
+        format!("two random points disagreed {ATTEMPTS} times, on the set {set}: please report this model");
+    Err(SensorError::Undecided { reason })
+}
+
+/// The costs in millionths.
+fn checked(candidates: &[Candidate]) -> Result<Vec<u64>, SensorError> {
+    let found = candidates.len();
+    if found == 0 || found > MAX_SENSORS {
+        return Err(SensorError::Candidates { found });
+    }
+    let cost = |c: &Candidate| match check_cost(c.cost) {
+        Ok(()) => Ok((c.cost * MILLION).round() as u64),
+        Err(expected) => Err(SensorError::Cost { name: c.named.name.clone(), expected }),
+    };
+    candidates.iter().map(cost).collect()
+}
+
+/// Which candidate each output belongs to, as a set; empty of those that stay.
+fn owners(outputs: usize, ranges: &[std::ops::Range<usize>]) -> Vec<Set> {
+    let owner = |i: usize| ranges.iter().position(|range| range.contains(&i)).map_or(0, |c| 1 << c);
+    (0..outputs).map(owner).collect()
+}
+
+/// The unknowns that are spoken of.
+fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<Asked> {
+    let unit = |role: Role| match role {
+        Role::State(i) => model.states[i].named.unit.clone(),
+        Role::Parameter(i) => model.parameters[i].unit.clone(),
+        Role::UnknownInput(i) => model.unknown_inputs[i].0.unit.clone(),
+        _ => String::new(),
+    };
+    let all = judged.layout.unknowns.iter().enumerate().filter(|(c, _)| judged.shown(model, *c));
+    all.map(|(column, u)| Asked { name: u.name.clone(), unit: unit(u.role), column }).collect()
+}
+
+fn names(set: Set, options: &SensorOptions) -> Vec<String> {
+    members(set).map(|c| options.candidates[c].named.name.clone()).collect()
+}
+
+fn degree(degree: u16) -> Option<usize> {
+    (degree < NONE).then_some(degree.into())
+}
+
+/// One search.
+struct Task<'a> {
+    model: &'a SystemModel,
+    options: &'a SensorOptions,
+    gathered: &'a Gathered,
+    asked: Vec<Asked>,
+    search: Search<'a>,
+    /// Unknowns that are asked for, by their place among all.
+    required: Vec<usize>,
+}
+
+impl Task<'_> {
+    /// The unknowns that a name stands for: one, or that of every experiment.
+    fn named(&self, name: &str) -> Result<Vec<usize>, SensorError> {
+        let is = |u: &Asked| u.name == name || u.name.split_once('@').is_some_and(|(base, _)| base == name);
+        let found: Vec<usize> = (0..self.asked.len()).filter(|&u| is(&self.asked[u])).collect();
+        match found.is_empty() {
+            false => Ok(found),
+            true => Err(SensorError::Unknown {
+                name: name.into(),
+                known: self.asked.iter().map(|u| u.name.clone()).collect(),
+            }),
+        }
+    }
+
+    /// Reads what is required; those that all candidates together do not reach are left out and listed.
+    fn require(&mut self) -> Result<Vec<Unattainable>, SensorError> {
+        let mut limits = vec![NONE - 1; self.asked.len()];
+        for (name, most) in &self.options.max_degree {
+            let of = name.as_ref().map_or_else(|| Ok((0..limits.len()).collect()), |n| self.named(n))?;
+            let most = u16::try_from(*most).unwrap_or(NONE - 1).min(NONE - 1);
+            of.into_iter().for_each(|u| limits[u] = limits[u].min(most));
+        }
+        let mut required: Vec<usize> = match self.options.required.is_empty() {
+            true => (0..self.asked.len()).collect(),
+            false => {
+                let all = self.options.required.iter().map(|name| self.named(name));
+                all.collect::<Result<Vec<_>, _>>()?.concat()
+            }
+        };
+        required.sort_unstable();
+        required.dedup();
+        let everything = self.search.all;
+        let reached = self.search.degrees(everything).map_err(|_| SensorError::Interrupted)?.to_vec();
+        let (reach, never): (Vec<usize>, Vec<usize>) =
+            required.into_iter().partition(|u| reached[*u] <= limits[*u]);
+        reach.iter().for_each(|&u| self.search.limits[u] = Some(limits[u]));
+        self.required = reach;
+        let never = never.into_iter();
+        Ok(never
+            .map(|u| Unattainable { name: self.asked[u].name.clone(), degree: degree(reached[u]) })
+            .collect())
+    }
+
+    fn set(&self, set: Set, degree: u16) -> SensorSet {
+        let cost = self.cost(cost_of(set, &self.search.costs));
+        SensorSet { outputs: names(set, self.options), cost, degree: degree.into() }
+    }
+
+    fn cost(&self, millionths: u64) -> f64 {
+        millionths as f64 / MILLION
+    }
+
+    /// The front of cost against degree, as far as it is found: sets with what proves them.
+    fn front(&mut self, out: &mut Vec<(Set, FrontSet)>) -> Result<(), Stopped> {
+        let (mut most, everything) = (NONE - 1, self.search.worst(self.search.all)?);
+        loop {
+            let best = self.search.best(&Goal::All, most)?;
+            let cuts = self.search.needed(&best);
+            let Best { set, degree: worst, examined, .. } = best;
+            let one_of_each = cuts.into_iter().map(|cut| names(cut, self.options)).collect();
+            let SensorSet { outputs, cost, degree } = self.set(set, worst);
+            let below = (most < NONE - 1).then_some(most.into());
+            out.push((set, FrontSet { outputs, cost, degree, below, one_of_each, examined }));
+            if worst <= everything {
+                return Ok(());
+            }
+            most = worst - 1;
+        }
+    }
+
+    /// Per unknown the cheapest set.
+    fn of_unknowns(&mut self, stopped: &mut Option<Stopped>) -> Vec<SensorUnknown> {
+        let reached = self.search.degrees(self.search.all).map(<[u16]>::to_vec).unwrap_or_default();
+        let mut out = Vec::new();
+        for u in 0..self.asked.len() {
+            let least = reached.get(u).copied().unwrap_or(NONE);
+            let mut cheapest = None;
+            if least < NONE && stopped.is_none() {
+                match self.search.best(&|k| Goal::One(u, k), NONE - 1) {
+                    Ok(best) => cheapest = Some(self.set(best.set, best.degree)),
+                    Err(reason) => *stopped = Some(reason),
+                }
+            }
+            let (name, unit) = (self.asked[u].name.clone(), self.asked[u].unit.clone());
+            let required = self.required.contains(&u);
+            out.push(SensorUnknown { name, unit, required, cheapest, least_degree: degree(least) });
+        }
+        out
+    }
+
+    /// The candidates, each with the degrees that it gives alone.
+    fn candidates(&mut self) -> Vec<SensorCandidate> {
+        let alone: Vec<Set> = (0..self.options.candidates.len()).map(|c| 1 << c).collect();
+        let judged = self.search.judge(&alone).is_ok();
+        let mut out = Vec::new();
+        for (c, candidate) in self.options.candidates.iter().enumerate() {
+            let degrees =
+                if judged { self.search.degrees(1 << c).map(<[u16]>::to_vec) } else { Ok(Vec::new()) };
+            let degrees: Vec<Option<usize>> = degrees.unwrap_or_default().into_iter().map(degree).collect();
+            let required = self.required.iter().filter_map(|&u| degrees.get(u).copied());
+            let observable: Vec<usize> = required.flatten().collect();
+            let all = observable.len() == self.required.len();
+            out.push(SensorCandidate {
+                name: candidate.named.name.clone(),
+                expression: candidate.parts.first().map_or_else(String::new, |p| p.text.clone()),
+                unit: candidate.named.unit.clone(),
+                description: candidate.named.description.clone(),
+                cost: candidate.cost,
+                degree: observable.iter().max().copied().filter(|_| all),
+                observable: observable.len(),
+                degrees,
+            });
+        }
+        out
+    }
+
+    fn answer(&mut self) -> Result<Sensors, SensorError> {
+        let unattainable = self.require()?;
+        let candidates = self.candidates();
+        let (mut front, mut sets, mut complete, mut stopped) = (Vec::new(), Vec::new(), u32::MAX, None);
+        let any = !self.required.is_empty();
+        if any {
+            stopped = self.front(&mut front).err();
+            if front.is_empty() && stopped == Some(Stopped::Interrupted) {
+                return Err(SensorError::Interrupted);
+            }
+        }
+        if any && stopped.is_none() {
+            (sets, complete, stopped) = self.search.minimal(Goal::All(NONE - 1));
+        }
+        let quantities = self.of_unknowns(&mut stopped);
+        let all = self.options.candidates.len() as u32;
+        let (found, complete_to) = (sets.len(), (complete < all).then_some(complete as usize));
+        sets.truncate(self.options.keep);
+        let mut listed = Vec::new();
+        for &set in &sets {
+            let worst = self.search.worst(set).map_err(|_| SensorError::Interrupted)?;
+            listed.push(self.set(set, worst));
+        }
+        let least = self.search.worst(self.search.all).ok().filter(|_| any);
+        let relied = front.iter().map(|f| f.0).chain(sets).chain(self.proofs(&front));
+        let confirmed = Confirmed::of(self, relied.collect())?;
+        Ok(Sensors {
+            schema: SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            name: self.model.name.clone(),
+            own_outputs: match self.options.own_outputs {
+                true => self.model.outputs.iter().map(|o| o.0.name.clone()).collect(),
+                false => Vec::new(),
+            },
+            candidates,
+            required: self.required.iter().map(|&u| self.asked[u].name.clone()).collect(),
+            max_degree: self
+                .options
+                .max_degree
+                .iter()
+                .map(|(name, k)| match name {
+                    Some(name) => format!("{name}={k}"),
+                    None => k.to_string(),
+                })
+                .collect(),
+            unattainable,
+            least_degree: least.and_then(degree),
+            front: front.into_iter().map(|f| f.1).collect(),
+            sets: listed,
+            minimal_sets: (any && stopped.is_none() && complete_to.is_none()).then_some(found),
+            minimal_sets_found: found,
+            complete_to,
+            quantities,
+            judged_sets: self.search.judged.len(),
+            confirmed_sets: confirmed.sets,
+            closed: self.gathered.ended(),
+            last_order: self.gathered.judged.layout.bound,
+            stopped: stopped.map(|s| s.words().into()),
+            error_bound: self.gathered.error_bound(self.search.judged.len()),
+            digits: self.gathered.judged.digits(),
+            seed: self.options.seed,
+        })
+    }
+
+    /// The failing sets that the proofs of a front rest on.
+    fn proofs(&self, front: &[(Set, FrontSet)]) -> Vec<Set> {
+        let place = |name: &String| {
+            self.options.candidates.iter().position(|c| c.named.name == *name).map_or(0, |c| 1 << c)
+        };
+        let cut = |group: &Vec<String>| group.iter().map(place).fold(0, |all: Set, one: Set| all | one);
+        let cuts = front.iter().flat_map(|f| &f.1.one_of_each).map(cut);
+        cuts.map(|cut| self.search.all & !cut).collect()
+    }
+
+    /// A judged set under which another point gives other degrees.
+    fn differs(&self, other: &dyn Ranks) -> Option<Set> {
+        let judged = &self.search.judged;
+        let mut sets: Vec<Set> = judged.keys().copied().collect();
+        sets.sort_unstable();
+        sets.par_iter().copied().find_first(|set| judged[set] != other.degrees(*set))
+    }
+}
+
+impl Stopped {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Work => {
+                "more sets would be judged than the limit of work allows; a larger --work-limit allows more"
+            }
+            Self::Nodes => {
+                "there are too many ways to choose from the groups of candidates that the proofs need"
+            }
+            Self::Interrupted => "interrupted",
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! Sets of outputs of a model.
+
+use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors};
+
+use crate::Answer;
+use crate::document::{Block, Document, left, right};
+use crate::words;
+
+/// Most members of the groups of a proof that are shown.
+const MEMBERS: usize = 24;
+
+/// A number, and what it counts: `1 output`, `2 outputs`.
+fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// Members of a set.
+fn set(outputs: &[String]) -> String {
+    match outputs.is_empty() {
+        true => "none".into(),
+        false => outputs.join(", "),
+    }
+}
+
+/// A text that begins a sentence.
+fn capital(text: &str) -> String {
+    let mut rest = text.chars();
+    rest.next().map_or_else(String::new, |first| first.to_uppercase().chain(rest).collect())
+}
+
+/// A cost without zeros at its end.
+fn cost(cost: f64) -> String {
+    let text = format!("{cost:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// True if some cost is not one.
+fn has_costs(s: &Sensors) -> bool {
+    s.candidates.iter().any(|c| c.cost != 1.0)
+}
+
+/// What a set costs, in words: `2 outputs`, `cost 2.5`.
+fn price(s: &Sensors, f: &FrontSet) -> String {
+    match has_costs(s) {
+        true => format!("cost {}", cost(f.cost)),
+        false => count(f.outputs.len(), "output"),
+    }
+}
+
+/// The unknowns that the sets are about: `all 34 unknowns`, `k1, k2`.
+fn about(s: &Sensors) -> String {
+    let (required, all) = (s.required.len(), s.quantities.len());
+    match required {
+        n if n == all => format!("all {}", count(n, "unknown")),
+        n if n <= 6 => words::names(s.required.iter().map(String::as_str)),
+        n => format!("{n} of {all} unknowns"),
+    }
+}
+
+/// The answer in sentences, the first one being the answer.
+fn sentences(s: &Sensors) -> Vec<String> {
+    let mut out = Vec::new();
+    if let Some(first) = s.front.first() {
+        let makes = if first.outputs.len() == 1 || has_costs(s) { "makes" } else { "make" };
+        let price = price(s, first);
+        let beside = if s.own_outputs.is_empty() { "" } else { " beside the outputs of the model" };
+        out.push(match first.outputs.is_empty() {
+            true => format!(
+                "The outputs of the model make {} observable without another one, with degree {}",
+                about(s),
+                first.degree
+            ),
+            false => format!(
+                "{}{beside} {makes} {} observable, with degree {}: {}",
+                capital(&price),
+                about(s),
+                first.degree,
+                set(&first.outputs)
+            ),
+        });
+    } else {
+        let reason = if s.required.is_empty() { "" } else { ": the search ended before a set was found" };
+        let none = "No set of the candidates makes an unknown that was asked for observable";
+        out.push(if reason.is_empty() {
+            none.into()
+        } else {
+            format!("No set of the candidates was found{reason}")
+        });
+    }
+    let gives = if has_costs(s) { "gives" } else { "give" };
+    for pair in s.front.windows(2) {
+        out.push(format!(
+            "{} {gives} degree {}: {}",
+            capital(&price(s, &pair[1])),
+            pair[1].degree,
+            set(&pair[1].outputs)
+        ));
+    }
+    if !s.unattainable.is_empty() {
+        let word = |u: &obsdeg_design::sensors::Unattainable| match u.degree {
+            Some(k) => format!("{} (degree {k} with all)", u.name),
+            None => u.name.clone(),
+        };
+        let list: Vec<String> = s.unattainable.iter().map(word).collect();
+        out.push(format!("No set of the candidates does that for {}", list.join(", ")));
+    }
+    out
+}
+
+/// What proves that a set of the front is the cheapest.
+fn proof(s: &Sensors, f: &FrontSet) -> String {
+    let goal = match f.below {
+        Some(below) => format!("with degrees of at most {below}"),
+        None => "that makes them observable".into(),
+    };
+    let (mut shown, mut members) = (Vec::new(), 0);
+    for group in &f.one_of_each {
+        members += group.len();
+        if members > MEMBERS && !shown.is_empty() {
+            break;
+        }
+        shown.push(format!("{{{}}}", group.join(", ")));
+    }
+    let more = f.one_of_each.len() - shown.len();
+    let more = match more {
+        0 => String::new(),
+        n => format!(" and {} more (--format json)", count(n, "group")),
+    };
+    let judged = match f.examined {
+        0 => String::new(),
+        n => format!("; the {} that do and are cheaper fail one by one", count(n, "set")),
+    };
+    match shown.is_empty() {
+        true => format!("{}: nothing is cheaper", price(s, f)),
+        false => format!(
+            "{}: every set {goal} holds a candidate of {}{more}, since all candidates outside one of these groups fail together{judged}",
+            price(s, f),
+            shown.join(", of ")
+        ),
+    }
+}
+
+/// What the answer rests on.
+fn validity(s: &Sensors) -> Vec<String> {
+    let mut out = Vec::new();
+    out.extend(s.stopped.as_ref().map(|reason| format!("the search ended early: {reason}")));
+    out.push(match (s.minimal_sets, s.complete_to) {
+        (Some(n), _) => format!(
+            "{}; an output more never raises a degree, so every set that does holds one of them",
+            count(n, "minimal set")
+        ),
+        (None, Some(most)) => format!(
+            "at least {}: all with up to {} are found, not all of more outputs",
+            count(s.minimal_sets_found, "minimal set"),
+            count(most, "output")
+        ),
+        (None, None) => "minimal sets were not all found".into(),
+    });
+    if !s.closed {
+        out.push(format!(
+            "no end of the derivatives is proven for some outputs: what is not observable is so up to order {}",
+            s.last_order
+        ));
+    }
+    let certainty = match (s.error_bound, s.digits) {
+        (Some(bound), _) => format!(
+            "degrees under {} by ranks at two random points; one is wrong with probability below {}",
+            count(s.judged_sets, "set"),
+            words::at_most(bound)
+        ),
+        _ => format!(
+            "degrees under {} by ranks of real numbers at two random points; no probability belongs to them",
+            count(s.judged_sets, "set")
+        ),
+    };
+    out.push(format!(
+        "{certainty}; {} judged again by `analyze`: the same degrees; seed {}",
+        count(s.confirmed_sets, "set"),
+        s.seed
+    ));
+    out
+}
+
+fn unknown_row(u: &SensorUnknown) -> Vec<String> {
+    let outputs = u.cheapest.as_ref().map_or_else(|| "-".into(), |c| set(&c.outputs));
+    let degree = words::degree(u.cheapest.as_ref().map(|c| c.degree));
+    vec![u.name.clone(), outputs, degree, words::degree(u.least_degree)]
+}
+
+impl Answer for Sensors {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
+    fn document(&self) -> Document {
+        let costs = has_costs(self);
+        let of_set = |outputs: &[String], price: f64, degree: usize| {
+            let mut row = vec![outputs.len().to_string()];
+            row.extend(costs.then(|| cost(price)));
+            row.extend([degree.to_string(), set(outputs)]);
+            row
+        };
+        let columns = || {
+            let mut columns = vec![right("outputs")];
+            columns.extend(costs.then(|| right("cost")));
+            columns.extend([right("degree"), left("set")]);
+            columns
+        };
+        let mut blocks = Vec::new();
+        if !self.front.is_empty() {
+            let rows = self.front.iter().map(|f| of_set(&f.outputs, f.cost, f.degree));
+            let name = if costs { "Cost against degree" } else { "Outputs against degree" };
+            blocks.push(Block::table(name, columns(), rows));
+            blocks.push(Block::list("Nothing cheaper", self.front.iter().map(|f| proof(self, f)).collect()));
+        }
+        if !self.sets.is_empty() {
+            let all = self.minimal_sets.is_some_and(|n| n == self.sets.len());
+            let heading = match (all, self.minimal_sets) {
+                (true, _) => "Minimal sets".to_string(),
+                (false, Some(n)) => format!("The first {} of {n} minimal sets", self.sets.len()),
+                (false, None) => format!("The first {} minimal sets", self.sets.len()),
+            };
+            let rows = self.sets.iter().map(|s| of_set(&s.outputs, s.cost, s.degree));
+            blocks.push(Block::table(heading, columns(), rows));
+        }
+        let rows = self.quantities.iter().map(unknown_row);
+        let header = [left("unknown"), left("cheapest set"), right("degree"), right("degree with all")];
+        blocks.push(Block::table("Cheapest set of each unknown", header, rows));
+        let rows = self.candidates.iter().map(|c| {
+            let mut row = vec![c.name.clone()];
+            row.extend(costs.then(|| cost(c.cost)));
+            row.extend([format!("{} of {}", c.observable, self.required.len()), words::degree(c.degree)]);
+            row
+        });
+        let mut header = vec![left("candidate")];
+        header.extend(costs.then(|| right("cost")));
+        header.extend([right("observable"), right("degree")]);
+        blocks.push(Block::table("Each candidate alone", header, rows));
+        blocks.push(Block::list("Validity", validity(self)));
+        let kept = match self.own_outputs.is_empty() {
+            true => "in place of its outputs".to_string(),
+            false => format!("beside {}", self.own_outputs.join(", ")),
+        };
+        Document {
+            title: format!("What to measure of {}, {kept}", self.name),
+            lead: sentences(self).into_iter().map(|s| format!("{s}.")).collect(),
+            blocks,
+        }
+    }
+
+    fn sentences(&self) -> Vec<String> {
+        sentences(self)
+    }
+
+    fn main_table(&self) -> &'static str {
+        "front"
+    }
+}

@@ -1,0 +1,72 @@
+"""Which quantities of a model to measure."""
+
+from __future__ import annotations
+
+import itertools
+
+import obsdeg
+import pytest
+
+CHAIN = """
+name = "chain"
+parameters = ["k", "m"]
+[states]
+a = "-k*a"
+b = "k*a - m*b"
+c = "m*b"
+[outputs]
+y = "c"
+[candidates]
+last = { expression = "c", cost = 0.5 }
+first = { expression = "a", cost = 2 }
+"""
+
+
+def chain() -> obsdeg.Model:
+    return obsdeg.Model.from_text(CHAIN)
+
+
+def degree(outputs: tuple[str, ...]) -> int | None:
+    """The largest degree where these are the outputs, by the verdicts."""
+    text = CHAIN.replace('y = "c"', "\n".join(f'o{i} = "{o}"' for i, o in enumerate(outputs)))
+    degrees = [q.degree for q in obsdeg.analyze(obsdeg.Model.from_text(text), solutions=False)]
+    return None if None in degrees else max(d for d in degrees if d is not None)
+
+
+def test_sets_are_those_of_verdicts_on_all() -> None:
+    found = obsdeg.measure(chain(), "states")
+    sets = [s for n in (1, 2, 3) for s in itertools.combinations("abc", n)]
+    worst = {s: degree(s) for s in sets}
+    front: list[tuple[int, int]] = []
+    for n in (1, 2, 3):
+        best = min((d for s, d in worst.items() if len(s) == n and d is not None), default=None)
+        if best is not None and (not front or best < front[-1][1]):
+            front.append((n, best))
+    assert [(len(s.outputs), s.degree) for s in found.front] == front
+    minimal = [s for s in sets if worst[s] is not None and all(worst.get(tuple(c for c in s if c != x)) is None for x in s)]
+    assert sorted(tuple(s.outputs) for s in found.sets) == sorted(minimal)
+    assert found.minimal_sets == len(minimal) and found.confirmed_sets > 0
+
+
+def test_costs_names_and_tables() -> None:
+    found = obsdeg.measure(chain())
+    assert [c.name for c in found.candidates] == ["last", "first"]
+    assert [(s.outputs, s.cost) for s in found.front][0] == (["last"], 0.5)
+    assert found["m"].cheapest.cost == 0.5 and found["m"].required
+    dear = obsdeg.measure(chain(), ["a", "c"], cost={"c": 5}, observable="k", max_degree=9)
+    assert dear.required == ["k"] and dear.front[0].outputs == ["a"]
+    frame = found.to_frame()
+    assert list(frame["degree"]) == [s.degree for s in found.front]
+    assert obsdeg.Answer.from_json(found.json()) == found
+    assert "chain" in str(found) and len(found) == 5
+    stay = obsdeg.measure(chain(), "a", own_outputs=True)
+    assert stay.own_outputs == ["y"] and stay.front[0].outputs == []
+
+
+def test_what_is_wrong() -> None:
+    with pytest.raises(obsdeg.ProblemError, match="no unknown of the model"):
+        obsdeg.measure(chain(), observable="q")
+    with pytest.raises(obsdeg.ProblemError, match="no such candidate"):
+        obsdeg.measure(chain(), "a", cost={"b": 2})
+    with pytest.raises(obsdeg.ProblemError, match="measure is about models"):
+        obsdeg.measure(obsdeg.Scheme([(0, 0, 0)]), "states")  # type: ignore[arg-type]
