@@ -406,7 +406,7 @@ def judge(p, names, rows, functionals):
     found = [{"degree": None, "solution": None, "hidden_by": None, "excited_by": None} for _ in functionals]
     # reduced echelon form; the columns beyond n tell how each row is made of the basis rows
     basis, reduced, ranks = [], {}, []
-    for k in range(1 + max(triple[1] for triple, _ in rows)):
+    for k in range(1 + max((triple[1] for triple, _ in rows), default=0)):
         for triple, row in rows:
             if triple[1] != k:
                 continue

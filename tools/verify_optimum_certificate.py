@@ -23,6 +23,7 @@ EARTH_RATE = 7.292115e-5  # rad/s
 ARCSEC = math.pi / 648000
 TOLERANCE = 1e-5
 PIVOT = 1e-13
+SURE_PIVOT = 1e-9
 ALL_UP_TO = 20_000
 
 
@@ -177,10 +178,12 @@ class Accuracy:
         return psi, rows + [new], own, information
 
     def value(self, state):
-        """The criterion as computed, and what no rounding makes it fall below."""
+        """The criterion as computed; what no rounding makes it fall below; the smallest pivot by its diagonal entry, 0 if a
+        coefficient is held by rounding alone; the number of unknowns that are left out."""
         information = state[3]
         n, d = len(information), len(self.limits)
         first = n - d
+        smallest, left_out = 1.0, 0
         lower = [[0.0] * n for _ in range(n)]
         for i in range(n):
             row = lower[i]
@@ -190,8 +193,11 @@ class Accuracy:
             given = information[i][i]
             pivot = given - sum(a * a for a in row[:i])
             if pivot > PIVOT * given:
-                row[i] = math.sqrt(pivot)
-            elif i >= first:
+                row[i], smallest = math.sqrt(pivot), min(smallest, pivot / given)
+            elif i < first:
+                left_out += 1
+            else:
+                smallest = 0.0
                 row[i] = math.sqrt(PIVOT * given) or 1.0
 
         def backward(x):
@@ -229,7 +235,7 @@ class Accuracy:
                 variances = [dot(y, y) / limit**2 for y, limit in zip(inverse, self.limits)]
                 k = max(range(d), key=lambda k: variances[k])
                 squared, least = variances[k], bound(units[k]) / self.limits[k] ** 2
-        return math.sqrt(squared), math.sqrt(least) * (1 - 1e-13)
+        return math.sqrt(squared), math.sqrt(least) * (1 - 1e-13), smallest, left_out
 
     def energy(self, state, x):
         """|Y x| at most, whatever rounding did."""
@@ -328,19 +334,25 @@ class Space:
     def worst_degree(self, sequence):
         members = tuple(sorted(set(sequence)))
         if members not in self.known:
-            found = [self.judged(p, rows, members) for p, rows in self.fields]
+            found = [self.judged(p, rows, members)[0] for p, rows in self.fields]
             self.known[members] = min((degree for degree in found if degree is not None), default=None)
         return self.known[members]
+
+    def certain(self, sequence):
+        """The largest degree by all primes, which a single one could make too small, and the number of undetermined unknowns."""
+        found = [self.judged(p, rows, tuple(sorted(set(sequence)))) for p, rows in self.fields]
+        degrees = [degree for degree, _ in found]
+        return None if None in degrees else max(degrees), min(left for _, left in found)
 
     def judged(self, p, candidates, members):
         d = len(self.problem.names) - 3
         psi = 0 if self.reset else 3  # under reset carry no row has entries at psi
         rows = [((i + 1, k, component), row) for i, c in enumerate(members) for (_, k, component), row in candidates[c]]
         names = [""] * (psi + d)
-        _, _, witnesses = base.judge(p, names, rows, [{psi + column: 1} for column, _, _ in self.required])
+        _, ranks, witnesses = base.judge(p, names, rows, [{psi + column: 1} for column, _, _ in self.required])
         degrees = [w["degree"] for w in witnesses]
         good = all(x is not None and x <= cap for x, (_, cap, _) in zip(degrees, self.required))
-        return max(degrees) if good else None
+        return max(degrees) if good else None, psi + d - (ranks[-1] if ranks else 0)
 
 
 def without_psi(p, rows):
@@ -390,11 +402,11 @@ class Search:
         torqued = self.carry == "inertial" and self.k > 1 and any(t in RATE for t in problem.terms)
         need(not torqued, "problem.terms", "expected no torquer errors under inertial carry: they act in slews", "found some")
         integer("problem.samples", raw["samples"], 5, 10_000)
-        between("problem.dwell_s", raw["dwell_s"], 1, 1e6)
+        between("problem.dwell_s", raw["dwell_s"], 10, 1e6)
         between("problem.noise_g", raw["noise_g"], 1e-9, 1e-2)
         precise(raw, problem)
         if problem.azimuth:
-            number("problem.azimuth_noise_deg", raw["azimuth_noise_deg"], 180.0)
+            between("problem.azimuth_noise_deg", raw["azimuth_noise_deg"], 1e-6, 10)
         else:
             need(raw["azimuth_noise_deg"] is None, "problem.azimuth_noise_deg", "expected null", "found a number")
         criteria = ("worst", "a", "d", "e", "margin")
@@ -539,9 +551,15 @@ def verify_optimum(value, data, scheme, blocks=None, seed=None):
         need(number(place, claimed) >= before, place, "expected values in ascending order", f"found {claimed}")
         before = claimed
         own = [c - 1 for c in sequence]
-        same(f"{place}, worst degree", degree, search.space.worst_degree(own))
-        computed = search.value(own)[0]
-        need(abs(claimed / computed - 1) <= TOLERANCE, f"{place}.value", f"expected {computed:e}", f"found {claimed}")
+        worst, undetermined = search.space.certain(own)
+        same(f"{place}, worst degree", degree, worst)
+        place = f"{place}.value"
+        computed, at_least, pivot, left_out = search.value(own)
+        need(abs(claimed / computed - 1) <= TOLERANCE, place, f"expected {computed:e}", f"found {claimed}")
+        sure = pivot >= SURE_PIVOT and left_out <= undetermined
+        expected = f"expected pivots from {SURE_PIVOT:e} on, and {undetermined} unknowns left out at most"
+        need(sure, place, expected, f"found {pivot:e}, {left_out} left out")
+        need(at_least <= computed * (1 + TOLERANCE), place, f"expected at least {at_least:e}, its own bound", f"found {claimed}")
     firsts = search.cover(all_blocks, best[0]["value"])
     same("sequences", sequences, sum(block["sequences"] for block in all_blocks))
     chosen, seed = choice(all_blocks, sequences, data, blocks, seed)

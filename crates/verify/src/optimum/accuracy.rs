@@ -19,6 +19,8 @@ const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 const LOCAL: usize = 9;
 /// Pivots below this part of a diagonal entry are rounding.
 const PIVOT: f64 = 1e-13;
+/// Pivots from this part of a diagonal entry on are known to a part of some 1e-6.
+pub(super) const SURE_PIVOT: f64 = 1e-9;
 
 /// Rows of any length.
 pub(super) type Rows = Vec<Vec<f64>>;
@@ -141,6 +143,11 @@ pub(super) struct State {
 pub(super) struct Value {
     pub computed: f64,
     pub at_least: f64,
+    /// Smallest pivot of the root by its diagonal entry, but for those that are left out; 0 if a coefficient
+    /// is held by rounding alone.
+    pub pivot: f64,
+    /// Number of unknowns that are left out because nothing determines them.
+    pub left_out: usize,
 }
 
 fn zeros(rows: usize, columns: usize) -> Rows {
@@ -364,7 +371,12 @@ impl Accuracy {
             }
         };
         // the few roundings of the bound itself
-        Value { computed: squared.sqrt(), at_least: (bound.sqrt() * (1.0 - 1e-13)).max(0.0) }
+        Value {
+            computed: squared.sqrt(),
+            at_least: (bound.sqrt() * (1.0 - 1e-13)).max(0.0),
+            pivot: root.pivot,
+            left_out: root.left_out,
+        }
     }
 
     /// `|Y x|` at most, whatever rounding did.
@@ -419,12 +431,16 @@ fn root(problem: &Problem, rates: [f64; 2], dwell: &Dwell) -> Rows {
 /// left out; what counts and is undetermined is held by rounding alone.
 struct Root {
     l: Rows,
+    /// Smallest pivot by its diagonal entry, but for those that are left out; 0 if one counts as rounding.
+    pivot: f64,
+    left_out: usize,
 }
 
 impl Root {
     fn new(information: &Rows, nuisance: usize) -> Self {
         let n = information.len();
         let mut l = zeros(n, n);
+        let (mut smallest, mut left_out) = (1.0f64, 0);
         for i in 0..n {
             for j in 0..i {
                 let rest = information[i][j] - dot(&l[i][..j], &l[j][..j]);
@@ -432,14 +448,20 @@ impl Root {
             }
             let given = information[i][i];
             let pivot = given - dot(&l[i][..i], &l[i][..i]);
-            l[i][i] = match pivot > PIVOT * given {
+            let counts = pivot > PIVOT * given;
+            match counts {
+                true => smallest = smallest.min(pivot / given),
+                false if i < nuisance => left_out += 1,
+                false => smallest = 0.0,
+            }
+            l[i][i] = match counts {
                 true => pivot.sqrt(),
                 false if i < nuisance => 0.0,
                 false if given > 0.0 => (PIVOT * given).sqrt(),
                 false => 1.0,
             };
         }
-        Self { l }
+        Self { l, pivot: smallest, left_out }
     }
 
     /// Column j of the inverse of the root, from entry j on.

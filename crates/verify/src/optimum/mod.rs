@@ -10,7 +10,7 @@ use crate::file::{RawGyro, RawProblem};
 use crate::modular::{Randomness, chance};
 use crate::problem::{Problem, known_carry};
 use crate::{Refused, Replay, by_primes, need, parsed, refusal, same};
-use accuracy::{Accuracy, Criterion, Dwell, State, Value};
+use accuracy::{Accuracy, Criterion, Dwell, SURE_PIVOT, State, Value};
 use space::{Space, multisets, power};
 
 /// Layout of certificates of optima.
@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 1e-5;
 /// Most blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
 /// Dwell of a position, in s.
-const DWELL_S: [f64; 2] = [1.0, 1e6];
+const DWELL_S: [f64; 2] = [10.0, 1e6];
 /// Noise of a sample of Z, in g.
 const NOISE_G: [f64; 2] = [1e-9, 1e-2];
 /// Noise of a sample of the azimuth, in degrees.
@@ -181,11 +181,19 @@ fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
         need(best.value >= before, &place, "values in ascending order", best.value)?;
         before = best.value;
         let sequence: Vec<usize> = best.sequence.iter().map(|c| c - 1).collect();
-        let degree = search.space.worst_degree(&sequence);
+        let certain = search.space.certain(&sequence);
+        let (degree, undetermined) = (certain.map(|c| c.0), certain.map_or(0, |c| c.1));
         same(&format!("{place}, worst degree"), &Some(file.degree), &degree)?;
-        let value = search.value(&sequence).computed;
-        let near = (best.value / value - 1.0).abs() <= TOLERANCE;
-        need(near, &format!("{place}.value"), &format!("{value:e}"), best.value)?;
+        let place = format!("{place}.value");
+        let value = search.value(&sequence);
+        let near = (best.value / value.computed - 1.0).abs() <= TOLERANCE;
+        need(near, &place, &format!("{:e}", value.computed), best.value)?;
+        // double precision decides it
+        let sure = value.pivot >= SURE_PIVOT && value.left_out <= undetermined;
+        let expected = format!("pivots from {SURE_PIVOT:e} on, and {undetermined} unknowns left out at most");
+        need(sure, &place, &expected, format!("{:e}, {} left out", value.pivot, value.left_out))?;
+        let bounded = value.at_least <= value.computed * (1.0 + TOLERANCE);
+        need(bounded, &place, &format!("at least {:e}, its own bound", value.at_least), best.value)?;
     }
     Ok(file.best[0].value)
 }

@@ -94,12 +94,29 @@ impl Space {
         found
     }
 
+    /// The largest degree by all primes, which a single one could make too small, and the number of unknowns
+    /// that nothing determines; `None` where a required coefficient is not observable or above its cap.
+    pub(super) fn certain(&self, sequence: &[usize]) -> Option<(usize, usize)> {
+        let mut set = sequence.to_vec();
+        set.sort_unstable();
+        set.dedup();
+        let all: Option<Vec<(usize, usize)>> =
+            self.fields.iter().map(|field| self.found(field, &set)).collect();
+        let all = all?;
+        Some((all.iter().map(|f| f.0).max()?, all.iter().map(|f| f.1).min()?))
+    }
+
     /// Number of sets that were judged.
     pub(super) fn judged_sets(&self) -> usize {
         self.known.len()
     }
 
-    fn judged(&self, (p, candidates): &(u64, Vec<RowsOf>), set: &[usize]) -> Option<usize> {
+    fn judged(&self, field: &(u64, Vec<RowsOf>), set: &[usize]) -> Option<usize> {
+        self.found(field, set).map(|found| found.0)
+    }
+
+    /// Worst degree and number of undetermined unknowns by one prime.
+    fn found(&self, (p, candidates): &(u64, Vec<RowsOf>), set: &[usize]) -> Option<(usize, usize)> {
         let d = self.names.len() - 3;
         // under reset carry no row has entries at psi
         let psi = if self.reset { 0 } else { 3 };
@@ -112,11 +129,10 @@ impl Space {
         let names = vec![String::new(); psi + d];
         let judged = judge(*p, &names, &rows, &functionals);
         let degrees = judged.witnesses.iter().zip(&self.required);
-        degrees
-            .map(|(w, (_, cap))| w.degree.filter(|degree| degree <= cap))
-            .collect::<Option<Vec<_>>>()?
-            .into_iter()
-            .max()
+        let degrees: Option<Vec<usize>> =
+            degrees.map(|(w, (_, cap))| w.degree.filter(|degree| degree <= cap)).collect();
+        let undetermined = psi + d - judged.ranks.last().copied().unwrap_or(0);
+        Some((degrees?.into_iter().max()?, undetermined))
     }
 }
 

@@ -445,7 +445,7 @@ fn what_certificates_of_optima_do_not_cover() {
         (with(&|t| t.conditions.accelerometer_instability_ug = 10.0), "a bias instability"),
         (
             with(&|t| {
-                t.conditions.drift_noise = obsdeg_core::model::DriftNoise::OneStep(0.01);
+                t.conditions.drift_noise = obsdeg_core::model::settings::DriftNoise::OneStep(0.01);
                 t.conditions.stated.drift_noise = true;
             }),
             "random drift (--drift-noise",
