@@ -557,7 +557,7 @@ def verify_optimum(value, data, scheme, blocks=None, seed=None):
         computed, at_least, pivot, left_out = search.value(own)
         need(abs(claimed / computed - 1) <= TOLERANCE, place, f"expected {computed:e}", f"found {claimed}")
         sure = pivot >= SURE_PIVOT and left_out <= undetermined
-        expected = f"expected pivots from {SURE_PIVOT:e} on, and {undetermined} unknowns left out at most"
+        expected = f"expected pivots from {SURE_PIVOT:g} on, and {undetermined} unknowns left out at most"
         need(sure, place, expected, f"found {pivot:e}, {left_out} left out")
         need(at_least <= computed * (1 + TOLERANCE), place, f"expected at least {at_least:e}, its own bound", f"found {claimed}")
     firsts = search.cover(all_blocks, best[0]["value"])

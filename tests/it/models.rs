@@ -313,6 +313,10 @@ fn monsters_do_no_harm() {
     let longer = model(&format!("{}x", "x+".repeat(4_000_000)));
     let error = model_file::read(&longer).expect_err("too many signs");
     assert_eq!(error.to_string(), "the model file: more than 400000 signs + - * / ^");
+    // 4,000 entries with the same 8,000 operations each
+    let long = "name='long'\n[states]\n'v[4000]' = '-v*dot(v,v)'\n[outputs]\ny='v[1]'";
+    let error = model_file::read(long).expect_err("written out");
+    assert!(error.to_string().contains("at most 4000000 names, numbers and operations"), "{error}");
     let sum = model(&format!("{}x", "a*x + ".repeat(20_000)));
     assert_eq!(judged(&sum).findings.degrees.rank(), 2);
     let error = model_file::read(&model("x^123456")).and_then(|m| judge(&m, 1, None)).expect_err("too high");

@@ -12,6 +12,9 @@ use super::expression::{
 };
 use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
 
+/// Most names, numbers and operations of a vector or matrix, all entries written out.
+const MAX_WRITTEN_OUT: usize = 4_000_000;
+
 /// The shapes of names that are no scalars.
 pub type Shapes = HashMap<String, Shape>;
 
@@ -402,7 +405,7 @@ pub struct Components {
 /// [`ExpressionError`] with the place in the text.
 pub fn parse_components(text: &str, shapes: &Shapes) -> Result<Components, ExpressionError> {
     let (read, value) = read(text, Names::Plain, shapes, sum)?;
-    Ok(components(read, &value))
+    components(read, &value, text)
 }
 
 /// Parses `a = b` as `a - b`; `norm(v) = c`, or `|v| = c`, as `dot(v, v) - c^2`, and so every root that
@@ -451,15 +454,25 @@ pub fn parse_equation(
         let square = binary(input, '*', &right, &right)?;
         binary(input, '-', &Value { entries: vec![argument], ..left }, &square)
     })?;
-    Ok((components(read, &value), other_side))
+    Ok((components(read, &value, text)?, other_side))
 }
 
-fn components(read: Reading<'_>, value: &Value) -> Components {
-    let entries = match read.vectors {
-        false => vec![read.expression],
-        true => value.entries.iter().map(|&root| component(&read.expression, root)).collect(),
-    };
-    Components { shape: value.shape, entries }
+fn components(read: Reading<'_>, value: &Value, text: &str) -> Result<Components, ExpressionError> {
+    let mut entries = Vec::with_capacity(value.entries.len());
+    let mut operations = 0;
+    for &root in value.entries.iter().filter(|_| read.vectors) {
+        let entry = component(&read.expression, root);
+        operations += entry.nodes.len();
+        if operations > MAX_WRITTEN_OUT {
+            let expected = format!("at most {MAX_WRITTEN_OUT} names, numbers and operations, entry by entry");
+            return Err(ExpressionError::Shape { expected, found: "more".into(), span: 0..text.len() });
+        }
+        entries.push(entry);
+    }
+    if !read.vectors {
+        entries.push(read.expression);
+    }
+    Ok(Components { shape: value.shape, entries })
 }
 
 /// Reads a whole text by a rule of the grammar.

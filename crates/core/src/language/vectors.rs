@@ -394,23 +394,24 @@ pub(super) fn entry(of: &Value, index: &[usize]) -> Result<usize, Mismatch> {
 
 /// What `root` is made of, alone.
 pub(crate) fn component(e: &Expression, root: usize) -> Expression {
-    let mut used = vec![root];
-    let mut seen = std::collections::HashSet::from([root]);
-    let mut next = 0;
-    while let Some(&i) = used.get(next) {
-        next += 1;
-        e.nodes[i].with(&mut |a| {
-            if seen.insert(a) {
-                used.push(a);
-            }
-            a
-        });
+    // operands stand before what they are operands of
+    let mut used = vec![false; root + 1];
+    used[root] = true;
+    for i in (0..=root).rev() {
+        if used[i] {
+            e.nodes[i].with(&mut |a| {
+                used[a] = true;
+                a
+            });
+        }
     }
-    used.sort_unstable();
-    let place: std::collections::HashMap<usize, usize> =
-        used.iter().enumerate().map(|(k, &i)| (i, k)).collect();
+    let used: Vec<usize> = (0..=root).filter(|&i| used[i]).collect();
+    let mut place = vec![0; root + 1];
+    for (k, &i) in used.iter().enumerate() {
+        place[i] = k;
+    }
     Expression {
-        nodes: used.iter().map(|&i| e.nodes[i].with(&mut |a| place.get(&a).copied().unwrap_or(0))).collect(),
+        nodes: used.iter().map(|&i| e.nodes[i].with(&mut |a| place[a])).collect(),
         spans: used.iter().map(|&i| e.spans[i].clone()).collect(),
     }
 }

@@ -414,6 +414,37 @@ fn searches_beyond_double_precision_are_refused() {
     }
 }
 
+/// Near a pole, with a dwell of seconds, the value of a sequence is rounding: a claim that agrees with the
+/// checker's own computation to all digits is refused all the same, by the pivots.
+#[test]
+fn values_that_are_rounding_are_refused() {
+    let (_, json) = certified(&cardinals(Carry::Platform, 4)).expect("a certificate");
+    let mut python = Python::start();
+    type Checker<'a> = Box<dyn FnMut(&str) -> String + 'a>;
+    let mut checkers: Vec<Checker<'_>> =
+        vec![Box::new(|text| verify(text.as_bytes(), None).expect_err("refused").to_string())];
+    if let Some(python) = &mut python {
+        checkers.push(Box::new(|text| {
+            let (accepted, said) = python.replays(text, 1, 5);
+            assert!(!accepted, "{said}");
+            said
+        }));
+    }
+    for said in &mut checkers {
+        let mut value: Value = serde_json::from_str(&json).expect("JSON");
+        value["best"].as_array_mut().expect("a list").truncate(1);
+        let problem = &mut value["problem"];
+        (problem["latitude_deg"], problem["dwell_s"], problem["samples"]) =
+            (json!("89"), json!(10), json!(5));
+        let first = said(&value.to_string());
+        let computed = first.split("best.0.value: expected ").nth(1).expect(&first);
+        let computed: f64 = computed.split([';', ',']).next().expect("a number").parse().expect(computed);
+        value["best"][0]["value"] = json!(computed);
+        let second = said(&value.to_string());
+        assert!(second.contains("best.0.value: expected pivots from"), "{second}");
+    }
+}
+
 /// Searches that certificates do not cover are refused with a sentence that names what is not covered.
 #[test]
 fn what_certificates_of_optima_do_not_cover() {
