@@ -12,7 +12,7 @@ use obsdeg_exact::SplitMix64;
 use crate::program::{obsdeg, run, stdout};
 
 /// Command lines of each command.
-const DRAWN: usize = 10;
+const DRAWN: usize = 16;
 
 const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
     [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";

@@ -481,6 +481,9 @@ fn what_certificates_of_optima_do_not_cover() {
             }),
             "random drift (--drift-noise",
         ),
+        (with(&|t| t.conditions.dwell_s = 1.0), "a dwell outside 10 s"),
+        (with(&|t| t.conditions.step_s = 0.01), "samples outside 5 to 10,000"),
+        (with(&|t| t.conditions.accelerometer_noise_g = 0.1), "noise outside 1e-9 g"),
     ];
     for (Task { base, conditions, options }, what) in cases {
         let refused = obsdeg_design::design::check_certifiable(&base, &conditions, &options);

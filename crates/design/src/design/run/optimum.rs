@@ -132,6 +132,8 @@ pub fn check_certifiable(
     let psi = || conditions.requirements.iter().any(|r| r.name.starts_with("psi"));
     let limits_psi = options.criterion == CriterionName::Margin && options.required.is_empty() && psi();
     let cardinal = |angles: &Euler| cardinal_name(angles).is_some();
+    let latitude = latitude_of(base).and_then(|l| l.to_string().parse().ok()).map_or(0.0, f64::abs);
+    let samples = steps(conditions.dwell_s, conditions.step_s);
     let noisy = !conditions.gyro_noise.is_none() || conditions.as_stated().drift_noise.amount() > 0.0;
     let found = [
         (options.positions.is_none(), "a search for the fewest positions"),
@@ -150,6 +152,13 @@ pub fn check_certifiable(
         (noisy, "random drift (--drift-noise, [simulation])"),
         (conditions.accelerometer_instability_ug > 0.0, "a bias instability of the accelerometers"),
         (limits_psi, "a requirement on psi"),
+        (!(1.0..=89.0).contains(&latitude), "a latitude within 1 degree of the equator or a pole"),
+        (!(10.0..=1e6).contains(&conditions.dwell_s), "a dwell outside 10 s to 1e6 s"),
+        (
+            !samples.is_ok_and(|n| (5..=10_000).contains(&n)),
+            "samples outside 5 to 10,000 a position (--step)",
+        ),
+        (!(1e-9..=1e-2).contains(&conditions.accelerometer_noise_g), "noise outside 1e-9 g to 1e-2 g"),
     ];
     match found.into_iter().find(|(is, _)| *is) {
         Some((_, what)) => Err(not_covered(what)),
