@@ -462,7 +462,7 @@ def measure(
     Returns
     -------
     Sensors
-        ``front`` from the cheapest set to that of the smallest degree, ``sets``, ``unknowns``, and what proves them.
+        ``front`` from the cheapest set to that of the smallest degree, ``sets``, ``quantities``, and what proves them.
 
     Raises
     ------
@@ -480,8 +480,8 @@ def measure(
     ['b']
     """
     asked: dict[str, Any] = dict(options)
-    if candidates is not None:
-        asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(candidates)
+    # an empty text: the candidates of the model
+    asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(candidates or ())
     log: list[Rounded] = []
     given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
     answer: Sensors = ask((Sensors,), "design", given, log, progress)

@@ -1867,11 +1867,11 @@ class FrontSet(Record):
     """Worst degree: the largest one of the required unknowns."""
     below: int | None
     """Observable degree up to which no cheaper set makes all required unknowns observable; null if no cheaper set does so with any
-    degree.
+    degree that `max_degree` allows.
     """
     one_of_each: list[list[str]]
-    """Proof: every set with degrees of at most `below` holds a candidate of each of these groups, since all candidates outside a group
-    fail together; the cheapest choice has the cost of this set if `examined` is 0.
+    """Proof: every set with degrees of at most `below` and `max_degree` holds a candidate of each of these groups, since all candidates
+    outside a group fail together; the cheapest choice has the cost of this set if `examined` is 0.
     """
     examined: int
     """Number of sets that hold a candidate of each group, cost less than this set, and were judged one by one: all of them fail."""

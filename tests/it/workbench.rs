@@ -16,9 +16,9 @@ use crate::workbench_page::{choose, click, key, opened, quiet, root, says, schem
 fn the_page_is_small_and_asks_for_nothing() {
     let Some((mut browser, page)) = opened(1400) else { return };
     let text = fs::read_to_string(page).expect("the page");
-    // 2.94 MB measured, 0.1 of it multiple shooting, Allan deviations and zstd, 0.07 identifiable functions
-    // and relations; a page that grows past the bound is looked at before the bound is moved
-    assert!(text.len() < 2_960_000, "{} bytes", text.len());
+    // 2.99 MB measured, 0.1 of it multiple shooting, Allan deviations and zstd, 0.07 identifiable functions
+    // and relations, 0.04 sets of outputs; a page that grows past the bound is looked at before it is moved
+    assert!(text.len() < 3_010_000, "{} bytes", text.len());
     // what would be forbidden is refused: the policy is not void
     let refused = browser.value("fetch('https://example.com').then(() => 'sent', () => 'refused')");
     assert_eq!(refused, json!("refused"));

@@ -99,7 +99,9 @@ pub(crate) fn measured(
 /// What sets are chosen from, with the costs that were given.
 fn candidates(a: &MeasureOptions, model: &SystemModel) -> Result<Vec<Candidate>, SensorError> {
     let all = if model.candidates.is_empty() { "states" } else { "candidates" };
-    let mut out = model.candidates_of(a.measure.as_deref().unwrap_or(all))?;
+    // an empty text: those of the model
+    let asked = a.measure.as_deref().filter(|list| !list.trim().is_empty());
+    let mut out = model.candidates_of(asked.unwrap_or(all))?;
     for given in &a.cost {
         let known = out.iter().map(|c| c.named.name.clone()).collect::<Vec<_>>();
         let found = out.iter_mut().find(|c| c.named.name == given.name);

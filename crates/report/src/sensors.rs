@@ -109,9 +109,13 @@ fn sentences(s: &Sensors) -> Vec<String> {
 
 /// What proves that a set of the front is the cheapest.
 fn proof(s: &Sensors, f: &FrontSet) -> String {
+    let asked = match s.max_degree.is_empty() {
+        true => String::new(),
+        false => format!(" within the largest degrees asked for ({})", s.max_degree.join(", ")),
+    };
     let goal = match f.below {
-        Some(below) => format!("with degrees of at most {below}"),
-        None => "that makes them observable".into(),
+        Some(below) => format!("with degrees of at most {below}{asked}"),
+        None => format!("that makes them observable{asked}"),
     };
     let (mut shown, mut members) = (Vec::new(), 0);
     for group in &f.one_of_each {
@@ -149,16 +153,16 @@ fn validity(s: &Sensors) -> Vec<String> {
             "{}; an output more never raises a degree, so every set that does holds one of them",
             count(n, "minimal set")
         ),
-        (None, Some(most)) => format!(
+        (None, Some(most)) if most > 0 => format!(
             "at least {}: all with up to {} are found, not all of more outputs",
             count(s.minimal_sets_found, "minimal set"),
             count(most, "output")
         ),
-        (None, None) => "minimal sets were not all found".into(),
+        _ => "minimal sets were not all found".into(),
     });
     if !s.closed {
         out.push(format!(
-            "no end of the derivatives is proven for some outputs: what is not observable is so up to order {}",
+            "derivatives of some outputs are looked at up to order {} without a proven end: what is not observable is so up to there",
             s.last_order
         ));
     }

@@ -58,6 +58,26 @@ impl SystemModel {
         }
     }
 
+    /// Refuses a candidate of the file with the name of a state, a parameter, an unknown input or an output
+    /// that is something else.
+    pub(super) fn check_candidates(&self) -> Result<(), ModelError> {
+        let states = self.states.iter().map(|s| &s.named.name);
+        let own = states.chain(self.parameters.iter().map(|p| &p.name));
+        let own: Vec<&String> = own.chain(self.unknown_inputs.iter().map(|u| &u.0.name)).collect();
+        for candidate in &self.candidates {
+            let Some(part) = candidate.parts.first() else { continue };
+            let name = &candidate.named.name;
+            let output = self.outputs.iter().find(|o| o.0.name == *name).map(|o| &o.1.text);
+            let base = |other: &&String| other.split('[').next() == Some(name);
+            let taken = own.iter().any(|other| base(other)) && part.text != *name;
+            if taken || output.is_some_and(|text| part.text != *text) {
+                let message = format!("{name} is something else in the model; expected another name");
+                return Err(part.place.error(message, part.expression.span()));
+            }
+        }
+        Ok(())
+    }
+
     /// A candidate that is an expression, or a state, input or parameter by its name.
     fn candidate(&self, text: &str) -> Result<Candidate, ModelError> {
         let own = (self.states.iter().map(|s| &s.named))
@@ -239,6 +259,8 @@ mod tests {
             ("z = { expression = 'x', cost = 'high' }", "expected a cost above 0"),
             ("z = { expression = 'x', price = 1 }", "unknown key `price`"),
             ("z = 'x + nowhere'", "nowhere"),
+            ("x = 'k'", "x is something else"),
+            ("y = 'k'", "y is something else"),
         ] {
             let e = read(&format!("{TEXT}{text}\n")).expect_err("refused");
             assert!(e.to_string().contains(message) && e.span.is_some(), "{e}");

@@ -488,6 +488,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
     }
     model.candidates = r.file_candidates(&in_order(&file.candidates))?;
+    model.check_candidates()?;
     nominal(&r, &outputs, &file.simulation, &mut model)?;
     if let Some(record) = &file.record {
         let inputs: Vec<&str> = model.known_inputs.iter().map(|i| i.0.name.as_str()).collect();

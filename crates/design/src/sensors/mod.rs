@@ -344,6 +344,7 @@ impl Task<'_> {
         let any = !self.required.is_empty();
         if any {
             stopped = self.front(&mut front).err();
+            complete = if stopped.is_some() { 0 } else { complete };
             if front.is_empty() && stopped == Some(Stopped::Interrupted) {
                 return Err(SensorError::Interrupted);
             }
