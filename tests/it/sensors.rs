@@ -348,9 +348,10 @@ fn three_states_of_nfkb_are_not_enough_one_by_one() {
     }
 }
 
-/// Any outputs of random linear chains of 20 states, with costs: a front within its limits.
+/// Fronts of four reference models with 20 candidates, states and sums of states, are searched to their end.
 #[test]
 #[ignore = "a minute: fronts of reference models with 20 candidates"]
+#[expect(clippy::print_stdout, reason = "the figures of a long run")]
 fn fronts_of_twenty_candidates() {
     for name in ["mapk_6out", "nfkb_all_symbolic", "jak_stat_bachmann", "akt_fujita"] {
         let model = named(name);

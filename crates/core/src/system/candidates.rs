@@ -69,7 +69,7 @@ impl SystemModel {
             let name = &candidate.named.name;
             let output = self.outputs.iter().find(|o| o.0.name == *name).map(|o| &o.1.text);
             let base = |other: &&String| other.split('[').next() == Some(name);
-            let taken = own.iter().any(|other| base(other)) && part.text != *name;
+            let taken = own.iter().any(base) && part.text != *name;
             if taken || output.is_some_and(|text| part.text != *text) {
                 let message = format!("{name} is something else in the model; expected another name");
                 return Err(part.place.error(message, part.expression.span()));
