@@ -102,7 +102,12 @@ fn candidates(a: &MeasureOptions, model: &SystemModel) -> Result<Vec<Candidate>,
     // an empty text: those of the model
     let asked = a.measure.as_deref().filter(|list| !list.trim().is_empty());
     let mut out = model.candidates_of(asked.unwrap_or(all))?;
-    for given in &a.cost {
+    for (i, given) in a.cost.iter().enumerate() {
+        if a.cost[..i].iter().any(|other| other.name == given.name) {
+            let what = format!("the cost of {}", given.name);
+            let message = "it is given twice; expected one --cost for each candidate".into();
+            return Err(ModelError { what, message, span: None }.into());
+        }
         let known = out.iter().map(|c| c.named.name.clone()).collect::<Vec<_>>();
         let found = out.iter_mut().find(|c| c.named.name == given.name);
         let none = || ModelError {

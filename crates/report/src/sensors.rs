@@ -1,9 +1,10 @@
 //! Sets of outputs of a model.
 
-use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors};
+use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors, Unattainable};
 
 use crate::Answer;
 use crate::document::{Block, Document, left, right};
+use crate::stated::capital;
 use crate::words;
 
 /// Most members of the groups of a proof that are shown.
@@ -20,12 +21,6 @@ fn set(outputs: &[String]) -> String {
         true => "none".into(),
         false => outputs.join(", "),
     }
-}
-
-/// A text that begins a sentence.
-fn capital(text: &str) -> String {
-    let mut rest = text.chars();
-    rest.next().map_or_else(String::new, |first| first.to_uppercase().chain(rest).collect())
 }
 
 /// A cost without zeros at its end.
@@ -97,12 +92,12 @@ fn sentences(s: &Sensors) -> Vec<String> {
         ));
     }
     if !s.unattainable.is_empty() {
-        let word = |u: &obsdeg_design::sensors::Unattainable| match u.degree {
-            Some(k) => format!("{} (degree {k} with all)", u.name),
-            None => u.name.clone(),
+        let word = |u: &Unattainable| match u.degree {
+            Some(k) => format!("{} (degree {k} with all candidates)", u.name),
+            None => format!("{} (not observable with all candidates)", u.name),
         };
         let list: Vec<String> = s.unattainable.iter().map(word).collect();
-        out.push(format!("No set of the candidates does that for {}", list.join(", ")));
+        out.push(format!("No set of the candidates reaches {}", list.join(", ")));
     }
     out
 }
@@ -132,12 +127,13 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
     };
     let judged = match f.examined {
         0 => String::new(),
-        n => format!("; the {} that do and are cheaper fail one by one", count(n, "set")),
+        n => format!("; the {} of this kind that cost less fail one by one", count(n, "set")),
     };
     match shown.is_empty() {
         true => format!("{}: nothing is cheaper", price(s, f)),
         false => format!(
-            "{}: every set {goal} holds a candidate of {}{more}, since all candidates outside one of these groups fail together{judged}",
+            "{}: every set {goal} contains a candidate of {}{more}, because all candidates outside any of \
+             these groups fail together{judged}",
             price(s, f),
             shown.join(", of ")
         ),
@@ -150,19 +146,22 @@ fn validity(s: &Sensors) -> Vec<String> {
     out.extend(s.stopped.as_ref().map(|reason| format!("the search ended early: {reason}")));
     out.push(match (s.minimal_sets, s.complete_to) {
         (Some(n), _) => format!(
-            "{}; an output more never raises a degree, so every set that does holds one of them",
-            count(n, "minimal set")
+            "{}: every set that makes {} observable contains one of them, because an additional output \
+             never raises a degree",
+            count(n, "minimal set"),
+            about(s)
         ),
         (None, Some(most)) if most > 0 => format!(
-            "at least {}: all with up to {} are found, not all of more outputs",
+            "at least {}: those of up to {} are all found, larger ones are not",
             count(s.minimal_sets_found, "minimal set"),
             count(most, "output")
         ),
-        _ => "minimal sets were not all found".into(),
+        _ => "minimal sets were not searched".into(),
     });
     if !s.closed {
         out.push(format!(
-            "derivatives of some outputs are looked at up to order {} without a proven end: what is not observable is so up to there",
+            "derivatives of some outputs are computed up to order {} without a proven end: \
+             \"not observable\" means up to this order",
             s.last_order
         ));
     }

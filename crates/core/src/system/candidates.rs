@@ -180,7 +180,9 @@ pub fn check_cost(cost: f64) -> Result<(), String> {
     let steps = cost * 1e6;
     match (1.0..=1e12).contains(&steps) && (steps - steps.round()).abs() < 1e-3 {
         true => Ok(()),
-        false => Err("expected a cost above 0 and up to 1000000, with at most 6 decimals".into()),
+        false => {
+            Err(format!("found {cost}; expected a cost above 0 and up to 1000000, with at most 6 decimals"))
+        }
     }
 }
 

@@ -98,7 +98,15 @@ pub enum SensorError {
         /// Those that there are.
         known: Vec<String>,
     },
-    /// A cost that is none.
+    /// Largest degree of an unknown that is not required.
+    #[error("a largest degree of {name} does nothing, because {name} is not required; expected one of {}", required.join(", "))]
+    NotRequired {
+        /// The unknown.
+        name: String,
+        /// Required unknowns.
+        required: Vec<String>,
+    },
+    /// A cost outside its range.
     #[error("the cost of {name}: {expected}")]
     Cost {
         /// The candidate.
@@ -252,6 +260,12 @@ impl Task<'_> {
         };
         required.sort_unstable();
         required.dedup();
+        for name in self.options.max_degree.iter().filter_map(|(name, _)| name.as_ref()) {
+            if !self.named(name)?.iter().any(|u| required.contains(u)) {
+                let required = self.options.required.clone();
+                return Err(SensorError::NotRequired { name: name.clone(), required });
+            }
+        }
         let everything = self.search.all;
         let reached = self.search.degrees(everything).map_err(|_| SensorError::Interrupted)?.to_vec();
         let (reach, never): (Vec<usize>, Vec<usize>) =
