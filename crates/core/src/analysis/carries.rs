@@ -12,7 +12,7 @@ use crate::findings::AnalysisError;
 use crate::model::platform::Platform;
 use crate::model::{Carry, Scheme, SchemeError, Unknowns};
 
-/// Verdicts under one carry: by name of an unknown, and of psi at positions.
+/// Verdicts under one carry, with the names of their unknowns and of psi at positions.
 struct Named {
     names: Vec<String>,
     verdicts: Vec<Verdict>,
@@ -24,7 +24,7 @@ impl Named {
     }
 }
 
-/// Verdicts under the other carries, and reasons for those that are left out.
+/// Verdicts under the other carries, and reasons for omitted ones.
 pub(super) fn carry_reports(
     platform: &Platform,
     judged: &Verdicts,
@@ -78,9 +78,9 @@ pub(super) fn carry_reports(
     Ok((out, untold))
 }
 
-/// The verdicts of a scheme that is not under reset carry, with those on psi of every position, `psi_x@2`; of
-/// the first alone where rotations are judged by their course, since psi behind one is no combination of the
-/// unknowns with known numbers.
+/// Verdicts of a scheme that is not under reset carry, with verdicts on psi of every position, `psi_x@2`.
+/// Where rotations are judged by their output history only the first position is included: psi after a
+/// rotation is no combination of the unknowns with known numbers.
 fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> Named {
     let (scheme, names) = (platform.scheme(), platform.names());
     let sample = judged.values[0].sample(scheme, 1);

@@ -33,7 +33,7 @@ use crate::solution::solver::{Frame, Functional, Solver};
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.analysis/1";
 
-/// What is to be computed.
+/// Contents and seed of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AnalysisOptions {
     /// Seed of all random choices.
@@ -71,7 +71,7 @@ pub fn analyze(
     let mut solver = judged.solver(options.frame, worker);
     let findings = judged.findings(&mut solver);
 
-    // derivatives of Z while the platform turns with such errors hold its rate
+    // with torquer or accelerometer errors, derivatives of Z during a turn contain its rate
     let course = scheme.by_course();
     let printed = AnalysisOptions { solutions: options.solutions && !course, ..options };
     let mut printer = Printer { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
@@ -80,7 +80,7 @@ pub fn analyze(
     let combinations: Vec<CombinationReport> =
         findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
     let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
-    // without an engine, and without a reason of their own
+    // true if no engine was available and the loci gave no reason of their own
     let untold_loci = found.is_ok();
     let found = printer.noted(found).unwrap_or_default();
     let generic = !scheme.generic_names().is_empty();
@@ -155,7 +155,7 @@ pub fn analyze(
     })
 }
 
-/// Turns functionals into printed solutions and collects what could not be said.
+/// Turns functionals into printed solutions, and collects notes about those without one.
 struct Printer<'a> {
     solver: Solver<'a>,
     options: AnalysisOptions,
@@ -186,7 +186,7 @@ impl Printer<'_> {
         }
     }
 
-    /// The value, or a note.
+    /// Value of a result; an error becomes a note.
     fn noted<T>(&mut self, result: Result<T, impl std::error::Error>) -> Option<T> {
         result.map_err(|reason| self.notes.push(reason.to_string())).ok()
     }
@@ -303,7 +303,7 @@ impl Wanting {
         !self.parts().is_empty()
     }
 
-    /// A clause for each kind.
+    /// One clause for each kind of missing part.
     fn parts(&self) -> Vec<String> {
         let count =
             |n: usize, one: &str, many: &str| if n == 1 { one.to_string() } else { format!("{n} {many}") };
@@ -331,7 +331,8 @@ impl Wanting {
     }
 }
 
-/// Says what is missing since the symbolic engine gave no formulas, and why; `None` where that is not why.
+/// Note on the parts that are missing because the symbolic engine gave no formulas, with the reason; `None`
+/// where nothing is missing for that reason.
 fn engine_note(built: bool, solver: &mut Solver<'_>, wanting: &Wanting) -> Option<String> {
     let failure = solver.worker().and_then(|w| w.failure().cloned());
     let why = match failure {
@@ -352,7 +353,7 @@ fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, Analysis
 
 /// The same scheme with a name for every angle; `None` when some are names already.
 fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
-    // the angle of a slew is none of its sines and cosines
+    // the angle of a slew is not determined by its sine and cosine
     if !scheme.generic_names().is_empty() || scheme.unknowns == Unknowns::Drift || scheme.torquers_act() {
         return None;
     }
@@ -365,7 +366,7 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
     Some(out)
 }
 
-/// What the unknown terms of a scheme cannot but mean, whatever its verdicts are.
+/// Notes on ambiguities of the unknown terms, which hold whatever the verdicts are.
 pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     let terms = scheme.unknowns.terms();
     let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));

@@ -11,11 +11,12 @@ use crate::model::platform::{Platform, RandomValues};
 use crate::model::{Position, Unknowns};
 use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
 
-/// Most unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half a verdict.
+/// Largest number of unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half
+/// a verdict.
 const MOST_UNKNOWNS: usize = 120;
-/// Most values that are tried as known.
+/// Largest number of values tried as known.
 const MOST_KNOWN: usize = 64;
-/// Most pairs that the engine judges.
+/// Largest number of pairs that the engine judges.
 const MOST_PAIRS: usize = 12;
 
 /// Bases of `V_0, V_1, ...` in the two fields of a verdict.
@@ -36,13 +37,13 @@ struct Search<'a> {
 struct Candidate {
     attitude: String,
     degrees: Vec<Option<usize>>,
-    /// Rows of the attitude in the unobservable directions; `None` where the two schemes have no random
-    /// values in common.
+    /// Rows of the attitude in the unobservable directions; `None` where the two schemes share no random
+    /// values.
     tells: Option<Told<Field>>,
 }
 
-/// The remedies of a scheme that was judged. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs
-/// of each kind are tried.
+/// Remedies of a judged scheme. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs of each
+/// kind are tried.
 pub(super) fn remedies(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -96,7 +97,7 @@ fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>
     (first == second).then_some(first)
 }
 
-/// The entries of rows of a longer scheme in the unobservable directions; `places` are the columns of this
+/// Entries of the rows of a longer scheme in the unobservable directions; `places` are the columns of this
 /// scheme's unknowns. Unknowns of the new position alone are eliminated.
 fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Told<Field> {
     let own: Vec<usize> = (0..space.columns()).filter(|k| !places.contains(k)).collect();
@@ -116,13 +117,14 @@ impl Search<'_> {
         self.platform.names()[c].clone()
     }
 
-    /// Unknowns that no remedy resolves so far.
+    /// Unknowns without a remedy so far.
     fn left(&self) -> Vec<usize> {
         let left = |c: &usize| !self.out.resolves(&self.platform.names()[*c]);
         self.open.iter().copied().filter(left).collect()
     }
 
-    /// Enters what the engine found of a changed scheme, by the names of its unknowns; what it resolves.
+    /// Records the verdicts on a changed scheme, by the names of its unknowns. Returns the unknowns that the
+    /// changes resolve.
     fn enter(&mut self, changes: Vec<Change>, names: &[String], degrees: &[Option<usize>]) -> Vec<usize> {
         self.out.verdicts += 1;
         let given = |name: &str| changes.iter().any(|c| c.known() == Some(name));
@@ -144,7 +146,7 @@ impl Search<'_> {
         Change::Known { name: self.name(c) }
     }
 
-    /// One value known, wherever that resolves another unknown.
+    /// Tries each value as known, and keeps those that resolve another unknown.
     fn known(&mut self, directions: &Directions<Field>) {
         let others = |w: &usize| !directions.resolved(&directions.known(&[*w]), &self.open).is_empty();
         let mut candidates: Vec<usize> = self.open.iter().copied().filter(others).collect();
@@ -161,8 +163,8 @@ impl Search<'_> {
         }
     }
 
-    /// The scheme with more cardinal attitudes at its end; `None` where they cannot be added, beyond a gimbal
-    /// for instance.
+    /// The scheme with more cardinal attitudes at its end; `None` where they cannot be added, for instance
+    /// beyond a gimbal limit.
     fn with(&self, attitudes: &[&str]) -> Option<Platform> {
         let mut scheme = self.platform.scheme().clone();
         for attitude in attitudes {
@@ -186,7 +188,7 @@ impl Search<'_> {
         attitudes.iter().enumerate().map(change).collect()
     }
 
-    /// One more cardinal attitude: of the 24 those that together resolve most, as few as possible.
+    /// Tries one more cardinal attitude: keeps the fewest of the 24 that together resolve most unknowns.
     fn attitudes(&mut self, directions: &Directions<Field>) -> Vec<Candidate> {
         let n = self.platform.names().len();
         if self.platform.scheme().unknowns == Unknowns::Drift {
@@ -214,7 +216,7 @@ impl Search<'_> {
         candidates
     }
 
-    /// Judges the scheme with more attitudes; what that resolves.
+    /// Judges the scheme with more attitudes. Returns the unknowns that they resolve.
     fn judge_attitudes(&mut self, attitudes: &[&str]) -> Vec<usize> {
         let Some(platform) = self.with(attitudes) else { return Vec::new() };
         let Ok(Degrees { degree, .. }) = degrees(&platform, self.seed) else { return Vec::new() };
@@ -225,8 +227,7 @@ impl Search<'_> {
     fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<Candidate> {
         let platform = self.with(&[attitude])?;
         let scheme = platform.scheme();
-        // where turns between positions or rates of rotations take part, random values are drawn for each
-        // scheme
+        // with turns between positions or rates of rotations, each scheme draws its own random values
         let own = scheme.torquers_act() || scheme.by_course();
         let drawn;
         let values = match own {
@@ -248,11 +249,11 @@ impl Search<'_> {
         })
     }
 
-    /// Another carry, as it was judged already.
+    /// Tries the other carries, by the verdicts already found.
     fn carries(&mut self, carries: &[CarryReport]) {
         for report in carries {
             self.out.verdicts += 1;
-            // psi of a position under reset carry is an unknown of its own
+            // psi of a position is an unknown only under reset carry
             let resolves = report.differs.iter().filter(|d| d.here.degree.is_none() && !d.name.contains('@'));
             let resolves: Vec<Resolved> = resolves
                 .filter_map(|d| Some(Resolved { name: d.name.clone(), degree: d.there.degree? }))
@@ -266,7 +267,8 @@ impl Search<'_> {
         }
     }
 
-    /// Two changes for what no single one resolves: two attitudes, an attitude and a value, two values.
+    /// Tries two changes for unknowns that no single one resolves: two attitudes, an attitude and a value,
+    /// two values.
     fn two(&mut self, directions: &Directions<Field>, candidates: Vec<Candidate>) {
         if candidates.iter().any(|c| c.tells.is_none()) && !self.left().is_empty() {
             let text = "two changes with an attitude among them: the turn to it acts as well";
