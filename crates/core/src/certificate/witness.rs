@@ -1,5 +1,5 @@
-//! The witness that rows give in one field, and the derivative rows of a scheme by definition, `H_c F^k
-//! S_i`.
+//! The witness that rows give in one field, and the derivative rows of a scheme by definition,
+//! `H_c F^k S_i`.
 
 use obsdeg_exact::{Echelon, Field};
 

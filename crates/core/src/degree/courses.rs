@@ -270,8 +270,8 @@ fn psi_dynamics(field: &Field, w_n: u64, w_u: u64) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| local[i][j]))
 }
 
-/// Ring of the trigonometric polynomials of an angle with coefficients in a field: coefficients of `exp(i j
-/// angle)` for j in `-degree..=degree`.
+/// Ring of the trigonometric polynomials of an angle with coefficients in a field: coefficients of
+/// `exp(i j angle)` for j in `-degree..=degree`.
 struct Harmonics<'a> {
     field: &'a Field,
     degree: usize,

@@ -18,8 +18,8 @@ pub struct LocalRow {
     pub row: [u64; LOCAL],
 }
 
-/// Rows of `H F^k` that raise the rank of one position, order by order until the rank stalls. Since `V_{k+1}
-/// = V_k + V_k F`, only the new rows of order k need a derivative.
+/// Rows of `H F^k` that raise the rank of one position, order by order until the rank stalls. Since
+/// `V_{k+1} = V_k + V_k F`, only the new rows of order k need a derivative.
 pub fn local_chain(field: &Field, w_n: u64, w_u: u64, observed: Observed) -> Vec<LocalRow> {
     chain_of(field, [w_n, w_u], local_output(field, observed), observed.locals())
 }

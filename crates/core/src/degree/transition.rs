@@ -44,8 +44,8 @@ pub(crate) fn transition(ring: &SeriesRing, w_n: u64, w_u: u64, ratio: u64) -> [
     out
 }
 
-/// Transition matrix at a random time. `T`, `cos wT` and `sin wT` are independent except for `cos^2 + sin^2
-/// = 1`, so a random point of the circle stands for any dwell.
+/// Transition matrix at a random time. `T`, `cos wT` and `sin wT` are independent except for
+/// `cos^2 + sin^2 = 1`, so a random point of the circle stands for any dwell.
 pub(crate) struct AtATime {
     field: Field,
     /// Random time `T`.

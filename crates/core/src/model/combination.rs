@@ -8,7 +8,7 @@ use super::symbols::Symbols;
 use super::{Angle, Platform};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 
-/// What the names of a combination stand for.
+/// Names in a combination and their meanings.
 pub(crate) struct Names<'a> {
     pub(crate) unknowns: &'a [String],
     generic: Vec<String>,
@@ -28,7 +28,7 @@ impl<'a> Names<'a> {
     }
 }
 
-/// `n = s^2 m` with m one of 1, 2, 3, 6: s and the place of `sqrt m` in a radical.
+/// Square root of `n = s^2 m` with m one of 1, 2, 3, 6: s and the index of `sqrt m` in a radical.
 pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
     let n = i64::from(n);
     [1, 2, 3, 6].into_iter().enumerate().find_map(|(i, m)| {
@@ -42,7 +42,7 @@ struct Unit<'a> {
     names: &'a Names<'a>,
     values: &'a RandomValues,
     sample: &'a Sample,
-    /// The value of each unknown.
+    /// Value of each unknown.
     unknowns: &'a [u64],
     rates: [u64; 2],
 }
@@ -72,7 +72,7 @@ impl Environment for Unit<'_> {
     }
 }
 
-/// One point at which a combination is looked at.
+/// Point at which a combination is evaluated.
 pub(crate) struct At<'a> {
     pub(crate) values: &'a RandomValues,
     pub(crate) sample: &'a Sample,
@@ -85,8 +85,8 @@ impl At<'_> {
     }
 }
 
-/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of
-/// its parts at random values.
+/// The coefficients of a linear expression at one point, or the reason why it is not linear. It is linear if
+/// it equals the sum of its parts at random values.
 pub(crate) fn row_of(
     expression: &Expression,
     names: &Names<'_>,
@@ -100,7 +100,7 @@ pub(crate) fn row_of(
     };
     let zero = vec![0; n];
     let unit = |c: usize| -> Vec<u64> { (0..n).map(|j| if j == c { f.one() } else { 0 }).collect() };
-    // what it does not name has no part in it
+    // unknowns that it does not name have coefficient zero
     let named = |c: usize| {
         expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names.unknowns[c]))
     };
@@ -111,7 +111,7 @@ pub(crate) fn row_of(
     };
     let probe: Vec<u64> = (0..n).map(|_| rng.below(f.modulus())).collect();
     let there = at(&probe)?;
-    // what can be divided by there, but not where unknowns are zero, has unknowns in it
+    // an expression that can be divided by there, but not where the unknowns are zero, contains unknowns
     let divided = |e: ExpressionError| match e {
         ExpressionError::DivisionByZero { .. } => not_linear(),
         other => other,
@@ -125,8 +125,8 @@ pub(crate) fn row_of(
     if linear { Ok(row) } else { Err(not_linear()) }
 }
 
-/// Refuses a combination that is zero, whatever the unknowns and the rates are: `row` is its row at rates
-/// that were drawn.
+/// Refuses a combination that is zero for all values of the unknowns and rates; `row` is its row at random
+/// rates.
 pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), ExpressionError> {
     if row.iter().any(|x| *x != 0) {
         return Ok(());
@@ -138,8 +138,7 @@ pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), Expre
     })
 }
 
-/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are
-/// known.
+/// Checks that a text is a linear combination of the unknowns of `platform`, with known coefficients.
 pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionError> {
     let parsed = parse(text)?;
     let mut rng = SplitMix64::of(1, "combination", &[text]);

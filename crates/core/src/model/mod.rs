@@ -1,4 +1,4 @@
-//! What can be judged: the platform of the paper, and how it is written down.
+//! The platform of the paper: schemes, their notation, and the model in any ring.
 
 pub(crate) mod angle;
 pub(crate) mod attitude;

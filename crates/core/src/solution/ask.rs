@@ -1,4 +1,4 @@
-//! What the solver asks of the symbolic worker.
+//! Requests of the solver to the symbolic worker.
 
 use obsdeg_exact::Radical;
 use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protocol::CheckTerm};
@@ -28,7 +28,7 @@ impl Solver<'_> {
         Some(self.ask(&request)?.0)
     }
 
-    /// Asks for a formula; after one that was too much work no other is attempted.
+    /// Requests a formula; after one that exceeded the limit of work no other is requested.
     fn ask(&mut self, request: &Request) -> Option<(Vec<String>, bool)> {
         let answer = self.worker.as_deref_mut()?.ask(request);
         if matches!(answer, Err(WorkerError::OverLimit { .. })) {
@@ -41,8 +41,8 @@ impl Solver<'_> {
         (!self.text.is_empty()).then(|| self.text.clone())
     }
 
-    /// The numbers of the printed terms as text, solved and verified by the worker; `None` when there
-    /// is none, or the job failed.
+    /// Numbers of the printed terms as text, solved and verified by the worker; `None` if there are none, or
+    /// if the job failed.
     pub(super) fn ask_for_solution(
         &mut self,
         functional: &Functional,

@@ -1,4 +1,4 @@
-//! Small linear systems whose support is known, solved in a prime field, in floats, or as text.
+//! Small linear systems of known support, solved in a prime field, in floats, or as text.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_exact::{Field, echelon::express};
@@ -6,22 +6,22 @@ use obsdeg_symbolic::System;
 
 use crate::model::ring::{Float, ManyDigits, Real, Ring, Text};
 
-/// `M x = b` with entries out of the table of observable rows, and the outputs `P x`.
+/// Linear system `M x = b` with entries from the table of observable rows, and the outputs `P x`.
 ///
-/// Every entry is a place `(row, column)` of that table, so one problem is posed once and solved in
-/// any ring.
+/// Every entry is a place `(row, column)` of that table, so a system is stated once and solved in any
+/// ring.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Problem {
     /// Number of unknowns.
     pub unknowns: usize,
-    /// One equation per row: the unknowns that occur with the places of their coefficients, and its right
-    /// side.
+    /// Equations, one per row of M: the unknowns that occur with the places of their coefficients, and the
+    /// right side.
     pub equations: Vec<(Vec<(usize, Place)>, Right)>,
-    /// The outputs: the unknowns themselves, or sums of places times unknowns.
+    /// Outputs: the unknowns themselves, or sums of places times unknowns.
     pub outputs: Outputs,
 }
 
-/// The right side of an equation.
+/// Right side of an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Right {
     /// Zero.
@@ -30,7 +30,7 @@ pub(crate) enum Right {
     One,
     /// Minus the entry at a place.
     Minus(Place),
-    /// An entry of the target.
+    /// Entry of the target at a column.
     Target(usize),
 }
 
@@ -45,40 +45,41 @@ impl Right {
     }
 }
 
-/// A place `(row, column)` in the table of observable rows.
+/// Place `(row, column)` in the table of observable rows.
 pub(crate) type Place = (usize, usize);
 
-/// What is asked of the solution.
+/// Outputs of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Outputs {
-    /// The unknowns.
+    /// Outputs are the unknowns.
     Unknowns,
-    /// `sum_i place_i x_i`, one per row.
+    /// Outputs are sums `sum_i place_i x_i`, one per row.
     Sums(Vec<Vec<Place>>),
 }
 
-/// What the turning of a platform adds to a solution: rows `rows` in the amounts `z` with
-/// `sum_i z_i rows[i] = sum_j y_j motion_j` over some unknowns `y_j` of the solution, given with their rows
-/// of minus the motion.
+/// Correction of a solution for the turning of the platform: amounts `z` of the rows `rows` with
+/// `sum_i z_i rows[i] = sum_j y_j motion_j`. The `y_j` are unknowns of the solution, listed with the rows of
+/// minus their motion.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Motion {
-    /// Independent rows that span it.
+    /// Independent rows that span the motion.
     pub rows: Vec<usize>,
-    /// `(j, row of minus motion_j)`.
+    /// Unknowns of the solution with their motions: `(j, row of minus motion_j)`.
     pub of: Vec<(usize, usize)>,
 }
 
-/// Unknowns in order, each with its place.
+/// Unknowns in order, each with the place of its coefficient.
 fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
     places.enumerate().collect()
 }
 
-/// Six digits are printed.
+/// Largest effect of rounding on a value, relative to the largest value; six digits are printed.
 const CERTAIN: f64 = 1e-9;
 
 impl Problem {
-    /// `y` with `sum_j y_j rows[j] = target`, for the given rows (independent, so `y` is unique). The right
-    /// sides are the target's entries, column by column. Behind `y` stand the unknowns of every motion.
+    /// System of the solution `y` with `sum_j y_j rows[j] = target`. The given rows are independent, so `y`
+    /// is unique. The right sides are the target's entries, column by column. The unknowns of every motion
+    /// follow after `y`.
     pub(crate) fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
         let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), Right::Target(c));
         let mut equations: Vec<_> = (0..columns).map(equation).collect();
@@ -94,7 +95,7 @@ impl Problem {
         Self { unknowns, equations, outputs: Outputs::Unknowns }
     }
 
-    /// The combination of the given rows that vanishes outside `support` and is one at `lead`.
+    /// System of the combination of the given rows that vanishes outside `support` and is one at `lead`.
     /// Outputs: its entries on `support`.
     pub(crate) fn combination(rows: &[usize], columns: usize, support: &[usize], lead: usize) -> Self {
         let places = |c: usize| -> Vec<Place> { rows.iter().map(|&j| (j, c)).collect() };
@@ -106,8 +107,8 @@ impl Problem {
         Self { unknowns: rows.len(), equations, outputs: Outputs::Sums(sums) }
     }
 
-    /// The vector on `support` that all the given rows annihilate, without its lead entry, which is
-    /// one: `sum_c row[c] v_c = -row[lead]`.
+    /// System of the vector on `support` that all the given rows annihilate, without its lead entry, which
+    /// is one: `sum_c row[c] v_c = -row[lead]`.
     pub(crate) fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
         let equation = |&j: &usize| (numbered(others.iter().map(|&c| (j, c))), Right::Minus((j, lead)));
@@ -133,7 +134,7 @@ impl Problem {
         }
     }
 
-    /// The outputs in a prime field; `None` when there is no solution.
+    /// Outputs in a prime field; `None` if there is no solution.
     pub(crate) fn solve_in_field(&self, f: &Field, table: &[Vec<u64>], targets: &[u64]) -> Option<Vec<u64>> {
         let mut columns = vec![vec![0; self.equations.len()]; self.unknowns];
         for (e, (places, _)) in self.equations.iter().enumerate() {
@@ -147,9 +148,9 @@ impl Problem {
         Some(self.outputs_of(f, table, x))
     }
 
-    /// The outputs in many digits, by elimination with the largest pivot; `None` when a pivot is not told
-    /// from zero, or an output is not known to all digits of a double. The system has a solution: that is
-    /// known from the prime fields.
+    /// Outputs in many digits, by elimination with the largest pivot. `None` if a pivot is not distinguished
+    /// from zero, or an output is not known to all digits of a double. The prime fields have shown that
+    /// there is a solution.
     pub(crate) fn solve_in_many_digits(&self, table: &[Vec<Real>]) -> Option<Vec<f64>> {
         let ring = ManyDigits;
         let equation = |(places, right): &(Vec<(usize, Place)>, Right)| {
@@ -180,9 +181,9 @@ impl Problem {
         self.outputs_of(&ring, table, x).iter().map(ManyDigits::to_f64).collect()
     }
 
-    /// The outputs in floats, by least squares (QR); `None` when the residual exceeds 1e-9 of the right side,
-    /// when the rounding of the table alone may move a value by more than [`CERTAIN`] of the largest, or
-    /// anything is not finite.
+    /// Outputs in floats, by least squares (QR). `None` if the residual exceeds 1e-9 of the right side, if
+    /// the rounding of the table alone may change a value by more than [`CERTAIN`] of the largest, or if a
+    /// number is not finite.
     pub(crate) fn solve_in_floats(&self, table: &[Vec<f64>], targets: &[f64]) -> Option<Vec<f64>> {
         let m = self.equations.len();
         let mut a = DMatrix::zeros(m, self.unknowns);
@@ -197,7 +198,7 @@ impl Problem {
         let (q, r) = (qr.q(), qr.r());
         let x = r.solve_upper_triangular(&(q.transpose() * &b))?;
         let residual = (&a * &x - &b).norm();
-        // |A^+| (|A| |x| + |b|): what relative errors of the entries make of x
+        // |A^+| (|A| |x| + |b|): errors of x by relative errors of the entries
         let inverse = r.solve_upper_triangular(&q.transpose())?;
         let moved = inverse.abs() * (a.abs() * x.abs() + b.abs()) * f64::EPSILON;
         let certain = moved.amax() <= CERTAIN * x.amax();

@@ -1,4 +1,5 @@
-//! What a scheme file holds, as TOML reads it: every value with its place. The JSON Schema comes from here.
+//! Layout of a scheme file, as TOML reads it: every value with its byte range. The JSON Schema is derived
+//! from it.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,7 @@ use crate::model::scheme::Carry;
 use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
 use crate::model::terms::{DefinedBy, Term};
 
-/// A number as it is written.
+/// Value as written: a number or text, with its byte range.
 pub(super) type Literal = Option<Spanned<toml::Value>>;
 /// Numbers by unknown or family.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
@@ -250,20 +251,20 @@ pub(super) struct GimbalEntry {
     pub(super) gamma_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
 }
 
-/// The directions of an axis to turn about.
+/// Names of the axes of a turn.
 const AXES: [&str; 6] = ["X_p", "Y_p", "Z_p", "N", "U", "E"];
 
-/// Degrees, or the name of a generic angle with an offset.
+/// JSON Schema of an angle: degrees, or the name of a generic angle with an offset.
 fn angle() -> serde_json::Value {
     serde_json::json!({ "anyOf": [{ "type": "number" }, { "type": "string" }] })
 }
 
-/// Numbers of a range.
+/// JSON Schema of the numbers in a range.
 fn within(range: ranges::Range) -> serde_json::Value {
     serde_json::json!({ "type": "number", "minimum": range.low, "maximum": range.high })
 }
 
-/// Numbers up to the end of a range.
+/// JSON Schema of zero and the numbers up to the end of a range.
 fn none_or(range: ranges::Range) -> serde_json::Value {
     serde_json::json!({ "type": "number", "minimum": 0, "maximum": range.high })
 }

@@ -1,4 +1,4 @@
-//! A scheme as a file that reads as the same scheme.
+//! Writer of scheme files: the text of a scheme, from which the same scheme is read.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
 use crate::model::{Geometry, PerGyro, Recording, SlewAxis, Unknowns};
 
-/// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
+/// Text of a scheme file. Reading it gives the scheme again; a comment may precede it.
 pub fn write(scheme: &Scheme) -> String {
     let mut out = String::new();
     for (key, text) in [("name", &scheme.name), ("description", &scheme.description)] {
@@ -72,14 +72,14 @@ fn list(items: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", items.into_iter().collect::<Vec<_>>().join(", "))
 }
 
-/// A table, unless it is empty.
+/// Writes a table, unless it is empty.
 fn table(out: &mut String, name: &str, lines: &str) {
     if !lines.is_empty() {
         let _ = write!(out, "\n[{name}]\n{lines}");
     }
 }
 
-/// A number as TOML has it: the shortest that reads as the same double.
+/// Number in TOML: the shortest text that reads as the same double.
 fn number(x: f64) -> String {
     match x {
         x if x == 0.0 || (1e-3..1e15).contains(&x.abs()) => format!("{x}"),
@@ -87,7 +87,7 @@ fn number(x: f64) -> String {
     }
 }
 
-/// A text in quotes, with what would end it or is no character of a line escaped.
+/// Text in quotes; quotes, backslashes and control characters are escaped.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
@@ -108,7 +108,7 @@ fn quoted(text: &str) -> String {
 fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
     let mut lines = String::new();
     for (key, x) in given {
-        // names hold `@` and `^` too
+        // names may contain `@` and `^`
         line(&mut lines, &quoted(key), &number(*x));
     }
     table(out, name, &lines);
@@ -343,7 +343,8 @@ mod tests {
             if scheme.validate().is_ok() {
                 match read(&text) {
                     Ok(back) => prop_assert_eq!(back, scheme, "{}", text),
-                    // under reset carry psi has a position; where torquers act, a turn needs an exact form
+                    // under reset carry psi belongs to a position; where torquers act, a turn needs an exact
+                    // form
                     Err(e) => prop_assert!(
                         e.message.contains("no such unknown")
                             || scheme.torquers_act() && e.message.contains("has no exact form"),
