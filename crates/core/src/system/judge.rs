@@ -1,4 +1,4 @@
-//! Verdicts on any system: degrees, agreed on at two random points, modulo two primes or in many digits.
+//! Verdicts on any system: degrees on which two random points agree, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
@@ -20,73 +20,72 @@ use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
 use crate::language::Function;
 
-/// Pairs of fields that are tried.
+/// Number of pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
 
-/// Operations of verdicts in prime fields up to which they are compared with those at a real point, where
-/// constraints hold.
+/// Largest number of operations of verdicts in prime fields for which they are compared with those at a real
+/// point, if there are constraints.
 const COMPARED: u64 = 2_000_000;
 
-/// Primes that are tried until constraints have a point.
+/// Number of primes tried until constraints have a point.
 const PRIMES: usize = 20;
 
-/// Points that are drawn in each.
+/// Number of points drawn modulo each prime.
 const POINTS: usize = 2;
 
-/// Largest bound on the probability of a wrong verdict with which a verdict is given.
+/// Largest bound on the probability of a wrong verdict.
 const CERTAIN: f64 = 1e-9;
 
-/// From so many orders on, about, fields have roots of unity.
+/// Number of orders from which, approximately, fields are chosen with roots of unity.
 const LONG: usize = 100;
 
-/// What is known of a system.
+/// Verdicts on a system, with their certainty.
 #[derive(Debug, Clone)]
 pub struct Judgement {
-    /// The unknowns and the bound.
+    /// Unknowns of the system, and the bound on the order.
     pub layout: Layout,
-    /// The verdicts.
+    /// Verdicts on the unknowns and on requested combinations.
     pub findings: Findings,
-    /// What they rest on.
+    /// Certainty of the verdicts.
     pub certainty: SystemCertainty,
-    /// The span of all rows in the first prime field, where there is one.
+    /// Span of all rows in the first prime field; `None` if real numbers decided.
     pub span: Option<Echelon>,
     /// The two prime fields of a rational model.
     pub fields: Option<[Field; 2]>,
-    /// Functions whose values are proven to be independent of each other, so that random ones stand for them;
-    /// `None` where true values were taken.
+    /// Number of functions whose values are proven to be independent of each other, so that random values
+    /// replace them; `None` if true values were used.
     pub independent_functions: Option<usize>,
-    /// Operations of the verdicts, at all points that were drawn.
+    /// Number of operations of the verdicts, at all points that were drawn.
     pub work: u64,
-    /// What is not observable would be so only beyond the bound on the order: it is not proven that there is
-    /// nothing.
+    /// True if unobservable unknowns might be observable beyond the bound on the order: it is not proven
+    /// that higher orders add nothing.
     pub rests_on_bound: bool,
     /// Sides of the branches of abs and sign at the two points.
     pub sides: Vec<BranchSide>,
 }
 
-/// What the verdicts on a system rest on.
+/// Certainty of the verdicts on a system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SystemCertainty {
-    /// A rational model, or one whose functions have independent values: two prime fields that agree.
+    /// Two prime fields that agree: a rational model, or one whose functions have independent values.
     Primes(ByPrimes),
-    /// Any other model with functions: two random real points that agree.
+    /// Two random real points that agree: any other model with functions.
     Digits(ByDigits),
 }
 
-/// How clear ranks were that real numbers decided. Decimal logarithms, relative to the largest entry of a
-/// row.
+/// Margin of rank decisions in real numbers. Decimal logarithms, relative to the largest entry of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByDigits {
-    /// Decimal digits of the numbers at the first point and at the second.
+    /// Numbers of decimal digits at the first point and at the second.
     pub digits: [usize; 2],
-    /// The smallest number that counts as different from zero: it is proven to be, by an error bound.
+    /// Smallest number that counts as non-zero: an error bound proves it.
     pub nonzero: f64,
-    /// The widest error bound of a number that holds zero and counts as zero.
+    /// Widest error bound of a number that counts as zero: it contains zero.
     pub zero: f64,
 }
 
 impl Judgement {
-    /// True if an unknown is spoken of: of arbitrary inputs only the signal itself is of interest.
+    /// True if an unknown is reported: of arbitrary inputs only the signal itself, not its derivatives.
     pub fn shown(&self, model: &SystemModel, unknown: usize) -> bool {
         let u = &self.layout.unknowns[unknown];
         match u.role {
@@ -95,23 +94,23 @@ impl Judgement {
         }
     }
 
-    /// The verdict on the unknown of a name, where it is spoken of.
+    /// Verdict on the unknown of a name; `None` if it is not reported.
     pub fn verdict(&self, model: &SystemModel, name: &str) -> Option<Verdict> {
         let unknown = self.layout.unknowns.iter().position(|u| u.name == name)?;
         self.shown(model, unknown).then(|| self.verdict_on(unknown))
     }
 
-    /// The verdict on an unknown, as far as it is proven.
+    /// Verdict on an unknown, as far as it is proven.
     pub fn verdict_on(&self, unknown: usize) -> Verdict {
         self.as_proven(self.findings.verdict(unknown))
     }
 
-    /// The verdicts on the combinations that were asked for, as far as they are proven.
+    /// Verdicts on requested combinations, as far as they are proven.
     pub fn asked(&self) -> impl Iterator<Item = Verdict> + '_ {
         self.findings.asked.iter().map(|v| self.as_proven(*v))
     }
 
-    /// What is not observable may be so at a higher order, where no end is proven.
+    /// Verdict that allows for a higher order: an unobservable unknown is not resolved if no end is proven.
     fn as_proven(&self, verdict: Verdict) -> Verdict {
         match verdict.degree {
             None if self.rests_on_bound => Verdict { status: Status::NotSeen, ..verdict },
@@ -124,9 +123,9 @@ impl Judgement {
 pub(crate) struct At<S: Values> {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Verdict>,
-    /// The span of all rows.
+    /// Span of all rows.
     pub(crate) span: S::Space,
-    /// The value of every unknown there, then of every known constant.
+    /// Value of every unknown at the point, then of every known constant.
     pub(crate) values: Vec<S::Element>,
     /// True if the last order is proven to be the last.
     ended: bool,
@@ -152,7 +151,7 @@ impl<S: Values> Steps<S> {
         }
     }
 
-    /// The smallest k with a functional in `V_k`.
+    /// Observable degree: the smallest k with a functional in `V_k`.
     fn degree(&self, functional: &[S::Element]) -> Option<usize> {
         let f = &self.field;
         let mut rest = functional.to_vec();
@@ -172,14 +171,14 @@ impl<S: Values> Steps<S> {
 }
 
 impl<S: Values> At<S> {
-    /// The degree of a functional there.
+    /// Observable degree of a functional at this point.
     pub(crate) fn degree(&self, functional: &[S::Element]) -> Option<usize> {
         self.steps.degree(functional)
     }
 }
 
-/// Climbs the staircase of a system at a random point of a field, and adds the operations to those that were
-/// `spent`, whether or not there is a verdict.
+/// Climbs the staircase of a system at a random point of a field. Adds the operations to `spent`, whether or
+/// not there is a verdict.
 pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -216,7 +215,7 @@ fn climbed<S: Values>(
     let mut steps = Steps { field: field.clone(), rows: Vec::new() };
     let (mut refined, product) = (0, product::<S::Element>());
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
-        // rows that were made anew; what is refused ends the climb
+        // rows that were computed again; a refusal ends the climb
         let again = basis.refined() - std::mem::replace(&mut refined, basis.refined());
         let _refused = work.take(Step::Derivatives(order), again.saturating_mul(product), 0);
         for (degree, gradient) in found.iter_mut().zip(&gradients) {
@@ -243,7 +242,7 @@ fn climbed<S: Values>(
     Ok(At { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
-/// Where the model has no value, in words.
+/// Error that states where the model has no value.
 pub(super) fn singular<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -265,7 +264,7 @@ pub(super) fn singular<S: Values>(
             return of.place.error(message, 0..of.text.len());
         }
         Singular::Dependent(c) => return dependent_at_points(model, c),
-        // said before, with what was too much
+        // reported before, with the exceeded limit
         Singular::Refused => return refuse("the limit of work".into()),
         Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
         Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => (
@@ -308,8 +307,8 @@ pub(super) fn singular<S: Values>(
     }
 }
 
-/// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one
-/// modulo two primes, and so one with functions whose values are independent; any other in many digits.
+/// Judges a model at two random points, each with its own stream of `seed` and the model. A rational model,
+/// or one whose functions have independent values, is judged modulo two primes; any other in many digits.
 /// `bound` overrides the highest order.
 ///
 /// # Errors
@@ -318,8 +317,8 @@ pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Jud
     judge_compiled(model, &model.compile()?, seed, bound)
 }
 
-/// Judges a change of a judged model, on the same sides of abs and sign where it has as many. Adds the
-/// operations at all points to those that were `spent`, whether or not there is a verdict.
+/// Judges a change of a judged model, on the same sides of abs and sign if it has as many. Adds the
+/// operations at all points to `spent`, whether or not there is a verdict.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -337,7 +336,7 @@ pub(super) fn judge_beside(
     judge_within(model, &compiled, (judged.findings.seed, bound), sides, spent)
 }
 
-/// Judges a model that was compiled.
+/// Judges a compiled model.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -350,7 +349,7 @@ pub fn judge_compiled(
     judge_within(model, compiled, (seed, bound), None, &mut Spent::default())
 }
 
-/// `sides`: those on which points should be.
+/// Judges a model at points on the given `sides`, if any.
 fn judge_within(
     model: &SystemModel,
     compiled: &Compiled,
@@ -366,7 +365,7 @@ fn judge_within(
         let apart = written_apart(compiled);
         let apart = apart.as_ref().unwrap_or(compiled);
         let independent = independent_functions(model, apart, &layout, &mut rng, spent);
-        // where prime fields fail, for whatever reason, digits say why
+        // if prime fields fail for any reason, real numbers give the reason
         if let Some(count) = independent
             && let Ok(judged) = judge_in_fields(model, apart, &layout, seed, spent)
         {
@@ -375,7 +374,7 @@ fn judge_within(
         return judge_by_digits(model, compiled, &layout, seed, spent);
     }
     match judge_in_fields(model, compiled, &layout, seed, spent) {
-        // constraints with real points that were found in no prime field, though the work was allowed
+        // constraints with real points but without points in prime fields, within the limit of work
         Err(_) if !compiled.constraints.is_empty() && !spent.refused => {
             judge_by_digits(model, compiled, &layout, seed, spent)
         }
@@ -429,9 +428,9 @@ fn judge_in_fields(
     )))
 }
 
-/// False if verdicts in prime fields are others than those at a real point: constraints may be met in several
-/// parts, and one of these may have no real point, as where x = 1 or x^2 + y^2 = 0. True where the comparison
-/// would take too much work, or decides nothing.
+/// False if verdicts in prime fields differ from those at a real point. Constraints may hold on several
+/// components, one of them without a real point, as for x = 1 or x^2 + y^2 = 0. True if the comparison would
+/// take too much work, or decides nothing.
 fn holds_at_real_point(
     model: &SystemModel,
     compiled: &Compiled,
@@ -452,32 +451,31 @@ fn holds_at_real_point(
     }
 }
 
-/// Prime fields in which points of a model are drawn.
+/// Choice of prime fields in which points of a model are drawn.
 pub(super) struct Points<'a> {
     pub(super) model: &'a SystemModel,
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'a Layout,
-    /// Number of orders of derivatives that may be needed, about.
+    /// Approximate number of orders of derivatives that may be needed.
     pub(super) orders: usize,
 }
 
 impl Points<'_> {
-    /// Order of the roots of unity of a field: long series are multiplied by transforms, which need them.
+    /// Order of the roots of unity in a field: long series are multiplied by transforms, which need them.
     pub(super) fn root_order(&self) -> u64 {
         if self.orders < LONG { 1 } else { (4 * self.orders as u64).next_power_of_two() }
     }
 
-    /// A random field in which the constraints hold at a point, as far as one is found; `own` draws these
-    /// points.
+    /// Random field in which the constraints hold at a point, if one is found; `own` draws these points.
     pub(super) fn field(&self, rng: &mut SplitMix64, own: &mut SplitMix64, spent: &mut Spent) -> Field {
         let order = self.root_order();
         let draw = |rng: &mut SplitMix64| match order {
             1 => random_field(rng),
-            // it has divisors enough
+            // this order has divisors enough
             _ => RootField::random(order, rng).map_or_else(|_| random_field(rng), |k| k.field),
         };
         let mut field = draw(rng);
-        // constraints that leave points alone have one modulo some primes
+        // constraints with isolated points have one modulo some primes
         for _ in 1..PRIMES {
             if can_hold(self.model, self.compiled, self.layout, field, own, spent) {
                 break;
@@ -508,14 +506,14 @@ fn can_hold(
         field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, rng, &work).is_ok()
     });
     spent.add(&work);
-    // beyond its limit another prime is of no use
+    // beyond the limit of work another prime does not help
     found || work.refused().is_some()
 }
 
-/// Judges a model by real numbers, whether it is rational or not: the other way to the same verdicts.
+/// Judges any model, rational or not, by real numbers: the independent path to the same verdicts.
 ///
 /// # Errors
-/// [`ModelError`]; of a model that no number of digits decides, with the reason.
+/// [`ModelError`], with the reason if no number of digits decides.
 pub fn judge_in_digits(
     model: &SystemModel,
     compiled: &Compiled,
@@ -568,7 +566,7 @@ fn checked_layout(
     }
 }
 
-/// The verdicts at a point in `64 A` bits and at another in `64 B`, or why they decide nothing.
+/// Verdicts at a point in `64 A` bits and at another in `64 B`, or the reason why they decide nothing.
 fn pair<const A: usize, const B: usize>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -580,7 +578,7 @@ fn pair<const A: usize, const B: usize>(
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
     let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
     let unclear = |gap: Gap, digits: usize| {
-        // bounds wider than what they bound
+        // error bounds as wide as their numbers decide nothing
         if gap.zero >= 0.0 {
             return format!(
                 "with {digits} digits the numbers that decide a rank lose all of them to rounding"
@@ -596,7 +594,7 @@ fn pair<const A: usize, const B: usize>(
     if !first.gap.is_decisive(64 * A as i64) {
         return Ok(Err(unclear(first.gap, digits[0])));
     }
-    // all other points are on the side of this one
+    // all other points are on the sides of this one
     let layout = &Layout { sides: Some(first.signs.clone()), ..layout.clone() };
     let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1), spent)?;
     if !second.gap.is_decisive(64 * B as i64) {
@@ -640,16 +638,16 @@ impl Judgement {
     }
 }
 
-/// What the error bound depends on: the degree and the coefficients of the polynomials that decide a rank
-/// (derivation: crates/README.md, *Certainty*).
+/// Size of the claim: the degree and the coefficients of the polynomials that decide a rank (derivation:
+/// crates/README.md, *Certainty*).
 ///
-/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k`
-/// grows by at most `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative
-/// and two products make of them.
+/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`. The degree of `P_k` grows
+/// by at most `delta = max(deg N, deg D) + deg D` an order. Its coefficients grow by the effect of a
+/// derivative and two products.
 fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
-    // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here
-    // and at a generic point; that no unit vector comes an order early (if the ranks are right none comes
-    // late), and no column or entry of the last basis is zero by chance
+    // Decisions at each of ATTEMPTS points: a rank at each order, of all runs and of each alone, here and at
+    // a generic point; that no unit vector comes an order early (if the ranks are correct none comes late);
+    // and that no column or entry of the last basis is zero by chance.
     let decisions = ATTEMPTS
         * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
             + 2 * layout.unknowns.len()
@@ -658,7 +656,7 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
     Claim { decisions, ..claim_of(compiled, layout, degrees.rank_profile.len()) }
 }
 
-/// The same of one decision on rows of so many orders.
+/// Size of the claim of one decision on rows of the given number of orders.
 pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
@@ -696,7 +694,7 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
     }
 }
 
-/// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the sizes of its coefficients.
+/// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the absolute coefficients.
 #[derive(Debug, Clone, Copy)]
 struct Fraction {
     above: (f64, f64),
@@ -724,13 +722,13 @@ impl Fraction {
     }
 }
 
-/// Of a product of polynomials.
+/// Bounds of a product of polynomials.
 fn times(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
     (x.0 + y.0, x.1 + y.1)
 }
 
-/// The derivatives in time of the variables that stand for functions: `E' = E u'` of exp and tanh,
-/// `(1 + t^2)/2 u'` for `t = tan(u/2)` of sin, cos and tan, `weight u'` of a logarithm and an arc tangent.
+/// Time derivatives of the variables that replace functions: `E' = E u'` for exp and tanh, `(1 + t^2)/2 u'`
+/// with `t = tan(u/2)` for sin, cos and tan, `weight u'` for a logarithm and an arc tangent.
 fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec<Fraction> {
     // derivatives of all nodes; a jet of an input is a variable
     let mut rates: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
@@ -765,8 +763,8 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
     out
 }
 
-/// Every node of a graph as a quotient of polynomials in the slots and in one variable for each function,
-/// over the integers.
+/// Every node of a graph as a quotient of polynomials over the integers, in the slots and in one variable
+/// for each function.
 fn fractions(dag: &Dag) -> Vec<Fraction> {
     let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
@@ -782,7 +780,7 @@ fn fractions(dag: &Dag) -> Vec<Fraction> {
             }
             Op::Slot(_) | Op::Pi => Fraction::VARIABLE,
             Op::Primitive { function, .. } => match function {
-                // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and the like
+                // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and similar quotients
                 Function::Tanh | Function::Sin | Function::Cos | Function::Tan => {
                     Fraction { above: (2.0, 1.0), below: (2.0, 1.0) }
                 }

@@ -1,4 +1,5 @@
-//! Real points at which the constraints of a model hold: prime fields have points where there is no real one.
+//! Real points at which the constraints of a model hold: prime fields may have points where there is no real
+//! one.
 
 use obsdeg_exact::{Ball, Reals, SplitMix64};
 
@@ -12,35 +13,36 @@ use super::taylor::{Signal, Singular, Taylor};
 use super::values::{NotHeld, Values};
 use super::work::{Refused, Spent, Work};
 
-/// Starts of Newton's method: near the values of the file first, then random points, the later the farther.
+/// Number of starts of Newton's method: first near the values of the file, then at random points of growing
+/// size.
 const TRIES: usize = 200;
-/// Random attempts from one start to the next: sizes grow with them.
+/// Number of random attempts from one start to the next; their sizes grow.
 const FARTHER: usize = 10;
-/// Starts from which only points with dependent gradients were reached, before no other kind is expected.
+/// Number of starts that reach only points with dependent gradients, before the search ends.
 const DEPENDENT: usize = 20;
-/// Points near a point at which it is tried whether constraints follow from the others.
+/// Number of points near a point at which constraints are tested for following from the others.
 const NEARBY: usize = 3;
 /// Relative residual, as a power of two, below which a constraint holds at such a point.
 const HOLDS: f64 = -128.0;
 
-/// Bits of the values of a file.
+/// Number of bits of the values of a file.
 const DOUBLE: i64 = 52;
 
 /// Outcome of one start.
 enum Found {
     /// A point, and the number of constraints that follow from the others there.
     Point(usize),
-    /// A point at which gradients of constraints depend on each other, though the constraints do not.
+    /// A point at which gradients of constraints are dependent, although the constraints are not.
     Dependent(usize),
     Nothing,
 }
 
-/// Looks for a real point at which all constraints hold and their gradients are independent. The number of
-/// constraints that follow from the others there.
+/// Searches for a real point at which all constraints hold and their gradients are independent. Returns the
+/// number of constraints that follow from the others there.
 ///
 /// # Errors
-/// [`ModelError`] where the signs of both sides contradict, where constraints hold only where gradients
-/// depend on each other, where no point was found, and where the search is beyond the limit of work.
+/// [`ModelError`] if the signs of both sides contradict, if constraints hold only at points with dependent
+/// gradients, if no point was found, or if the search exceeds the limit of work.
 pub(super) fn real_point(
     model: &SystemModel,
     compiled: &Compiled,
@@ -109,7 +111,7 @@ fn sought(
     Err(first.place.error(message, 0..first.text.len()))
 }
 
-/// The refusal of a constraint at whose points gradients depend on each other.
+/// Error for a constraint at whose points gradients are dependent.
 pub(super) fn dependent_at_points(model: &SystemModel, c: usize) -> ModelError {
     let own = &model.constraints[c];
     let message = "at the points found at which it holds its gradient vanishes or depends on those of the other constraints, so that \
@@ -161,7 +163,7 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// Newton's method from one start, and what the point is.
+/// Newton's method from one start, and the kind of the point that it reaches.
 fn from_start(
     maker: &Maker<'_, '_, Reals<4>>,
     mut values: Vec<Ball<4>>,
@@ -201,7 +203,7 @@ fn from_start(
     Ok(if follow { Found::Point(others.len()) } else { Found::Dependent(place(other)) })
 }
 
-/// True if no root that constraints hold would be negative at a point.
+/// True if no root in a constraint would be negative at a point.
 fn are_not_negative(maker: &Maker<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
     let compiled = maker.compiled;
     let signals = values.iter().map(|value| Signal::Constant { value: *value, lane: None }).collect();

@@ -1,14 +1,15 @@
 //! Consequences of relations among derivatives of outputs for the constants: those that are unique, and
 //! equations that every solution satisfies.
 //!
-//! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution, and where one
-//! trajectory determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output.
-//! Ratios of low degree are interpolated; that they have the values of the base point is a system in the
-//! constants alone. A constant with one value among its solutions is unique, whatever other ratios say;
-//! several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
+//! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution. If one trajectory
+//! determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output. Ratios of
+//! low degree are interpolated; setting them to their values at the base point gives a system in the
+//! constants alone. A constant with one value among its solutions is unique, whatever other ratios are.
+//! Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
 //! doi:10.1016/0005-1098(94)90029-9; relations by evaluation instead of elimination).
 //!
-//! Constants that a symmetry moves keep their values: the solutions for all others are conjugate over them.
+//! Constants that a symmetry changes keep their values: the solutions for all others are conjugate over
+//! them.
 
 mod jets;
 mod ratios;
@@ -24,14 +25,14 @@ use jets::Source;
 use ratios::{Pool, Ratio, ratios};
 use relation::{Relation, relations};
 
-/// Most evaluations of a relation for one ratio, in steps: what is found with few makes the next ratios
-/// cheaper.
+/// Largest numbers of evaluations of a relation for one ratio, in steps: results of a cheap step make the
+/// next ratios cheaper.
 const EVALUATIONS: [usize; 5] = [30, 100, 300, 700, 1500];
-/// Ratios beyond those that raise the rank, at each step.
+/// Number of ratios at each step beyond those that raise the rank.
 const EXTRAS: usize = 6;
-/// Work of one Groebner basis in the constants.
+/// Limit of the work of one Groebner basis in the constants.
 const BASIS: u64 = 20_000_000;
-/// Highest degree of a minimal polynomial of a constant that is looked at.
+/// Highest degree of a minimal polynomial of a constant that is computed.
 const SOLUTIONS: usize = 24;
 
 /// Consequences of relations for the unknowns at a point.
@@ -43,15 +44,15 @@ pub(super) struct Known {
     pub(super) zero: Vec<Polynomial>,
 }
 
-/// The relations of a model, which are the same at every point and in every field.
+/// Relations of a model, the same at every point and in every field; `None` before they were sought.
 #[derive(Debug, Default)]
 pub(super) struct Found(Option<Vec<Relation>>);
 
-/// True if relations among derivatives decide anything: one experiment and segment, generic starts and
+/// True if relations among derivatives can decide anything: one experiment and segment, generic starts and
 /// inputs, no function.
 pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgement) -> bool {
     let generic = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
-    // with the time in it a relation would hold at one time only
+    // a relation that contains the time would hold at one time only
     let autonomous = compiled.dag.is_rational() && !compiled.uses_time();
     generic
         && autonomous
@@ -79,17 +80,17 @@ pub(super) fn known(
     }
     let relations = found.0.as_deref().unwrap_or_default();
     let mut fibre = Fibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
-    // what was found before the work ended holds
+    // results found before the work ended are valid
     let _ended = fibre.narrow(&source, relations, rng, work);
     let is_observable = |lane: usize| judged.findings.degrees.degree[lane].is_some();
     let unique = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v) && is_observable(*v));
-    // where more constants were kept than elsewhere the equations hold only beside them
+    // if additional constants were fixed, the equations hold only together with these
     let zero = if added { Vec::new() } else { fibre.zero() };
     Known { unique: unique.collect(), zero }
 }
 
-/// The constants without as many as the symmetries move: no pivots of the span first, then any that is
-/// independent of it; and whether there were any of these.
+/// The constants without as many as there are symmetry directions (first those that are no pivots of the
+/// span, then any that is independent of it); true if any of the latter were fixed.
 fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
     let mut space = span.clone();
     let (mut open, mut added) = (Vec::new(), false);
@@ -108,19 +109,19 @@ fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
     (open, added)
 }
 
-/// The constants with the same values of ratios.
+/// Constants with the same values of ratios.
 struct Fibre {
     f: Field,
     at: Vec<u64>,
     /// All constants that were open at first.
     variables: Vec<usize>,
-    /// Those that are not yet known to be unique.
+    /// Constants that are not yet known to be unique.
     open: Vec<usize>,
     /// Ratios as functions, with their gradients.
     equations: Vec<Equation>,
 }
 
-/// A ratio that has its value at the base point.
+/// Ratio that has its value at the base point.
 struct Equation {
     above: Polynomial,
     below: Polynomial,
@@ -161,13 +162,13 @@ impl Fibre {
         Ok(())
     }
 
-    /// The places of the open constants among the variables.
+    /// Indices of the open constants among the variables.
     fn places(&self) -> Vec<usize> {
         let open = |k: &usize| self.open.contains(&self.variables[*k]);
         (0..self.variables.len()).filter(open).collect()
     }
 
-    /// The space of the gradients of the equations, by the open constants.
+    /// Span of the gradients of the equations, by the open constants.
     fn space(&self, places: &[usize]) -> Echelon {
         let mut space = Echelon::new(self.f, places.len());
         for e in &self.equations {
@@ -176,8 +177,8 @@ impl Fibre {
         space
     }
 
-    /// Takes ratios out of the list that cost at most `limit` evaluations: those that raise the rank, the
-    /// cheapest first, and some others at random.
+    /// Removes from the list the ratios of at most `limit` evaluations that are used: those that raise the
+    /// rank, the cheapest first, and some others at random.
     fn chosen(&self, all: &mut Vec<Ratio>, limit: usize, rng: &mut SplitMix64) -> Vec<Ratio> {
         let places = self.places();
         let depends = |r: &Ratio| places.iter().any(|&k| r.gradient[k] != 0);
@@ -197,7 +198,7 @@ impl Fibre {
             }
             !new
         });
-        // without one of a few constants alone the others would be sought in vain
+        // one with few constants only is needed: otherwise the others would be sought in vain
         for _ in 0..EXTRAS.min(left.len()) {
             let at = rng.below(left.len() as u64) as usize;
             taken.push(left.swap_remove(at).1);
@@ -208,7 +209,7 @@ impl Fibre {
         out
     }
 
-    /// Polynomials that are zero: every ratio less its value.
+    /// Polynomials that are zero: every ratio minus its value.
     fn zero(&self) -> Vec<Polynomial> {
         let f = self.f;
         let less = |e: &Equation| {
@@ -219,14 +220,14 @@ impl Fibre {
         self.equations.iter().map(less).filter(|p| !p.is_empty()).collect()
     }
 
-    /// The open constants with one value.
+    /// Open constants with one value.
     fn unique(&self, work: &mut Work) -> Vec<usize> {
         let f = self.f;
         let places = self.places();
         let space = self.space(&places);
         let name = |v: u32| self.open.iter().position(|&o| o == v as usize).map(|i| i as u32);
         let mut ideal: Vec<Polynomial> = self.zero().iter().filter_map(|p| p.renamed(name)).collect();
-        // nothing is divided by zero
+        // no divisor is zero
         let mut below: Vec<&Polynomial> = Vec::new();
         for e in self.equations.iter().filter(|e| e.below.as_constant().is_none()) {
             if !below.contains(&&e.below) {
@@ -262,7 +263,7 @@ impl Fibre {
         out
     }
 
-    /// Gives constants their values.
+    /// Sets constants to their values.
     fn fix(&mut self, unique: &[usize]) {
         for &v in unique {
             let value = Polynomial::constant(self.at[v]);

@@ -12,31 +12,31 @@ use obsdeg_exact::{Field, SplitMix64};
 use super::jets::Source;
 use super::relation::Relation;
 
-/// Highest degree above and below of a ratio that is used.
+/// Highest degree of numerator and denominator of a ratio that is used.
 const DEGREE: usize = 6;
-/// Points on a line through all constants, and on one along a constant.
+/// Number of points on a line through all constants, and on one along a constant.
 const LINE: usize = 16;
 const ALONG: usize = 12;
-/// Most ratios of a relation that are kept, those of low degree.
+/// Largest number of ratios of a relation that are kept, lowest degrees first.
 const KEPT: usize = 1500;
-/// Points that confirm an interpolation beyond those that determine it.
+/// Number of points that confirm an interpolation, beyond those that determine it.
 const SPARE: usize = 3;
 
-/// A ratio of two coefficients of a relation that is no constant.
+/// Ratio of two coefficients of a relation that is not constant.
 #[derive(Debug, Clone)]
 pub(super) struct Ratio {
     pub(super) relation: usize,
     above: usize,
     below: usize,
-    /// Total degrees above and below.
+    /// Total degrees of numerator and denominator.
     degrees: (usize, usize),
-    /// By variable: degrees above and below.
+    /// Degrees of numerator and denominator in each variable.
     own: Vec<(usize, usize)>,
-    /// By variable: the derivative at the base point.
+    /// Derivative at the base point by each variable.
     pub(super) gradient: Vec<u64>,
 }
 
-/// A relation's coefficients at the points of a line through the base point.
+/// Coefficients of a relation at the points of a line through the base point.
 fn on_line(
     source: &Source<'_>,
     relation: &Relation,
@@ -58,7 +58,7 @@ fn on_line(
     Ok(out)
 }
 
-/// Coefficients on a line with their inverses.
+/// Coefficients on a line, with their inverses.
 struct Values {
     f: Field,
     abscissae: Abscissae,
@@ -82,7 +82,7 @@ impl Values {
     }
 }
 
-/// The ratios of a relation's coefficients at the base point `at`, as functions of `variables`, of low degree
+/// Ratios of a relation's coefficients at the base point `at`, as functions of `variables`, low degrees
 /// first.
 ///
 /// # Errors
@@ -116,7 +116,7 @@ pub(super) fn ratios(
                 continue;
             }
             let inverse = line.ratio(1, j, i);
-            // the same function again, its opposite, or its inverse
+            // the same function, its opposite, or its inverse
             let again = [second, f.neg(second), inverse, f.neg(inverse)];
             if again.iter().any(|x| seen.contains(x)) {
                 continue;
@@ -148,7 +148,7 @@ pub(super) fn ratios(
     Ok(out)
 }
 
-/// Exponents of a total degree up to `total` and of each variable up to its limit, by degree.
+/// Exponents of total degree up to `total` and of each variable up to its limit, sorted by degree.
 fn boxed(total: usize, limits: &[usize]) -> Vec<Vec<usize>> {
     let mut out = vec![(0, Vec::new())];
     for &limit in limits {
@@ -161,7 +161,7 @@ fn boxed(total: usize, limits: &[usize]) -> Vec<Vec<usize>> {
     out.into_iter().map(|e| e.1).collect()
 }
 
-/// The number of [`boxed`] exponents.
+/// Number of [`boxed`] exponents.
 fn boxed_count(total: usize, limits: &[usize]) -> usize {
     let mut table = vec![0usize; total + 1];
     table[0] = 1;
@@ -175,13 +175,13 @@ fn boxed_count(total: usize, limits: &[usize]) -> usize {
 }
 
 impl Ratio {
-    /// The limits of the open variables' degrees, above or below.
+    /// Limits of the degrees in the open variables, of the numerator or (`below`) of the denominator.
     fn limits(&self, open: &[usize], below: bool) -> Vec<usize> {
         open.iter().map(|&k| if below { self.own[k].1 } else { self.own[k].0 }).collect()
     }
 
-    /// The number of evaluations that its interpolation in the open variables (places in the list of
-    /// variables) takes.
+    /// Number of evaluations that the interpolation in the open variables (indices in the list of variables)
+    /// takes.
     pub(super) fn cost(&self, open: &[usize]) -> usize {
         let (above, below) = (self.limits(open, false), self.limits(open, true));
         let unknown = boxed_count(self.degrees.0, &above).saturating_add(boxed_count(self.degrees.1, &below));
@@ -189,7 +189,7 @@ impl Ratio {
     }
 }
 
-/// Random values of the open variables, and what the coefficients of relations are there.
+/// Random values of the open variables, with the coefficients of relations at them.
 pub(super) struct Pool<'s, 'a> {
     source: &'s Source<'a>,
     relations: &'s [Relation],
@@ -233,8 +233,8 @@ impl<'s, 'a> Pool<'s, 'a> {
         Ok(())
     }
 
-    /// A ratio as polynomials above and below in the open variables (numbered as unknowns). `None` where the
-    /// points contradict its degrees.
+    /// Numerator and denominator of a ratio as polynomials in the open variables (numbered as unknowns);
+    /// `None` if the points contradict its degrees.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -257,7 +257,7 @@ impl<'s, 'a> Pool<'s, 'a> {
         let coefficients = &self.coefficients[&ratio.relation];
         let row = |(here, c): (&Vec<u64>, &Vec<u64>)| -> Vec<u64> {
             let (n, d) = (c[ratio.above], f.neg(c[ratio.below]));
-            // numerator d - denominator n = 0
+            // numerator * d - denominator * n = 0
             let first = above.iter().map(|e| f.mul(d, product(e, here)));
             first.chain(below.iter().map(|e| f.mul(n, product(e, here)))).collect()
         };
