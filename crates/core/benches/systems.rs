@@ -78,7 +78,14 @@ fn all_references_counted() {
 }
 
 /// Judges one of the largest models: MAPK (34 unknowns) or the rail vehicle (89 unknowns).
-#[divan::bench(args = ["mapk_5out", "mapk_6out", "rail_vehicle_27dof_jothi2016", "jak_stat_bachmann", "ovarian_follicle", "tumor_hu2019"])]
+#[divan::bench(args = [
+    "mapk_5out",
+    "mapk_6out",
+    "rail_vehicle_27dof_jothi2016",
+    "jak_stat_bachmann",
+    "ovarian_follicle",
+    "tumor_hu2019",
+])]
 fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
     let text = std::fs::read_to_string(folder().join(format!("{name}.json"))).expect("readable");
     let model = json::read(&text).expect("a model");
@@ -103,7 +110,8 @@ fn chain_of_links(n: usize, functions: bool, related: bool) -> SystemModel {
     };
     let equations: Vec<String> = (0..n).map(equation).collect();
     let text = format!(
-        "{{\"name\": \"chain\", \"states\": [{}], \"params\": [{}], \"equations\": {{{}}}, \"outputs\": {{\"y\": \"x{}\"}}}}",
+        "{{\"name\": \"chain\", \"states\": [{}], \"params\": [{}], \"equations\": {{{}}}, \"outputs\": \
+         {{\"y\": \"x{}\"}}}}",
         states.join(","),
         rates.join(","),
         equations.join(","),

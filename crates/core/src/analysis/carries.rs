@@ -71,7 +71,8 @@ pub(super) fn carry_reports(
     }
     if scheme.by_course() && scheme.positions.len() > 1 && !out.is_empty() {
         untold.push(
-            "where rotations are judged by their course, psi of reset carry is compared with the other carries at the first position alone"
+            "where rotations are judged by their course, psi of reset carry is compared with the other \
+             carries at the first position alone"
                 .into(),
         );
     }

@@ -99,8 +99,8 @@ pub fn analyze(
     let omitted = omitted.filter(|o| !o.terms.is_empty());
     if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
-            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \
-             finite duration they need not hold"
+            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning \
+             at once, and with slews of finite duration they need not hold"
                 .into(),
         );
     }
@@ -381,8 +381,9 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     let mut say = |holds: bool, text: &str| out.extend(holds.then(|| text.to_string()));
     say(
         have(&[Term::GM, Term::M6]) && !scheme.measured_azimuth,
-        "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation changes no output, so three directions are \
-         not observable by any scheme that has Z alone; let the accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
+        "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation \
+         changes no output, so three directions are not observable by any scheme that has Z alone; let the \
+         accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
     );
     say(
         have(&[Term::GM3, Term::M3]),
@@ -390,32 +391,38 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     );
     say(
         have(&[Term::F, Term::II, Term::OO, Term::SS]),
-        "the squares of the components of g along I, O and S add up to 1 g^2 at every attitude: D_F, D_II, D_OO and D_SS of a gyro are never \
-         told apart",
+        "the squares of the components of g along I, O and S add up to 1 g^2 at every attitude: D_F, D_II, \
+         D_OO and D_SS of a gyro are never told apart",
     );
     say(
         cardinal && have(&[Term::K1, Term::K3]),
-        "at attitudes where the force along every input axis is -1, 0 or 1 g its third power is itself: K1 and K3 are not told apart there",
+        "at attitudes where the force along every input axis is -1, 0 or 1 g its third power is itself: K1 \
+         and K3 are not told apart there",
     );
     say(
         cardinal && have(&[Term::Kx]),
-        "at attitudes where the force is along one input axis the product of two components is zero: Kx is not excited there",
+        "at attitudes where the force is along one input axis the product of two components is zero: Kx is \
+         not excited there",
     );
     say(
         scheme.by_course(),
-        "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers look like, so a rotating segment is \
-         judged by the course of Z, at almost any rate: a degree is a power of time, the order of the derivative at positions, and what has \
-         accumulated in psi while the platform turned counts by its power; expressions are not written out, and of combinations and \
-         directions whose coefficients hold the rate of turning the former are not listed, the latter named without numbers",
+        "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers \
+         look like, so a rotating segment is judged by the course of Z, at almost any rate: a degree is a \
+         power of time, the order of the derivative at positions, and what has accumulated in psi while \
+         the platform turned counts by its power; expressions are not written out, and of combinations and \
+         directions whose coefficients hold the rate of turning the former are not listed, the latter \
+         named without numbers",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
-        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act at positions and in rotations alone, \
-         as if nothing had been torqued in between; real slews need inertial carry and a path",
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors \
+         included: they act at positions and in rotations alone, as if nothing had been torqued in \
+         between; real slews need inertial carry and a path",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
-        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act at positions and in rotations alone",
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act \
+         at positions and in rotations alone",
     );
     out
 }

@@ -22,7 +22,8 @@ pub enum EnsembleError {
     Prime(#[from] PrimeError),
     /// The fields kept disagreeing.
     #[error(
-        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this scheme"
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 \
+         runs: please report this scheme"
     )]
     Disagreement,
 }

@@ -2,8 +2,9 @@
 
 use obsdeg_exact::{RowSpace, Scalars};
 
-/// Number of column orders tried for short vectors, and number of columns up to which all of them are tried.
+/// Number of column orders tried for short vectors, up to [`SMALL`] columns; beyond, two are tried.
 const ORDERS: usize = 16;
+/// Largest number of columns for which all orders are tried.
 const SMALL: usize = 120;
 
 /// Rows of a reduced basis of the span of `rows` when pivots are chosen in the order `columns`. Every such

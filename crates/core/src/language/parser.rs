@@ -150,7 +150,9 @@ const fn functions(names: Names) -> &'static str {
     match names {
         Names::Platform => "a known function (sin, cos, sqrt) or an operator before `(`",
         Names::Plain => {
-            "a known function (sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, tanh, abs, sign; of vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator before `(`"
+            "a known function (sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, tanh, abs, sign; of \
+             vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator \
+             before `(`"
         }
     }
 }

@@ -56,7 +56,8 @@ mod tests {
             scheme.random(1, "verdicts").next_u64()
         };
         let plain = "[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
-        let words = "name = 'A'\n[[position]]\nname = 'a'\nangles_deg = [0.0, 0, 0]\n[[position]]\nangles_deg = ['180', 0, 0]\n";
+        let words = "name = 'A'\n[[position]]\nname = 'a'\nangles_deg = [0.0, 0, \
+                     0]\n[[position]]\nangles_deg = ['180', 0, 0]\n";
         assert_eq!(first(plain), first(words));
         let mut seen = vec![first(plain)];
         for other in [
@@ -67,7 +68,8 @@ mod tests {
             "combinations = ['D_FX']",
             "combinations = ['D_FX', 'D_FY']",
             "combinations = ['2*D_FX']",
-            "geometry = { X = { I = '+x', O = '+z', S = '-y' }, Y = { I = '+y', O = '-z', S = '-x' }, Z = { I = '+z', O = '+x', S = '+y' } }",
+            "geometry = { X = { I = '+x', O = '+z', S = '-y' }, Y = { I = '+y', O = '-z', S = '-x' }, Z = \
+             { I = '+z', O = '+x', S = '+y' } }",
         ] {
             seen.push(first(&format!("{other}\n{plain}")));
         }

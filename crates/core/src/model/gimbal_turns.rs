@@ -333,7 +333,10 @@ mod tests {
                         return Err(TestCaseError::fail(format!("no stop at {at:?}")));
                     };
                     let after_deg = stop.after_deg;
-                    prop_assert_eq!((stop.gimbal.as_deref(), stop.at_deg), (Some(NAMES[k]), limits[k] as f64 * at[k].signum()));
+                    prop_assert_eq!(
+                        (stop.gimbal.as_deref(), stop.at_deg),
+                        (Some(NAMES[k]), limits[k] as f64 * at[k].signum())
+                    );
                     prop_assert!((after_deg - (step + 1) as f64 * h).abs() < 0.5, "{after_deg}");
                     return Ok(());
                 }

@@ -394,7 +394,11 @@ mod tests {
             prop_assert!(gimbals.hold(&found), "{found:?} {gimbals}");
             let found: [i64; 3] = std::array::from_fn(|k| found[k].nanodeg() / DEG / 15);
             prop_assert!(distance(&of_degrees(found.map(|x| (x * 15) as f64)), &target) < 1e-9);
-            let round = |k: usize| if width[k].is_some() { found[k] } else { before[k] + wrapped((found[k] - before[k]) * 15 * DEG) / DEG / 15 };
+            let round = |k: usize| if width[k].is_some() {
+                found[k]
+            } else {
+                before[k] + wrapped((found[k] - before[k]) * 15 * DEG) / DEG / 15
+            };
             prop_assert_eq!(Some(key(std::array::from_fn(round))), best);
             prop_assert!((0..3).all(|k| width[k].is_some() || (-11..=12).contains(&found[k])));
         }
@@ -420,7 +424,9 @@ mod tests {
             prop_assert!(gimbals.hold(&found));
             let turns = euler.iter().chain(&found).map(Angle::turn);
             let mut rng = obsdeg_exact::SplitMix64::new(seed);
-            let roots = obsdeg_exact::RootField::random(obsdeg_exact::turn::common_order(turns), &mut rng).expect("a field");
+            let roots =
+                obsdeg_exact::RootField::random(obsdeg_exact::turn::common_order(turns), &mut rng)
+                    .expect("a field");
             let matrix = |euler: &Euler| {
                 let cs = euler.each_ref().map(|a| roots.cos_sin(roots.unit_circle(a.turn()).expect("held")));
                 crate::model::attitude::c_n_from_euler(&roots.field, &cs)

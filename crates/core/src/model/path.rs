@@ -84,9 +84,10 @@ pub enum PathError {
     },
     /// No slew is stated, and the verdict depends on it.
     #[error(
-        "torquer errors ({terms}) are unknown under inertial carry, and nothing says how `{name}` is reached: they act while the platform turns, so a \
-         repositioning at once would give a verdict that is wrong in kind; expected path = \"one-axis\" or \"gimbals\", a slew rate, or a slew of \
-         the position"
+        "torquer errors ({terms}) are unknown under inertial carry, and nothing says how `{name}` is \
+         reached: they act while the platform turns, so a repositioning at once would give a verdict that \
+         is wrong in kind; expected path = \"one-axis\" or \"gimbals\", a slew rate, or a slew of the \
+         position"
     )]
     NotStated {
         /// Name of the position.
@@ -106,8 +107,9 @@ pub enum PathError {
     },
     /// An angle or axis has no image in a field.
     #[error(
-        "the turn to `{name}` ({found}) has no exact form; expected a turn about X_p, Y_p, Z_p, N, U or E by decimal degrees, a turn by 15 \
-         degrees or a multiple between such attitudes, or path = \"gimbals\""
+        "the turn to `{name}` ({found}) has no exact form; expected a turn about X_p, Y_p, Z_p, N, U or E \
+         by decimal degrees, a turn by 15 degrees or a multiple between such attitudes, or path = \
+         \"gimbals\""
     )]
     NotExact {
         /// Name of the position.

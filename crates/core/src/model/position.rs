@@ -142,7 +142,8 @@ pub enum PositionError {
     },
     /// The letters are no right-handed attitude.
     #[error(
-        "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW"
+        "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, \
+         perpendicular and right-handed, as in NUE or NDW"
     )]
     Cardinal {
         /// The text found.

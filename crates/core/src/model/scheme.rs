@@ -194,7 +194,8 @@ pub enum SchemeError {
     },
     /// Several positions with the unknowns `drift`: the drift is constant at one position only.
     #[error(
-        "the unknowns `drift` describe a single position; found {found} positions (use coefficients such as --terms F,I,O,S)"
+        "the unknowns `drift` describe a single position; found {found} positions (use coefficients such \
+         as --terms F,I,O,S)"
     )]
     DriftPositions {
         /// Number of positions.

@@ -107,7 +107,8 @@ impl DriftNoise {
 pub enum DriftNoiseError {
     /// The text has no number with a unit.
     #[error(
-        "`{found}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
+        "`{found}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of \
+         one step) or \"0.001 deg/sqrt(h)\""
     )]
     Form {
         /// Text found.

@@ -334,7 +334,9 @@ impl FromStr for DefinedBy {
 pub enum TermError {
     /// A text is not a term.
     #[error(
-        "`{found}` is not a term; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, GS, GM, GM3 (gyros), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or gyros, accelerometers, all, or `drift` alone"
+        "`{found}` is not a term; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, GS, GM, GM3 \
+         (gyros), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or gyros, accelerometers, all, or `drift` \
+         alone"
     )]
     Unknown {
         /// The text found.
@@ -366,7 +368,8 @@ pub enum TermError {
     },
     /// A frame is given, but no term depends on it.
     #[error(
-        "frame {frame}, but no misalignment is among the terms; expected a family (gyros, accelerometers, all) or one of {expected}"
+        "frame {frame}, but no misalignment is among the terms; expected a family (gyros, accelerometers, \
+         all) or one of {expected}"
     )]
     NoMisalignment {
         /// Name of the frame.

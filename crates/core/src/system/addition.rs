@@ -333,7 +333,12 @@ mod tests {
             };
             let off = value(&before).sub(&value(&after));
             assert!(off.is_zero() && off.radius_log2() < -200.0, "{output}: {off:?}");
-            let is_left = |i: &usize| matches!(after.dag.ops[*i], Op::Primitive { function, .. } if function != Function::Log);
+            let is_left = |i: &usize| {
+                matches!(
+                    after.dag.ops[*i],
+                    Op::Primitive { function, .. } if function != Function::Log
+                )
+            };
             let below = super::super::constraints::below(&after.dag, after.outputs(0)[0]);
             assert_eq!(below.iter().filter(|i| is_left(i)).count(), functions, "{output}");
             assert!(written_apart(&after).is_none(), "{output}");

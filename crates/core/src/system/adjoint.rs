@@ -300,8 +300,10 @@ mod tests {
     #[test]
     fn the_same_as_forwards() {
         for text in [
-            "[states]\nx='-a*x*z + u'\nz='x/(z + b)'\nw='w'\n[outputs]\ny='x*z'\nv='w + t'\n[known_inputs]\nu='generic'\n",
-            "[states]\nx={equation='a*sin(z)', initial='2*b'}\nz='exp(x) - u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
+            "[states]\nx='-a*x*z + u'\nz='x/(z + b)'\nw='w'\n[outputs]\ny='x*z'\nv='w + \
+             t'\n[known_inputs]\nu='generic'\n",
+            "[states]\nx={equation='a*sin(z)', initial='2*b'}\nz='exp(x) - \
+             u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
             "[states]\nx='a/b'\nz='log(x + z)*tanh(a)'\n[outputs]\ny='z'\n",
         ] {
             let model =

@@ -225,8 +225,9 @@ mod tests {
     use super::*;
     use crate::system::model_file::read;
 
-    const TEXT: &str = "name = 'm'\nparameters = ['k']\n[states]\nx = '-k*x + w'\n'p[2]' = '[p[2], x]'\n\
-                        [unknown_inputs]\nw = 'constant'\n[outputs]\ny = 'x'\n[candidates]\nbeat = { expression = 'x*k', cost = 2.5, unit = 'V' }\nplace = 'p'\n";
+    const TEXT: &str = "name = 'm'\nparameters = ['k']\n[states]\nx = '-k*x + w'\n'p[2]' = '[p[2], \
+                        x]'\n[unknown_inputs]\nw = 'constant'\n[outputs]\ny = 'x'\n[candidates]\nbeat = { \
+                        expression = 'x*k', cost = 2.5, unit = 'V' }\nplace = 'p'\n";
 
     fn names(list: &str) -> Vec<String> {
         let model = read(TEXT).expect("a model");

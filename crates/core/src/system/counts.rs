@@ -214,7 +214,12 @@ impl Counting<'_> {
     /// Number of additional runs with other inputs.
     fn others(&self) -> usize {
         let Self { model, compiled, judged, .. } = *self;
-        let generic = |role: &Role| matches!(*role, Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic));
+        let generic = |role: &Role| {
+            matches!(
+                *role,
+                Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic)
+            )
+        };
         let alone = judged.layout.closed
             && compiled.segments.len() <= 1
             && compiled.constraints.is_empty()

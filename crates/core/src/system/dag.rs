@@ -99,7 +99,10 @@ impl Dag {
     }
 
     pub(super) fn is(&self, node: usize, x: i64) -> bool {
-        matches!(self.ops[node], Op::Number { mantissa, decimals } if mantissa == i128::from(x) && (x == 0 || decimals == 0))
+        matches!(
+            self.ops[node],
+            Op::Number { mantissa, decimals } if mantissa == i128::from(x) && (x == 0 || decimals == 0)
+        )
     }
 
     pub(super) fn sum(&mut self, a: usize, b: usize) -> usize {

@@ -270,8 +270,8 @@ pub(super) fn singular<S: Values>(
         Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => (
             node,
             format!(
-                "a power whose exponent is not known as a whole number or half of one is defined for a positive base alone, which it was at \
-                 none of {points} points that were tried"
+                "a power whose exponent is not known as a whole number or half of one is defined for a \
+                 positive base alone, which it was at none of {points} points that were tried"
             ),
         ),
         Singular::Domain(node, function) => (
@@ -298,7 +298,8 @@ pub(super) fn singular<S: Values>(
         StartTime::Generic => message,
         _ if !of_time => message,
         _ => format!(
-            "{message}; it depends on the time, which is that of the start: `time` in the file chooses another, or \"generic\""
+            "{message}; it depends on the time, which is that of the start: `time` in the file chooses \
+             another, or \"generic\""
         ),
     };
     match compiled.places.get(&node) {
@@ -411,8 +412,9 @@ fn judge_in_fields(
                 error_bound(&Claim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
             if error_bound > CERTAIN {
                 return Err(refuse(format!(
-                    "undecided, because the powers in it are too high for primes of 61 bits: two agree, but a verdict may be wrong with \
-                     probability {error_bound:.0e}, where {CERTAIN:.0e} is expected at most"
+                    "undecided, because the powers in it are too high for primes of 61 bits: two agree, \
+                     but a verdict may be wrong with probability {error_bound:.0e}, where {CERTAIN:.0e} is \
+                     expected at most"
                 )));
             }
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
@@ -424,7 +426,8 @@ fn judge_in_fields(
         }
     }
     Err(refuse(format!(
-        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this model"
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 \
+         runs: please report this model"
     )))
 }
 
@@ -585,7 +588,8 @@ fn pair<const A: usize, const B: usize>(
             );
         }
         format!(
-            "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of the rest is 10^{:.0}",
+            "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of \
+             the rest is 10^{:.0}",
             decimal(gap.zero),
             decimal(gap.nonzero)
         )

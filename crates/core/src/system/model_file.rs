@@ -274,7 +274,8 @@ impl Reader<'_> {
                 vec![KnownInput::Polynomial(self.polynomial(&what, t, &span)?); named.len()]
             }
             _ => {
-                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
+                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \
+                               \"sin(t)\" }";
                 return Err(self.at(span, what, message.into()));
             }
         };

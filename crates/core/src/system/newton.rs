@@ -26,7 +26,7 @@ const TERMS: usize = 64;
 const NEAR: f64 = -16.0;
 /// Logarithm of the ratio of sides from which a point counts as far.
 const FAR: f64 = 0.5;
-/// Smallest gain of that logarithm by a step from far away; twice the smallest useful gain.
+/// Smallest gain of that logarithm by a step from far away; a gain of half the logarithm suffices too.
 const GAIN: f64 = 0.2;
 /// Relative residual, as a power of two, below which a constraint holds at values of double precision.
 const HELD: f64 = -40.0;
@@ -287,7 +287,7 @@ pub(super) fn hold_by_newton<const N: usize>(
         let step = newton.step(&linear, false).ok_or_else(|| failed(nowhere))?;
         let here: Vec<Ball<N>> = newton.places.iter().map(|&s| values[s]).collect();
         let (length, far) = (size(&step), size(&here).max(0.0));
-        // if constraints hold only in the limit, the next step is as long as the distance so far
+        // require a short step: if constraints hold only in the limit, it is as long as the distance so far
         if linear.holds && length <= far - STILL {
             let error = (length + 8.0).max(far - Ball::<N>::BITS as f64 + 24.0);
             newton.places.iter().for_each(|&s| values[s] = values[s].midpoint().widened(error));

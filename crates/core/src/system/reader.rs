@@ -58,7 +58,8 @@ pub(super) fn declared(key: &str) -> Result<(&str, Option<Shape>), String> {
     match shape.filter(|s| most(s) && s.entries() > 1) {
         Some(shape) => Ok((base.trim_end(), Some(shape))),
         None => Err(format!(
-            "not a size; expected that of a vector, as in {base}[3], or of a matrix, as in {base}[3,3], with 2 to {MAX_ENTRIES} entries"
+            "not a size; expected that of a vector, as in {base}[3], or of a matrix, as in {base}[3,3], \
+             with 2 to {MAX_ENTRIES} entries"
         )),
     }
 }

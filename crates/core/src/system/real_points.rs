@@ -104,7 +104,8 @@ fn sought(
         "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}",
         match maker.gives_start() {
             true =>
-                ", the first three near the values given under [simulation.values]; if there is one, give values nearer to it",
+                ", the first three near the values given under [simulation.values]; if there is one, give \
+                 values nearer to it",
             false => "; if there is one, give it under [simulation.values]",
         }
     );
@@ -114,9 +115,10 @@ fn sought(
 /// Error for a constraint at whose points gradients are dependent.
 pub(super) fn dependent_at_points(model: &SystemModel, c: usize) -> ModelError {
     let own = &model.constraints[c];
-    let message = "at the points found at which it holds its gradient vanishes or depends on those of the other constraints, so that \
-                   derivatives do not say what it leaves free; expected constraints with independent gradients (x = 0 and y = 0 in \
-                   place of x^2 + y^2 = 0, and none that follows from the others)";
+    let message = "at the points found at which it holds its gradient vanishes or depends on those of the \
+                   other constraints, so that derivatives do not say what it leaves free; expected \
+                   constraints with independent gradients (x = 0 and y = 0 in place of x^2 + y^2 = 0, and \
+                   none that follows from the others)";
     own.place.error(message.into(), 0..own.text.len())
 }
 
@@ -133,8 +135,9 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
                 }
                 right if right.high <= 0.0 => {
                     return refuse(
-                        "it holds only where both sides are zero, because its right side is never positive and a root or norm never \
-                         negative; expected these conditions as constraints of their own",
+                        "it holds only where both sides are zero, because its right side is never positive \
+                         and a root or norm never negative; expected these conditions as constraints of \
+                         their own",
                     );
                 }
                 _ => {}
@@ -155,8 +158,9 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
                 ));
             }
             return refuse(format!(
-                "its left side minus its right side is never {sign}: where it holds, if anywhere, its gradient vanishes and says nothing; expected the \
-                 conditions themselves as constraints (x = 0 and y = 0 in place of x^2 + y^2 = 0)"
+                "its left side minus its right side is never {sign}: where it holds, if anywhere, its \
+                 gradient vanishes and says nothing; expected the conditions themselves as constraints (x \
+                 = 0 and y = 0 in place of x^2 + y^2 = 0)"
             ));
         }
     }

@@ -89,7 +89,9 @@ pub(super) fn remedies(
         }
     }
     if search.elsewhere {
-        let text = "known values and outputs: the constraints hold in several ways, and with a change verdicts are those of another one".into();
+        let text = "known values and outputs: the constraints hold in several ways, and with a change \
+                    verdicts are those of another one"
+            .into();
         let verdicts = search.out.verdicts;
         search.out = Remedies { not_tried: vec![text], verdicts, ..Remedies::default() };
     }

@@ -62,7 +62,8 @@ pub(super) enum NoExpressions {
     TooMany,
     /// An equation contains a function.
     #[error(
-        "solving expressions are sought for models without functions only (elsewhere only where an unknown is an output or its derivative)"
+        "solving expressions are sought for models without functions only (elsewhere only where an unknown \
+         is an output or its derivative)"
     )]
     NotRational,
     /// The elimination exceeds its limit of work.

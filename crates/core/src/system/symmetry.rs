@@ -134,8 +134,9 @@ impl Budget {
         let limit = self.limit.0;
         self.over.then(|| {
             format!(
-                "not all symmetries were sought: with the changes tried after it the search takes more operations than one verdict may, beyond \
-                 --work-limit {limit} ({:.1e} operations); a larger --work-limit allows more",
+                "not all symmetries were sought: with the changes tried after it the search takes more \
+                 operations than one verdict may, beyond --work-limit {limit} ({:.1e} operations); a \
+                 larger --work-limit allows more",
                 self.limit.operations() as f64
             )
         })

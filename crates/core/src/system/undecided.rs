@@ -17,8 +17,8 @@ pub(super) enum NotCounted {
     NotRational,
     /// The verdicts were decided in real numbers.
     #[error(
-        "solutions are counted in prime fields, and the verdicts were decided in real numbers (constraints that follow from each other, \
-         or hold in no prime field)"
+        "solutions are counted in prime fields, and the verdicts were decided in real numbers (constraints \
+         that follow from each other, or hold in no prime field)"
     )]
     InDigits,
     /// The model has too many unknowns.
@@ -29,7 +29,8 @@ pub(super) enum NotCounted {
     TooLong,
     /// The elimination exceeds its limit of work.
     #[error(
-        "the elimination takes more products of coefficients than --count-limit allows; a larger --count-limit allows more"
+        "the elimination takes more products of coefficients than --count-limit allows; a larger \
+         --count-limit allows more"
     )]
     OverLimit,
     /// The elimination needs a power that it does not form.
@@ -40,7 +41,8 @@ pub(super) enum NotCounted {
     TooMany,
     /// The start or an input is special.
     #[error(
-        "starts, inputs, segments or constraints are not generic: there are several with the derivatives looked at, and those of a higher order may leave fewer"
+        "starts, inputs, segments or constraints are not generic: there are several with the derivatives \
+         looked at, and those of a higher order may leave fewer"
     )]
     NotClosed(usize),
     /// The numbers at two points differ.

@@ -71,8 +71,9 @@ impl WorkLimit {
         ModelError {
             what: "the model".into(),
             message: format!(
-                "too large to be judged at the limit of work: {step} take {what}, beyond --work-limit {} ({:.1e} operations, {:.1e} \
-                 bytes); a larger --work-limit allows more, and a lower --order, a smaller model or fewer unknowns need less",
+                "too large to be judged at the limit of work: {step} take {what}, beyond --work-limit {} \
+                 ({:.1e} operations, {:.1e} bytes); a larger --work-limit allows more, and a lower \
+                 --order, a smaller model or fewer unknowns need less",
                 self.0,
                 self.operations() as f64,
                 self.bytes() as f64

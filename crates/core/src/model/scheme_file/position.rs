@@ -96,7 +96,8 @@ impl Reader<'_> {
                 let text = self.number(rate)?;
                 turned(&text, dwell).ok_or_else(|| {
                     let message = format!(
-                        "at `{text}` deg/s for {dwell} s there is no exact angle of at least 0.001 degrees; expected a decimal"
+                        "at `{text}` deg/s for {dwell} s there is no exact angle of at least 0.001 \
+                         degrees; expected a decimal"
                     );
                     self.at(rate.span(), message)
                 })?

@@ -232,7 +232,12 @@ mod tests {
             angles in prop::array::uniform3(angle()),
             dwell in prop::option::of(1_000_000u64..1_000_000_000_000_000),
             turn in prop::option::of((0usize..6, 1_000_000i64..700_000_000_000)),
-            slew in prop::option::of((prop::option::of(1e-3f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
+            slew in prop::option::of((
+                prop::option::of(1e-3f64..5000.0),
+                prop::option::of(0usize..6),
+                1_000_000i64..700_000_000_000,
+                any::<bool>(),
+            )),
             direction in prop::option::of(prop::array::uniform3(-2f64..2.0)),
         ) -> Position {
             let axis = |i: usize| crate::model::rotation::Axis { index: i % 3, geographic: i >= 3 };
@@ -267,12 +272,14 @@ mod tests {
             estimates in numbers(-20..5),
             priors in numbers(-9..8),
         ) -> Settings {
-            let drift_noise = noise.map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
+            let drift_noise = noise
+                .map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
             let [angle, rate, bias] = gyros.map(|g| g.map(|(x, of)| PerGyro(of.map(|k| x * f64::from(k.min(1))))));
             Settings {
                 angle_random_walk_deg_sqrt_h: angle, rate_random_walk_dph_sqrt_h: rate, bias_instability_dph: bias,
-                correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
-                accelerometer_bias_instability_ug, accelerometer_correlation_time_s, drift_noise, drift_scale, values, estimates, priors,
+                correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s,
+                accelerometer_noise_g, azimuth_noise_deg, accelerometer_bias_instability_ug,
+                accelerometer_correlation_time_s, drift_noise, drift_scale, values, estimates, priors,
             }
         }
     }
@@ -324,7 +331,11 @@ mod tests {
                 unknowns: if alone { Unknowns::Drift } else { Unknowns::Coefficients(terms) },
                 measured_azimuth,
                 path,
-                combinations: if combination && !alone { vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()] } else { Vec::new() },
+                combinations: if combination && !alone {
+                    vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()]
+                } else {
+                    Vec::new()
+                },
                 simulation,
                 requirements,
                 bench: if mirrored { [("K0".into(), 20.0), ("latitude".into(), 0.5)].into() } else { [].into() },

@@ -198,7 +198,7 @@ impl Fibre {
             }
             !new
         });
-        // one with few constants only is needed: otherwise the others would be sought in vain
+        // random extras: without a ratio of few constants alone the others would be sought in vain
         for _ in 0..EXTRAS.min(left.len()) {
             let at = rng.below(left.len() as u64) as usize;
             taken.push(left.swap_remove(at).1);
