@@ -14,7 +14,7 @@ use obsdeg_exact::{Echelon, SplitMix64, gcd};
 
 use crate::degree::ensemble::Verdicts;
 use crate::degree::platform_rows::{LocalRow, local_chain};
-use crate::degree::transition::{AtATime, LiftField, transition};
+use crate::degree::transition::{LiftField, RandomTime, transition};
 use crate::model::platform::{Block, LOCAL, Platform, Sample};
 use crate::model::ring::Ring;
 use crate::model::{Carry, Dwell, Scheme, Unknowns};
@@ -169,7 +169,7 @@ fn module(
 
     let mut full = Echelon::new(field, n);
     let time = 1 + rng.below(field.modulus() - 1);
-    let at_a_time = AtATime::random(field, [point.w_n, point.w_u], time, rng);
+    let at_a_time = RandomTime::random(field, [point.w_n, point.w_u], time, rng);
     let power = |j: usize| field.pow(time, j as u64);
     for row in dwell_rows(&field, &blocks, &chain, power, |i| at_a_time.phi(dwells[i])).0 {
         full.insert(&row);

@@ -23,7 +23,7 @@ use crate::degree::coefficient::{
 };
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::platform_rows::{LocalRow, chain_of};
-use crate::degree::transition::AtATime;
+use crate::degree::transition::RandomTime;
 use crate::model::platform::{Block, LOCAL, Platform, RandomValues, Sample, local_output};
 use crate::model::{Carry, Observed, OmittedModel, Scheme};
 
@@ -103,7 +103,7 @@ pub enum OmittedError {
 
 /// Classes in one field, with the change of every determined unknown by every silent error.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Found {
+struct FoundClasses {
     classes: Vec<OmittedClass>,
     /// True per unknown if the samples determine it.
     determined: Vec<bool>,
@@ -137,7 +137,7 @@ pub fn omitted_verdicts(
             Ok::<_, OmittedError>((values, found))
         };
         let ((values, first), (_, second)) = (draw(0)?, draw(1)?);
-        let nonzero = |f: &Found| -> Vec<Vec<bool>> {
+        let nonzero = |f: &FoundClasses| -> Vec<Vec<bool>> {
             f.changes.iter().map(|v| v.iter().map(|x| *x != 0).collect()).collect()
         };
         let agree = first.classes == second.classes
@@ -163,7 +163,7 @@ pub fn omitted_verdicts(
 fn verdicts(
     platform: &Platform,
     model: &OmittedModel,
-    found: &Found,
+    found: &FoundClasses,
     exact: Vec<Vec<Option<Coefficient>>>,
     order: u64,
 ) -> OmittedVerdicts {
@@ -204,7 +204,7 @@ fn verdicts(
 }
 
 /// Classes and changes at one sample.
-fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> Found {
+fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> FoundClasses {
     let (n, m) = (platform.names().len(), model.terms().len());
     let field = sample.point.ring;
     let mut space = Echelon::new(field, n + m);
@@ -228,7 +228,7 @@ fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut
         OmittedClass::Silent => (0..n).map(|c| change(c, j)).collect(),
         _ => Vec::new(),
     });
-    Found { determined, changes: changes.collect(), classes }
+    FoundClasses { determined, changes: changes.collect(), classes }
 }
 
 fn quotient(field: &Field, a: u64, b: u64) -> u64 {
@@ -249,7 +249,7 @@ fn rows(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut Sp
         return reset_rows(platform, model, &field, &blocks, &chain);
     }
     let time = 1 + rng.below(field.modulus() - 1);
-    let at_a_time = AtATime::random(field, [point.w_n, point.w_u], time, rng);
+    let at_a_time = RandomTime::random(field, [point.w_n, point.w_u], time, rng);
     let dwells = dwell_ratios(platform.scheme());
     let power = |j: usize| field.pow(time, j as u64);
     dwell_rows(&field, &blocks, &chain, power, |i| at_a_time.phi(dwells[i])).0
@@ -308,7 +308,7 @@ fn exact_changes(
     }
     let [one, two] = &samples[..] else { return Vec::new() };
     let recovered = |j: usize, c: usize| -> Option<Coefficient> {
-        let value = |f: &Found| f.changes.get(j)?.get(c).copied();
+        let value = |f: &FoundClasses| f.changes.get(j)?.get(c).copied();
         let field = one.0.field;
         let image = |value, rates| Image { value, rates };
         let rates = rates_between(&field, image(value(&one.2[0])?, one.1), image(value(&one.4)?, one.3))?;

@@ -26,7 +26,7 @@ use crate::omitted::omitted_verdicts;
 use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
-use crate::solution::loci::{Found, loci};
+use crate::solution::loci::{DegenerateLoci, loci};
 use crate::solution::print::{StationLabel, stations, terms, text};
 use crate::solution::solver::{Frame, Functional, Solver};
 
@@ -105,15 +105,15 @@ pub fn analyze(
         );
     }
     let asked = (options.solutions && !course, untold_loci && generic);
-    let wanting = Wanting::new(&quantities, &combinations, &findings, &found, asked);
-    let wanting = Wanting {
+    let missing = MissingParts::new(&quantities, &combinations, &findings, &found, asked);
+    let missing = MissingParts {
         left_out: printer.solver.left_out(),
         formulas: options.formulas && formulas.is_none(),
-        ..wanting
+        ..missing
     };
-    let sought = (options.solutions && !course || wanting.formulas) && wanting.any();
+    let sought = (options.solutions && !course || missing.formulas) && missing.any();
     if sought {
-        let note = engine_note(built, &mut printer.solver, &wanting);
+        let note = engine_note(built, &mut printer.solver, &missing);
         printer.notes.extend(note);
     }
     let failure = printer.solver.worker().and_then(|w| w.failure().cloned());
@@ -256,7 +256,7 @@ fn null_report(platform: &Platform, v: &NullVector) -> Vec<Component> {
 
 /// Parts of an answer that are missing without the symbolic engine.
 #[derive(Debug, Default)]
-struct Wanting {
+struct MissingParts {
     /// Names of observable unknowns with a solution in decimals.
     decimals: Vec<String>,
     /// Names of observable unknowns without a solution.
@@ -271,12 +271,12 @@ struct Wanting {
     formulas: bool,
 }
 
-impl Wanting {
+impl MissingParts {
     fn new(
         quantities: &[Quantity],
         combinations: &[CombinationReport],
         findings: &SchemeFindings,
-        found: &Found,
+        found: &DegenerateLoci,
         (solutions, generic): (bool, bool),
     ) -> Self {
         let quantities = quantities.iter().map(|q| (&q.name, q.degree, &q.solution));
@@ -333,18 +333,18 @@ impl Wanting {
 
 /// Note on the parts that are missing because the symbolic engine gave no formulas, with the reason; `None`
 /// where nothing is missing for that reason.
-fn engine_note(built: bool, solver: &mut Solver<'_>, wanting: &Wanting) -> Option<String> {
+fn engine_note(built: bool, solver: &mut Solver<'_>, missing: &MissingParts) -> Option<String> {
     let failure = solver.worker().and_then(|w| w.failure().cloned());
     let why = match failure {
         _ if !built => "built without the symbolic engine".into(),
         _ if solver.too_many_angles() => {
             "too many different angles for formulas in their sines and cosines".into()
         }
-        Some(WorkerError::OverLimit { .. }) if !solver.given_up() && !wanting.formulas => return None,
+        Some(WorkerError::OverLimit { .. }) if !solver.given_up() && !missing.formulas => return None,
         Some(failure) => format!("formulas were given up ({failure})"),
         None => return None,
     };
-    Some(format!("{why}, therefore: {}", wanting.parts().join("; ")))
+    Some(format!("{why}, therefore: {}", missing.parts().join("; ")))
 }
 
 fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, AnalysisError> {

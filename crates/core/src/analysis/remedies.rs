@@ -9,7 +9,7 @@ use crate::degree::staircase::Degrees;
 use crate::model::attitude::{cardinal, cardinal_names};
 use crate::model::platform::{Platform, RandomValues};
 use crate::model::{Position, Unknowns};
-use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
+use crate::remedies::{Change, Directions, Information, Remedies, Remedy, Resolved};
 
 /// Largest number of unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half
 /// a verdict.
@@ -23,7 +23,7 @@ const MOST_PAIRS: usize = 12;
 type Stairs = [Vec<Echelon>; 2];
 
 /// Search for remedies of one scheme.
-struct Search<'a> {
+struct SchemeRemedySearch<'a> {
     platform: &'a Platform,
     verdicts: &'a Verdicts,
     seed: u64,
@@ -34,12 +34,12 @@ struct Search<'a> {
 }
 
 /// A scheme with one more attitude, in the first field of the verdict.
-struct Candidate {
+struct AttitudeCandidate {
     attitude: String,
     degrees: Vec<Option<usize>>,
     /// Rows of the attitude in the unobservable directions; `None` where the two schemes share no random
     /// values.
-    tells: Option<Told<Field>>,
+    information: Option<Information<Field>>,
 }
 
 /// Remedies of a judged scheme. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs of each
@@ -60,7 +60,7 @@ pub(super) fn remedies(
     let none = Echelon::new(field, platform.names().len());
     let directions = Directions::of(field, stairs[0].last().unwrap_or(&none));
     let out = Remedies::default();
-    let mut search = Search { platform, verdicts, seed: findings.seed, open, stairs, out };
+    let mut search = SchemeRemedySearch { platform, verdicts, seed: findings.seed, open, stairs, out };
     search.known(&directions);
     let candidates = search.attitudes(&directions);
     search.carries(carries);
@@ -99,7 +99,7 @@ fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>
 
 /// Entries of the rows of a longer scheme in the unobservable directions; `places` are the columns of this
 /// scheme's unknowns. Unknowns of the new position alone are eliminated.
-fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Told<Field> {
+fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Information<Field> {
     let own: Vec<usize> = (0..space.columns()).filter(|k| !places.contains(k)).collect();
     let field = space.field();
     let mut shared = Echelon::new(field, space.columns());
@@ -112,7 +112,7 @@ fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> T
     directions.rows(beyond.map(|(i, _)| &shared.row(i)[own.len()..]))
 }
 
-impl Search<'_> {
+impl SchemeRemedySearch<'_> {
     fn name(&self, c: usize) -> String {
         self.platform.names()[c].clone()
     }
@@ -189,7 +189,7 @@ impl Search<'_> {
     }
 
     /// Tries one more cardinal attitude: keeps the fewest of the 24 that together resolve most unknowns.
-    fn attitudes(&mut self, directions: &Directions<Field>) -> Vec<Candidate> {
+    fn attitudes(&mut self, directions: &Directions<Field>) -> Vec<AttitudeCandidate> {
         let n = self.platform.names().len();
         if self.platform.scheme().unknowns == Unknowns::Drift {
             return Vec::new();
@@ -199,7 +199,8 @@ impl Search<'_> {
             return Vec::new();
         }
         let names = cardinal_names();
-        let candidates: Vec<Candidate> = names.iter().filter_map(|a| self.candidate(a, directions)).collect();
+        let candidates: Vec<AttitudeCandidate> =
+            names.iter().filter_map(|a| self.candidate(a, directions)).collect();
         let mut left = self.open.clone();
         let mut excluded = vec![false; candidates.len()];
         loop {
@@ -224,7 +225,7 @@ impl Search<'_> {
     }
 
     /// Degrees with one more attitude, in the first field.
-    fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<Candidate> {
+    fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<AttitudeCandidate> {
         let platform = self.with(&[attitude])?;
         let scheme = platform.scheme();
         // with turns between positions or rates of rotations, each scheme draws its own random values
@@ -241,11 +242,11 @@ impl Search<'_> {
         let names = self.platform.names();
         let place = |name: &String| platform.names().iter().position(|n| n == name);
         let places: Vec<usize> = names.iter().map(place).collect::<Option<_>>()?;
-        let tells = stairs.last().filter(|_| !own).map(|space| added(directions, space, &places));
-        Some(Candidate {
+        let information = stairs.last().filter(|_| !own).map(|space| added(directions, space, &places));
+        Some(AttitudeCandidate {
             attitude: attitude.into(),
             degrees: places.iter().map(|&k| found.degree[k]).collect(),
-            tells,
+            information,
         })
     }
 
@@ -269,15 +270,15 @@ impl Search<'_> {
 
     /// Tries two changes for unknowns that no single one resolves: two attitudes, an attitude and a value,
     /// two values.
-    fn two(&mut self, directions: &Directions<Field>, candidates: Vec<Candidate>) {
-        if candidates.iter().any(|c| c.tells.is_none()) && !self.left().is_empty() {
+    fn two(&mut self, directions: &Directions<Field>, candidates: Vec<AttitudeCandidate>) {
+        if candidates.iter().any(|c| c.information.is_none()) && !self.left().is_empty() {
             let text = "two changes with an attitude among them: the turn to it acts as well";
             self.out.not_tried.push(text.into());
         }
-        let (names, attitudes): (Vec<String>, Vec<Told<Field>>) =
-            candidates.into_iter().filter_map(|c| Some((c.attitude, c.tells?))).unzip();
-        let values: Vec<Told<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
-        type List<'a> = &'a [Told<Field>];
+        let (names, attitudes): (Vec<String>, Vec<Information<Field>>) =
+            candidates.into_iter().filter_map(|c| Some((c.attitude, c.information?))).unzip();
+        let values: Vec<Information<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
+        type List<'a> = &'a [Information<Field>];
         let kinds: [(List<'_>, Option<List<'_>>); 3] =
             [(&attitudes, None), (&attitudes, Some(&values)), (&values, None)];
         let mut complete = true;

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use obsdeg_exact::radical::embeddings;
 use obsdeg_exact::{Field, RootField};
 
-use super::witness::{Found, Staircase};
+use super::witness::{Staircase, WitnessedVerdict};
 use super::{ExactNumber, ExactVector, Exactly, number};
 use crate::degree::coefficient::{Coefficient, Number, power, recover_radical};
 use crate::degree::ensemble::Verdicts;
@@ -43,11 +43,11 @@ pub(super) fn image(c: &Exactly, sample: &Sample, rates: [u64; 2]) -> Vec<(usize
 }
 
 /// The fields, embeddings and rates at which everything is solved.
-struct Points<'a> {
+struct StaircasePoints<'a> {
     platform: &'a Platform,
     fields: [RootField; 2],
     /// Staircases at the points, indexed `[field][embedding][point]`.
-    stairs: [[Vec<Solved>; 4]; 2],
+    stairs: [[Vec<SolvedStaircase>; 4]; 2],
     /// Rates `(wN, wU)` of the points. At a pole or the equator the only non-zero rate is 1.
     rates: Vec<[u64; 2]>,
     pole: bool,
@@ -56,7 +56,7 @@ struct Points<'a> {
 }
 
 /// Staircase at one point, with the inverses of its minors.
-struct Solved {
+struct SolvedStaircase {
     sample: Sample,
     staircase: Staircase,
     inverses: Vec<Vec<Vec<u64>>>,
@@ -69,7 +69,7 @@ pub(super) fn exact(
     verdicts: &Verdicts,
     staircase: &Staircase,
     combinations: &[Exactly],
-    found: &[Found],
+    found: &[WitnessedVerdict],
 ) -> Option<ExactWitness> {
     let scheme = platform.scheme();
     let mut angles = scheme.positions.iter().flat_map(|p| p.angles.iter().map(Angle::turn));
@@ -77,7 +77,7 @@ pub(super) fn exact(
     if !drifts || !angles.all(|a| a.is_multiple_of_deg(15)) {
         return None;
     }
-    let points = Points::new(platform, verdicts, staircase, combinations)?;
+    let points = StaircasePoints::new(platform, verdicts, staircase, combinations)?;
     let null_vectors =
         (0..staircase.ranks.len()).map(|k| points.null_vectors(staircase, k)).collect::<Option<_>>()?;
     let one = |c: usize| vec![(c, Coefficient::one())];
@@ -92,7 +92,7 @@ pub(super) fn exact(
     Some(ExactWitness { null_vectors, coefficients })
 }
 
-impl<'a> Points<'a> {
+impl<'a> StaircasePoints<'a> {
     /// Computes the staircases at all points; `None` if the basis rows differ at one of them.
     fn new(
         platform: &'a Platform,
@@ -116,7 +116,7 @@ impl<'a> Points<'a> {
             let other = Staircase::new(platform, &sample);
             let same = other.basis == staircase.basis && other.ranks == staircase.ranks;
             let inverses = (0..other.ranks.len()).map(|k| other.inverse(k)).collect::<Option<_>>();
-            Some(Solved { sample, inverses: inverses?, staircase: other }).filter(|_| same)
+            Some(SolvedStaircase { sample, inverses: inverses?, staircase: other }).filter(|_| same)
         };
         let mut stairs = [0, 1].map(|_| [0; 4].map(|_| Vec::new()));
         for (field, values) in stairs.iter_mut().zip(&verdicts.values) {
@@ -184,7 +184,7 @@ impl<'a> Points<'a> {
             // latitude alone has no solution. A row whose coefficient vanishes only there (such as wN - wU
             // at 45 deg) is not among `rows`.
             let holds = Cell::new(true);
-            let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
+            let solved = |s: &SolvedStaircase, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;
                 let c = image(&part, &s.sample, [f.from_u64(*w_n), f.from_u64(*w_u)]);
                 let y = s.staircase.solution(&s.inverses[degree], &c);

@@ -24,7 +24,7 @@ use crate::model::scheme::MAX_COMBINATIONS;
 use crate::model::{Carry, Scheme, Term, Unknowns};
 use crate::solution::Frame;
 use crate::system::ModelError;
-use witness::{Found, Staircase};
+use witness::{Staircase, WitnessedVerdict};
 
 /// Name and version of the layout.
 pub const LAYOUT: &str = "obsdeg.certificate/1";
@@ -286,7 +286,7 @@ fn number(c: &Coefficient) -> ExactNumber {
 
 /// Verdict and witness of a functional in the form of the file.
 fn proof(
-    found: Found,
+    found: WitnessedVerdict,
     coefficients: Option<Vec<ExactNumber>>,
     staircase: &Staircase,
     names: &[String],
@@ -306,7 +306,7 @@ fn written(
     platform: &Platform,
     staircase: &Staircase,
     combinations: &[Exactly],
-    found: Vec<Found>,
+    found: Vec<WitnessedVerdict>,
     exact: Option<exact::ExactWitness>,
 ) -> Certificate {
     let names = platform.names();

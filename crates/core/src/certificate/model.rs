@@ -7,7 +7,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::witness::{Found, Staircase};
+use super::witness::{Staircase, WitnessedVerdict};
 use super::{CertificateError, CertifiedUnknown, MOST_UNKNOWNS, RowName, not_covered, proof, text};
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::rows::DerivativeRows;
@@ -95,7 +95,7 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
     let [first, second] =
         fields.map(|field| witness(model, &compiled, &judgement, field, &columns, &mut rng));
     let ((staircase, found), (other, second)) = (first?, second?);
-    let verdict = |(found, &column): (&Found, &usize)| {
+    let verdict = |(found, &column): (&WitnessedVerdict, &usize)| {
         let verdict = judgement.findings.verdict(column);
         (verdict.status, verdict.degree) == (found.status, found.degree)
     };
@@ -315,7 +315,7 @@ fn witness(
     field: Field,
     columns: &[usize],
     rng: &mut SplitMix64,
-) -> Result<(Staircase, Vec<Found>), CertificateError> {
+) -> Result<(Staircase, Vec<WitnessedVerdict>), CertificateError> {
     let work = Work::new(model.work_limit);
     let unsolved =
         || not_covered("no point at which it is defined, or more work than the limit", "models with rows");

@@ -26,7 +26,7 @@ pub(super) struct Staircase {
 
 /// Status, degree and witness of one functional.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct WitnessedVerdict {
     pub status: Status,
     pub degree: Option<usize>,
     /// Indices of the basis rows in the solution.
@@ -137,7 +137,7 @@ impl Staircase {
     }
 
     /// Status, degree and witness of functionals, each as columns and values.
-    pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<Found> {
+    pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<WitnessedVerdict> {
         let orders = 0..self.ranks.len();
         let null: Vec<_> = orders.clone().map(|k| (self.free(k), self.null_vectors(k))).collect();
         let inverses: Vec<_> = orders.map(|k| self.inverse(k).unwrap_or_default()).collect();
@@ -165,7 +165,7 @@ impl Staircase {
                     Some(k) => k.checked_sub(1).and_then(|k| hidden[k]),
                     None => hidden.last().copied().flatten(),
                 };
-                Found {
+                WitnessedVerdict {
                     status: Status::of(degree, excited.is_some()),
                     degree,
                     solution,

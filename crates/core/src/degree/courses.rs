@@ -23,7 +23,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::platform_rows::local_chain;
 use super::staircase::Degrees;
-use super::transition::{AtATime, LiftField, transition};
+use super::transition::{LiftField, RandomTime, transition};
 use crate::model::Carry;
 use crate::model::attitude::{Matrix3, elementary, product, transpose, unit};
 use crate::model::error_model::Columns;
@@ -101,7 +101,7 @@ pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<E
 
 /// Motion of psi in a rotation: `exp(F t)` over all of it, its integral over time in units of T, and `(i j c
 /// - F T)^-1` for the harmonics j = -m..=m except 0.
-struct Motion<E> {
+struct PsiMotion<E> {
     phi: Matrix3<E>,
     integral: Matrix3<E>,
     resolvents: Vec<Option<Matrix3<E>>>,
@@ -117,7 +117,7 @@ fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
     let (t_squared, over_t) = (field.mul(t, t), field.inv(t));
     let motion = |arc: &SteadyTurn| {
         let time = field.mul(t, arc.duration);
-        let earth = AtATime::random(field, [point.w_n, point.w_u], time, &mut rng);
+        let earth = RandomTime::random(field, [point.w_n, point.w_u], time, &mut rng);
         let phi = earth.phi(1);
         // (s - F T)^-1 = (1 + (s F T + (F T)^2)/(s^2 + W^2 T^2))/s
         let resolvent = |s: u64| {
@@ -126,7 +126,7 @@ fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
             let both = field.mul(over_s, field.inv(square));
             earth.combine([over_s, field.mul(field.mul(s, both), t), field.mul(both, t_squared)])
         };
-        Motion {
+        PsiMotion {
             phi: phi.map(|row| [row[0], row[1], row[2]]),
             integral: phi.map(|row| [row[3], row[4], row[5]].map(|x| field.mul(x, over_t))),
             resolvents: frequencies(platform, sample, arc).into_iter().map(|s| s.map(resolvent)).collect(),
@@ -147,7 +147,12 @@ fn frequencies(platform: &Platform, sample: &Sample, arc: &SteadyTurn) -> Vec<Op
 }
 
 /// Motion of psi in a rotation, as power series in T.
-fn in_series(platform: &Platform, sample: &Sample, ring: &SeriesRing, arc: &SteadyTurn) -> Motion<Vec<u64>> {
+fn in_series(
+    platform: &Platform,
+    sample: &Sample,
+    ring: &SeriesRing,
+    arc: &SteadyTurn,
+) -> PsiMotion<Vec<u64>> {
     let (field, point) = (ring.field, &sample.point);
     // one more order, which the integral loses
     let longer = SeriesRing { precision: ring.precision + 1, ..*ring };
@@ -166,7 +171,7 @@ fn in_series(platform: &Platform, sample: &Sample, ring: &SeriesRing, arc: &Stea
         }
         out
     };
-    Motion {
+    PsiMotion {
         phi: std::array::from_fn(|i| std::array::from_fn(|j| phi[i][j][..ring.precision].to_vec())),
         integral: std::array::from_fn(|i| std::array::from_fn(|j| phi[i][j + 3][1..].to_vec())),
         resolvents: frequencies(platform, sample, arc).into_iter().map(|s| s.map(resolvent)).collect(),
@@ -179,7 +184,7 @@ fn rows<R: LiftField>(
     sample: &Sample,
     ring: &R,
     t: &R::Element,
-    mut motion: impl FnMut(&SteadyTurn) -> Motion<R::Element>,
+    mut motion: impl FnMut(&SteadyTurn) -> PsiMotion<R::Element>,
 ) -> Vec<Vec<R::Element>> {
     let point = &sample.point;
     let carry = platform.scheme().carry;
@@ -231,7 +236,7 @@ fn rows<R: LiftField>(
             left = Some(times(ring, &lift(&transpose(c)), &psi));
             continue;
         };
-        let turning = Turning::new(platform, sample, c, arc);
+        let turning = RotationErrors::new(platform, sample, c, arc);
         out.extend(turning.rows(ring, &psi, &powers));
         psi = turning.moved(ring, &psi, t, &motion(arc));
         // the end of the arc is the next station
@@ -323,7 +328,7 @@ impl Ring for Harmonics<'_> {
 }
 
 /// Errors along a rotation as trigonometric polynomials of its angle.
-struct Turning<'a> {
+struct RotationErrors<'a> {
     platform: &'a Platform,
     sample: &'a Sample,
     arc: &'a SteadyTurn,
@@ -335,7 +340,7 @@ struct Turning<'a> {
     accelerometer: Columns<Vec<u64>>,
 }
 
-impl<'a> Turning<'a> {
+impl<'a> RotationErrors<'a> {
     fn new(platform: &'a Platform, sample: &'a Sample, start: &Matrix3<u64>, arc: &'a SteadyTurn) -> Self {
         let (f, point, errors) = (&sample.point.ring, &sample.point, platform.errors());
         let ring = Harmonics { field: f, degree: errors.harmonics() };
@@ -434,7 +439,7 @@ impl<'a> Turning<'a> {
         ring: &R,
         psi: &Columns<R::Element>,
         t: &R::Element,
-        motion: &Motion<R::Element>,
+        motion: &PsiMotion<R::Element>,
     ) -> Columns<R::Element> {
         let f = &self.sample.point.ring;
         let (m, first) = (self.platform.errors().harmonics(), psi[0].len() - self.platform.coefficients());

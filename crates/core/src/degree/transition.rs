@@ -46,7 +46,7 @@ pub(crate) fn transition(ring: &SeriesRing, w_n: u64, w_u: u64, ratio: u64) -> [
 
 /// Transition matrix at a random time. `T`, `cos wT` and `sin wT` are independent except for
 /// `cos^2 + sin^2 = 1`, so a random point of the circle stands for any dwell.
-pub(crate) struct AtATime {
+pub(crate) struct RandomTime {
     field: Field,
     /// Random time `T`.
     t: u64,
@@ -59,7 +59,7 @@ pub(crate) struct AtATime {
     w_squared: [[u64; 3]; 3],
 }
 
-impl AtATime {
+impl RandomTime {
     /// Transition at the rates `(wN, wU)` and the time `t`; the angle by which the earth rotates in it is
     /// random.
     pub(crate) fn random(field: Field, [w_n, w_u]: [u64; 2], t: u64, rng: &mut SplitMix64) -> Self {

@@ -10,7 +10,7 @@ use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 use super::expression::{
     Expression, ExpressionError, Function, MAX_DEPTH, MAX_NAME, Names, Node, evaluate_f64,
 };
-use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
+use super::vectors::{Made, Mismatch, NodeBuilder, Shape, Value, VectorOperation, component, entry, list};
 
 /// Largest number of names, numbers and operations of a vector or matrix with all entries written out.
 const MAX_WRITTEN_OUT: usize = 4_000_000;
@@ -20,7 +20,7 @@ pub type Shapes = HashMap<String, Shape>;
 
 /// State of the parser: the expression read so far.
 #[derive(Debug, Clone)]
-struct Reading<'a> {
+struct ParserState<'a> {
     expression: Expression,
     names: Names,
     shapes: &'a Shapes,
@@ -28,17 +28,17 @@ struct Reading<'a> {
     vectors: bool,
 }
 
-type Input<'a> = Stateful<LocatingSlice<&'a str>, Reading<'a>>;
+type Input<'a> = Stateful<LocatingSlice<&'a str>, ParserState<'a>>;
 
 /// Error of the parser: place and expected text, or shapes that do not fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Wrong {
+struct ParseFailure {
     at: usize,
     expected: &'static str,
     shape: Option<Box<ExpressionError>>,
 }
 
-impl ParserError<Input<'_>> for Wrong {
+impl ParserError<Input<'_>> for ParseFailure {
     type Inner = Self;
     fn from_input(input: &Input<'_>) -> Self {
         Self { at: input.current_token_start(), expected: "something else", shape: None }
@@ -48,15 +48,15 @@ impl ParserError<Input<'_>> for Wrong {
     }
 }
 
-type Parsed<T> = Result<T, ErrMode<Wrong>>;
+type Parsed<T> = Result<T, ErrMode<ParseFailure>>;
 
 fn wrong<T>(input: &Input<'_>, expected: &'static str) -> Parsed<T> {
-    Err(ErrMode::Cut(Wrong { at: input.current_token_start(), expected, shape: None }))
+    Err(ErrMode::Cut(ParseFailure { at: input.current_token_start(), expected, shape: None }))
 }
 
 /// Failure from which the parser may try another rule.
 fn other<T>(input: &Input<'_>) -> Parsed<T> {
-    Err(ErrMode::Backtrack(Wrong::from_input(input)))
+    Err(ErrMode::Backtrack(ParseFailure::from_input(input)))
 }
 
 fn skip_blanks(input: &mut Input<'_>) {
@@ -101,16 +101,16 @@ fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
 fn push_vector(
     input: &mut Input<'_>,
     start: usize,
-    made: impl FnOnce(&mut Maker<'_>) -> Made,
+    made: impl FnOnce(&mut NodeBuilder<'_>) -> Made,
 ) -> Parsed<Value> {
     let span = start..input.previous_token_end();
     input.state.vectors = true;
-    let mut maker = Maker { expression: &mut input.state.expression, span: span.clone() };
-    match made(&mut maker) {
+    let mut builder = NodeBuilder { expression: &mut input.state.expression, span: span.clone() };
+    match made(&mut builder) {
         Ok((shape, entries)) => Ok(Value { shape, entries, start }),
         Err(Mismatch { expected, found }) => {
             let shape = ExpressionError::Shape { expected, found, span };
-            Err(ErrMode::Cut(Wrong { at: start, expected: "", shape: Some(Box::new(shape)) }))
+            Err(ErrMode::Cut(ParseFailure { at: start, expected: "", shape: Some(Box::new(shape)) }))
         }
     }
 }
@@ -262,8 +262,8 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
         return angle(input, &arguments, start);
     }
     if peek(input) == Some('(') {
-        let Some(operation) = Operation::named(&name).filter(|_| names == Names::Plain) else {
-            return Err(ErrMode::Cut(Wrong { at: start, expected: functions(names), shape: None }));
+        let Some(operation) = VectorOperation::named(&name).filter(|_| names == Names::Plain) else {
+            return Err(ErrMode::Cut(ParseFailure { at: start, expected: functions(names), shape: None }));
         };
         symbol(input, "(");
         let arguments = values(input, ")", "an operator, `,` or `)`")?;
@@ -430,7 +430,7 @@ pub fn parse_equation(
                 return wrong(input, "an operator or `|`");
             }
             let of = [left];
-            left = push_vector(input, start, |make| Operation::Norm.apply(&of, make))?;
+            left = push_vector(input, start, |make| VectorOperation::Norm.apply(&of, make))?;
         }
         if symbol(input, "=").is_none() {
             return wrong(input, "an operator or `=`");
@@ -459,7 +459,7 @@ pub fn parse_equation(
     Ok((components(read, &value, text)?, other_side))
 }
 
-fn components(read: Reading<'_>, value: &Value, text: &str) -> Result<Components, ExpressionError> {
+fn components(read: ParserState<'_>, value: &Value, text: &str) -> Result<Components, ExpressionError> {
     let mut entries = Vec::with_capacity(value.entries.len());
     let mut operations = 0;
     for &root in value.entries.iter().filter(|_| read.vectors) {
@@ -483,11 +483,11 @@ fn read<'a>(
     names: Names,
     shapes: &'a Shapes,
     rule: impl FnOnce(&mut Input<'a>) -> Parsed<Value>,
-) -> Result<(Reading<'a>, Value), ExpressionError> {
+) -> Result<(ParserState<'a>, Value), ExpressionError> {
     if let Some(at) = too_deep(text) {
         return Err(ExpressionError::TooDeep { span: at..at + 1 });
     }
-    let state = Reading { expression: Expression::default(), names, shapes, vectors: false };
+    let state = ParserState { expression: Expression::default(), names, shapes, vectors: false };
     let mut input = Stateful { input: LocatingSlice::new(text), state };
     let parsed = rule(&mut input).and_then(|value| {
         skip_blanks(&mut input);
@@ -499,7 +499,7 @@ fn read<'a>(
     match parsed {
         Ok(value) => Ok((input.state, value)),
         Err(error) => {
-            let fallback = Wrong { at: text.len(), expected: "an expression", shape: None };
+            let fallback = ParseFailure { at: text.len(), expected: "an expression", shape: None };
             let wrong = error.into_inner().unwrap_or(fallback);
             if let Some(shape) = wrong.shape {
                 return Err(*shape);

@@ -84,7 +84,7 @@ pub(super) type Made = Result<(Shape, Vec<usize>), Mismatch>;
 
 /// Functions of vectors; their names are taken only before a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Operation {
+pub(super) enum VectorOperation {
     Cross,
     Dot,
     Norm,
@@ -99,7 +99,7 @@ pub(super) enum Operation {
     AboutZ,
 }
 
-impl Operation {
+impl VectorOperation {
     pub(super) const ALL: [(&'static str, Self); 12] = [
         ("cross", Self::Cross),
         ("dot", Self::Dot),
@@ -137,7 +137,7 @@ impl Operation {
     }
 
     /// Result of the operation on `arguments`; adds its nodes to the expression.
-    pub(super) fn apply(self, arguments: &[Value], make: &mut Maker<'_>) -> Made {
+    pub(super) fn apply(self, arguments: &[Value], builder: &mut NodeBuilder<'_>) -> Made {
         let (words, shapes) = self.takes();
         let fits = arguments.len() == shapes.len()
             && arguments.iter().zip(shapes).all(|(a, s)| s.is_none_or(|s| s == a.shape));
@@ -158,11 +158,11 @@ impl Operation {
         let b = arguments.get(1).map_or(&[][..], |b| &b.entries);
         let shape = arguments[0].shape;
         Ok(match self {
-            Self::Cross => (shape, make.cross(a, b)),
-            Self::Dot => (Shape::SCALAR, vec![make.dot(a, b)]),
+            Self::Cross => (shape, builder.cross(a, b)),
+            Self::Dot => (Shape::SCALAR, vec![builder.dot(a, b)]),
             Self::Norm => {
-                let square = make.dot(a, a);
-                (Shape::SCALAR, vec![make.node(Node::Call { function: Function::Sqrt, argument: square })])
+                let square = builder.dot(a, a);
+                (Shape::SCALAR, vec![builder.node(Node::Call { function: Function::Sqrt, argument: square })])
             }
             Self::Transpose => {
                 let Shape { rows, columns } = shape;
@@ -170,38 +170,38 @@ impl Operation {
                 (Shape { rows: columns, columns: rows }, turned.collect())
             }
             Self::Skew => {
-                let zero = make.integer(0);
+                let zero = builder.integer(0);
                 let [x, y, z] = [a[0], a[1], a[2]];
-                let [mx, my, mz] = [x, y, z].map(|k| make.node(Node::Negate(k)));
+                let [mx, my, mz] = [x, y, z].map(|k| builder.node(Node::Negate(k)));
                 (Shape { rows: 3, columns: 3 }, vec![zero, mz, y, z, zero, mx, my, x, zero])
             }
-            Self::Rotation => (Shape { rows: 3, columns: 3 }, make.rotation(a)),
-            Self::Product => (shape, make.quaternion_product(a, b)),
+            Self::Rotation => (Shape { rows: 3, columns: 3 }, builder.rotation(a)),
+            Self::Product => (shape, builder.quaternion_product(a, b)),
             Self::Conjugate => {
-                let minus = a[1..].iter().map(|&k| make.node(Node::Negate(k))).collect::<Vec<_>>();
+                let minus = a[1..].iter().map(|&k| builder.node(Node::Negate(k))).collect::<Vec<_>>();
                 (shape, [&a[..1], &minus].concat())
             }
             Self::Rate => {
-                let zero = make.integer(0);
-                let product = make.quaternion_product(a, &[&[zero], b].concat());
-                let two = make.integer(2);
-                (shape, product.into_iter().map(|k| make.node(Node::Divide(k, two))).collect())
+                let zero = builder.integer(0);
+                let product = builder.quaternion_product(a, &[&[zero], b].concat());
+                let two = builder.integer(2);
+                (shape, product.into_iter().map(|k| builder.node(Node::Divide(k, two))).collect())
             }
             Self::AboutX | Self::AboutY | Self::AboutZ => {
                 let axis = self as usize - Self::AboutX as usize;
-                (Shape { rows: 3, columns: 3 }, make.turn(axis, a[0]))
+                (Shape { rows: 3, columns: 3 }, builder.turn(axis, a[0]))
             }
         })
     }
 }
 
 /// Builder of the nodes of one operation, all with the byte range of the operation.
-pub(super) struct Maker<'a> {
+pub(super) struct NodeBuilder<'a> {
     pub(super) expression: &'a mut Expression,
     pub(super) span: Range<usize>,
 }
 
-impl Maker<'_> {
+impl NodeBuilder<'_> {
     fn node(&mut self, node: Node) -> usize {
         self.expression.nodes.push(node);
         self.expression.spans.push(self.span.clone());
@@ -283,9 +283,9 @@ impl Maker<'_> {
     /// Nodes of a binary operation (`a + b` and others) with at least one operand that is no scalar.
     pub(super) fn binary(&mut self, sign: char, a: &Value, b: &Value) -> Made {
         let both = || format!("{} {sign} {}", a.shape, b.shape);
-        let each = |make: &mut Self, node: fn(usize, usize) -> Node| {
+        let each = |builder: &mut Self, node: fn(usize, usize) -> Node| {
             let pairs: Vec<_> = a.entries.iter().copied().zip(b.entries.iter().copied()).collect();
-            pairs.into_iter().map(|(x, y)| make.node(node(x, y))).collect()
+            pairs.into_iter().map(|(x, y)| builder.node(node(x, y))).collect()
         };
         match sign {
             '+' | '-' if a.shape == b.shape => {

@@ -9,13 +9,13 @@ use super::{Angle, Platform};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 
 /// Names in a combination and their meanings.
-pub(crate) struct Names<'a> {
+pub(crate) struct CombinationNames<'a> {
     pub(crate) unknowns: &'a [String],
     generic: Vec<String>,
     pub(crate) symbols: Symbols,
 }
 
-impl<'a> Names<'a> {
+impl<'a> CombinationNames<'a> {
     pub(crate) fn of(platform: &'a Platform) -> Self {
         let generic = platform.scheme().generic_names();
         Self { unknowns: platform.names(), generic, symbols: Symbols::of(platform) }
@@ -38,8 +38,8 @@ pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
     })
 }
 
-struct Unit<'a> {
-    names: &'a Names<'a>,
+struct UnknownValues<'a> {
+    names: &'a CombinationNames<'a>,
     values: &'a RandomValues,
     sample: &'a Sample,
     /// Value of each unknown.
@@ -47,7 +47,7 @@ struct Unit<'a> {
     rates: [u64; 2],
 }
 
-impl Environment for Unit<'_> {
+impl Environment for UnknownValues<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         match name {
             "wN" => Some(self.rates[0]),
@@ -73,13 +73,13 @@ impl Environment for Unit<'_> {
 }
 
 /// Point at which a combination is evaluated.
-pub(crate) struct At<'a> {
+pub(crate) struct EvaluationPoint<'a> {
     pub(crate) values: &'a RandomValues,
     pub(crate) sample: &'a Sample,
     pub(crate) rates: [u64; 2],
 }
 
-impl At<'_> {
+impl EvaluationPoint<'_> {
     fn field(&self) -> &Field {
         &self.sample.roots.field
     }
@@ -89,14 +89,14 @@ impl At<'_> {
 /// it equals the sum of its parts at random values.
 pub(crate) fn row_of(
     expression: &Expression,
-    names: &Names<'_>,
-    point: &At<'_>,
+    names: &CombinationNames<'_>,
+    point: &EvaluationPoint<'_>,
     rng: &mut SplitMix64,
 ) -> Result<Vec<u64>, ExpressionError> {
     let (f, n) = (point.field(), names.unknowns.len());
     let at = |unknowns: &[u64]| {
-        let At { values, sample, rates } = *point;
-        evaluate(expression, f, &Unit { names, values, sample, unknowns, rates })
+        let EvaluationPoint { values, sample, rates } = *point;
+        evaluate(expression, f, &UnknownValues { names, values, sample, unknowns, rates })
     };
     let zero = vec![0; n];
     let unit = |c: usize| -> Vec<u64> { (0..n).map(|j| if j == c { f.one() } else { 0 }).collect() };
@@ -146,7 +146,11 @@ pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionErr
     let Ok(values) = RandomValues::draw(platform.scheme(), &mut rng) else { return Ok(()) };
     let sample = values.sample(platform.scheme(), 1);
     let rates = [0; 2].map(|_| 1 + rng.below(sample.roots.field.modulus() - 1));
-    let row =
-        row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)?;
+    let row = row_of(
+        &parsed,
+        &CombinationNames::of(platform),
+        &EvaluationPoint { values: &values, sample: &sample, rates },
+        &mut rng,
+    )?;
     not_zero(&parsed, &row)
 }

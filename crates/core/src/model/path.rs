@@ -99,7 +99,7 @@ pub enum PathError {
     },
     /// The stated turn does not lead to the position.
     #[error("the slew to `{name}` does not lead there")]
-    NoWay {
+    NotReached {
         /// Name of the position.
         name: String,
         /// Index of the position.
@@ -127,7 +127,9 @@ impl PathError {
         match self {
             Self::Name { .. } => Some("path".into()),
             Self::NotStated { .. } => None,
-            Self::NoWay { index, .. } | Self::NotExact { index, .. } => Some(format!("position.{index}")),
+            Self::NotReached { index, .. } | Self::NotExact { index, .. } => {
+                Some(format!("position.{index}"))
+            }
         }
     }
 }
@@ -238,8 +240,9 @@ pub(super) fn steps(from: &Position, to: &Position, path: Path) -> Result<Vec<Pa
     let turned = from.rotation.as_ref().map(|r| Turned { axis: r.axis, angle: r.angle.clone() });
     let start = c_n(&Float, &from.angles, turned.as_ref(), |a| a.turn().cos_sin_f64());
     let how = own.cloned().unwrap_or_default();
-    let Some(turn) =
-        Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0).map_err(|_| StepError::NoWay)?.map(|s| s.turn())
+    let Some(turn) = Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0)
+        .map_err(|_| StepError::NotReached)?
+        .map(|s| s.turn())
     else {
         return Ok(Vec::new());
     };
@@ -264,7 +267,7 @@ fn generic() -> StepError {
 
 /// Reasons for the lack of exact steps.
 pub(super) enum StepError {
-    NoWay,
+    NotReached,
     NotExact(String),
 }
 

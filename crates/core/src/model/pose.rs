@@ -21,12 +21,12 @@ pub struct Pose {
     pub rotation: Option<String>,
     /// Turns that lead to the position. `None` for the first position, between generic angles, and if the
     /// stated turn does not lead there.
-    pub way: Option<Way>,
+    pub way: Option<SlewTurns>,
 }
 
 /// Turns from one position to the next.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Way {
+pub struct SlewTurns {
     /// Turns in order; none if the attitude stays the same.
     pub turns: Vec<Turn>,
     /// True if the scheme states the turns; otherwise they are the shortest turn.
@@ -53,7 +53,7 @@ impl Scheme {
     }
 
     /// Turns from `from` to `to`; `None` for generic angles, and if the stated turn does not lead there.
-    fn way(&self, from: &Position, to: &Position) -> Option<Way> {
+    fn way(&self, from: &Position, to: &Position) -> Option<SlewTurns> {
         if from.angles.iter().chain(&to.angles).any(|a| a.generic().is_some()) {
             return None;
         }
@@ -63,7 +63,7 @@ impl Scheme {
         let how = to.slew.clone().unwrap_or_default();
         if how.axis.is_some() || self.path != Some(Path::Gimbals) {
             let slew = Slew::to(&end, &c_n_f64(&to.angles), &how, 1.0).ok()?;
-            return Some(Way { turns: slew.iter().map(Slew::turn).collect(), stated });
+            return Some(SlewTurns { turns: slew.iter().map(Slew::turn).collect(), stated });
         }
         let mut turns = Vec::new();
         for step in Path::gimbals(from, to)? {
@@ -72,7 +72,7 @@ impl Scheme {
             end = slew.at(slew.duration_s);
             turns.push(slew.turn());
         }
-        Some(Way { turns, stated })
+        Some(SlewTurns { turns, stated })
     }
 }
 

@@ -57,9 +57,9 @@ impl Range {
 }
 
 /// Shortest text of a number, with a power of ten for very small and large numbers.
-struct Short(f64);
+struct ShortNumber(f64);
 
-impl fmt::Display for Short {
+impl fmt::Display for ShortNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             x if x == 0.0 || (1e-3..1e5).contains(&x.abs()) => write!(f, "{x}"),
@@ -70,7 +70,7 @@ impl fmt::Display for Short {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} to {}", Short(self.low), Short(self.high))?;
+        write!(f, "{} to {}", ShortNumber(self.low), ShortNumber(self.high))?;
         if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
     }
 }
@@ -96,7 +96,7 @@ impl Range {
         if self.admits(x) {
             return Ok(());
         }
-        Err(RangeError { what: what.into(), found: Short(x).to_string(), expected: self.to_string() })
+        Err(RangeError { what: what.into(), found: ShortNumber(x).to_string(), expected: self.to_string() })
     }
 }
 

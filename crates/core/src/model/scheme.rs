@@ -522,7 +522,7 @@ impl Scheme {
                 return Err(PathError::NotStated { name, index, terms });
             };
             out.push(path::steps(from, to, path).map_err(|e| match e {
-                StepError::NoWay => PathError::NoWay { name, index },
+                StepError::NotReached => PathError::NotReached { name, index },
                 StepError::NotExact(found) => PathError::NotExact { name, index, found },
             })?);
         }

@@ -114,7 +114,7 @@ fn axis_in_c(from: &Matrix3<f64>, axis: Axis) -> [f64; 3] {
 
 /// Error for a turn that does not lead to the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoWay;
+pub struct TurnMismatch;
 
 /// Turn from one attitude to another about a fixed axis at a constant rate.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,13 +146,13 @@ impl Slew {
     /// `to -> to P`, leaves the turn in n unchanged.
     ///
     /// # Errors
-    /// [`NoWay`] if a turn about the axis, or by the angle, does not lead there.
+    /// [`TurnMismatch`] if a turn about the axis, or by the angle, does not lead there.
     pub fn to(
         from: &Matrix3<f64>,
         to: &Matrix3<f64>,
         slew: &SlewTo,
         rate_rad_s: f64,
-    ) -> Result<Option<Self>, NoWay> {
+    ) -> Result<Option<Self>, TurnMismatch> {
         let shortest = apply(&transpose(from), &rotation_vector(&times(to, &transpose(from))));
         let length = norm(&shortest);
         let axis = match &slew.axis {
@@ -169,7 +169,7 @@ impl Slew {
         let reached = times(from, &rotation(&axis.map(|x| x * angle)));
         let missed = (0..9).map(|k| (reached[k / 3][k % 3] - to[k / 3][k % 3]).abs()).fold(0.0, f64::max);
         if missed > 1e-6 {
-            return Err(NoWay);
+            return Err(TurnMismatch);
         }
         let duration_s = angle.abs() / rate_rad_s;
         let rate = axis.map(|x| x * angle / duration_s);
@@ -294,7 +294,7 @@ mod tests {
         assert_eq!(Slew::to(&from, &from, &eigenaxis, 0.02), Ok(None));
         // about another axis no turn leads there
         let about = SlewTo { axis: "X_p".parse().ok(), ..SlewTo::default() };
-        assert_eq!(Slew::to(&from, &to, &about, 0.02), Err(NoWay));
+        assert_eq!(Slew::to(&from, &to, &about, 0.02), Err(TurnMismatch));
     }
 
     #[test]
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(degrees(&about(None)), 70.0);
         assert_eq!(degrees(&about(Some(-290))), -290.0);
         assert_eq!(degrees(&about(Some(430))), 430.0);
-        assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(NoWay));
+        assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(TurnMismatch));
     }
 
     /// Turns about a direction in n, by a signed angle or right-handed.

@@ -10,7 +10,7 @@ use crate::model::scheme::Station;
 
 /// Angle whose sine and cosine remain symbols.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Base {
+enum BaseAngle {
     /// A generic angle.
     Name(String),
     /// A constant angle between 0 and 45 degrees, in 1e-9 degrees.
@@ -20,7 +20,7 @@ enum Base {
 /// Symbols in the formulas of a scheme.
 #[derive(Debug, Clone, Default)]
 pub struct Symbols {
-    bases: Vec<Base>,
+    bases: Vec<BaseAngle>,
     radicals: bool,
     /// Indices of the positions that rotate.
     turning: Vec<usize>,
@@ -39,10 +39,10 @@ impl Symbols {
         let mut out = Self { turning, radicals, ..Self::default() };
         for angle in platform.scheme().stations().iter().flat_map(Station::angles) {
             if let Some((name, _)) = angle.generic() {
-                out.add(Base::Name(name.into()));
+                out.add(BaseAngle::Name(name.into()));
             }
             if !angle.turn().is_multiple_of_deg(15) {
-                out.add(Base::Constant(octant(angle).0));
+                out.add(BaseAngle::Constant(octant(angle).0));
             } else if !angle.turn().is_multiple_of_deg(90) {
                 out.radicals = true;
             }
@@ -50,7 +50,7 @@ impl Symbols {
         out
     }
 
-    fn add(&mut self, base: Base) {
+    fn add(&mut self, base: BaseAngle) {
         if !self.bases.contains(&base) {
             self.bases.push(base);
         }
@@ -86,8 +86,8 @@ impl Symbols {
     /// Suffix of a symbol: a name or a number, which differ, since names start with a letter.
     fn suffix(&self, i: usize) -> String {
         match &self.bases[i] {
-            Base::Name(name) => name.clone(),
-            Base::Constant(_) => format!("{i}"),
+            BaseAngle::Name(name) => name.clone(),
+            BaseAngle::Constant(_) => format!("{i}"),
         }
     }
 
@@ -102,8 +102,9 @@ impl Symbols {
     pub fn has(&self, angle: &Angle) -> bool {
         let base = octant(angle).0;
         let name = angle.generic().map(|(name, _)| name);
-        angle.turn().is_multiple_of_deg(15) && name.is_none_or(|n| self.bases.contains(&Base::Name(n.into())))
-            || name.is_none() && self.bases.contains(&Base::Constant(base))
+        angle.turn().is_multiple_of_deg(15)
+            && name.is_none_or(|n| self.bases.contains(&BaseAngle::Name(n.into())))
+            || name.is_none() && self.bases.contains(&BaseAngle::Constant(base))
     }
 
     /// The cosine and sine of an angle as text.
@@ -131,7 +132,7 @@ impl Symbols {
             15_000_000_000 => ("(r_2*r_3+r_2)/4".into(), "(r_2*r_3-r_2)/4".into()),
             30_000_000_000 => ("r_3/2".into(), "1/2".into()),
             45_000_000_000 => ("r_2/2".into(), "r_2/2".into()),
-            _ => match self.bases.iter().position(|b| *b == Base::Constant(base)) {
+            _ => match self.bases.iter().position(|b| *b == BaseAngle::Constant(base)) {
                 Some(i) => (format!("c_{}", self.suffix(i)), format!("s_{}", self.suffix(i))),
                 None => ("0".into(), "0".into()),
             },
@@ -174,8 +175,8 @@ impl Symbols {
         };
         let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
         Some(match &self.bases[i] {
-            Base::Name(name) => format!("{function}({name})"),
-            Base::Constant(nanodeg) => format!("{function}({} deg)", format_decimal(*nanodeg)),
+            BaseAngle::Name(name) => format!("{function}({name})"),
+            BaseAngle::Constant(nanodeg) => format!("{function}({} deg)", format_decimal(*nanodeg)),
         })
     }
 
@@ -188,9 +189,9 @@ impl Symbols {
                 return Real::from_i64(suffix.parse().ok()?).sqrt();
             }
             let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
-            let digits = |base: &Base| match base {
-                Base::Constant(nanodeg) => ManyDigits::cos_sin(*nanodeg),
-                Base::Name(_) => None,
+            let digits = |base: &BaseAngle| match base {
+                BaseAngle::Constant(nanodeg) => ManyDigits::cos_sin(*nanodeg),
+                BaseAngle::Name(_) => None,
             };
             let all = self.digits.get_or_init(|| self.bases.iter().map(digits).collect());
             let (c, s) = all[i].as_ref()?;
@@ -262,8 +263,8 @@ impl Environment for SymbolValues<'_> {
         let (kind, suffix) = name.split_at_checked(2)?;
         let i = (0..self.symbols.bases.len()).find(|&i| self.symbols.suffix(i) == suffix)?;
         let (c, s) = match &self.symbols.bases[i] {
-            Base::Constant(nanodeg) => angle(*nanodeg),
-            Base::Name(name) => self.values.generic_cos_sin(name, self.sample)?,
+            BaseAngle::Constant(nanodeg) => angle(*nanodeg),
+            BaseAngle::Name(name) => self.values.generic_cos_sin(name, self.sample)?,
         };
         match kind {
             "c_" => Some(c),

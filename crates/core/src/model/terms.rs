@@ -78,7 +78,7 @@ impl ErrorTerm {
 
 /// Coefficients of a term in a triad of sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
+enum TriadShape {
     /// One coefficient per sensor.
     Each,
     /// One coefficient per sensor and other sensor.
@@ -194,11 +194,11 @@ impl Term {
         }
     }
 
-    const fn shape(self) -> Shape {
+    const fn shape(self) -> TriadShape {
         match self {
-            Self::GM | Self::M6 | Self::Kx => Shape::Others,
-            Self::GM3 | Self::M3 => Shape::Before,
-            _ => Shape::Each,
+            Self::GM | Self::M6 | Self::Kx => TriadShape::Others,
+            Self::GM3 | Self::M3 => TriadShape::Before,
+            _ => TriadShape::Each,
         }
     }
 
@@ -243,9 +243,9 @@ impl Term {
         let mut out = Vec::new();
         for (i, input) in inputs.into_iter().enumerate() {
             let others: Vec<Option<usize>> = match self.shape() {
-                Shape::Each => vec![None],
-                Shape::Others => (0..3).filter(|&j| j != i).map(Some).collect(),
-                Shape::Before => (0..i).map(Some).collect(),
+                TriadShape::Each => vec![None],
+                TriadShape::Others => (0..3).filter(|&j| j != i).map(Some).collect(),
+                TriadShape::Before => (0..i).map(Some).collect(),
             };
             for other in others {
                 let factors = match (self, other) {
@@ -429,7 +429,8 @@ impl Unknowns {
             let own = frame.misalignments();
             let expected = own.map(Term::letters).join(" and ");
             let frame = frame.name();
-            let mut found = terms.iter().filter(|t| t.shape() != Shape::Each && **t != Term::Kx).peekable();
+            let mut found =
+                terms.iter().filter(|t| t.shape() != TriadShape::Each && **t != Term::Kx).peekable();
             if found.peek().is_none() {
                 return Err(TermError::NoMisalignment { frame, expected });
             }

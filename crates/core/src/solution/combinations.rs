@@ -8,7 +8,7 @@ use crate::degree::sparse::{extend_by_short_vectors, support};
 use crate::model::Platform;
 use crate::model::platform::LOCAL_NAMES;
 use crate::solution::print::{StationLabel, stations};
-use crate::solution::problem::Problem;
+use crate::solution::problem::LinearSystem;
 use crate::solution::solver::{Functional, Solver, Sparse};
 use crate::solution::support::short_support;
 
@@ -149,7 +149,7 @@ fn combination_coefficients(
     let field = first.sample.roots.field;
     let allowed = solver.tables.rows_up_to(degree);
     let used = short_support(field, &first.rows, &allowed, vector, |_| 1)?;
-    let problem = Problem::combination(&used, platform.names().len(), support, support[0]);
+    let problem = LinearSystem::combination(&used, platform.names().len(), support, support[0]);
     solver.functional_of(support, &problem)
 }
 
@@ -184,7 +184,7 @@ fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Sparse>
     let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
     let used: Vec<usize> =
         (0..solver.tables.observable_rows).filter(|&j| basis.insert(&restricted(j))).collect();
-    let (values, _) = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
+    let (values, _) = solver.coefficients(&LinearSystem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())
 }

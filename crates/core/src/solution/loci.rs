@@ -38,7 +38,7 @@ pub struct Locus {
 
 /// Degenerate loci of a scheme, and the reason why some may be missing.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Found {
+pub(crate) struct DegenerateLoci {
     /// Degenerate loci; `None` without generic angles or worker.
     pub loci: Option<Vec<Locus>>,
     /// Reason why some may be missing; `None` if none is.
@@ -98,10 +98,10 @@ pub(crate) fn loci(
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
     seed: u64,
-) -> Result<Found, LociError> {
+) -> Result<DegenerateLoci, LociError> {
     let names = platform.scheme().generic_names();
     if names.is_empty() {
-        return Ok(Found::default());
+        return Ok(DegenerateLoci::default());
     }
     if platform.scheme().by_course() {
         return Err(LociError::Course);
@@ -111,7 +111,7 @@ pub(crate) fn loci(
         return Err(LociError::OtherAngles);
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
-    let Some(worker) = solver.worker() else { return Ok(Found::default()) };
+    let Some(worker) = solver.worker() else { return Ok(DegenerateLoci::default()) };
     let mut conditions: Vec<Condition> = names.iter().cloned().map(Condition::HalfTurn).collect();
     let mut seen: Vec<String> = Vec::new();
     let mut incomplete = None;
@@ -129,13 +129,13 @@ pub(crate) fn loci(
         }
     }
     let mut rng = platform.scheme().random(seed, "degenerate angles");
-    let mut found: Vec<(Place, Locus)> = Vec::new();
+    let mut found: Vec<(LocusPoints, Locus)> = Vec::new();
     let mut undecided = 0;
     for condition in conditions {
-        let place = match Place::of(&condition, &names) {
-            Where::Nowhere => continue,
-            Where::At(place) => Some(place),
-            Where::Unknown => None,
+        let place = match LocusPoints::of(&condition, &names) {
+            RealPoints::Nowhere => continue,
+            RealPoints::At(place) => Some(place),
+            RealPoints::Unknown => None,
         };
         let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else {
             undecided += 1;
@@ -161,7 +161,7 @@ pub(crate) fn loci(
         };
         let rank_profile = there.rank_profile;
         // values of one angle with the same effect are one condition
-        let same = |l: &&mut (Place, Locus)| {
+        let same = |l: &&mut (LocusPoints, Locus)| {
             let same_angle = l.0.angle.is_some() && l.0.angle == place.angle && l.0.words == place.words;
             same_angle && l.1.rank_profile == rank_profile && l.1.changes == changes
         };
@@ -179,7 +179,7 @@ pub(crate) fn loci(
             }
         }
     }
-    let finished = |(mut place, locus): (Place, Locus)| {
+    let finished = |(mut place, locus): (LocusPoints, Locus)| {
         let angle = place.angle.clone();
         place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
         Locus {
@@ -197,7 +197,7 @@ pub(crate) fn loci(
         );
         incomplete = Some(incomplete.map_or(few.clone(), |e| format!("{e}; {few}")));
     }
-    Ok(Found { loci: Some(found.into_iter().map(finished).collect()), incomplete })
+    Ok(DegenerateLoci { loci: Some(found.into_iter().map(finished).collect()), incomplete })
 }
 
 /// Requests, one per candidate matrix, over `t_name = tan(name/2)`.
@@ -355,7 +355,7 @@ fn degree_in(e: &Expression, name: &str) -> usize {
 
 /// Real points of a condition.
 #[derive(Debug, Clone, PartialEq)]
-struct Place {
+struct LocusPoints {
     /// Name of the angle, if the condition is on a single one.
     angle: Option<String>,
     /// Values of the angles: all of them if there are no words, examples otherwise.
@@ -366,10 +366,10 @@ struct Place {
 
 /// Knowledge about the real points of a condition.
 #[derive(Debug, Clone, PartialEq)]
-enum Where {
+enum RealPoints {
     /// The condition has no real point, or only points that satisfy two conditions at once.
     Nowhere,
-    At(Place),
+    At(LocusPoints),
     /// No real point was found, but there may be one.
     Unknown,
 }
@@ -379,16 +379,16 @@ fn degrees(x: f64) -> String {
     if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") }
 }
 
-impl Place {
-    fn of(condition: &Condition, names: &[String]) -> Where {
+impl LocusPoints {
+    fn of(condition: &Condition, names: &[String]) -> RealPoints {
         let text = match condition {
             Condition::HalfTurn(name) => {
                 let points_deg = vec![BTreeMap::from([(name.clone(), 180.0)])];
-                return Where::At(Self { angle: Some(name.clone()), points_deg, words: None });
+                return RealPoints::At(Self { angle: Some(name.clone()), points_deg, words: None });
             }
             Condition::Factor(text) => text,
         };
-        let Ok(e) = parse(text) else { return Where::Unknown };
+        let Ok(e) = parse(text) else { return RealPoints::Unknown };
         let in_it: Vec<&String> = names.iter().filter(|n| degree_in(&e, &format!("t_{n}")) > 0).collect();
         let roots = |name: &str, others: &dyn Fn(&str) -> f64| -> Roots {
             let found = coefficients(&e, &format!("t_{name}"), others).and_then(|c| roots_deg(&c));
@@ -397,15 +397,15 @@ impl Place {
         if let [name] = in_it[..] {
             let Roots { deg, all } = roots(name, &|_| f64::NAN);
             if deg.is_empty() {
-                return if all { Where::Nowhere } else { Where::Unknown };
+                return if all { RealPoints::Nowhere } else { RealPoints::Unknown };
             }
             let points_deg = deg.into_iter().map(|x| BTreeMap::from([(name.clone(), x)])).collect();
             let words = (!all).then(|| in_words(&e, text, &in_it));
-            return Where::At(Self { angle: Some(name.clone()), points_deg, words });
+            return RealPoints::At(Self { angle: Some(name.clone()), points_deg, words });
         }
         // a factor that is never negative vanishes on no surface
         if never_negative(&e) {
-            return Where::Nowhere;
+            return RealPoints::Nowhere;
         }
         // examples: solve for each angle in turn, with some values of the others
         for i in 0..EXAMPLES {
@@ -426,11 +426,11 @@ impl Place {
                 let points_deg: Vec<BTreeMap<String, f64>> = points.collect();
                 if !points_deg.is_empty() {
                     let words = Some(in_words(&e, text, &in_it));
-                    return Where::At(Self { angle: None, points_deg, words });
+                    return RealPoints::At(Self { angle: None, points_deg, words });
                 }
             }
         }
-        Where::Unknown
+        RealPoints::Unknown
     }
 
     /// Condition `alpha = 0, 180 deg`, or in words with an example.
@@ -515,9 +515,9 @@ mod tests {
     #[test]
     fn conditions_in_words() {
         let names = ["a".to_string(), "b".into()];
-        let place = |t: &str| Place::of(&Condition::Factor(t.into()), &names);
+        let place = |t: &str| LocusPoints::of(&Condition::Factor(t.into()), &names);
         let factor = |t: &str| match place(t) {
-            Where::At(p) => Some(p.condition()),
+            RealPoints::At(p) => Some(p.condition()),
             _ => None,
         };
         let says = |t: &str, words: &str| assert_eq!(factor(t).as_deref(), Some(words));
@@ -541,9 +541,9 @@ mod tests {
         assert!(words.len() < 160 && words.starts_with(described), "{words}");
         // no real point; points that satisfy two conditions; not all points known
         for t in ["1+t_a^2", "1+t_a^2*t_b^2", "t_a^2+2*t_b^2", "3+t_a^2*(1+t_b^2)"] {
-            assert_eq!(place(t), Where::Nowhere, "{t}");
+            assert_eq!(place(t), RealPoints::Nowhere, "{t}");
         }
-        assert_eq!(place("3-2*t_a+t_a^2-2*t_b+t_b^2"), Where::Unknown);
+        assert_eq!(place("3-2*t_a+t_a^2-2*t_b+t_b^2"), RealPoints::Unknown);
         let hidden = factor("(t_a-1)*(t_b-t_b+3*t_a-1)^2*(t_a^200-1)*t_a");
         assert_eq!(hidden, None, "beyond the limit");
         says("(t_a-1)*(3*t_a-1)^2", "(tan(a/2)-1)*(3*tan(a/2)-1)^2 = 0, for instance at a = 90 deg");

@@ -11,30 +11,30 @@ use crate::model::ring::{Float, ManyDigits, Real, Ring, Text};
 /// Every entry is a place `(row, column)` of that table, so a system is stated once and solved in any
 /// ring.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Problem {
+pub(crate) struct LinearSystem {
     /// Number of unknowns.
     pub unknowns: usize,
     /// Equations, one per row of M: the unknowns that occur with the places of their coefficients, and the
     /// right side.
-    pub equations: Vec<(Vec<(usize, Place)>, Right)>,
+    pub equations: Vec<(Vec<(usize, TableEntry)>, RightSide)>,
     /// Outputs: the unknowns themselves, or sums of places times unknowns.
-    pub outputs: Outputs,
+    pub outputs: SystemOutputs,
 }
 
 /// Right side of an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Right {
+pub(crate) enum RightSide {
     /// Zero.
     Zero,
     /// One.
     One,
     /// Minus the entry at a place.
-    Minus(Place),
+    Minus(TableEntry),
     /// Entry of the target at a column.
     Target(usize),
 }
 
-impl Right {
+impl RightSide {
     fn value<R: Ring>(self, ring: &R, table: &[Vec<R::Element>], target: &[R::Element]) -> R::Element {
         match self {
             Self::Zero => ring.zero(),
@@ -46,22 +46,22 @@ impl Right {
 }
 
 /// Place `(row, column)` in the table of observable rows.
-pub(crate) type Place = (usize, usize);
+pub(crate) type TableEntry = (usize, usize);
 
 /// Outputs of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Outputs {
+pub(crate) enum SystemOutputs {
     /// Outputs are the unknowns.
     Unknowns,
     /// Outputs are sums `sum_i place_i x_i`, one per row.
-    Sums(Vec<Vec<Place>>),
+    Sums(Vec<Vec<TableEntry>>),
 }
 
 /// Correction of a solution for the turning of the platform: amounts `z` of the rows `rows` with
 /// `sum_i z_i rows[i] = sum_j y_j motion_j`. The `y_j` are unknowns of the solution, listed with the rows of
 /// minus their motion.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Motion {
+pub(crate) struct TurningCorrection {
     /// Independent rows that span the motion.
     pub rows: Vec<usize>,
     /// Unknowns of the solution with their motions: `(j, row of minus motion_j)`.
@@ -69,53 +69,55 @@ pub(crate) struct Motion {
 }
 
 /// Unknowns in order, each with the place of its coefficient.
-fn numbered(places: impl Iterator<Item = Place>) -> Vec<(usize, Place)> {
+fn numbered(places: impl Iterator<Item = TableEntry>) -> Vec<(usize, TableEntry)> {
     places.enumerate().collect()
 }
 
 /// Largest effect of rounding on a value, relative to the largest value; six digits are printed.
 const CERTAIN: f64 = 1e-9;
 
-impl Problem {
+impl LinearSystem {
     /// System of the solution `y` with `sum_j y_j rows[j] = target`. The given rows are independent, so `y`
     /// is unique. The right sides are the target's entries, column by column. The unknowns of every motion
     /// follow after `y`.
-    pub(crate) fn solution(rows: &[usize], columns: usize, motions: &[Motion]) -> Self {
-        let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), Right::Target(c));
+    pub(crate) fn solution(rows: &[usize], columns: usize, motions: &[TurningCorrection]) -> Self {
+        let equation = |c: usize| (numbered(rows.iter().map(|&j| (j, c))), RightSide::Target(c));
         let mut equations: Vec<_> = (0..columns).map(equation).collect();
         let mut unknowns = rows.len();
         for motion in motions {
             for c in 0..columns {
                 let own = motion.rows.iter().enumerate().map(|(i, &row)| (unknowns + i, (row, c)));
                 let others = motion.of.iter().map(|&(j, row)| (j, (row, c)));
-                equations.push((own.chain(others).collect(), Right::Zero));
+                equations.push((own.chain(others).collect(), RightSide::Zero));
             }
             unknowns += motion.rows.len();
         }
-        Self { unknowns, equations, outputs: Outputs::Unknowns }
+        Self { unknowns, equations, outputs: SystemOutputs::Unknowns }
     }
 
     /// System of the combination of the given rows that vanishes outside `support` and is one at `lead`.
     /// Outputs: its entries on `support`.
     pub(crate) fn combination(rows: &[usize], columns: usize, support: &[usize], lead: usize) -> Self {
-        let places = |c: usize| -> Vec<Place> { rows.iter().map(|&j| (j, c)).collect() };
+        let places = |c: usize| -> Vec<TableEntry> { rows.iter().map(|&j| (j, c)).collect() };
         let equations = (0..columns)
             .filter(|c| *c == lead || !support.contains(c))
-            .map(|c| (numbered(places(c).into_iter()), if c == lead { Right::One } else { Right::Zero }))
+            .map(|c| {
+                (numbered(places(c).into_iter()), if c == lead { RightSide::One } else { RightSide::Zero })
+            })
             .collect();
         let sums = support.iter().map(|&c| places(c)).collect();
-        Self { unknowns: rows.len(), equations, outputs: Outputs::Sums(sums) }
+        Self { unknowns: rows.len(), equations, outputs: SystemOutputs::Sums(sums) }
     }
 
     /// System of the vector on `support` that all the given rows annihilate, without its lead entry, which
     /// is one: `sum_c row[c] v_c = -row[lead]`.
     pub(crate) fn null_vector(rows: &[usize], support: &[usize], lead: usize) -> Self {
         let others: Vec<usize> = support.iter().copied().filter(|&c| c != lead).collect();
-        let equation = |&j: &usize| (numbered(others.iter().map(|&c| (j, c))), Right::Minus((j, lead)));
+        let equation = |&j: &usize| (numbered(others.iter().map(|&c| (j, c))), RightSide::Minus((j, lead)));
         Self {
             unknowns: others.len(),
             equations: rows.iter().map(equation).collect(),
-            outputs: Outputs::Unknowns,
+            outputs: SystemOutputs::Unknowns,
         }
     }
 
@@ -126,8 +128,8 @@ impl Problem {
         x: Vec<R::Element>,
     ) -> Vec<R::Element> {
         match &self.outputs {
-            Outputs::Unknowns => x,
-            Outputs::Sums(sums) => sums
+            SystemOutputs::Unknowns => x,
+            SystemOutputs::Sums(sums) => sums
                 .iter()
                 .map(|places| ring.dot(places.iter().zip(&x).map(|(&(r, c), x)| (&table[r][c], x))))
                 .collect(),
@@ -153,7 +155,7 @@ impl Problem {
     /// there is a solution.
     pub(crate) fn solve_in_many_digits(&self, table: &[Vec<Real>]) -> Option<Vec<f64>> {
         let ring = ManyDigits;
-        let equation = |(places, right): &(Vec<(usize, Place)>, Right)| {
+        let equation = |(places, right): &(Vec<(usize, TableEntry)>, RightSide)| {
             let mut row = vec![ring.zero(); self.unknowns + 1];
             for &(i, (r, c)) in places {
                 row[i] = table[r][c];
@@ -208,8 +210,8 @@ impl Problem {
 
     /// The system as text for the symbolic worker: matrix, right side, output matrix.
     pub(crate) fn to_text(&self, table: &[Vec<String>], targets: &[String]) -> System {
-        let cell = |&(r, c): &Place| table[r][c].clone();
-        let row = |places: &[(usize, Place)]| {
+        let cell = |&(r, c): &TableEntry| table[r][c].clone();
+        let row = |places: &[(usize, TableEntry)]| {
             let mut row = vec![Text.zero(); self.unknowns];
             for (i, place) in places {
                 row[*i] = cell(place);
@@ -219,8 +221,10 @@ impl Problem {
         let matrix = self.equations.iter().map(|(places, _)| row(places)).collect();
         let right = self.equations.iter().map(|(_, t)| t.value(&Text, table, targets)).collect();
         let outputs = match &self.outputs {
-            Outputs::Unknowns => Vec::new(),
-            Outputs::Sums(sums) => sums.iter().map(|places| places.iter().map(cell).collect()).collect(),
+            SystemOutputs::Unknowns => Vec::new(),
+            SystemOutputs::Sums(sums) => {
+                sums.iter().map(|places| places.iter().map(cell).collect()).collect()
+            }
         };
         System { matrix, right, outputs }
     }
@@ -238,7 +242,7 @@ mod tests {
         let images: Vec<Vec<u64>> =
             table.iter().map(|r| r.iter().map(|&a| f.from_i64(a)).collect()).collect();
         // e_0 = (row0 - 2 row1 + 2 row2) / 3
-        let p = Problem::solution(&[0, 1, 2], 3, &[]);
+        let p = LinearSystem::solution(&[0, 1, 2], 3, &[]);
         let x = p.solve_in_floats(&floats, &[1.0, 0.0, 0.0]).expect("solvable");
         for (a, b) in x.iter().zip([1.0 / 3.0, -2.0 / 3.0, 2.0 / 3.0]) {
             assert!((a - b).abs() < 1e-12);
@@ -248,15 +252,15 @@ mod tests {
         let y = p.solve_in_field(&f, &images, &[f.one(), 0, 0]).expect("solvable");
         assert_eq!(y, [f.from_ratio(1, 3), f.from_ratio(-2, 3), f.from_ratio(2, 3)]);
         // rows 0 and 1 vanish outside {0, 2} as (1, 0, -2)
-        let p = Problem::combination(&[0, 1], 3, &[0, 2], 0);
+        let p = LinearSystem::combination(&[0, 1], 3, &[0, 2], 0);
         assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.one(), f.from_i64(-2)]));
         assert_eq!(p.solve_in_many_digits(&digits), Some(vec![1.0, -2.0]));
         // (2, -1, 1) is annihilated by rows 0 and 1: lead 0 = 1 gives (-1/2, 1/2)
-        let p = Problem::null_vector(&[0, 1], &[0, 1, 2], 0);
+        let p = LinearSystem::null_vector(&[0, 1], &[0, 1, 2], 0);
         assert_eq!(p.solve_in_field(&f, &images, &[]), Some(vec![f.from_ratio(-1, 2), f.from_ratio(1, 2)]));
         assert_eq!(p.solve_in_many_digits(&digits), Some(vec![-0.5, 0.5]));
         // no solution
-        let p = Problem::solution(&[0], 3, &[]);
+        let p = LinearSystem::solution(&[0], 3, &[]);
         assert_eq!(p.solve_in_field(&f, &images, &[f.one(), 0, 0]), None);
         assert_eq!(p.solve_in_floats(&floats, &[1.0, 0.0, 0.0]), None);
     }

@@ -11,7 +11,7 @@ use crate::degree::ensemble::Verdicts;
 use crate::degree::status::{Status, Verdict};
 use crate::language::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::Platform;
-use crate::model::combination::{At, Names, not_zero, row_of, square_root};
+use crate::model::combination::{CombinationNames, EvaluationPoint, not_zero, row_of, square_root};
 use crate::model::ring::{Ring, Text};
 
 /// Error for a requested combination that is no linear combination of the unknowns.
@@ -47,7 +47,7 @@ pub(crate) fn requested_combinations(
 ) -> Result<Vec<Requested>, CombinationError> {
     let scheme = platform.scheme();
     let mut rng = scheme.random(seed, "combinations asked for");
-    let names = Names::of(platform);
+    let names = CombinationNames::of(platform);
     scheme
         .combinations
         .iter()
@@ -61,7 +61,8 @@ pub(crate) fn requested_combinations(
             let values = &verdicts.values[0];
             let sample = &values.sample(scheme, 1);
             let rates = [sample.point.w_n, sample.point.w_u];
-            let row = row_of(&parsed, &names, &At { values, sample, rates }, &mut rng).map_err(wrap)?;
+            let row = row_of(&parsed, &names, &EvaluationPoint { values, sample, rates }, &mut rng)
+                .map_err(wrap)?;
             let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
             let moved = (0..row.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
             let status = Status::of(degree, moved);
@@ -75,7 +76,7 @@ pub(crate) fn requested_combinations(
 fn terms_of(
     parsed: &Expression,
     platform: &Platform,
-    names: &Names<'_>,
+    names: &CombinationNames<'_>,
     verdicts: &Verdicts,
     rng: &mut SplitMix64,
 ) -> Result<Sparse, ExpressionError> {
@@ -85,9 +86,9 @@ fn terms_of(
     let f = sample.roots.field;
     let mut rates = || [1 + rng.below(f.modulus() - 1), 1 + rng.below(f.modulus() - 1)];
     let [one, other] = [rates(), rates()];
-    let first = row_of(parsed, names, &At { values, sample, rates: one }, rng)?;
+    let first = row_of(parsed, names, &EvaluationPoint { values, sample, rates: one }, rng)?;
     not_zero(parsed, &first)?;
-    let second = row_of(parsed, names, &At { values, sample, rates: other }, rng)?;
+    let second = row_of(parsed, names, &EvaluationPoint { values, sample, rates: other }, rng)?;
     let unsupported = || ExpressionError::Syntax {
         expected: "coefficients that are numbers times powers of wN and wU, such as 2*wN, wU/wN or sqrt(2)/2",
         found: "a sum of such powers, or a power beyond 2".into(),
@@ -117,7 +118,7 @@ fn terms_of(
 
 /// Coefficient of an unknown as text in the symbols of the formulas, at rates one: the expression where this
 /// unknown is one and the others are zero. It has been evaluated before, so nothing in it fails.
-fn text_of(expression: &Expression, names: &Names<'_>, unknown: &str) -> String {
+fn text_of(expression: &Expression, names: &CombinationNames<'_>, unknown: &str) -> String {
     let mut values: Vec<String> = Vec::with_capacity(expression.nodes.len());
     let integer = |i: usize| expression.integer_at(i);
     for node in &expression.nodes {

@@ -6,7 +6,7 @@ use obsdeg_exact::SplitMix64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::problem::{Motion, Problem};
+use super::problem::{LinearSystem, TurningCorrection};
 use super::solver::{Frame, Functional, MAX_SYMBOLIC_ANGLES, PRINTABLE, Solver, float_point, tidy};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
@@ -125,7 +125,7 @@ pub(super) struct Contribution {
 
 /// Unknown of the system: a row of the tables, with the rates that multiply its amount.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Used {
+pub(super) struct UsedRow {
     pub(super) row: usize,
     pub(super) rates: Rates,
     pub(super) turns: usize,
@@ -193,24 +193,24 @@ impl Solver<'_> {
                 .ok_or(Unsolved::NotSpanned)?,
         };
         let columns = self.platform.names().len();
-        let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {
+        let solve = |problem: &LinearSystem| -> Option<Vec<(Rates, Vec<u64>)>> {
             let tables = self.all_tables().zip(&targets);
             let y =
                 tables.map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target));
             self.split_rates(&y.collect::<Option<Vec<_>>>()?)
         };
-        let mut problem = Problem::solution(&support, columns, &[]);
+        let mut problem = LinearSystem::solution(&support, columns, &[]);
         let mut split = solve(&problem).ok_or(Unsolved::NoForm)?;
         let motions = self.motions(&support, &split).ok_or(Unsolved::Motion)?;
         if !motions.is_empty() {
-            problem = Problem::solution(&support, columns, &motions);
+            problem = LinearSystem::solution(&support, columns, &motions);
             split = solve(&problem).ok_or(Unsolved::NoForm)?;
         }
         let rows = support.iter().map(|&row| (row, [0, 0], 0));
         // the motion enters (16) with w/wN
         let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
-        let used: Vec<Used> = (rows.chain(moved).zip(&split))
-            .map(|((row, by, turns), (r, _))| Used { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
+        let used: Vec<UsedRow> = (rows.chain(moved).zip(&split))
+            .map(|((row, by, turns), (r, _))| UsedRow { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
             .collect();
         let plan = self.plan(&used);
         // numbers of the printed terms in every field
@@ -283,7 +283,7 @@ impl Solver<'_> {
     /// Motions of a solution by the rows `support` while the platform turns: one per rotation and rates of
     /// the amounts, in rows of the rotation itself up to order one. `None` if these rows do not span it,
     /// which does not happen.
-    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<Motion>> {
+    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<TurningCorrection>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;
         let mut groups: BTreeMap<(usize, Rates), Vec<usize>> = BTreeMap::new();
@@ -313,13 +313,13 @@ impl Solver<'_> {
             let mut own = self.tables.rows_up_to(1);
             own.retain(|&row| self.stations[self.tables.station(row)].0 == position);
             let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-            out.push(Motion { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
+            out.push(TurningCorrection { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
         }
         Some(out)
     }
 
     /// Printed terms of a solution that uses the rows `used`.
-    fn plan(&self, used: &[Used]) -> Vec<(Key, Vec<Contribution>)> {
+    fn plan(&self, used: &[UsedRow]) -> Vec<(Key, Vec<Contribution>)> {
         let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
         for (j, u) in used.iter().enumerate() {
             let station = self.tables.station(u.row);
@@ -388,7 +388,7 @@ impl Solver<'_> {
     fn decimals(
         &self,
         functional: &Functional,
-        problem: &Problem,
+        problem: &LinearSystem,
         plan: &[(Key, Vec<Contribution>)],
     ) -> Option<Vec<Number>> {
         let (point, rows) = self.floats.as_ref()?;

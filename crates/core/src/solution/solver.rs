@@ -8,7 +8,7 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::problem::Problem;
+use super::problem::LinearSystem;
 use super::turning::motion_rows;
 use crate::degree::coefficient::{
     Coefficient, Image, Number, READABLE, Rates, power, rates_between, recover_radical,
@@ -169,7 +169,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Functional on `support` whose coefficients are the outputs of `problem`.
-    pub(crate) fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
+    pub(crate) fn functional_of(&mut self, support: &[usize], problem: &LinearSystem) -> Option<Functional> {
         let (coefficients, images) = self.coefficients(problem)?;
         Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
     }
@@ -259,7 +259,10 @@ impl<'a> Solver<'a> {
 
     /// Outputs of a system without targets, as coefficients and as their images in all tables: roots if
     /// possible, or readable formulas in sines and cosines, or decimals. `None` if all fail.
-    pub(crate) fn coefficients(&mut self, problem: &Problem) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
+    pub(crate) fn coefficients(
+        &mut self,
+        problem: &LinearSystem,
+    ) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
         let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
         let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
         let split = self.split_rates(&values)?;
@@ -269,7 +272,7 @@ impl<'a> Solver<'a> {
         Some((coefficients.collect(), values))
     }
 
-    fn output_numbers(&mut self, problem: &Problem, split: &[(Rates, Vec<u64>)]) -> Option<Vec<Number>> {
+    fn output_numbers(&mut self, problem: &LinearSystem, split: &[(Rates, Vec<u64>)]) -> Option<Vec<Number>> {
         let exact: Option<Vec<Number>> =
             split.iter().map(|(_, numbers)| self.recover(numbers).map(Number::Radical)).collect();
         if exact.is_some() {

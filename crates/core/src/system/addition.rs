@@ -35,7 +35,7 @@ struct Parts {
 
 /// Arguments of one family of functions.
 #[derive(Debug, Default)]
-struct Family {
+struct ArgumentFamily {
     /// Kept arguments: node, number of quarter turns, and divisor.
     kept: Vec<(usize, i64, i64)>,
     /// Combination of kept arguments by the node of an argument.
@@ -47,7 +47,8 @@ struct Family {
 pub(super) fn written_apart(compiled: &Compiled) -> Option<Compiled> {
     let families = [false, true].map(|real| family(&compiled.dag, real));
     let [circular, real] = &families;
-    let plain = |f: &Family| f.parts.len() == f.kept.len() && f.kept.iter().all(|k| k.1 == 0 && k.2 == 1);
+    let plain =
+        |f: &ArgumentFamily| f.parts.len() == f.kept.len() && f.kept.iter().all(|k| k.1 == 0 && k.2 == 1);
     if plain(circular) && plain(real) {
         return None;
     }
@@ -82,8 +83,8 @@ fn is_function_of_sums(function: Function) -> bool {
 }
 
 /// Arguments of exp and tanh, or of sin, cos and tan: the kept ones, and the others as combinations of them.
-fn family(dag: &Dag, real: bool) -> Family {
-    let mut out = Family::default();
+fn family(dag: &Dag, real: bool) -> ArgumentFamily {
+    let mut out = ArgumentFamily::default();
     // kept arguments, reduced: leading monomial, polynomial, and its combination of the kept arguments
     let mut reduced: Vec<(Monomial, Polynomial, Vec<Ratio>)> = Vec::new();
     let mut found: Vec<(usize, i64, Vec<Ratio>)> = Vec::new();
@@ -218,7 +219,7 @@ fn product(left: &Polynomial, right: &Polynomial) -> Option<Polynomial> {
     Some(out)
 }
 
-impl Family {
+impl ArgumentFamily {
     /// Node of a function written by functions of the kept arguments; `None` if a power is large.
     fn write(&self, dag: &mut Dag, nodes: &[usize], function: Function, parts: &Parts) -> Option<usize> {
         if let ([(k, 1)], 0) = (&parts.of[..], parts.quarters)

@@ -293,7 +293,7 @@ mod tests {
     use obsdeg_exact::{Field, Scalars, SplitMix64};
 
     use crate::system::model_file;
-    use crate::system::rows::{Layout, Maker, random_field};
+    use crate::system::rows::{Layout, PointBuilder, random_field};
     use crate::system::work::Work;
 
     /// The rows agree with duals in every node, to orders beyond the first length.
@@ -313,8 +313,9 @@ mod tests {
             let mut rng = SplitMix64::new(5);
             let field: Field = random_field(&mut rng);
             let work = Work::new(model.work_limit);
-            let maker = Maker { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
-            let (mut forward, mut adjoint) = maker.both(&mut rng);
+            let builder =
+                PointBuilder { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
+            let (mut forward, mut adjoint) = builder.both(&mut rng);
             let mut factorial = field.one();
             for order in 0..12 {
                 factorial = Scalars::mul(&field, &factorial, &field.integer((order as i64).max(1)));

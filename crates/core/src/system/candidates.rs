@@ -7,7 +7,7 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{Candidate, Named, Place, PlacedExpression, SystemModel};
-use super::reader::{Entry, Reader, base};
+use super::reader::{Entry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, parse_components};
 
 /// Words for groups of candidates, with their meanings.
@@ -139,7 +139,7 @@ impl SystemModel {
     }
 }
 
-impl Reader<'_> {
+impl ModelReader<'_> {
     /// Candidate of an entry of the table `candidates`: an expression, or a table with expression, cost,
     /// unit, description.
     pub(super) fn file_candidate(&self, (key, value): Entry<'_>) -> Result<Candidate, ModelError> {

@@ -14,7 +14,7 @@ use obsdeg_exact::polynomial::{interpolate, root};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::dag::{Dag, Op};
-use super::values::NotHeld;
+use super::values::ConstraintFailure;
 use super::work::{PER_NODE, Step, Work};
 
 /// Number of draws of a block: half of all quadratic equations have a root in a field.
@@ -161,7 +161,7 @@ impl Constraint<'_> {
 /// alone) become zero.
 ///
 /// # Errors
-/// [`NotHeld`]: the constraint that could not be solved, or an exceeded limit of work.
+/// [`ConstraintFailure`]: the constraint that could not be solved, or an exceeded limit of work.
 pub(crate) fn hold(
     dag: &Dag,
     constraints: &[usize],
@@ -170,7 +170,7 @@ pub(crate) fn hold(
     f: &Field,
     rng: &mut SplitMix64,
     work: &Work,
-) -> Result<(), NotHeld> {
+) -> Result<(), ConstraintFailure> {
     let mut all: Vec<Constraint<'_>> = Vec::new();
     for &node in constraints {
         let nodes = below(dag, node);
@@ -207,7 +207,7 @@ pub(crate) fn hold(
         if !found {
             // a refusal holds for every later try
             work.take(Step::Constraints, 0, 0)?;
-            return Err(NotHeld::Constraint(block[0]));
+            return Err(ConstraintFailure::Constraint(block[0]));
         }
         open.retain(|(c, _)| !block.contains(c));
         for (_, left) in &mut open {

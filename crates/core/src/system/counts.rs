@@ -5,8 +5,8 @@ use obsdeg_exact::groebner::Work;
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::{Dag, Op};
-use super::fibre::{Counted, Fibre, at_point};
-use super::global::{self, Found, Known};
+use super::fibre::{CountingPoint, Fibre, at_point};
+use super::global::{self, ModelRelations, RelationConsequences};
 use super::judge::Judgement;
 use super::maps::second_solution;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
@@ -82,14 +82,14 @@ impl Counting<'_> {
     }
 
     /// Solutions in a field, given known consequences of relations.
-    fn fibre(&self, i: usize, stage: Stage, known: &Known) -> Result<Fibre, NotCounted> {
+    fn fibre(&self, i: usize, stage: Stage, known: &RelationConsequences) -> Result<Fibre, NotCounted> {
         let Self { model, compiled, judged, order, .. } = *self;
         if judged.findings.degrees.degree.len() > UNKNOWNS {
             return Err(NotCounted::TooLarge);
         }
         let mut work = Work::new(stage.limit);
         let functions = stage.whole.then_some(self.functions);
-        let at = Counted { f: self.fields[i], order, others: stage.others, known, functions };
+        let at = CountingPoint { f: self.fields[i], order, others: stage.others, known, functions };
         let found = at_point(model, compiled, judged, at, &mut self.random(i), &mut work);
         let used_up = work.used_up;
         let why = |e: NotCounted| match e {
@@ -144,7 +144,7 @@ impl Counting<'_> {
     }
 
     /// Solutions in both fields; in the second only if the first decides a number.
-    fn both(&self, stage: Stage, known: [&Known; 2]) -> [Result<Fibre, NotCounted>; 2] {
+    fn both(&self, stage: Stage, known: [&RelationConsequences; 2]) -> [Result<Fibre, NotCounted>; 2] {
         let first = self.fibre(0, stage, known[0]);
         let second = match &first {
             Ok(fibre) if fibre.polynomials.iter().any(Result::is_ok) => self.fibre(1, stage, known[1]),
@@ -193,10 +193,10 @@ impl Counting<'_> {
     }
 
     /// Consequences of relations in both fields, if there are any.
-    fn by_relations(&self, limit: u64) -> Option<[Known; 2]> {
+    fn by_relations(&self, limit: u64) -> Option<[RelationConsequences; 2]> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
-        let mut found = Found::default();
-        let mut known = |i: usize| -> Option<Known> {
+        let mut found = ModelRelations::default();
+        let mut known = |i: usize| -> Option<RelationConsequences> {
             let verdict = work::Work::new(model.work_limit);
             let mut own = self.random(i);
             let point =
@@ -206,7 +206,7 @@ impl Counting<'_> {
             let system = (model, compiled, judged);
             let known =
                 global::known(system, fields[i], &values, &mut found, &mut rng, &mut Work::new(limit));
-            (known != Known::default()).then_some(known)
+            (known != RelationConsequences::default()).then_some(known)
         };
         Some([known(0)?, known(1)?])
     }
@@ -232,7 +232,7 @@ impl Counting<'_> {
 impl Counting<'_> {
     /// Numbers of solutions, stage by stage, as far as the limits allow.
     fn by_stages(&self, limits: Limits) -> Vec<Count> {
-        let nothing = Known::default();
+        let nothing = RelationConsequences::default();
         let mut counts = self.agreed(&self.both(Stage::new(0, limits.count), [&nothing; 2]));
         let others = self.others();
         if self.is_open(&counts) && others > 0 {
@@ -262,7 +262,7 @@ impl Counting<'_> {
     }
 
     /// Counts again, and fills in numbers that were not decided before.
-    fn again(&self, counts: &mut [Count], stage: Stage, known: [&Known; 2]) {
+    fn again(&self, counts: &mut [Count], stage: Stage, known: [&RelationConsequences; 2]) {
         let mut new = self.agreed(&self.both(stage, known));
         let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
         unique.for_each(|&lane| new[lane] = Ok(1));
@@ -283,7 +283,7 @@ impl Counting<'_> {
         // if the smaller count is not decided, the count with all unknowns is not either
         if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
             let stage = Stage { whole: true, ..Stage::new(0, limit) };
-            found = self.both(stage, [&Known::default(); 2]);
+            found = self.both(stage, [&RelationConsequences::default(); 2]);
         }
         let name = |lane: usize| self.judged.layout.unknowns[lane].name.clone();
         if pairs && let [Ok(first), Ok(second)] = &found {

@@ -47,7 +47,7 @@ pub(super) struct System {
 }
 
 /// Equation `polynomial = 0`, at any time or at the start only.
-struct Equation {
+struct PolynomialEquation {
     zero: Polynomial,
     at_any_time: bool,
 }
@@ -60,7 +60,7 @@ type Cost = (bool, bool, usize, usize);
 type Row = BTreeMap<Monomial, Fraction>;
 
 /// Derivative of an output or of a known input.
-struct Signal {
+struct SignalDerivative {
     /// Order of the derivative; 0 for known inputs, which need no derivative of an output.
     order: usize,
     /// Variable of the next derivative; `None` if it has none.
@@ -70,7 +70,7 @@ struct Signal {
 }
 
 /// Derivative of a variable: zero, an expression, or a derivative without a variable.
-enum Rate {
+enum TimeDerivative {
     Zero,
     Is(Fraction),
     Nameless,
@@ -88,7 +88,7 @@ struct Elimination<'a> {
     /// Index of the state, by variable.
     states: BTreeMap<u32, usize>,
     /// Outputs and known inputs with their derivatives, by variable.
-    signals: BTreeMap<u32, Signal>,
+    signals: BTreeMap<u32, SignalDerivative>,
 }
 
 /// Expressions of the states, then of the parameters, and true if all were sought within the limit of work.
@@ -117,14 +117,14 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
 }
 
 /// Outputs and known inputs with their derivatives, by variable.
-fn signals(system: &System) -> BTreeMap<u32, Signal> {
+fn signals(system: &System) -> BTreeMap<u32, SignalDerivative> {
     let outputs = system.outputs.iter().map(|(_, chain)| (chain, false, true));
     let inputs = system.inputs.iter().map(|(chain, ends)| (chain, *ends, false));
     let mut out = BTreeMap::new();
     for (chain, ends, counts) in outputs.chain(inputs) {
         for (k, &v) in chain.iter().enumerate() {
             let order = if counts { k } else { 0 };
-            out.entry(v).or_insert(Signal { order, next: chain.get(k + 1).copied(), ends });
+            out.entry(v).or_insert(SignalDerivative { order, next: chain.get(k + 1).copied(), ends });
         }
     }
     out
@@ -137,7 +137,7 @@ impl Elimination<'_> {
             let Some(&y) = chain.first() else { continue };
             let y = self.s.whole(Polynomial::variable(&self.s.f, y));
             let minus = self.s.minus(h);
-            equations.push(Equation { zero: self.s.sum(&y, &minus)?.numerator, at_any_time: true });
+            equations.push(PolynomialEquation { zero: self.s.sum(&y, &minus)?.numerator, at_any_time: true });
         }
         let mut relations = self.eliminate_states(equations)?;
         for &(state, value) in &system.starts {
@@ -146,7 +146,7 @@ impl Elimination<'_> {
                 let minus = self.s.minus(x);
                 let zero = self.s.sum(&value, &minus)?.numerator;
                 if !self.holds_state(&zero) {
-                    relations.push(Equation { zero, at_any_time: false });
+                    relations.push(PolynomialEquation { zero, at_any_time: false });
                 }
             }
         }
@@ -158,20 +158,20 @@ impl Elimination<'_> {
     }
 
     /// Derivative of a variable by time.
-    fn rate(&self, v: u32) -> Rate {
+    fn rate(&self, v: u32) -> TimeDerivative {
         if let Some(&i) = self.states.get(&v) {
-            return Rate::Is(self.rates[i].clone());
+            return TimeDerivative::Is(self.rates[i].clone());
         }
         if let Some(signal) = self.signals.get(&v) {
             return match signal.next {
-                Some(next) => Rate::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
-                None if signal.ends => Rate::Zero,
-                None => Rate::Nameless,
+                Some(next) => TimeDerivative::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
+                None if signal.ends => TimeDerivative::Zero,
+                None => TimeDerivative::Nameless,
             };
         }
         match self.system.time == Some(v) {
-            true => Rate::Is(self.s.whole(Polynomial::constant(self.s.f.one()))),
-            false => Rate::Zero,
+            true => TimeDerivative::Is(self.s.whole(Polynomial::constant(self.s.f.one()))),
+            false => TimeDerivative::Zero,
         }
     }
 
@@ -180,9 +180,9 @@ impl Elimination<'_> {
         let mut sum = self.s.whole(Polynomial::default());
         for v in p.variables() {
             let rate = match self.rate(v) {
-                Rate::Zero => continue,
-                Rate::Nameless => return Ok(None),
-                Rate::Is(rate) => rate,
+                TimeDerivative::Zero => continue,
+                TimeDerivative::Nameless => return Ok(None),
+                TimeDerivative::Is(rate) => rate,
             };
             let slope = self.s.whole(p.derivative(&self.s.f, v));
             let part = self.s.times(&slope, &rate)?;
@@ -198,10 +198,13 @@ impl Elimination<'_> {
 
     /// Equation that is linear in a state at the least cost: its index, the state, and the state's
     /// expression.
-    fn best(&mut self, equations: &[Equation]) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
+    fn best(
+        &mut self,
+        equations: &[PolynomialEquation],
+    ) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
         let mut best: Option<(Cost, usize, usize, [Polynomial; 2])> = None;
         // slope and rest together have as many terms as the equation
-        let short = |e: &(usize, &Equation)| e.1.zero.len() <= SUBSTITUTED;
+        let short = |e: &(usize, &PolynomialEquation)| e.1.zero.len() <= SUBSTITUTED;
         for (e, equation) in equations.iter().enumerate().filter(short) {
             let occurring: BTreeSet<usize> =
                 equation.zero.variables().iter().filter_map(|v| self.states.get(v)).copied().collect();
@@ -226,7 +229,10 @@ impl Elimination<'_> {
 
     /// Eliminates states by equations that are linear in them. Returns the remaining equations, which
     /// contain no state.
-    fn eliminate_states(&mut self, mut equations: Vec<Equation>) -> Result<Vec<Equation>, OverLimit> {
+    fn eliminate_states(
+        &mut self,
+        mut equations: Vec<PolynomialEquation>,
+    ) -> Result<Vec<PolynomialEquation>, OverLimit> {
         while let Some((e, i, x)) = self.best(&equations)? {
             let v = self.system.states[i];
             equations.swap_remove(e);
@@ -242,7 +248,7 @@ impl Elimination<'_> {
                     self.solved[k] = Some(put(self.s, own)?);
                 }
             }
-            equations.extend(next.map(|d| Equation { zero: d.numerator, at_any_time: true }));
+            equations.extend(next.map(|d| PolynomialEquation { zero: d.numerator, at_any_time: true }));
             for equation in &mut equations {
                 if equation.zero.terms_with(v) > 0 {
                     let zero = self.s.put_into(&equation.zero, v, &x)?.numerator;
@@ -271,12 +277,12 @@ impl Elimination<'_> {
 
     /// Finds parameters that are determined alone by the relations, at the lowest order. Beyond its degree a
     /// parameter counts as known at first, since others may be solved by it, and then as open.
-    fn parameters(&mut self, relations: Vec<Equation>) -> Result<(), OverLimit> {
+    fn parameters(&mut self, relations: Vec<PolynomialEquation>) -> Result<(), OverLimit> {
         let system = self.system;
         let (degrees, beyond) = (&system.degrees[system.states.len()..], system.beyond);
         let highest = degrees.iter().flatten().copied().max().unwrap_or(0) + beyond;
         // sorted by order; a relation is differentiated when its turn comes
-        let mut waiting: Vec<(usize, Equation)> =
+        let mut waiting: Vec<(usize, PolynomialEquation)> =
             relations.into_iter().map(|r| (self.order(&r.zero), r)).collect();
         let mut pool: Vec<Polynomial> = Vec::new();
         for order in 0..=highest {
@@ -289,7 +295,7 @@ impl Elimination<'_> {
                 if equation.at_any_time
                     && let Some(next) = self.derivative(&equation.zero)?.filter(|d| !d.is_zero())
                 {
-                    let next = Equation { zero: next.numerator, at_any_time: true };
+                    let next = PolynomialEquation { zero: next.numerator, at_any_time: true };
                     waiting.push((self.order(&next.zero).max(order + 1), next));
                 }
                 pool.push(equation.zero);

@@ -5,7 +5,7 @@ use obsdeg_exact::{Ball, Field, Reals, Scalars, SplitMix64, Transform};
 use super::constraints::hold;
 use super::dag::Dag;
 use super::newton::hold_by_newton;
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::Work;
 use crate::language::{Function, from_i128};
 
@@ -96,7 +96,7 @@ impl Values for Field {
         free: &[bool],
         rng: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld> {
+    ) -> Result<(), ConstraintFailure> {
         hold(dag, constraints, values, free, self, rng, work)
     }
 }
@@ -209,7 +209,7 @@ impl<const N: usize> Values for Reals<N> {
         free: &[bool],
         _: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld> {
+    ) -> Result<(), ConstraintFailure> {
         hold_by_newton(dag, constraints, values, free, work)
     }
 }

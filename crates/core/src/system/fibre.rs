@@ -24,7 +24,7 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
-use super::global::Known;
+use super::global::RelationConsequences;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{Quotients, Terms};
@@ -54,11 +54,11 @@ struct Equations<'a> {
     lanes: Vec<Polynomial>,
     /// Polynomials that are zero.
     zero: Vec<Polynomial>,
-    runs: Vec<Run>,
+    runs: Vec<SegmentSeries>,
 }
 
 /// Segment of an experiment.
-struct Run {
+struct SegmentSeries {
     experiment: usize,
     /// States at its start.
     initial: Vec<Polynomial>,
@@ -281,7 +281,7 @@ fn equations<'a>(
     model: &SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    Counted { f, order, others, known, .. }: Counted<'_>,
+    CountingPoint { f, order, others, known, .. }: CountingPoint<'_>,
     (rng, verdict): (&mut SplitMix64, &'a work::Work),
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
@@ -335,7 +335,11 @@ fn equations<'a>(
         }
         for segment in 0..segments {
             let r = out.runs.len();
-            out.runs.push(Run { experiment, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
+            out.runs.push(SegmentSeries {
+                experiment,
+                initial,
+                nodes: vec![Vec::new(); compiled.dag.ops.len()],
+            });
             let given = compiled.starts.iter().enumerate().filter_map(|(s, node)| Some((s, (*node)?)));
             let given: Vec<(usize, usize)> = given.filter(|_| segment == 0).collect();
             let jumps = compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
@@ -352,7 +356,11 @@ fn equations<'a>(
     }
     for _ in 0..others {
         let initial = out.runs[0].initial.clone();
-        out.runs.push(Run { experiment: 0, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
+        out.runs.push(SegmentSeries {
+            experiment: 0,
+            initial,
+            nodes: vec![Vec::new(); compiled.dag.ops.len()],
+        });
     }
     let needed: Vec<Vec<bool>> = (0..experiments)
         .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
@@ -402,14 +410,14 @@ fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynom
 
 /// Random point in one of the two fields at which solutions are counted, with what is known there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Counted<'a> {
+pub(super) struct CountingPoint<'a> {
     pub(super) f: Field,
     /// Highest order of the derivatives of the outputs.
     pub(super) order: usize,
     /// Number of runs from the same start with other values of the generic inputs.
     pub(super) others: usize,
     /// Consequences of relations for the unknowns.
-    pub(super) known: &'a Known,
+    pub(super) known: &'a RelationConsequences,
     /// Functions whose values are counted too, together with all unknowns. For unknowns that are not
     /// observable these are the values while as many of them are fixed as there are unobservable directions.
     /// `None`: only observable unknowns.
@@ -434,7 +442,7 @@ pub(super) fn at_point(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
-    at: Counted<'_>,
+    at: CountingPoint<'_>,
     rng: &mut SplitMix64,
     work: &mut Work,
 ) -> Result<Fibre, NotCounted> {

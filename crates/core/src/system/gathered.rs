@@ -5,7 +5,7 @@ use obsdeg_exact::{Field, Reals, SplitMix64};
 
 use super::addition::written_apart;
 use super::error::ModelError;
-use super::judge::{Judgement, Points, SystemCertainty, claim_of, judge_compiled, refuse, singular};
+use super::judge::{FieldChoice, Judgement, SystemCertainty, claim_of, judge_compiled, refuse, singular};
 use super::model::{Compiled, SystemModel};
 use super::rows::{Layout, PointRows, SystemRows};
 use super::values::Values;
@@ -70,7 +70,7 @@ pub fn gather(
             let apart = if compiled.dag.is_rational() { None } else { written_apart(&compiled) };
             let compiled = apart.as_ref().unwrap_or(&compiled);
             let layout = &judged.layout;
-            let points = Points { model, compiled, layout, orders: layout.unknowns.len() };
+            let points = FieldChoice { model, compiled, layout, orders: layout.unknowns.len() };
             root_order = points.root_order();
             let mut at = |i: usize| {
                 let name = format!("rows of outputs, attempt {attempt}, field {i}");

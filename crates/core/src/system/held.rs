@@ -7,7 +7,7 @@ use obsdeg_exact::{RowSpace, SplitMix64};
 
 use super::constraints::slots_of;
 use super::model::{Role, StateStart};
-use super::rows::{Maker, Point, Rows, dense};
+use super::rows::{Point, PointBuilder, Rows, dense};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::Values;
 use super::work::{Step, product};
@@ -15,7 +15,7 @@ use super::work::{Step, product};
 /// Numbers of bits that random starts near given values share with these, by attempt.
 pub(super) const CLOSE: [i64; 3] = [10, 25, 40];
 
-impl<S: Values> Maker<'_, '_, S> {
+impl<S: Values> PointBuilder<'_, '_, S> {
     /// Changes states, and in the first experiment the shared values, so that the constraints hold.
     pub(super) fn hold_constraints(
         &self,

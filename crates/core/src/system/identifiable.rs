@@ -10,7 +10,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{At, Judgement, climb_at};
+use super::judge::{Judgement, PointDegrees, climb_at};
 use super::lie::lie_derivatives;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{Powers, Terms};
@@ -44,7 +44,7 @@ pub(super) struct IdentifiableFunction {
 }
 
 /// Products among which functions are sought.
-struct Family {
+struct ProductFamily {
     variables: Vec<usize>,
     /// Largest sum of the absolute exponents.
     degree: u32,
@@ -73,7 +73,7 @@ pub(super) fn identifiable_functions(
     if missing == 0 {
         return Ok((Vec::new(), 0));
     }
-    let mut search = Search::new(model, compiled, judged, f, seed)?;
+    let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
     (search.all, search.shown) = (all, shown);
     let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     for terms in &listed {
@@ -94,7 +94,7 @@ pub(super) fn identifiable_functions(
         for negative in [false, true] {
             if search.missing() > 0 {
                 let variables = search.not_expressed(&listed);
-                search.among(&Family { variables, degree, negative }.products(&weights))?;
+                search.among(&ProductFamily { variables, degree, negative }.products(&weights))?;
             }
         }
     }
@@ -139,7 +139,7 @@ fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
 
 /// Families in the order of the search: parameters alone first, then with states, then with observable
 /// unknowns; polynomials first.
-fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
+fn families(judged: &Judgement, shown: &[bool]) -> Vec<ProductFamily> {
     let degrees = &judged.findings.degrees;
     let all: Vec<usize> =
         (0..judged.layout.unknowns.len()).filter(|&c| degrees.excited[c] && shown[c]).collect();
@@ -148,7 +148,7 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
     let parameters: Vec<usize> = moved.iter().copied().filter(is_parameter).collect();
     let family = |variables: &Vec<usize>, degree, negative| {
         let variables = variables.clone();
-        Family { variables, degree, negative }
+        ProductFamily { variables, degree, negative }
     };
     vec![
         family(&parameters, 2, false),
@@ -162,7 +162,7 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
     ]
 }
 
-impl Family {
+impl ProductFamily {
     /// Products of weight zero that contain at least one unknown, short ones first; none if there are too
     /// many.
     fn products(&self, weights: &[Vec<(usize, i64)>]) -> Vec<Powers> {
@@ -199,14 +199,14 @@ impl Family {
 }
 
 /// Search at points of one field.
-struct Search<'a> {
+struct FunctionSearch<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
     f: Field,
     rng: SplitMix64,
     /// Points, with the unobservable directions there.
-    points: Vec<(At<Field>, Vec<Vec<u64>>)>,
+    points: Vec<(PointDegrees<Field>, Vec<Vec<u64>>)>,
     /// Differentials of functions known to be identifiable, at the first point.
     known: Echelon,
     /// Number of independent identifiable functions of the unknowns in `shown`.
@@ -218,7 +218,7 @@ struct Search<'a> {
     found: Vec<IdentifiableFunction>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> FunctionSearch<'a> {
     fn new(
         model: &'a SystemModel,
         compiled: &'a Compiled,
@@ -265,7 +265,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn first(&self) -> &At<Field> {
+    fn first(&self) -> &PointDegrees<Field> {
         &self.points[0].0
     }
 
@@ -273,7 +273,7 @@ impl<'a> Search<'a> {
         self.all.saturating_sub(self.known.rank())
     }
 
-    fn gradient(&self, terms: &[(i64, Powers)], at: &At<Field>) -> Vec<u64> {
+    fn gradient(&self, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
         gradient(&at.span.field(), self.judged.layout.unknowns.len(), terms, at)
     }
 
@@ -374,7 +374,7 @@ fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64])
 }
 
 /// Differential of a function at a point (shape: unknowns).
-fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &At<Field>) -> Vec<u64> {
+fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
     let inverses: Vec<u64> = at.values.iter().map(|&x| f.inv(x)).collect();
     let mut out = vec![0; n];
     for (number, powers) in terms {

@@ -23,7 +23,7 @@ use obsdeg_exact::{Echelon, Field, Reals, SplitMix64};
 use super::constraints::slots_of;
 use super::dag::Op;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
-use super::rows::{Layout, Maker, random_field};
+use super::rows::{Layout, PointBuilder, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
 use super::work::{Spent, Step, Work};
@@ -71,8 +71,8 @@ pub(super) fn independent_functions(
     }
     // beyond the limit of work nothing is concluded
     let work = Work::new(model.work_limit);
-    let maker = Maker { model, compiled, layout, field: random_field(rng), work: &work };
-    let free = sets.iter().all(|nodes| is_free(&maker, nodes, rng))
+    let builder = PointBuilder { model, compiled, layout, field: random_field(rng), work: &work };
+    let free = sets.iter().all(|nodes| is_free(&builder, nodes, rng))
         && is_somewhere(model, compiled, layout, rng, &work);
     spent.add(&work);
     free.then_some(functions.len())
@@ -87,11 +87,11 @@ fn is_somewhere(
     work: &Work,
 ) -> bool {
     let field = Reals::<2>;
-    let maker = Maker { model, compiled, layout, field, work };
+    let builder = PointBuilder { model, compiled, layout, field, work };
     let roots: Vec<usize> =
         compiled.rates(0).iter().chain(compiled.outputs(0)).chain(&compiled.combinations).copied().collect();
     (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
-        let Some(values) = maker.values(rng, attempt) else { return false };
+        let Some(values) = builder.values(rng, attempt) else { return false };
         let starts = vec![None; values.len()];
         let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();
         let seed = SplitMix64::new(0);
@@ -152,15 +152,19 @@ fn is_generic(model: &SystemModel, role: Role) -> bool {
 
 /// True if no combination of these nodes is constant: their gradients by all generic slots, side by side at
 /// some points, have full rank.
-fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &mut SplitMix64) -> bool {
-    let compiled = maker.compiled;
+fn is_free(
+    builder: &PointBuilder<'_, '_, Field>,
+    nodes: &BTreeSet<(bool, usize)>,
+    rng: &mut SplitMix64,
+) -> bool {
+    let compiled = builder.compiled;
     let roots: Vec<usize> = nodes.iter().map(|n| n.1).collect();
     let given =
         |s: usize| matches!(compiled.roles[s], Role::Constant(c) if compiled.constants(0)[c].is_some());
     let lanes: Vec<usize> = (0..compiled.roles.len()).filter(|&s| !given(s)).collect();
     let mut rows: Vec<Vec<u64>> = vec![Vec::new(); roots.len()];
     for _ in 0..POINTS.min(roots.len()) {
-        let Some(values) = maker.values(rng, 0) else { return false };
+        let Some(values) = builder.values(rng, 0) else { return false };
         let signal = |(s, value): (usize, &u64)| Signal::Constant {
             value: *value,
             lane: lanes.binary_search(&s).ok(),
@@ -169,7 +173,7 @@ fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &
         let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
         let dag = &compiled.dag;
         let at =
-            Taylor::new(dag, maker.field, lanes.len(), signals, &starts, &roots, false, seed, maker.work);
+            Taylor::new(dag, builder.field, lanes.len(), signals, &starts, &roots, false, seed, builder.work);
         let Ok(at) = at else { return false };
         for (row, &node) in rows.iter_mut().zip(&roots) {
             let start = row.len();
@@ -181,10 +185,11 @@ fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &
         // each row against all before it
         let (count, columns) = (rows.len() as u64, rows[0].len() as u64);
         let elimination = count.saturating_mul(count).saturating_mul(columns);
-        if maker.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err() {
+        if builder.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err()
+        {
             return false;
         }
-        let mut space = Echelon::new(maker.field, rows[0].len());
+        let mut space = Echelon::new(builder.field, rows[0].len());
         if rows.iter().all(|row| space.insert(row)) {
             return true;
         }

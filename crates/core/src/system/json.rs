@@ -25,7 +25,7 @@ struct Layout {
     states: Vec<String>,
     #[serde(default)]
     params: Vec<String>,
-    equations: BTreeMap<String, Text>,
+    equations: BTreeMap<String, PlacedText>,
     outputs: Outputs,
     #[serde(default)]
     known_inputs: Vec<String>,
@@ -37,30 +37,30 @@ struct Layout {
     #[serde(default)]
     known_constants: Vec<String>,
     #[serde(default)]
-    input_assumption: BTreeMap<String, Text>,
+    input_assumption: BTreeMap<String, PlacedText>,
     #[serde(default)]
-    known_initial_values: BTreeMap<String, Text>,
+    known_initial_values: BTreeMap<String, PlacedText>,
     #[serde(default)]
     known_initial_conditions: Vec<String>,
     #[serde(default)]
     experiments: Option<usize>,
     #[serde(default)]
-    segments: Vec<BTreeMap<String, Text>>,
+    segments: Vec<BTreeMap<String, PlacedText>>,
     #[serde(default)]
     segment_constants: Vec<String>,
     #[serde(default)]
-    observable_combinations: Vec<Text>,
+    observable_combinations: Vec<PlacedText>,
 }
 
 /// Text with its address in the memory of the file.
 #[derive(Debug)]
-struct Text {
+struct PlacedText {
     text: String,
     address: usize,
     length: usize,
 }
 
-impl<'de> Deserialize<'de> for Text {
+impl<'de> Deserialize<'de> for PlacedText {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let raw = <&RawValue>::deserialize(deserializer)?.get();
         let text = serde_json::from_str(raw)
@@ -71,7 +71,7 @@ impl<'de> Deserialize<'de> for Text {
 
 /// Outputs in the order of the file.
 #[derive(Debug)]
-struct Outputs(Vec<(String, Text)>);
+struct Outputs(Vec<(String, PlacedText)>);
 
 impl<'de> Deserialize<'de> for Outputs {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -82,7 +82,7 @@ impl<'de> Deserialize<'de> for Outputs {
                 f.write_str("an object")
             }
             fn visit_map<A: serde::de::MapAccess<'de>>(self, mut map: A) -> Result<Outputs, A::Error> {
-                let mut out: Vec<(String, Text)> = Vec::new();
+                let mut out: Vec<(String, PlacedText)> = Vec::new();
                 while let Some((name, text)) = map.next_entry()? {
                     out.retain(|(n, _)| *n != name);
                     out.push((name, text));
@@ -95,16 +95,16 @@ impl<'de> Deserialize<'de> for Outputs {
 }
 
 /// Text of the file.
-struct File<'a>(&'a str);
+struct JsonFile<'a>(&'a str);
 
-impl File<'_> {
+impl JsonFile<'_> {
     /// Byte range of a text in the file, with its quotes.
-    fn span(&self, text: &Text) -> Option<Range<usize>> {
+    fn span(&self, text: &PlacedText) -> Option<Range<usize>> {
         let start = text.address.checked_sub(self.0.as_ptr().addr())?;
         (start + text.length <= self.0.len()).then_some(start..start + text.length)
     }
 
-    fn formula(&self, what: String, text: &Text) -> Result<PlacedExpression, ModelError> {
+    fn formula(&self, what: String, text: &PlacedText) -> Result<PlacedExpression, ModelError> {
         let span = self.span(text);
         // a text without escapes is the same in the file
         let plain = |s: &Range<usize>| self.0.get(s.start + 1..s.end - 1) == Some(text.text.as_str());
@@ -148,7 +148,7 @@ fn named(name: &str) -> Named {
 /// [`ModelError`] with the byte range of the fault, if it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     check_signs(text)?;
-    let file = File(text);
+    let file = JsonFile(text);
     // a key, at its first occurrence in quotes
     let key = |name: &str| text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
     let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: key(what) };

@@ -11,7 +11,7 @@ use super::error::ModelError;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
-use super::rows::{Layout, Maker, SystemRows, random_field};
+use super::rows::{Layout, PointBuilder, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Step, Work, product};
@@ -120,7 +120,7 @@ impl Judgement {
 }
 
 /// Degrees at one random point.
-pub(crate) struct At<S: Values> {
+pub(crate) struct PointDegrees<S: Values> {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Verdict>,
     /// Span of all rows.
@@ -132,18 +132,18 @@ pub(crate) struct At<S: Values> {
     /// True if the point is generic, so that an order that adds nothing is the last.
     closed: bool,
     gap: Gap,
-    steps: Steps<S>,
+    steps: OrderedRows<S>,
     /// Signs of the arguments of abs and sign.
     signs: Signs,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
-struct Steps<S: Values> {
+struct OrderedRows<S: Values> {
     field: S,
     rows: Vec<(usize, usize, Vec<S::Element>)>,
 }
 
-impl<S: Values> Steps<S> {
+impl<S: Values> OrderedRows<S> {
     fn add(&mut self, order: usize, basis: &S::Space) {
         let pivots = basis.pivot_columns();
         for (i, &pivot) in pivots.iter().enumerate().skip(self.rows.len()) {
@@ -170,7 +170,7 @@ impl<S: Values> Steps<S> {
     }
 }
 
-impl<S: Values> At<S> {
+impl<S: Values> PointDegrees<S> {
     /// Observable degree of a functional at this point.
     pub(crate) fn degree(&self, functional: &[S::Element]) -> Option<usize> {
         self.steps.degree(functional)
@@ -186,7 +186,7 @@ pub(crate) fn climb_at<S: Values>(
     field: S,
     rng: &mut SplitMix64,
     spent: &mut Spent,
-) -> Result<At<S>, ModelError> {
+) -> Result<PointDegrees<S>, ModelError> {
     let work = Work::new(model.work_limit);
     let found = climbed(model, compiled, layout, field, rng, &work);
     spent.add(&work);
@@ -200,7 +200,7 @@ fn climbed<S: Values>(
     field: S,
     rng: &mut SplitMix64,
     work: &Work,
-) -> Result<At<S>, ModelError> {
+) -> Result<PointDegrees<S>, ModelError> {
     let refused = || work.refused().map_or(Ok(()), Err);
     let mut rows = match SystemRows::new(model, compiled, layout, field.clone(), rng, work) {
         Ok(rows) => rows,
@@ -212,7 +212,7 @@ fn climbed<S: Values>(
     let gradients = rows.combinations().to_vec();
     let mut found = vec![None; gradients.len()];
     let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
-    let mut steps = Steps { field: field.clone(), rows: Vec::new() };
+    let mut steps = OrderedRows { field: field.clone(), rows: Vec::new() };
     let (mut refined, product) = (0, product::<S::Element>());
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
         // rows that were computed again; a refusal ends the climb
@@ -239,7 +239,7 @@ fn climbed<S: Values>(
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
     let signs = rows.signs(&sided(compiled));
-    Ok(At { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
+    Ok(PointDegrees { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
 /// Error that states where the model has no value.
@@ -396,7 +396,7 @@ fn judge_in_fields(
 ) -> Result<Judgement, ModelError> {
     let before = spent.operations;
     let orders = layout.unknowns.len() / model.outputs.len().max(1);
-    let points = Points { model, compiled, layout, orders };
+    let points = FieldChoice { model, compiled, layout, orders };
     let order = points.root_order();
     let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
@@ -455,7 +455,7 @@ fn holds_at_real_point(
 }
 
 /// Choice of prime fields in which points of a model are drawn.
-pub(super) struct Points<'a> {
+pub(super) struct FieldChoice<'a> {
     pub(super) model: &'a SystemModel,
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'a Layout,
@@ -463,7 +463,7 @@ pub(super) struct Points<'a> {
     pub(super) orders: usize,
 }
 
-impl Points<'_> {
+impl FieldChoice<'_> {
     /// Order of the roots of unity in a field: long series are multiplied by transforms, which need them.
     pub(super) fn root_order(&self) -> u64 {
         if self.orders < LONG { 1 } else { (4 * self.orders as u64).next_power_of_two() }
@@ -502,10 +502,10 @@ fn can_hold(
         return true;
     }
     let work = Work::new(model.work_limit);
-    let maker = Maker { model, compiled, layout, field, work: &work };
-    let free = maker.free(0);
+    let builder = PointBuilder { model, compiled, layout, field, work: &work };
+    let free = builder.free(0);
     let found = (0..POINTS).any(|attempt| {
-        let Some(mut values) = maker.values(rng, attempt) else { return false };
+        let Some(mut values) = builder.values(rng, attempt) else { return false };
         field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, rng, &work).is_ok()
     });
     spent.add(&work);
@@ -614,14 +614,14 @@ fn pair<const A: usize, const B: usize>(
     Ok(Ok(Judgement { sides, ..Judgement::of(layout.clone(), first, certainty, seed) }))
 }
 
-impl<S: Values> At<S> {
-    fn agrees<T: Values>(&self, other: &At<T>) -> bool {
+impl<S: Values> PointDegrees<S> {
+    fn agrees<T: Values>(&self, other: &PointDegrees<T>) -> bool {
         (&self.degrees, &self.combinations, self.ended) == (&other.degrees, &other.combinations, other.ended)
     }
 }
 
 impl Judgement {
-    fn of<S: Values>(layout: Layout, at: At<S>, certainty: SystemCertainty, seed: u64) -> Self {
+    fn of<S: Values>(layout: Layout, at: PointDegrees<S>, certainty: SystemCertainty, seed: u64) -> Self {
         let full = at.degrees.rank() == layout.unknowns.len();
         Self {
             rests_on_bound: !full && !at.ended,
@@ -664,7 +664,7 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
 pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
-    let used: Vec<Fraction> = experiments
+    let used: Vec<QuotientBounds> = experiments
         .flat_map(|e| {
             let given = compiled.constants(e).iter().flatten();
             compiled.rates(e).iter().chain(compiled.outputs(e)).chain(given)
@@ -678,7 +678,7 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
         .collect();
     // over the product of all denominators
     let (below, below_bits) = used.iter().fold((0.0, 0.0), |(d, b), f| (d + f.below.0, b + f.below.1));
-    let above = |part: fn(&Fraction) -> f64| used.iter().map(part).fold(0.0, f64::max);
+    let above = |part: fn(&QuotientBounds) -> f64| used.iter().map(part).fold(0.0, f64::max);
     let (top, top_bits) = (above(|f| f.above.0) + below, above(|f| f.above.1) + below_bits);
     let delta = top.max(below) + below;
     let (orders, n) = (orders as f64, layout.unknowns.len() as f64);
@@ -700,12 +700,12 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
 
 /// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the absolute coefficients.
 #[derive(Debug, Clone, Copy)]
-struct Fraction {
+struct QuotientBounds {
     above: (f64, f64),
     below: (f64, f64),
 }
 
-impl Fraction {
+impl QuotientBounds {
     const ZERO: Self = Self { above: (0.0, 0.0), below: (0.0, 0.0) };
     const VARIABLE: Self = Self { above: (1.0, 0.0), below: (0.0, 0.0) };
 
@@ -733,16 +733,16 @@ fn times(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
 
 /// Time derivatives of the variables that replace functions: `E' = E u'` for exp and tanh, `(1 + t^2)/2 u'`
 /// with `t = tan(u/2)` for sin, cos and tan, `weight u'` for a logarithm and an arc tangent.
-fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec<Fraction> {
+fn function_rates(dag: &Dag, fractions: &[QuotientBounds], compiled: &Compiled) -> Vec<QuotientBounds> {
     // derivatives of all nodes; a jet of an input is a variable
-    let mut rates: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
+    let mut rates: Vec<QuotientBounds> = Vec::with_capacity(dag.ops.len());
     let mut out = Vec::new();
     for (i, op) in dag.ops.iter().enumerate() {
         rates.push(match *op {
-            Op::Number { .. } | Op::Pi => Fraction::ZERO,
+            Op::Number { .. } | Op::Pi => QuotientBounds::ZERO,
             Op::Slot(s) => match compiled.roles[s] {
                 Role::State(k) => fractions[compiled.rates(0)[k]],
-                _ => Fraction::VARIABLE,
+                _ => QuotientBounds::VARIABLE,
             },
             Op::Add(a, b) | Op::Subtract(a, b) => rates[a].plus(rates[b]),
             Op::Multiply(a, b) => rates[a].times(fractions[b]).plus(fractions[a].times(rates[b])),
@@ -753,9 +753,9 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
             }
             Op::Primitive { of, weight, function } => {
                 let factor = match function {
-                    Function::Exp | Function::Tanh => Fraction::VARIABLE,
+                    Function::Exp | Function::Tanh => QuotientBounds::VARIABLE,
                     Function::Sin | Function::Cos | Function::Tan => {
-                        Fraction { above: (2.0, 1.0), below: (0.0, 1.0) }
+                        QuotientBounds { above: (2.0, 1.0), below: (0.0, 1.0) }
                     }
                     _ => fractions[weight],
                 };
@@ -769,8 +769,8 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
 
 /// Every node of a graph as a quotient of polynomials over the integers, in the slots and in one variable
 /// for each function.
-fn fractions(dag: &Dag) -> Vec<Fraction> {
-    let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
+fn fractions(dag: &Dag) -> Vec<QuotientBounds> {
+    let mut out: Vec<QuotientBounds> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
         let one = (0.0, 0.0);
         out.push(match *op {
@@ -778,17 +778,17 @@ fn fractions(dag: &Dag) -> Vec<Fraction> {
                 let digits = (mantissa.unsigned_abs().max(1) as f64).log2();
                 let ten = f64::from(decimals.abs()) * std::f64::consts::LOG2_10;
                 match decimals > 0 {
-                    true => Fraction { above: (0.0, digits), below: (0.0, ten) },
-                    false => Fraction { above: (0.0, digits + ten), below: one },
+                    true => QuotientBounds { above: (0.0, digits), below: (0.0, ten) },
+                    false => QuotientBounds { above: (0.0, digits + ten), below: one },
                 }
             }
-            Op::Slot(_) | Op::Pi => Fraction::VARIABLE,
+            Op::Slot(_) | Op::Pi => QuotientBounds::VARIABLE,
             Op::Primitive { function, .. } => match function {
                 // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and similar quotients
                 Function::Tanh | Function::Sin | Function::Cos | Function::Tan => {
-                    Fraction { above: (2.0, 1.0), below: (2.0, 1.0) }
+                    QuotientBounds { above: (2.0, 1.0), below: (2.0, 1.0) }
                 }
-                _ => Fraction::VARIABLE,
+                _ => QuotientBounds::VARIABLE,
             },
             Op::Add(a, b) | Op::Subtract(a, b) => out[a].plus(out[b]),
             Op::Multiply(a, b) => out[a].times(out[b]),

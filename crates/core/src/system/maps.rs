@@ -17,13 +17,13 @@ const FACTORS: usize = 24;
 
 /// Quotient of unknowns, `a b/c`, each of which may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Term {
+struct QuotientTerm {
     above: [Option<usize>; 2],
     below: Option<usize>,
     negative: bool,
 }
 
-impl Term {
+impl QuotientTerm {
     fn value(&self, f: &Field, values: &[u64], inverses: &[u64]) -> u64 {
         let factors = self.above.iter().flatten().map(|&i| values[i]);
         let factors = factors.chain(self.below.iter().map(|&i| inverses[i]));
@@ -42,7 +42,7 @@ impl Term {
 }
 
 /// All quotients of `n` values, short ones first.
-fn terms(n: usize) -> Vec<Term> {
+fn terms(n: usize) -> Vec<QuotientTerm> {
     let places = || std::iter::once(None).chain((0..n).map(Some));
     let mut out = Vec::new();
     for below in places() {
@@ -50,12 +50,12 @@ fn terms(n: usize) -> Vec<Term> {
             for b in places().take_while(|b| b.is_none_or(|b| b <= a)) {
                 if below != Some(a) && (b.is_none() || below != b) {
                     let above = [Some(a), b];
-                    out.extend([false, true].map(|negative| Term { above, below, negative }));
+                    out.extend([false, true].map(|negative| QuotientTerm { above, below, negative }));
                 }
             }
         }
         if below.is_some() {
-            out.extend([false, true].map(|negative| Term { above: [None; 2], below, negative }));
+            out.extend([false, true].map(|negative| QuotientTerm { above: [None; 2], below, negative }));
         }
     }
     out.sort_by_key(|t| (t.above.iter().flatten().count() + usize::from(t.below.is_some()), t.negative));
@@ -63,7 +63,7 @@ fn terms(n: usize) -> Vec<Term> {
 }
 
 /// Values of the unknowns at a point, and of the terms.
-struct Point<'a> {
+struct SolutionPoint<'a> {
     f: Field,
     values: &'a [u64],
     /// Values of the terms.
@@ -72,7 +72,7 @@ struct Point<'a> {
 
 /// Sums of at most three terms with a value at each point.
 fn sum_with(
-    points: &[Point<'_>; 2],
+    points: &[SolutionPoint<'_>; 2],
     known: &BTreeMap<u64, usize>,
     lane: usize,
     targets: [u64; 2],
@@ -125,7 +125,7 @@ pub(super) fn second_solution(
         let (f, values) = (fields[i], &fibres[i].values[..]);
         let inverses: Vec<u64> = values.iter().map(|&x| if x == 0 { 0 } else { f.inv(x) }).collect();
         let of_terms = terms.iter().map(|t| t.value(&f, values, &inverses)).collect();
-        Point { f, values, terms: of_terms }
+        SolutionPoint { f, values, terms: of_terms }
     };
     let points = [point(0), point(1)];
     let mut known = BTreeMap::new();

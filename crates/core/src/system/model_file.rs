@@ -14,7 +14,7 @@ use super::model::{
     StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
-use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
+use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::ModelRecord;
@@ -130,7 +130,7 @@ pub struct SegmentEntry {
     carry: BTreeMap<String, Spanned<Value>>,
 }
 
-impl Reader<'_> {
+impl ModelReader<'_> {
     /// Checks that a table has no other keys than the given ones.
     pub(super) fn known_keys(
         &self,
@@ -405,7 +405,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let (message, span) = explain::<ModelFile>(text, &e);
         ModelError { what: "the model file".into(), message, span }
     })?;
-    let mut r = Reader { text, shapes: Shapes::new() };
+    let mut r = ModelReader { text, shapes: Shapes::new() };
     let mut model = SystemModel {
         name: file.name.clone().unwrap_or_default(),
         description: file.description,

@@ -4,7 +4,7 @@ use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
 
 use super::dag::{Dag, Op};
 use super::taylor::{Signal, Taylor};
-use super::values::NotHeld;
+use super::values::ConstraintFailure;
 use super::work::{Step, Work, product};
 
 /// Number of steps of Newton's method from one start: near a point they double the digits.
@@ -257,25 +257,25 @@ fn size<const N: usize>(list: &[Ball<N>]) -> f64 {
 /// slots. The residual of the constraints is included in the error bounds of the values.
 ///
 /// # Errors
-/// [`NotHeld`], with the constraint of the largest residual.
+/// [`ConstraintFailure`], with the constraint of the largest residual.
 pub(super) fn hold_by_newton<const N: usize>(
     dag: &Dag,
     constraints: &[usize],
     values: &mut [Ball<N>],
     free: &[bool],
     work: &Work,
-) -> Result<(), NotHeld> {
+) -> Result<(), ConstraintFailure> {
     let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
     let newton =
         Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
     // a refusal holds for all later steps
-    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(NotHeld::Refused, |()| reason);
+    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
     let (mut before, mut far_before, mut slow, mut stuck) = (f64::INFINITY, f64::INFINITY, 0, false);
     // residual and size of the point when the steps became slow
     let mut from = (f64::INFINITY, 0.0);
-    let mut linear = newton.linear(values).ok_or_else(|| failed(NotHeld::Constraint(0)))?;
+    let mut linear = newton.linear(values).ok_or_else(|| failed(ConstraintFailure::Constraint(0)))?;
     for _ in 0..STEPS {
-        let nowhere = NotHeld::Constraint(linear.worst);
+        let nowhere = ConstraintFailure::Constraint(linear.worst);
         if linear.far > FAR && !stuck {
             if let Some((there, next)) = newton.nearer(values, &linear) {
                 values.copy_from_slice(&there);
@@ -313,7 +313,7 @@ pub(super) fn hold_by_newton<const N: usize>(
         // and fall below the residual that large values leave in a sum that is nowhere zero
         let settles = settles && linear.residual < -4.0 * far - DEEP;
         if slow >= SLOW && settles {
-            return Err(NotHeld::Dependent(linear.worst));
+            return Err(ConstraintFailure::Dependent(linear.worst));
         }
         (before, far_before) = (length, linear.far);
         let shorter = (length - far - LONGEST).max(0.0).ceil() as i64;
@@ -321,7 +321,7 @@ pub(super) fn hold_by_newton<const N: usize>(
         values.copy_from_slice(&there);
         linear = newton.linear(values).ok_or_else(|| failed(nowhere))?;
     }
-    Err(failed(NotHeld::Constraint(linear.worst)))
+    Err(failed(ConstraintFailure::Constraint(linear.worst)))
 }
 
 /// First constraint that holds at a point where its gradient vanishes.

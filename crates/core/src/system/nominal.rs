@@ -10,7 +10,7 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{Named, SystemModel};
-use super::reader::Reader;
+use super::reader::ModelReader;
 use crate::language::{Node, Shapes, nearest};
 
 /// Numbers for a simulation, in the units of the model.
@@ -56,7 +56,7 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
 
 /// Checked numbers for a simulation: known names, admitted numbers.
 pub(super) fn nominal(
-    r: &Reader<'_>,
+    r: &ModelReader<'_>,
     outputs: &Shapes,
     entry: &SimulationEntry,
     model: &mut SystemModel,

@@ -23,7 +23,7 @@ pub(super) fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<Entry<'_>>
 }
 
 /// Reader of a model file.
-pub(super) struct Reader<'a> {
+pub(super) struct ModelReader<'a> {
     pub(super) text: &'a str,
     /// Shapes of the names that are no scalars.
     pub(super) shapes: Shapes,
@@ -131,7 +131,7 @@ fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
     Ok(out)
 }
 
-impl Reader<'_> {
+impl ModelReader<'_> {
     pub(super) fn at(&self, span: Range<usize>, what: String, message: String) -> ModelError {
         ModelError { what, message, span: Some(span) }
     }

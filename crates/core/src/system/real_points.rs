@@ -8,9 +8,9 @@ use super::held::{CLOSE, distinct, turned};
 use super::intervals::range;
 use super::model::{Compiled, SystemModel};
 use super::newton::{hold_by_newton, off, vanishing};
-use super::rows::{Layout, Maker};
+use super::rows::{Layout, PointBuilder};
 use super::taylor::{Signal, Singular, Taylor};
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::{Refused, Spent, Work};
 
 /// Number of starts of Newton's method: first near the values of the file, then at random points of growing
@@ -29,7 +29,7 @@ const HOLDS: f64 = -128.0;
 const DOUBLE: i64 = 52;
 
 /// Outcome of one start.
-enum Found {
+enum StartOutcome {
     /// A point, and the number of constraints that follow from the others there.
     Point(usize),
     /// A point at which gradients of constraints are dependent, although the constraints are not.
@@ -68,27 +68,27 @@ fn sought(
     work: &Work,
 ) -> Result<usize, ModelError> {
     let Some(first) = model.constraints.first() else { return Ok(0) };
-    let maker = Maker { model, compiled, layout, field: Reals::<4>, work };
+    let builder = PointBuilder { model, compiled, layout, field: Reals::<4>, work };
     let mut rng = model.random(seed, "real points");
-    let free = maker.free(0);
+    let free = builder.free(0);
     let mut dependent: Vec<usize> = Vec::new();
-    if maker.gives_start()
-        && let Some(mut values) = maker.values(&mut rng.clone(), 0)
+    if builder.gives_start()
+        && let Some(mut values) = builder.values(&mut rng.clone(), 0)
     {
-        maker.near_given(0, &free, &mut values, DOUBLE, &mut rng.clone());
+        builder.near_given(0, &free, &mut values, DOUBLE, &mut rng.clone());
         if let Some(c) = vanishing(&compiled.dag, &compiled.constraints, &values, &free, work) {
             return Err(dependent_at_points(model, c));
         }
     }
     for attempt in 0..TRIES {
-        let Some(mut values) = maker.values(&mut rng, attempt * FARTHER) else { continue };
+        let Some(mut values) = builder.values(&mut rng, attempt * FARTHER) else { continue };
         if let Some(&bits) = CLOSE.get(attempt) {
-            maker.near_given(0, &free, &mut values, bits, &mut rng);
+            builder.near_given(0, &free, &mut values, bits, &mut rng);
         }
-        match from_start(&maker, values, &free, attempt, &mut rng) {
-            Ok(Found::Point(following)) => return Ok(following),
-            Ok(Found::Dependent(c)) => dependent.push(c),
-            Ok(Found::Nothing) => {}
+        match from_start(&builder, values, &free, attempt, &mut rng) {
+            Ok(StartOutcome::Point(following)) => return Ok(following),
+            Ok(StartOutcome::Dependent(c)) => dependent.push(c),
+            Ok(StartOutcome::Nothing) => {}
             Err(Refused) => break,
         }
         if dependent.len() >= DEPENDENT && dependent.len() > attempt / 2 {
@@ -102,7 +102,7 @@ fn sought(
     let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
     let message = format!(
         "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}",
-        match maker.gives_start() {
+        match builder.gives_start() {
             true =>
                 ", the first three near the values given under [simulation.values]; if there is one, give \
                  values nearer to it",
@@ -169,30 +169,32 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
 
 /// Newton's method from one start, and the kind of the point that it reaches.
 fn from_start(
-    maker: &Maker<'_, '_, Reals<4>>,
+    builder: &PointBuilder<'_, '_, Reals<4>>,
     mut values: Vec<Ball<4>>,
     free: &[bool],
     attempt: usize,
     rng: &mut SplitMix64,
-) -> Result<Found, Refused> {
-    let compiled = maker.compiled;
+) -> Result<StartOutcome, Refused> {
+    let compiled = builder.compiled;
     let (dag, all) = (&compiled.dag, turned(distinct(&compiled.constraints), attempt));
     let place = |c: usize| compiled.constraints.iter().position(|node| *node == all[c]).unwrap_or(0);
-    match hold_by_newton(dag, &all, &mut values, free, maker.work) {
+    match hold_by_newton(dag, &all, &mut values, free, builder.work) {
         Ok(()) => {}
-        Err(NotHeld::Constraint(_)) => return Ok(Found::Nothing),
-        Err(NotHeld::Dependent(c)) => return Ok(Found::Dependent(place(c))),
-        Err(NotHeld::Refused) => return Err(Refused),
+        Err(ConstraintFailure::Constraint(_)) => return Ok(StartOutcome::Nothing),
+        Err(ConstraintFailure::Dependent(c)) => return Ok(StartOutcome::Dependent(place(c))),
+        Err(ConstraintFailure::Refused) => return Err(Refused),
     }
-    if !are_not_negative(maker, &values) {
-        return Ok(Found::Nothing);
+    if !are_not_negative(builder, &values) {
+        return Ok(StartOutcome::Nothing);
     }
-    let independent = match maker.independent(&all, &values, free) {
+    let independent = match builder.independent(&all, &values, free) {
         Ok(independent) => independent,
         Err(Singular::Refused) => return Err(Refused),
-        Err(_) => return Ok(Found::Nothing),
+        Err(_) => return Ok(StartOutcome::Nothing),
     };
-    let Some(other) = (0..all.len()).find(|c| !independent.contains(c)) else { return Ok(Found::Point(0)) };
+    let Some(other) = (0..all.len()).find(|c| !independent.contains(c)) else {
+        return Ok(StartOutcome::Point(0));
+    };
     // the others hold wherever the independent ones do, or only at points like this one
     let kept: Vec<usize> = independent.iter().map(|&c| all[c]).collect();
     let others: Vec<usize> = (0..all.len()).filter(|c| !independent.contains(c)).map(|c| all[c]).collect();
@@ -201,18 +203,18 @@ fn from_start(
         for (x, _) in nearby.iter_mut().zip(free).filter(|(_, free)| **free) {
             *x = Reals::<4>.near(x.to_f64(), CLOSE[0], rng).unwrap_or(*x);
         }
-        hold_by_newton(dag, &kept, &mut nearby, free, maker.work).is_ok()
-            && off(dag, &others, &nearby, maker.work).is_some_and(|off| off < HOLDS)
+        hold_by_newton(dag, &kept, &mut nearby, free, builder.work).is_ok()
+            && off(dag, &others, &nearby, builder.work).is_some_and(|off| off < HOLDS)
     });
-    Ok(if follow { Found::Point(others.len()) } else { Found::Dependent(place(other)) })
+    Ok(if follow { StartOutcome::Point(others.len()) } else { StartOutcome::Dependent(place(other)) })
 }
 
 /// True if no root in a constraint would be negative at a point.
-fn are_not_negative(maker: &Maker<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
-    let compiled = maker.compiled;
+fn are_not_negative(builder: &PointBuilder<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
+    let compiled = builder.compiled;
     let signals = values.iter().map(|value| Signal::Constant { value: *value, lane: None }).collect();
     let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
     let nodes = &compiled.not_negative;
-    let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, maker.work);
+    let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, builder.work);
     at.is_ok_and(|at| nodes.iter().all(|&node| !at.start(node).is_negative()))
 }

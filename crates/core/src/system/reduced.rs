@@ -79,7 +79,7 @@ pub fn reduced(model: &SystemModel, seed: u64, order: Option<usize>) -> Result<R
             false => Vec::new(),
         };
         let fixed: Vec<(String, i64)> = numbers.iter().map(|&(l, x)| (name(l), x)).collect();
-        let text = Written { model, fixed: &fixed, stands_for: &stands_for }.text();
+        let text = FileContent { model, fixed: &fixed, stands_for: &stands_for }.text();
         let holds = |m: &SystemModel| -> Result<bool, ModelError> {
             let again = judge(m, seed, order)?;
             let found = again.findings.degrees.rank();
@@ -152,13 +152,13 @@ fn quoted(text: &str) -> String {
 }
 
 /// Content of a model file.
-struct Written<'a> {
+struct FileContent<'a> {
     model: &'a SystemModel,
     fixed: &'a [(String, i64)],
     stands_for: &'a [(String, String)],
 }
 
-impl Written<'_> {
+impl FileContent<'_> {
     fn number(&self, name: &str) -> Option<i64> {
         self.fixed.iter().find(|f| f.0 == name).map(|f| f.1)
     }

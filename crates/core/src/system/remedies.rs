@@ -11,7 +11,7 @@ use super::model::{
 use super::values::Values;
 use super::work::{Spent, product};
 use crate::language::{Expression, Node};
-use crate::remedies::{Change, Directions, MOST_PAIRED, Remedies, Remedy, Resolved, Told};
+use crate::remedies::{Change, Directions, Information, MOST_PAIRED, Remedies, Remedy, Resolved};
 
 /// Largest number of verdicts on single changes of a model of up to `UNKNOWNS` unknowns; half as many on
 /// pairs. For larger models the number falls as the square of the unknowns, since the work of a verdict
@@ -25,7 +25,7 @@ const MOST_IN_DIGITS: usize = 12;
 const MOST_ALIKE: usize = 6;
 
 /// Search for remedies of one model.
-struct Search<'a> {
+struct ModelRemedySearch<'a> {
     model: &'a SystemModel,
     judged: &'a Judgement,
     order: Option<usize>,
@@ -73,8 +73,18 @@ pub(super) fn remedies(
     let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
     let out = Remedies::default();
-    let mut search =
-        Search { model, judged, order, open, roles, budget, left, ended: false, elsewhere: false, out };
+    let mut search = ModelRemedySearch {
+        model,
+        judged,
+        order,
+        open,
+        roles,
+        budget,
+        left,
+        ended: false,
+        elsewhere: false,
+        out,
+    };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -100,7 +110,7 @@ pub(super) fn remedies(
     search.out
 }
 
-impl Search<'_> {
+impl ModelRemedySearch<'_> {
     /// Tries single changes, then pairs for unknowns that no single change resolves.
     fn all<S: Values>(&mut self, directions: &Directions<S>) {
         let open = self.open.len();
@@ -173,7 +183,7 @@ impl Search<'_> {
         if complete {
             // one more than are paired shows that there are more
             let paired = self.roles.iter().take(MOST_PAIRED + 1);
-            let values: Vec<Told<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
+            let values: Vec<Information<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
             complete = directions.pairs(&values, None, left, |i, j| {
                 work = work.checked_sub(1)?;
                 let changes = [i, j].map(|k| self.known(self.roles[k].0));

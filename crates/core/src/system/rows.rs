@@ -117,7 +117,7 @@ impl Layout {
 pub(crate) struct SystemRows<'a, S: Values> {
     field: S,
     lanes: usize,
-    runs: Vec<Run<'a, S>>,
+    runs: Vec<RunRows<'a, S>>,
     bound: usize,
     /// Work of the points that were tried, and of all rows so far.
     work: &'a Work,
@@ -127,7 +127,7 @@ pub(crate) struct SystemRows<'a, S: Values> {
 
 /// Condition that ends a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum End {
+enum EndCondition {
     /// The point is generic: an order that adds nothing is the last.
     Stagnation,
     /// No higher rank is possible: these are the ranks at a generic point, of all outputs together, or of
@@ -140,7 +140,7 @@ enum End {
     Open,
 }
 
-impl End {
+impl EndCondition {
     /// True if a run has ended: its rows, or those of one of its outputs, have this rank after an order;
     /// `grew` is true if that order raised the rank.
     fn is_reached(&self, output: usize, order: usize, grew: bool, rank: usize) -> bool {
@@ -154,14 +154,14 @@ impl End {
 }
 
 #[derive(Debug, Clone)]
-struct Run<'a, S: Values> {
+struct RunRows<'a, S: Values> {
     taylor: Taylor<'a, S>,
     /// Rows computed backwards, if there are many unknowns.
     adjoint: Option<Adjoint<'a, S>>,
     outputs: &'a [usize],
     /// Span of the run's own rows.
     own: S::Space,
-    end: End,
+    end: EndCondition,
     done: bool,
     /// Differentials of the constraints at the start of the experiment.
     known: Rows<S>,
@@ -184,7 +184,7 @@ const SIDES: usize = 200;
 
 /// Additional runs at a point, beyond one for each segment and experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Followed {
+struct AdditionalRuns {
     /// Number of runs from the same start with other values of the generic inputs.
     others: usize,
     /// True if every output is followed to the end of its own rows.
@@ -217,7 +217,7 @@ impl<S: Values> Point<S> {
 }
 
 /// Builder of points: model, graph, unknowns, field and work.
-pub(super) struct Maker<'a, 'b, S: Values> {
+pub(super) struct PointBuilder<'a, 'b, S: Values> {
     pub(super) model: &'b SystemModel,
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'b Layout,
@@ -225,7 +225,7 @@ pub(super) struct Maker<'a, 'b, S: Values> {
     pub(super) work: &'b Work,
 }
 
-impl<'a, S: Values> Maker<'a, '_, S> {
+impl<'a, S: Values> PointBuilder<'a, '_, S> {
     fn slot_of(&self, role: Role) -> Option<usize> {
         self.compiled.roles.iter().position(|r| *r == role)
     }
@@ -545,8 +545,8 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed::default())
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns::default())
     }
 
     /// Rows of a system at a random point, then of `others` runs from the same start with other values of
@@ -562,21 +562,21 @@ impl<'a, S: Values> SystemRows<'a, S> {
         (rng, others): (&mut SplitMix64, usize),
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed { others, apart: false })
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns { others, apart: false })
     }
 
     fn drawn(
-        maker: &Maker<'a, '_, S>,
+        builder: &PointBuilder<'a, '_, S>,
         work: &'a Work,
         rng: &mut SplitMix64,
-        followed: Followed,
+        followed: AdditionalRuns,
     ) -> Result<Self, Singular> {
-        let (compiled, layout) = (maker.compiled, maker.layout);
+        let (compiled, layout) = (builder.compiled, builder.layout);
         let mut last = Singular::Division(0);
         let (mut attempt, mut tries, mut elsewhere) = (0, 0, None);
         while attempt < S::ATTEMPTS {
-            match Self::at(maker, work, (rng, followed), attempt) {
+            match Self::at(builder, work, (rng, followed), attempt) {
                 Err(singular) if singular != Singular::Refused => {
                     last = singular;
                     attempt += 1;
@@ -598,13 +598,13 @@ impl<'a, S: Values> SystemRows<'a, S> {
     }
 
     fn at(
-        maker: &Maker<'a, '_, S>,
+        builder: &PointBuilder<'a, '_, S>,
         work: &'a Work,
-        (rng, followed): (&mut SplitMix64, Followed),
+        (rng, followed): (&mut SplitMix64, AdditionalRuns),
         attempt: usize,
     ) -> Result<Self, Singular> {
-        let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
-        let lanes = maker.layout.unknowns.len();
+        let (model, compiled, f) = (builder.model, builder.compiled, &builder.field);
+        let lanes = builder.layout.unknowns.len();
         let mut parameters: Vec<S::Element> =
             model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
         let mut constants: Vec<S::Element> = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
@@ -619,9 +619,9 @@ impl<'a, S: Values> SystemRows<'a, S> {
             StartTime::Generic => f.random(rng, attempt),
         };
         for experiment in 0..model.experiments.max(1) {
-            let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
-            maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
-            maker.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
+            let mut point = builder.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
+            builder.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
+            builder.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
             let value = |slot: usize| match &point.signals[slot] {
                 Signal::Constant { value, .. } => Some(*value),
                 _ => None,
@@ -633,13 +633,13 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     _ => {}
                 }
             }
-            maker.set_states(&mut point, &given(&compiled.starts))?;
-            let (known, kept) = maker.constraints(&point)?;
+            builder.set_states(&mut point, &given(&compiled.starts))?;
+            let (known, kept) = builder.constraints(&point)?;
             let mut generic = kept && model.states.iter().all(|s| s.start == StateStart::Unknown);
             let mut begins = time;
             for (number, segment) in segments.iter().enumerate() {
                 if number > 0
-                    && let Some(slot) = maker.slot_of(Role::Time)
+                    && let Some(slot) = builder.slot_of(Role::Time)
                 {
                     // the start time of a later segment is not given, but it is later
                     let lasts = f.random(rng, 0);
@@ -647,40 +647,42 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     begins = f.add(&begins, &lasts);
                     point.signals[slot] = Signal::Time { value: begins };
                 }
-                maker.set_constants(&mut point, &segment.constants, true)?;
-                maker.set_states(&mut point, &segment.carry)?;
+                builder.set_constants(&mut point, &segment.constants, true)?;
+                builder.set_states(&mut point, &segment.carry)?;
                 generic &= segment.carry.is_empty();
-                let taylor = maker.series(&point, lanes)?;
+                let taylor = builder.series(&point, lanes)?;
                 let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
                 let combinations = compiled.combinations.iter().map(gradient).collect();
                 let end = match () {
-                    () if arbitrary => End::Open,
-                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
-                    () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
-                    () => match maker.generic_ranks(&point, &known, followed.apart, rng) {
-                        None => End::Open,
+                    () if arbitrary => EndCondition::Open,
+                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => {
+                        EndCondition::Stagnation
+                    }
+                    () if taylor.is_at_rest() => EndCondition::Order(lanes + model.states.len()),
+                    () => match builder.generic_ranks(&point, &known, followed.apart, rng) {
+                        None => EndCondition::Open,
                         Some((ranks, clear)) => {
                             gap = gap.and(clear);
-                            End::Rank(ranks)
+                            EndCondition::Rank(ranks)
                         }
                     },
                 };
                 let own = S::Space::new(f.clone(), lanes);
                 let outputs = compiled.outputs(experiment);
-                let adjoint = maker.adjoint(&point, lanes);
+                let adjoint = builder.adjoint(&point, lanes);
                 let known = known.clone();
-                runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
+                runs.push(RunRows { taylor, adjoint, outputs, own, end, done: false, known, combinations });
                 for number in 0..followed.others {
                     let other = point.with_constant_inputs(|| match number {
                         0 => f.zero(),
                         _ => f.random(rng, attempt),
                     });
-                    let taylor = maker.series(&other, lanes)?;
-                    runs.push(Run { taylor, ..runs[0].clone() });
+                    let taylor = builder.series(&other, lanes)?;
+                    runs.push(RunRows { taylor, ..runs[0].clone() });
                 }
             }
         }
-        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, work, gap })
+        Ok(Self { field: f.clone(), lanes, runs, bound: builder.layout.bound, work, gap })
     }
 
     /// Gradients of the combinations at the start of the first run.
@@ -690,7 +692,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
 
     /// Signs of some nodes at the start of every run in which they occur.
     pub(crate) fn signs(&self, nodes: &[usize]) -> Signs {
-        let sign = |run: &Run<'_, S>, node: usize| {
+        let sign = |run: &RunRows<'_, S>, node: usize| {
             let taylor = &run.taylor;
             taylor.takes_part(node).then(|| self.field.is_positive(&taylor.start(node))).flatten()
         };
@@ -704,7 +706,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
 
     /// True if every run starts at a generic point.
     pub(crate) fn is_generic(&self) -> bool {
-        self.runs.iter().all(|r| r.end == End::Stagnation)
+        self.runs.iter().all(|r| r.end == EndCondition::Stagnation)
     }
 
     /// True if the end of every run is proven, as far as its orders were requested.
@@ -790,7 +792,8 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
             for row in rows_of(&mut run.taylor, run.adjoint.as_mut(), run.outputs, order) {
                 let new = sink(&row);
                 // runs that share the rank are each followed until their own rank stalls
-                grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&row) };
+                grew |=
+                    if single && run.end == EndCondition::Stagnation { new } else { run.own.insert(&row) };
             }
             let again = (run.own.refined() - before).saturating_mul(product::<S::Element>());
             if self.work.take(Step::Derivatives(order), again, 0).is_err() {

@@ -75,7 +75,7 @@ pub(super) enum NoExpressions {
 
 /// Solving expression of an unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Expression {
+pub(super) struct SolvingExpression {
     /// Text in the names of the model.
     pub(super) text: String,
     /// True if the unknown is known to have one solution: every unknown in the expression has one solution,
@@ -91,7 +91,7 @@ pub(super) fn solutions(
     judged: &Judgement,
     seed: u64,
     single: &[bool],
-) -> (Vec<Option<Expression>>, Option<NoExpressions>) {
+) -> (Vec<Option<SolvingExpression>>, Option<NoExpressions>) {
     let n = judged.layout.unknowns.len();
     let none = |reason| (vec![None; n], reason);
     let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
@@ -121,7 +121,7 @@ pub(super) fn solutions(
     let unique = unique(&rests_on, single);
     let kept = |((text, on), unique): ((Option<String>, Option<BTreeSet<usize>>), bool)| {
         let text = on.and(text)?;
-        Some(Expression { text: shown(&text, &signals.symbols), unique })
+        Some(SolvingExpression { text: shown(&text, &signals.symbols), unique })
     };
     (out.into_iter().zip(rests_on).zip(unique).map(kept).collect(), reason)
 }
@@ -404,9 +404,9 @@ fn derivative(name: &str, order: usize) -> String {
     }
 }
 
-struct Point<'a>(&'a [(String, u64)]);
+struct SymbolPoint<'a>(&'a [(String, u64)]);
 
-impl Environment for Point<'_> {
+impl Environment for SymbolPoint<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         self.0.iter().find(|(n, _)| n == name).map(|(_, x)| *x)
     }
@@ -442,7 +442,7 @@ fn check(
     let holds = |(text, truth): (&Option<String>, &u64)| {
         let value = text.as_ref().and_then(|t| {
             let parsed = parse_with(t, Names::Plain).ok()?;
-            evaluate(&parsed, &field, &Point(&values)).ok()
+            evaluate(&parsed, &field, &SymbolPoint(&values)).ok()
         });
         value == Some(*truth)
     };

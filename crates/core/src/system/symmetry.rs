@@ -5,7 +5,7 @@ use obsdeg_exact::{Reals, RowSpace};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{At, Judgement, climb_at};
+use super::judge::{Judgement, PointDegrees, climb_at};
 use super::model::{Compiled, SystemModel};
 use super::values::Values;
 use super::work::{Spent, WorkLimit, product};
@@ -25,15 +25,15 @@ const POLYNOMIAL_POINTS: usize = 400;
 pub const POLYNOMIAL_DEGREE: usize = 4;
 
 /// Rational coefficient of an unknown.
-pub(crate) type Term = (usize, (i64, i64));
+pub(crate) type RationalTerm = (usize, (i64, i64));
 
 /// Direction that changes no output: `x_i` grows by `c_i x_i + d_i`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Symmetry {
     /// Coefficients `c_i` other than zero.
-    pub scaling: Vec<Term>,
+    pub scaling: Vec<RationalTerm>,
     /// Constants `d_i` other than zero.
-    pub translation: Vec<Term>,
+    pub translation: Vec<RationalTerm>,
 }
 
 /// Invariant of the symmetries: a product of powers, or a sum.
@@ -206,14 +206,14 @@ fn symmetries_in<S: Values>(
             basis.insert(&unit);
         }
     }
-    let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
+    let (mut last, mut at): (usize, Option<PointDegrees<S>>) = (0, None);
     let rank = judged.findings.degrees.rank();
     let reserved = judged.work.saturating_mul(RESERVED).min(model.work_limit.operations() / 10);
     let mut budget = Budget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false };
     // a verdict takes two points
     let mut verdict = judged.work / 2;
     // constraints that can hold in several ways have points with other verdicts
-    let alike = |at: &At<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
+    let alike = |at: &PointDegrees<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
     let (mut point, mut elsewhere) = (0, 0);
     while point < POINTS && elsewhere < ELSEWHERE {
         if !budget.spend(cost_of_point::<S>(verdict, rank, 2 * n)) {
@@ -253,7 +253,7 @@ fn symmetries_in<S: Values>(
     for v in short {
         let tangent: Vec<_> = (0..n).map(|c| f.add(&f.mul(&v[c], &at.values[c]), &v[n + c])).collect();
         let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
-        let terms = |half: &[(i64, i64)]| -> Vec<Term> {
+        let terms = |half: &[(i64, i64)]| -> Vec<RationalTerm> {
             half.iter().copied().enumerate().filter(|(_, k)| k.0 != 0).collect()
         };
         out.found.push(Symmetry { scaling: terms(&k[..n]), translation: terms(&k[n..]) });
@@ -330,7 +330,7 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
 
 /// Draws one more random point with its verdict, for rows of this many columns; `None` once the work is used
 /// up.
-type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<At<S>>, ModelError> + 'a;
+type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<PointDegrees<S>>, ModelError> + 'a;
 
 /// Directions `v_i = sum_j a_ij m_j` over the unknowns that change, with m_j products of unknowns and known
 /// constants. The a_ij solve a linear system of rows at several points, which `draw` provides as long as
@@ -340,12 +340,13 @@ fn directions<S: Values>(
     moved: &[usize],
     products: &[Vec<usize>],
     tangents: &mut S::Space,
-    at: &At<S>,
+    at: &PointDegrees<S>,
     (budget, draw): (&mut Budget, &mut Draw<'_, S>),
 ) -> Result<Vec<PolynomialDirection>, ModelError> {
     let width = products.len();
-    let value =
-        |at: &At<S>, product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]));
+    let value = |at: &PointDegrees<S>, product: &Vec<usize>| {
+        product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]))
+    };
     let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
     let mut basis = space(moved.len() * width);
     let (mut rank, mut still) = (0, 0);
@@ -393,7 +394,7 @@ fn invariants<S: Values>(
     f: &S,
     n: usize,
     found: &[Symmetry],
-    at: &At<S>,
+    at: &PointDegrees<S>,
     budget: &mut Budget,
 ) -> Vec<Invariant> {
     let mut out = Vec::new();

@@ -12,7 +12,7 @@ use obsdeg_exact::{SplitMix64, interrupt};
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::{PER_NODE, Refused, Step, Work, operations_of, product};
 use crate::language::Function;
 
@@ -80,12 +80,12 @@ impl From<Refused> for Singular {
     }
 }
 
-impl From<NotHeld> for Singular {
-    fn from(reason: NotHeld) -> Self {
+impl From<ConstraintFailure> for Singular {
+    fn from(reason: ConstraintFailure) -> Self {
         match reason {
-            NotHeld::Constraint(c) => Self::Constraint(c),
-            NotHeld::Dependent(c) => Self::Dependent(c),
-            NotHeld::Refused => Self::Refused,
+            ConstraintFailure::Constraint(c) => Self::Constraint(c),
+            ConstraintFailure::Dependent(c) => Self::Dependent(c),
+            ConstraintFailure::Refused => Self::Refused,
         }
     }
 }

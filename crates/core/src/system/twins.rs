@@ -60,7 +60,8 @@ pub(super) fn twins(
             out.push(Twin { images: signs.into_iter().map(|s| (s, (s, true))).collect() });
         }
     }
-    let points: Vec<Tested> = fields.into_iter().filter_map(|f| Tested::new(compiled, f, rng)).collect();
+    let points: Vec<TestPoint> =
+        fields.into_iter().filter_map(|f| TestPoint::new(compiled, f, rng)).collect();
     for pairs in exchanges(compiled, &slots) {
         let images = pairs.iter().flat_map(|&(a, b)| [(a, (b, false)), (b, (a, false))]).collect();
         let twin = Twin { images };
@@ -182,13 +183,13 @@ fn exchanges(compiled: &Compiled, slots: &[usize]) -> Vec<Vec<(usize, usize)>> {
 }
 
 /// Random point of a field at which maps are tested, with the values of all nodes there.
-struct Tested {
+struct TestPoint {
     f: Field,
     point: Vec<u64>,
     nodes: Vec<u64>,
 }
 
-impl Tested {
+impl TestPoint {
     fn new(compiled: &Compiled, f: Field, rng: &mut SplitMix64) -> Option<Self> {
         let point: Vec<u64> = compiled.roles.iter().map(|_| rng.below(f.modulus())).collect();
         let nodes = values(&compiled.dag, &f, &point)?;

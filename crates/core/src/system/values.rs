@@ -8,7 +8,7 @@ use crate::language::Function;
 
 /// Reasons why no point was found at which constraints hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum NotHeld {
+pub(crate) enum ConstraintFailure {
     /// This constraint could not be solved.
     Constraint(usize),
     /// Only points with dependent gradients of the constraints were found; this constraint is among them.
@@ -17,7 +17,7 @@ pub(crate) enum NotHeld {
     Refused,
 }
 
-impl NotHeld {
+impl ConstraintFailure {
     /// The reason with the index of its constraint replaced by `place`.
     pub(super) fn of(self, place: impl FnOnce(usize) -> usize) -> Self {
         match self {
@@ -28,7 +28,7 @@ impl NotHeld {
     }
 }
 
-impl From<Refused> for NotHeld {
+impl From<Refused> for ConstraintFailure {
     fn from(_: Refused) -> Self {
         Self::Refused
     }
@@ -85,5 +85,5 @@ pub(crate) trait Values: Scalars {
         free: &[bool],
         rng: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld>;
+    ) -> Result<(), ConstraintFailure>;
 }

@@ -37,14 +37,14 @@ pub struct SchemeFileError {
 }
 
 /// Reader of a file: its text, and the byte ranges of the values of its keys.
-struct Reader<'a> {
+struct SchemeReader<'a> {
     text: &'a str,
     /// Byte ranges by key, as in `simulation.priors.D_F` or `position.0.name`; names in lists by the key of
     /// the list.
     places: HashMap<String, Range<usize>>,
 }
 
-impl Reader<'_> {
+impl SchemeReader<'_> {
     fn at(&self, span: Range<usize>, message: impl Into<String>) -> SchemeFileError {
         SchemeFileError { message: message.into(), span: Some(span) }
     }
@@ -224,7 +224,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         let (message, span) = explain::<SchemeFile>(text, &e);
         SchemeFileError { message, span }
     })?;
-    let mut r = Reader { text, places: HashMap::new() };
+    let mut r = SchemeReader { text, places: HashMap::new() };
     let mut scheme = Scheme {
         name: r.keep("name", file.name.as_ref()).unwrap_or_default(),
         description: r.keep("description", file.description.as_ref()).unwrap_or_default(),

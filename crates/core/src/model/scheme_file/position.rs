@@ -3,7 +3,7 @@
 use serde_spanned::Spanned;
 
 use super::layout::{PositionEntry, RotationEntry, SlewEntry};
-use super::{Reader, SchemeFileError};
+use super::{SchemeFileError, SchemeReader};
 use crate::model::angle::{Angle, MAX_DEGREES, parse_decimal};
 use crate::model::attitude::Euler;
 use crate::model::dwell::Dwell;
@@ -11,7 +11,7 @@ use crate::model::ranges::DWELL_S;
 use crate::model::rotation::{AxisError, MIN_ROTATION, Rotation, SlewAxis, SlewTo, whole_angle};
 use crate::model::scheme::{Position, parse_attitude};
 
-impl Reader<'_> {
+impl SchemeReader<'_> {
     pub(super) fn position(
         &mut self,
         i: usize,

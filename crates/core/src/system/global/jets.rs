@@ -26,7 +26,7 @@ pub(super) struct Jet {
 
 /// A model with chosen values of the quantities that do not change in time (parameters, and states with the
 /// rate zero), and with random states and inputs.
-pub(super) struct Source<'a> {
+pub(super) struct JetSource<'a> {
     pub(super) f: Field,
     model: &'a SystemModel,
     compiled: &'a Compiled,
@@ -47,7 +47,7 @@ pub(super) struct Structure {
     inputs: Vec<Vec<Vec<Jet>>>,
 }
 
-impl<'a> Source<'a> {
+impl<'a> JetSource<'a> {
     /// Source for a model with one experiment and one segment, generic starts, no unknown input, no time.
     pub(super) fn new(model: &'a SystemModel, compiled: &'a Compiled, layout: &'a Layout, f: Field) -> Self {
         let is_zero =

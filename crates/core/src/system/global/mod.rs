@@ -21,7 +21,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
 use super::judge::Judgement;
 use super::model::{Compiled, SystemModel};
-use jets::Source;
+use jets::JetSource;
 use ratios::{Pool, Ratio, ratios};
 use relation::{Relation, relations};
 
@@ -37,7 +37,7 @@ const SOLUTIONS: usize = 24;
 
 /// Consequences of relations for the unknowns at a point.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Known {
+pub(super) struct RelationConsequences {
     /// Unknowns with one value among all points with the same outputs.
     pub(super) unique: Vec<usize>,
     /// Polynomials in the unknowns (numbered as in the layout) that are zero at all those points.
@@ -46,7 +46,7 @@ pub(super) struct Known {
 
 /// Relations of a model, the same at every point and in every field; `None` before they were sought.
 #[derive(Debug, Default)]
-pub(super) struct Found(Option<Vec<Relation>>);
+pub(super) struct ModelRelations(Option<Vec<Relation>>);
 
 /// True if relations among derivatives can decide anything: one experiment and segment, generic starts and
 /// inputs, no function.
@@ -67,26 +67,27 @@ pub(super) fn known(
     (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
     f: Field,
     at: &[u64],
-    found: &mut Found,
+    found: &mut ModelRelations,
     rng: &mut SplitMix64,
     work: &mut Work,
-) -> Known {
-    let source = Source::new(model, compiled, &judged.layout, f);
-    let Some(span) = &judged.span else { return Known::default() };
+) -> RelationConsequences {
+    let source = JetSource::new(model, compiled, &judged.layout, f);
+    let Some(span) = &judged.span else { return RelationConsequences::default() };
     let (open, added) = open_constants(span, &source.constants);
     if found.0.is_none() {
         let structure = source.structure(at, rng);
         found.0 = Some(structure.map_or_else(Vec::new, |s| relations(&source, &s, at, rng, work)));
     }
     let relations = found.0.as_deref().unwrap_or_default();
-    let mut fibre = Fibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
+    let mut fibre =
+        ConstantFibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
     // results found before the work ended are valid
     let _ended = fibre.narrow(&source, relations, rng, work);
     let is_observable = |lane: usize| judged.findings.degrees.degree[lane].is_some();
     let unique = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v) && is_observable(*v));
     // if additional constants were fixed, the equations hold only together with these
     let zero = if added { Vec::new() } else { fibre.zero() };
-    Known { unique: unique.collect(), zero }
+    RelationConsequences { unique: unique.collect(), zero }
 }
 
 /// The constants without as many as there are symmetry directions (first those that are no pivots of the
@@ -110,7 +111,7 @@ fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
 }
 
 /// Constants with the same values of ratios.
-struct Fibre {
+struct ConstantFibre {
     f: Field,
     at: Vec<u64>,
     /// All constants that were open at first.
@@ -118,21 +119,21 @@ struct Fibre {
     /// Constants that are not yet known to be unique.
     open: Vec<usize>,
     /// Ratios as functions, with their gradients.
-    equations: Vec<Equation>,
+    equations: Vec<RatioEquation>,
 }
 
 /// Ratio that has its value at the base point.
-struct Equation {
+struct RatioEquation {
     above: Polynomial,
     below: Polynomial,
     gradient: Vec<u64>,
 }
 
-impl Fibre {
+impl ConstantFibre {
     /// Interpolates ratios, cheap ones first, as long as they make constants unique.
     fn narrow(
         &mut self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         relations: &[Relation],
         rng: &mut SplitMix64,
         work: &mut Work,
@@ -149,7 +150,7 @@ impl Fibre {
                 for ratio in &chosen {
                     if let Some([above, below]) = pool.function(ratio, &places, rng, work)? {
                         let gradient = ratio.gradient.clone();
-                        self.equations.push(Equation { above, below, gradient });
+                        self.equations.push(RatioEquation { above, below, gradient });
                     }
                 }
                 let unique = if chosen.is_empty() { Vec::new() } else { self.unique(work) };
@@ -212,7 +213,7 @@ impl Fibre {
     /// Polynomials that are zero: every ratio minus its value.
     fn zero(&self) -> Vec<Polynomial> {
         let f = self.f;
-        let less = |e: &Equation| {
+        let less = |e: &RatioEquation| {
             let mut out = e.above.scaled(&f, e.below.at(&f, &self.at));
             out.add_scaled(&f, &e.below, f.neg(e.above.at(&f, &self.at)));
             out

@@ -9,7 +9,7 @@ use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::reconstruct::{Abscissae, Quotient};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::Source;
+use super::jets::JetSource;
 use super::relation::Relation;
 
 /// Highest degree of numerator and denominator of a ratio that is used.
@@ -38,7 +38,7 @@ pub(super) struct Ratio {
 
 /// Coefficients of a relation at the points of a line through the base point.
 fn on_line(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     relation: &Relation,
     at: &[u64],
     direction: &[(usize, u64)],
@@ -59,14 +59,14 @@ fn on_line(
 }
 
 /// Coefficients on a line, with their inverses.
-struct Values {
+struct LineValues {
     f: Field,
     abscissae: Abscissae,
     values: Vec<Vec<u64>>,
     inverses: Vec<Vec<u64>>,
 }
 
-impl Values {
+impl LineValues {
     fn new(f: Field, values: Vec<Vec<u64>>) -> Self {
         let inverses = values.iter().map(|v| v.iter().map(|&x| f.inv(x)).collect()).collect();
         Self { f, abscissae: Abscissae::new(&f, values.len()), values, inverses }
@@ -88,7 +88,7 @@ impl Values {
 /// # Errors
 /// [`OverLimit`].
 pub(super) fn ratios(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     (number, relation): (usize, &Relation),
     at: &[u64],
     variables: &[usize],
@@ -99,12 +99,12 @@ pub(super) fn ratios(
     let direction: Vec<(usize, u64)> = variables.iter().map(|&v| (v, rng.below(f.modulus()))).collect();
     let line = on_line(source, relation, at, &direction, None, LINE, (&mut *rng, &mut *work))?;
     let base = line[0].clone();
-    let line = Values::new(f, line);
+    let line = LineValues::new(f, line);
     let mut along = Vec::new();
     for &v in variables {
         let both = (&mut *rng, &mut *work);
         let values = on_line(source, relation, at, &[(v, f.one())], Some(&base), ALONG, both)?;
-        along.push(Values::new(f, values));
+        along.push(LineValues::new(f, values));
     }
     let size = base.len();
     let mut seen: BTreeSet<u64> = BTreeSet::new();
@@ -191,7 +191,7 @@ impl Ratio {
 
 /// Random values of the open variables, with the coefficients of relations at them.
 pub(super) struct Pool<'s, 'a> {
-    source: &'s Source<'a>,
+    source: &'s JetSource<'a>,
     relations: &'s [Relation],
     at: Vec<u64>,
     /// Unknowns that are drawn.
@@ -202,7 +202,7 @@ pub(super) struct Pool<'s, 'a> {
 
 impl<'s, 'a> Pool<'s, 'a> {
     pub(super) fn new(
-        source: &'s Source<'a>,
+        source: &'s JetSource<'a>,
         relations: &'s [Relation],
         at: &[u64],
         open: Vec<usize>,

@@ -7,7 +7,7 @@ use obsdeg_exact::dense::ColumnEchelon;
 use obsdeg_exact::groebner::{OverLimit, Work};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::{BEYOND, Jet, Source, Structure};
+use super::jets::{BEYOND, Jet, JetSource, Structure};
 
 /// Largest number of products of jets among which a relation is sought.
 const MONOMIALS: usize = 4000;
@@ -91,14 +91,14 @@ fn values(f: &Field, products: &[Exponents], point: &[u64]) -> Vec<u64> {
 }
 
 /// Points at the given constants, drawn on demand.
-struct Points<'s, 'a> {
-    source: &'s Source<'a>,
+struct JetPoints<'s, 'a> {
+    source: &'s JetSource<'a>,
     at: &'s [u64],
     jets: Vec<Jet>,
     drawn: Vec<Vec<u64>>,
 }
 
-impl Points<'_, '_> {
+impl JetPoints<'_, '_> {
     /// Rows of the products of some of the jets, one per point.
     fn rows(
         &mut self,
@@ -126,7 +126,7 @@ impl Points<'_, '_> {
 /// Relations at the given constants (values of the unknowns, then of the known constants): one for every
 /// output, or all of a few products if these suffice. Contains what was found when the work ended.
 pub(super) fn relations(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     structure: &Structure,
     at: &[u64],
     rng: &mut SplitMix64,
@@ -160,14 +160,14 @@ pub(super) fn relations(
 
 /// All relations among products of degree one or two of jets, sorted by the highest derivative in them.
 fn together(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     jets: Vec<Jet>,
     at: &[u64],
     rng: &mut SplitMix64,
     work: &mut Work,
 ) -> Result<Vec<Relation>, OverLimit> {
     let weights: Vec<usize> = jets.iter().map(|j| j.order).collect();
-    let mut points = Points { source, at, jets: jets.clone(), drawn: Vec::new() };
+    let mut points = JetPoints { source, at, jets: jets.clone(), drawn: Vec::new() };
     for degree in 1..=2 {
         let weighted = degree * weights.iter().max().unwrap_or(&0);
         if count(&weights, degree, weighted) > TOGETHER {
@@ -190,7 +190,7 @@ fn together(
 /// Relation with the first dependent derivative of an output, or with up to [`BEYOND`] more; it is sought in
 /// the smallest set of products that has one.
 fn led_by(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     structure: &Structure,
     leader: usize,
     at: &[u64],
@@ -199,7 +199,8 @@ fn led_by(
 ) -> Result<Option<Relation>, OverLimit> {
     let sets: Vec<Vec<Jet>> = (0..=BEYOND).map(|b| structure.jets(Some(leader), b)).collect();
     let weights: Vec<Vec<usize>> = sets.iter().map(|s| s.iter().map(|j| j.order).collect()).collect();
-    let mut points = Points { source, at, jets: sets.last().cloned().unwrap_or_default(), drawn: Vec::new() };
+    let mut points =
+        JetPoints { source, at, jets: sets.last().cloned().unwrap_or_default(), drawn: Vec::new() };
     // a set without a relation has no subset with one
     let mut failed: Vec<(usize, usize, usize)> = Vec::new();
     let mut budget = FIRST;
@@ -253,13 +254,13 @@ impl Relation {
     /// [`OverLimit`].
     pub(super) fn coefficients(
         &self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
         work: &mut Work,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let size = self.products.len();
-        let mut points = Points { source, at, jets: self.jets.clone(), drawn: Vec::new() };
+        let mut points = JetPoints { source, at, jets: self.jets.clone(), drawn: Vec::new() };
         let rows = points.rows(&self.jets, &self.products, size + 1, rng, work)?;
         let echelon = ColumnEchelon::new(&source.f, size, rows, work)?;
         Ok((echelon.free() == [size - 1]).then(|| echelon.dependency(size - 1)))
@@ -270,7 +271,7 @@ impl Relation {
     /// experiment.
     fn determined_by_one_trajectory(
         &self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
         work: &mut Work,

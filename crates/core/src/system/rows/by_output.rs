@@ -11,7 +11,7 @@ use super::super::model::{Compiled, SystemModel};
 use super::super::taylor::Singular;
 use super::super::values::Values;
 use super::super::work::{Step, Work, product};
-use super::{Followed, Layout, Maker, Rows, SystemRows, cost_of, rows_of};
+use super::{AdditionalRuns, Layout, PointBuilder, Rows, SystemRows, cost_of, rows_of};
 
 /// Rows of an output: order, and differential of a derivative by the unknowns.
 pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
@@ -47,8 +47,8 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed { others: 0, apart: true })
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns { others: 0, apart: true })
     }
 
     /// All rows of every output; `None` if `work` refused them.
