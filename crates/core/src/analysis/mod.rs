@@ -261,7 +261,7 @@ struct MissingParts {
     decimals: Vec<String>,
     /// Names of observable unknowns without a solution.
     unsolved: Vec<String>,
-    /// Number of combinations that are left out, since nobody gave their coefficients.
+    /// Number of combinations that are left out, since their coefficients are missing.
     left_out: usize,
     /// Number of unobservable directions without coefficients.
     directions: usize,

@@ -99,8 +99,8 @@ pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<E
     (degrees, stairs)
 }
 
-/// Motion of psi in a rotation: `exp(F t)` over all of it, its integral over time in units of T, and `(i j c
-/// - F T)^-1` for the harmonics j = -m..=m except 0.
+/// Motion of psi in a rotation: `exp(F t)` over all of it, its integral over time in units of T, and
+/// `(i j c - F T)^-1` for the harmonics j = -m..=m except 0.
 struct PsiMotion<E> {
     phi: Matrix3<E>,
     integral: Matrix3<E>,

@@ -13,7 +13,7 @@
 //! - magnitude of gravity (true minus stated): the vertical component of the specific force, `(0, 1, 0)` in
 //!   Z;
 //! - attitude of one position: `psi^n` increases by `C e_k` while the position lasts, for axis k of the
-//! platform.
+//!   platform.
 
 use super::attitude::{Matrix3, product};
 use super::error_model::{Columns, ErrorModel};

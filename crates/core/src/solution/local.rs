@@ -100,8 +100,8 @@ pub(crate) fn local_observables(zeros: RateZeros, observed: Observed) -> Vec<Loc
     without_zeros(out, zeros)
 }
 
-/// Observables of a position with an accelerometer error a in Z: `psi_z + a_x`, `a_y`, `psi_x - a_z`; `eps_x
-/// - wU psi_z`; then away from the poles `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z`. With a
+/// Observables of a position with an accelerometer error a in Z: `psi_z + a_x`, `a_y`, `psi_x - a_z`;
+/// `eps_x - wU psi_z`; then away from the poles `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z`. With a
 /// measured azimuth: `psi_y`, and the last two in Z' and Za'.
 fn with_accelerometers(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
     const UNIT: Rates = [0, 0];
