@@ -1,4 +1,4 @@
-//! The same in balls of 512 bits, for tests: other arithmetic, by elimination.
+//! Certificates recomputed in balls of 512 bits, for tests: independent arithmetic, by elimination.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Ring, earth_rate_in, elementary, product};
@@ -14,7 +14,7 @@ pub(super) fn real(x: f64) -> Real {
     Real::from_f64(x)
 }
 
-/// The ring of balls.
+/// Ring of balls of 512 bits.
 pub(super) struct Reals;
 
 impl Ring for Reals {
@@ -43,7 +43,7 @@ pub(super) fn square_root(x: &Real) -> f64 {
     x.sqrt().expect("not negative").to_f64()
 }
 
-/// What coefficients make of drift and accelerometers at the rotation of these angles.
+/// Effects of the coefficients on drift and accelerometers at the attitude `euler`.
 pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>> {
     #[derive(Clone, Copy)]
     struct Scaled(Real);
@@ -75,7 +75,7 @@ pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>>
     rows.into_iter().map(ordered).collect()
 }
 
-/// `d` there, G being `g`.
+/// Contribution `d` of an attitude with the effects `rows`, with `g` for G.
 pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x: &DMatrix<f64>) -> Real {
     let mut sum = Real::ZERO;
     for column in x.column_iter() {
@@ -92,9 +92,9 @@ pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x
 
 type Matrix = Vec<Vec<Real>>;
 
-/// The information of a scheme on the coefficients, the sum of that of its positions, and its inverse.
+/// Information of a scheme on the coefficients, the sum over its positions, and its inverse.
 pub(super) struct Exact {
-    /// (m x m)
+    /// Inverse of the information (m x m).
     inverse: Matrix,
     nuisance: usize,
     dph: f64,
@@ -117,7 +117,7 @@ impl Exact {
         self.nuisance..self.inverse.len()
     }
 
-    /// The square of a criterion but E's.
+    /// Square of a criterion, for all criteria except E.
     pub(super) fn squared(&self, criterion: &Criterion, evaluator: &Evaluator, sequence: &[Stop]) -> Real {
         let unit = real(self.dph).mul(&real(self.dph)).inverse().expect("not zero");
         let d = self.counting().len();
@@ -162,7 +162,7 @@ impl Exact {
         }
     }
 
-    /// True if every principal sigma of what counts is below this.
+    /// True if all principal sigmas of the coefficients that count are below `sigma`.
     pub(super) fn covariance_is_below(&self, sigma: f64) -> bool {
         let limit = real(sigma).mul(&real(self.dph));
         let limit = limit.mul(&limit);
@@ -175,7 +175,7 @@ impl Exact {
     }
 }
 
-/// The pivots of a symmetric matrix, by elimination from the first on.
+/// Pivots of a symmetric matrix, by elimination from the first on.
 fn pivots(mut a: Matrix) -> Vec<Real> {
     let n = a.len();
     for p in 0..n {
@@ -189,7 +189,7 @@ fn pivots(mut a: Matrix) -> Vec<Real> {
     (0..n).map(|i| a[i][i]).collect()
 }
 
-/// The inverse of a positive matrix, by Gauss and Jordan.
+/// Inverse of a positive matrix, by Gauss and Jordan.
 fn inverted(mut a: Matrix) -> Matrix {
     let n = a.len();
     let mut out: Matrix =

@@ -1,6 +1,5 @@
-//! How good the best scheme can be, where information adds over positions (reset carry): a lower bound on the
-//! criterion of every scheme of k candidates, from the optimal weights of the candidates (approximate design
-//! theory).
+//! Lower bounds on the criterion of every scheme of k candidates, where information adds over positions
+//! (reset carry), from the optimal weights of the candidates (approximate design theory).
 
 mod bound;
 pub(crate) mod bounded;
@@ -20,27 +19,27 @@ use crate::design::measure::evaluator::Evaluator;
 use bound::{Additive, Aim};
 use weights::{listed, weigh};
 
-/// Most positions whose psi is looked at one by one, for requirements on psi.
+/// Largest number of first positions for which psi is bounded one by one, for requirements on psi.
 const MOST_PSI: usize = 48;
 
-/// A bound that holds for every scheme of some candidates.
+/// Lower bound on the criterion of every scheme of given candidates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bound {
-    /// No scheme has a smaller criterion: in deg/h (per g), or for margin a ratio.
+    /// Lower bound, in deg/h (per g), for margin dimensionless.
     pub value: f64,
-    /// The criterion of the weights, were they possible: this way of bounding gives no more.
+    /// Criterion of the weights themselves: the largest bound that this method can give.
     pub attained: f64,
-    /// The weight of every candidate, sum 1.
+    /// Weight of every candidate, dimensionless (sum 1).
     pub weights: Vec<f64>,
-    /// The same rounded, to be divided by their sum, and the criterion of these.
+    /// Weights as they are listed, rounded, to be divided by their sum; and the criterion of these.
     pub listed: (Vec<f64>, f64),
 }
 
 impl Evaluator {
-    /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates
-    /// such that every scheme is as good as one that has one of them. `None` where information does not add
-    /// over positions (platform and inertial carry, noise of Z that is correlated), where the candidates
-    /// together do not determine what counts, or when stopped.
+    /// Lower bound for schemes of `k` candidates, in any order and with repetitions. Every scheme must
+    /// be as good as one that contains a candidate of `firsts`. `None` where information does not add
+    /// over positions (platform and inertial carry, correlated noise of Z), where the candidates
+    /// together do not determine the coefficients that count, or when stopped.
     pub fn bound(
         &self,
         criterion: &Criterion,
@@ -60,7 +59,7 @@ impl Evaluator {
         (going() && found.value > 0.0).then_some(found)
     }
 
-    /// What a criterion makes of the coefficients.
+    /// Objective of a criterion, as a function of the information on the coefficients.
     fn aim(&self, criterion: &Criterion) -> Aim {
         match criterion {
             Criterion::Margin(limits) => self.largest(limits),
@@ -74,13 +73,13 @@ impl Evaluator {
         }
     }
 
-    /// The coefficients that count as columns (m x d).
+    /// Unit columns of the coefficients that count (m x d).
     fn units(&self) -> DMatrix<f64> {
         let m = self.n - 3;
         DMatrix::from_fn(m, m - self.nuisance, |i, j| f64::from(u8::from(i == j + self.nuisance)))
     }
 
-    /// The largest variance over the square of its limit.
+    /// Objective: largest variance over the square of its limit.
     fn largest(&self, limits: &Limits) -> Aim {
         let mut vectors = self.units();
         for (mut column, limit) in vectors.column_iter_mut().zip(&limits.coefficients) {
@@ -90,7 +89,8 @@ impl Evaluator {
         Aim::Largest(vectors, offsets)
     }
 
-    /// The same with psi of one position: one of `firsts` is in every scheme, up to its images.
+    /// Objective as [`Self::largest`], with psi of one position added: every scheme, up to its images,
+    /// contains one of `firsts`.
     fn with_psi(
         &self,
         limits: &Limits,
@@ -123,13 +123,13 @@ impl Evaluator {
         least
     }
 
-    /// The weights of least aim.
+    /// Weights that minimise the objective, with their bound.
     fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
         let problem = self.additive(aim, k);
         let found = weigh(&problem, going)?;
         let exact = || (found.weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
-        // that of exact weights may rest on rounding
+        // the bound of exact weights may rest on rounding
         let listed = (weights, attained.max(found.bound).sqrt());
         Some(Bound {
             value: found.bound.sqrt(),
@@ -139,7 +139,7 @@ impl Evaluator {
         })
     }
 
-    /// The information of the candidates, k times; numbers are in deg/h (per g).
+    /// Information of the candidates, times k; numbers are in deg/h (per g).
     fn additive(&self, aim: Aim, k: usize) -> Additive {
         let (n, m) = (self.n, self.n - 3);
         let unit = k as f64 * self.dph * self.dph;

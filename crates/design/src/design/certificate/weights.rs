@@ -1,65 +1,67 @@
-//! Optimal weights of candidates: a primal-dual interior-point method on the simplex, and candidates taken up
-//! as they are needed (column generation).
+//! Optimal weights of candidates: a primal-dual interior-point method on the simplex. Candidates are
+//! added as they are needed (column generation).
 //!
-//! With the aim f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau of the
-//! least aim. Newton's method follows these minima; the curvature of the barriers is that of their
-//! multipliers (S. J. Wright, *Primal-Dual Interior-Point Methods*, 1997), without which weights go to zero
-//! slowly. The matrix X of each minimum gives a bound that needs none of this (`bound`).
+//! With the objective f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau
+//! of the least f. Newton's method follows these minima as tau grows. The curvature of the barriers is
+//! that of their multipliers (S. J. Wright, *Primal-Dual Interior-Point Methods*, 1997); without them
+//! weights go to zero slowly. The matrix X of each minimum gives a bound, valid whether or not the
+//! minimum is reached (`bound`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::bound::{Additive, Aim, Dual};
 
-/// Where a relative gap ends the search for weights.
+/// Relative gap between the objective and its bound at which the search for weights ends.
 const GAP: f64 = 1e-7;
 /// Factor on tau between two minima.
 const FASTER: f64 = 12.0;
-/// Where Newton's decrement is below this tau becomes larger.
+/// Newton decrement below which tau is increased.
 const CENTRED: f64 = 1e-6;
-/// How far a step goes towards zero, at most.
+/// Largest fraction of the distance to zero that a step may cover.
 const INSIDE: f64 = 0.95;
-/// Newton steps to one minimum, at most.
+/// Largest number of Newton steps to one minimum.
 const STEPS: usize = 40;
-/// Candidates that are weighed at once.
+/// Number of candidates that column generation starts with.
 const ACTIVE: usize = 160;
-/// Rounds of taking up candidates, at most.
+/// Largest number of rounds of column generation.
 const ROUNDS: usize = 60;
-/// A bound so much above what the weights reach shows that the latter rests on the ridge.
+/// Relative gap above which the attained objective is a result of the ridge.
 const SINGULAR: f64 = 1e-6;
-/// Digits of weights that are listed, those that are not, and how much worse than exact ones they may be.
+/// Numbers of digits tried for listed weights.
 const DIGITS: [i32; 3] = [2, 3, 4];
 const FAINT: f64 = 1e-7;
 const COARSE: f64 = 1e-3;
-/// Makes what nothing determines regular: a part of the mean information.
+/// Ridge added to the information, as a fraction of the mean information: it makes undetermined
+/// directions regular.
 const RIDGE: f64 = 1e-13;
 
-/// Weights, and what they prove.
+/// Optimal weights with the bound that they prove.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Weighed {
-    /// Of every candidate, sum 1.
+    /// Weight of every candidate, dimensionless (sum 1).
     pub(super) weights: Vec<f64>,
-    /// The aim at these weights.
+    /// Objective at these weights.
     pub(super) attained: f64,
-    /// No scheme has a smaller aim.
+    /// Lower bound on the objective of every scheme.
     pub(super) bound: f64,
-    /// What proves the bound; its X says what another candidate would add.
+    /// Dual variables that prove the bound; their X gives the gain of any other candidate.
     pub(super) dual: Dual,
 }
 
-/// The aim at some weights, with the root of the information.
+/// Barrier function at some weights, with the Cholesky factor of the information.
 struct At {
     root: Cholesky<f64, Dyn>,
-    /// `tau f`, with the barriers of the aim's own constraints.
+    /// `tau f`, with the barriers of the constraints of the objective itself.
     value: f64,
 }
 
-/// First and second derivatives of the aim's part of what is minimised.
+/// First and second derivatives of the part of the barrier function that depends on the objective.
 struct Slopes {
-    /// By the weights (shape n).
+    /// Gradient with respect to the weights (shape n).
     gradient: Vec<f64>,
-    /// By the weights (n x n), s where it is best for them.
+    /// Hessian with respect to the weights (n x n); s is at its minimum for the weights.
     hessian: DMatrix<f64>,
-    /// Where the aim has s: derivatives by it, and how it follows the weights.
+    /// Derivatives with respect to s, and of its minimum; `None` if the objective has no s.
     by_s: Option<ByS>,
 }
 
@@ -70,20 +72,20 @@ struct ByS {
     follows: Vec<f64>,
 }
 
-/// The weighing of some of the candidates.
+/// Barrier problem for a subset of the candidates.
 struct Weighing<'a> {
     problem: &'a Additive,
-    /// Which.
+    /// Indices of the candidates.
     active: Vec<usize>,
-    /// `A_i = F_i^T F_i` (r x m).
+    /// Factors `F_i` of `A_i = F_i^T F_i` (r x m).
     factors: Vec<DMatrix<f64>>,
     ridge: f64,
 }
 
-/// The best weights that are found while `going`, and the bound that they prove; `None` where all candidates
-/// together do not determine what counts as far as double precision tells.
+/// Optimal weights and the bound that they prove; stops when `going` returns false. `None` where all
+/// candidates together do not determine the unknowns that count in double precision.
 pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weighed> {
-    // where the ridge decides, and where rounding does without it, nothing is known
+    // the result is unknown if it depends on the ridge, and if rounding decides without the ridge
     [RIDGE, 0.0].into_iter().find_map(|ridge| {
         let found = generated(problem, ridge, going)?;
         let singular = found.bound > found.attained * (1.0 + SINGULAR);
@@ -91,8 +93,9 @@ pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weig
     })
 }
 
-/// Weights as they are listed: of two digits, or of more where those are worse by more than [`COARSE`];
-/// divided by their sum they have this aim. `None` where rounded weights do not determine what counts.
+/// Weights as they are listed, and the objective at these divided by their sum. They have two digits,
+/// or more where the objective is worse by more than [`COARSE`]. `None` where rounded weights do not
+/// determine the unknowns that count.
 pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
     let of = |weights: &[f64]| {
         let active: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
@@ -117,7 +120,7 @@ pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f
     last
 }
 
-/// To so many digits; 0 below [`FAINT`].
+/// Weight rounded to `digits` digits; 0 below [`FAINT`].
 fn rounded(weight: f64, digits: i32) -> f64 {
     if weight < FAINT {
         return 0.0;
@@ -126,7 +129,7 @@ fn rounded(weight: f64, digits: i32) -> f64 {
     (weight * unit).round() / unit
 }
 
-/// The same, column by column.
+/// Optimal weights as [`weigh`], by column generation with the given ridge.
 fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<Weighed> {
     let all = problem.candidates.len();
     let mean = problem.candidates.iter().map(DMatrix::trace).sum::<f64>() / all as f64;
@@ -137,7 +140,7 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
     for _ in 0..ROUNDS {
         let weighing = Weighing::new(problem, active.clone(), ridge);
         let Some(found) = weighing.weigh(going) else {
-            // these do not determine what counts: take more
+            // these candidates do not determine the unknowns that count: add more
             let missing = (0..all).filter(|i| !active.contains(i)).step_by(2).collect::<Vec<_>>();
             if missing.is_empty() {
                 return best;
@@ -161,7 +164,7 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
         }
         missing.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
         missing.truncate(ACTIVE / 4);
-        // what has no weight and would gain little gives way
+        // candidates without weight and with a small gain are dropped
         let counts = |i: &usize| weights[*i] > 1e-7 || gains[*i] > 0.98 * of_active;
         active.retain(counts);
         active.extend(missing);
@@ -169,7 +172,8 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
     best
 }
 
-/// `F` with `A = F^T F`, its rank many rows, by Cholesky's decomposition with pivots.
+/// Factor `F` with `A = F^T F` and as many rows as the rank of A, by Cholesky's decomposition with
+/// pivots.
 fn factor(a: &DMatrix<f64>) -> DMatrix<f64> {
     let m = a.nrows();
     let mut rest = a.clone();
@@ -202,7 +206,7 @@ impl<'a> Weighing<'a> {
         out
     }
 
-    /// The information without what E-optimality takes of it: `M - s` on what counts.
+    /// Information reduced for E-optimality: `M - s` on the unknowns that count.
     fn reduced(&self, w: &[f64], s: f64) -> DMatrix<f64> {
         let mut out = self.information(w);
         if self.problem.aim == Aim::Least {
@@ -211,7 +215,7 @@ impl<'a> Weighing<'a> {
         out
     }
 
-    /// `M^-1 v_j` of the aims (m x t), and `v_j^T M^-1 v_j`.
+    /// `M^-1 v_j` of the columns of the objective (m x t), and `v_j^T M^-1 v_j` (shape t).
     fn solved(&self, root: &Cholesky<f64, Dyn>) -> (DMatrix<f64>, Vec<f64>) {
         match &self.problem.aim {
             Aim::Mean(vectors) | Aim::Largest(vectors, _) => {
@@ -223,14 +227,14 @@ impl<'a> Weighing<'a> {
         }
     }
 
-    /// `-log det M_S / d`.
+    /// Objective `-log det M_S / d`.
     fn volume(&self, root: &Cholesky<f64, Dyn>) -> f64 {
         let l = root.l_dirty();
         let counting = self.problem.nuisance..self.problem.unknowns();
         -2.0 * counting.map(|j| l[(j, j)].ln()).sum::<f64>() / self.problem.counting() as f64
     }
 
-    /// The aim at some weights.
+    /// Objective at the weights `w`.
     fn aim(&self, w: &[f64]) -> Option<f64> {
         let root = self.information(w).cholesky()?;
         let value = match &self.problem.aim {
@@ -247,8 +251,8 @@ impl<'a> Weighing<'a> {
         Some(value).filter(|v| v.is_finite() && *v > 0.0)
     }
 
-    /// `tau f / scale` with the barriers of the aim, not those of the weights; `None` outside of where it is
-    /// defined.
+    /// `tau f / scale` with the barriers of the objective, not those of the weights; `None` outside its
+    /// domain.
     fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<At> {
         let root = self.reduced(w, s).cholesky()?;
         let value = match &self.problem.aim {
@@ -268,7 +272,7 @@ impl<'a> Weighing<'a> {
         value.is_finite().then_some(At { root, value })
     }
 
-    /// The weights of least aim, step by step; the best bound on the way.
+    /// Weights that minimise the objective, step by step, with the best bound of all steps.
     fn weigh(&self, going: &dyn Fn() -> bool) -> Option<Weighed> {
         let n = self.active.len();
         let mut w = vec![1.0 / n as f64; n];
@@ -304,11 +308,11 @@ impl<'a> Weighing<'a> {
         best
     }
 
-    /// X at some weights.
+    /// Dual variables at the weights `w`.
     fn dual(&self, w: &[f64], s: f64, rate: f64) -> Option<Dual> {
         let problem = self.problem;
         let m = problem.unknowns();
-        // the root of an inverse: L^-T, upper triangular
+        // factor of an inverse: L^-T, upper triangular
         let inverse_root = |root: &Cholesky<f64, Dyn>| {
             let upper = root.l().transpose();
             upper.solve_upper_triangular(&DMatrix::identity(m, m))
@@ -342,7 +346,7 @@ impl<'a> Weighing<'a> {
         }
     }
 
-    /// One damped Newton step; its decrement, or `None` when nothing gets smaller.
+    /// One damped Newton step. Returns its decrement, or `None` when nothing gets smaller.
     fn newton(
         &self,
         w: &mut [f64],
@@ -354,7 +358,7 @@ impl<'a> Weighing<'a> {
         let here = self.at(w, *s, tau, scale)?;
         let slopes = self.slopes(&here.root, w, tau, scale)?;
         let n = w.len();
-        // s where it is best for the weights as they are
+        // minimum over s at the present weights
         let to_s = slopes.by_s.as_ref().map_or(0.0, |by| -by.gradient / by.curvature);
         let pulled = |i: usize| slopes.by_s.as_ref().map_or(0.0, |by| by.gradient * by.follows[i]);
         // in units of the weights themselves
@@ -364,7 +368,7 @@ impl<'a> Weighing<'a> {
         });
         let g = DVector::from_fn(n, |i, _| w[i] * (slopes.gradient[i] + pulled(i)) - 1.0);
         let a = DVector::from_column_slice(w);
-        // what rounding makes of large curvatures may leave it indefinite
+        // rounding of large curvatures may make the Hessian indefinite
         let rough = f64::EPSILON * n as f64 * h.diagonal().max();
         let root = (h.clone() + DMatrix::identity(n, n) * rough).cholesky()?;
         let (to, along) = (root.solve(&g), root.solve(&a));
@@ -377,7 +381,7 @@ impl<'a> Weighing<'a> {
         if !(decrement.is_finite() && decrement > 0.0) {
             return None;
         }
-        // Newton's step of the multipliers, as far as they stay above zero
+        // Newton's step of the multipliers, shortened so that they stay positive
         let steps: Vec<f64> = multipliers
             .iter()
             .zip(w.iter())
@@ -407,7 +411,8 @@ impl<'a> Weighing<'a> {
         None
     }
 
-    /// Gradient and Hessian of [`Self::at`] by the weights, and by s where the aim has it.
+    /// Gradient and Hessian of [`Self::at`] with respect to the weights, and to s where the objective
+    /// has it.
     fn slopes(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64, scale: f64) -> Option<Slopes> {
         let (n, problem) = (w.len(), self.problem);
         let inverse = root.inverse();
@@ -428,7 +433,7 @@ impl<'a> Weighing<'a> {
             Aim::Volume => {
                 let d = problem.counting() as f64;
                 let nuisance = problem.nuisance;
-                // of the information on the nuisance alone
+                // from the information on the nuisance alone
                 let root = (nuisance > 0)
                     .then(|| self.information(w).view((0, 0), (nuisance, nuisance)).into_owned().cholesky());
                 let inner = root.flatten().map(|r| r.inverse());
@@ -447,7 +452,8 @@ impl<'a> Weighing<'a> {
                 Slopes { gradient, hessian: symmetric(&entry), by_s: None }
             }
             Aim::Least => {
-                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on what counts
+                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on the unknowns
+                // that count
                 let r = root
                     .l()
                     .transpose()
@@ -483,8 +489,8 @@ impl<'a> Weighing<'a> {
                     .iter()
                     .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
                     .collect();
-                // share_j times what the slope of v_j by the weights is beside that of s, which follows their
-                // mean
+                // share_j times the slope of v_j by the weights relative to the slope of s, which
+                // follows their mean
                 let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
                 let slopes = DMatrix::from_fn(n, shares.len(), slope);
                 let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
@@ -498,7 +504,7 @@ impl<'a> Weighing<'a> {
                 let entry = |i: usize, j: usize| {
                     outer[(i, j)] + 2.0 * pair(i, j).dot(&(&weighted[i] * seen[j].transpose()))
                 };
-                // s is the best for the weights
+                // s is at its minimum for the weights
                 Slopes {
                     gradient: (0..n).map(|i| weighed(i, &|x| x)).collect(),
                     hessian: symmetric(&entry),
@@ -509,13 +515,13 @@ impl<'a> Weighing<'a> {
     }
 }
 
-/// The s that makes `rate s - sum_j ln(s - o_j - v_j)` least, and how far each aim is below it; `None` where
-/// values are not finite.
+/// Minimum over s of `rate s - sum_j ln(s - o_j - v_j)`: s, and the distance of each `o_j + v_j` below
+/// s; `None` where values are not finite.
 fn left_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
     let aims: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
     let largest = aims.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // how far s is above the largest: the sum of the inverses falls with it, and is convex, so Newton's steps
-    // grow to the end
+    // distance of s above the largest value: the sum of the inverses falls with it and is convex, so
+    // Newton's steps increase to the end
     let mut above = 1.0 / rate;
     for _ in 0..100 {
         let left = || aims.iter().map(|a| above + (largest - a));
@@ -537,11 +543,11 @@ fn multipliers_of(left: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at this many points.
+    /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at `points` points.
     fn quadratic(points: usize, nuisance: usize, aim: Aim) -> Additive {
         let at = |i: usize| -> DMatrix<f64> {
             let x = 2.0 * i as f64 / (points - 1) as f64 - 1.0;
-            // what counts comes last
+            // unknowns that count come last
             let f = if nuisance == 2 {
                 DVector::from_vec(vec![1.0, x, x * x])
             } else {
@@ -554,8 +560,8 @@ mod tests {
     }
 
     /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and
-    /// E-optimal designs, and of the one for the coefficient of x^2 alone; column generation finds them among
-    /// 401 points.
+    /// E-optimal designs, and of the one for the coefficient of x^2 alone. Column generation finds them
+    /// among 401 points.
     #[test]
     fn weights_are_those_of_the_textbook() {
         let units = DMatrix::identity(3, 3);
@@ -580,7 +586,7 @@ mod tests {
         }
     }
 
-    /// Gradients and Hessians are the slopes of what is minimised.
+    /// Gradients and Hessians equal differences of the barrier function.
     #[test]
     fn slopes_are_differences() {
         let units = DMatrix::identity(3, 3);

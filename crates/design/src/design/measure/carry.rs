@@ -1,4 +1,4 @@
-//! What goes on from position to position: psi as a functional of the unknowns, by the carry.
+//! Carry from position to position: psi as a functional of the unknowns.
 
 use obsdeg_core::model::{Carry, Matrix3};
 
@@ -6,7 +6,8 @@ use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, State};
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
-    /// The local unknowns of a position behind others as functionals of the unknowns; psi where it goes on.
+    /// Local unknowns of the next position as functionals of the unknowns; psi only where it is
+    /// carried.
     #[inline]
     pub(crate) fn functionals<const L: usize, const N: usize>(
         &self,
@@ -44,7 +45,7 @@ impl Evaluator {
         local
     }
 
-    /// What is known beforehand of psi^n, which is what goes on under inertial carry: by the axes of the
+    /// Prior information on psi^n, the carried quantity under inertial carry: about the axes of the
     /// first position.
     #[inline]
     pub(crate) fn know_first(&self, state: &State, c: &Matrix3<f64>, mut add: impl FnMut(usize, usize, f64)) {
@@ -58,7 +59,7 @@ impl Evaluator {
         }
     }
 
-    /// psi behind a dwell, in the axes in which it goes on.
+    /// psi after a dwell, in the axes in which it is carried.
     #[inline]
     pub(crate) fn go_on<const L: usize, const N: usize>(
         &self,

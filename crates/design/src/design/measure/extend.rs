@@ -1,4 +1,4 @@
-//! The information of a sequence, built up position by position: what a search evaluates millions of times.
+//! Information of a sequence, built up position by position: the innermost loop of a search.
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
@@ -8,14 +8,15 @@ use crate::design::measure::stop::Stop;
 use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
 
 impl Evaluator {
-    /// Nothing but what is known beforehand.
+    /// State without positions: the prior alone.
     pub fn start(&self) -> State {
         let n = self.n;
         let unit = |r: usize| (0..n).map(|c| f64::from(u8::from(c == r))).collect();
         let mut information = vec![0.0; n * n];
         let mut known = |i: usize, p: f64| information[i * n + i] = p;
         self.prior.coefficients.iter().enumerate().for_each(|(j, &p)| known(3 + j, p));
-        // of platform axes; psi^n is known by the first position, and that of reset carry by every one
+        // in platform axes; under inertial carry the prior is added with the first position, under
+        // reset with each
         if self.carry() == Carry::Platform {
             self.prior.psi.iter().enumerate().for_each(|(k, &p)| known(k, p));
         }
@@ -34,14 +35,14 @@ impl Evaluator {
         self.extend_any(state, stop, true, out);
     }
 
-    /// Adds the information of a position alone: effects of errors that are not estimated stay in `out` as
-    /// they were. Enough for sigmas and for bounds on them.
+    /// Adds only the information of a position: effects of errors that are not estimated stay in `out`
+    /// as they were. Sufficient for sigmas and for bounds on them.
     pub(crate) fn extend_information(&self, state: &State, stop: Stop, out: &mut State) {
         self.extend_any(state, stop, false, out);
     }
 
-    /// Adds the effects of errors that are not estimated, to an `out` that [`Self::extend_information`] made
-    /// of the same `state` and `stop`.
+    /// Adds the effects of errors that are not estimated. `out` must be the result of
+    /// [`Self::extend_information`] for the same `state` and `stop`.
     pub(crate) fn extend_errors(&self, state: &State, stop: Stop, out: &mut State) {
         if self.carry() == Carry::Reset {
             return self.add_beside(state, stop.candidate, out);
@@ -63,7 +64,7 @@ impl Evaluator {
         if let Some(bias) = &self.bias {
             return self.extend_correlated(bias, state, stop, false, out);
         }
-        // sizes that the compiler knows
+        // sizes known at compile time
         match self.locals {
             PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, beside, out),
             _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, beside, out),
@@ -86,7 +87,7 @@ impl Evaluator {
         out.path.push(stop.candidate);
         out.seconds = state.seconds + dwelling.seconds + turn.map_or(0.0, |t| t.seconds);
         if carry == Carry::Reset {
-            // psi of the position is eliminated: information adds
+            // psi of the position is eliminated: information adds up
             for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
                 *sum = x + y;
             }
