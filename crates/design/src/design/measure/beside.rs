@@ -301,9 +301,9 @@ impl Evaluator {
         })
     }
 
-    /// Distance of a sequence from immunity, dimensionless; 0 if immune. It is 1 for an error that must
-    /// have no effect and has one, at most 1 for an error that a record shows later than required.
-    /// `root` is working space.
+    /// Distance of a sequence from immunity, dimensionless; 0 if immune. Each error adds 1 if it has an
+    /// effect that it must not have or that no record shows, and less than 1 if a record shows it at a
+    /// larger size than required. `root` is working space.
     pub(crate) fn not_immune(&self, state: &State, root: &mut Vec<f64>) -> f64 {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return 0.0 };
         if of.immune.iter().all(Option::is_none) {

@@ -1,11 +1,11 @@
-//! Fewest positions where the way between them counts: torquer errors act in every turn, so a scheme is a
-//! walk over candidates, and a position adds rows that depend on all turns before it.
-//!
+//! Fewest positions where torquer errors act in every turn. A scheme is then a slew sequence over
+//! candidates: the rows of a position depend on all turns before it.
 //! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows
-//! `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most. Walks are taken
-//! depth first with the echelon bases of their beginnings; a walk ends where even six more rows in every
-//! position to come could not do. A walk that is found is exact whatever the prime; that no shorter one does
-//! is wrong with a probability that is stated.
+//! In n a position at `C_i`, with `J` the sum of the effects of all turns so far on `psi^n`, adds the
+//! rows `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most.
+//! Sequences are enumerated depth first with the echelon bases of their beginnings. A branch ends where
+//! even six more rows in every further position are not enough. A sequence that is found is exact for
+//! any prime; the statement that no shorter one exists has a stated error bound.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -28,25 +28,25 @@ use crate::design::request::limits::PROOF;
 
 /// Name and version of the JSON layout.
 const WALKS_SCHEMA: &str = "obsdeg.walks/1";
-/// Most walks of one length that are examined.
+/// Largest number of slew sequences of one length that are examined.
 const MOST_WALKS: u64 = 100_000_000;
-/// Most candidates: every turn between two of them is a position of one tour.
+/// Largest number of candidates: every turn between two of them is a position of the tour.
 const MOST_TURNS: usize = 900;
-/// Walks that go on from every length when one that does is sought.
+/// Beam width: sequences of each length that are extended in the search for a short one.
 const BEAM: usize = 400;
-/// Longest walk that is sought.
+/// Largest number of positions of a slew sequence.
 const LONGEST: usize = 40;
-/// Walks between two questions whether to go on.
+/// Number of slew sequences between two calls of the cancellation callback.
 const PATIENCE: u64 = 256;
 
-/// What is to be found.
+/// Options of a search for the shortest slew sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WalkOptions {
-    /// What to choose from.
+    /// Candidate attitudes.
     pub candidates: Candidates,
-    /// Coefficients or families that must be observable; none: all.
+    /// Coefficients or families that must be observable; if empty, all coefficients.
     pub required: Vec<String>,
-    /// The largest turn from one position to the next, in degrees.
+    /// Largest turn from one position to the next, in degrees.
     pub most_turn_deg: f64,
     /// Seed of all random choices.
     pub seed: u64,
@@ -100,22 +100,22 @@ pub struct Walks {
     pub seed: u64,
 }
 
-/// The rows of every candidate and turn in one field.
+/// Rows of all candidates and turns in one field.
 struct InField {
     field: Field,
-    /// Rows of the local chain on psi (3 each), with their rows on the coefficients, by candidate.
+    /// Rows of the local chain on psi (3 each), by candidate; `rows` are theirs on the coefficients.
     of_psi: Vec<[u64; 3]>,
     rows: Vec<Vec<Vec<u64>>>,
-    /// What a turn leaves in `psi^n` (3 rows on the coefficients), by the place of the turn.
+    /// Effect of a turn on `psi^n` (3 rows on the coefficients), by the index of the turn.
     turns: Vec<[Vec<u64>; 3]>,
     coefficients: usize,
 }
 
-/// The way so far.
+/// Slew sequence with its echelon basis.
 #[derive(Clone)]
 struct Walk {
     places: Vec<usize>,
-    /// `J`.
+    /// Sum `J` of the effects of the turns so far on `psi^n`.
     torqued: [Vec<u64>; 3],
     basis: Echelon,
 }
@@ -182,13 +182,13 @@ impl InField {
     }
 }
 
-/// Everything that is shared.
+/// Data of a search, shared by all its branches.
 struct Space {
     fields: [InField; 2],
-    /// Of every candidate: `(turn, candidate)`.
+    /// Candidates that one turn leads to, by candidate: `(turn, candidate)`.
     neighbours: Vec<Vec<(usize, usize)>>,
     required: Vec<usize>,
-    /// The rows that a position adds at most.
+    /// Largest number of rows that a position adds.
     most: usize,
 }
 
@@ -197,7 +197,7 @@ impl Space {
         self.required.iter().all(|c| basis.has_unit(3 + c))
     }
 
-    /// A walk of `length` that goes on from `walk` and does.
+    /// First sufficient slew sequence of `length` positions that begins with `walk`.
     fn search(
         &self,
         walk: &Walk,
@@ -228,7 +228,7 @@ impl Space {
         }
     }
 
-    /// The same in the second field.
+    /// True if the sequence is sufficient in the second field.
     fn does_elsewhere(&self, places: &[usize]) -> bool {
         let field = &self.fields[1];
         let Some((&first, rest)) = places.split_first() else { return false };
@@ -241,7 +241,8 @@ impl Space {
         self.does(&walk.basis)
     }
 
-    /// The way through some places, in the first field; a place that no turn leads to begins anew.
+    /// Sequence through the given candidates in the first field; a candidate that no turn leads to
+    /// begins a new one.
     fn along(&self, places: &[usize]) -> Walk {
         let field = &self.fields[0];
         let mut walk = field.start(places[0]);
@@ -255,7 +256,7 @@ impl Space {
         walk
     }
 
-    /// The number of walks of so many positions.
+    /// Number of slew sequences of `length` positions.
     fn walks(&self, length: usize) -> u64 {
         let n = self.neighbours.len();
         let mut ends = vec![1u64; n];
@@ -269,7 +270,7 @@ impl Space {
         ends.into_iter().fold(0, u64::saturating_add)
     }
 
-    /// A short walk that does, by the best of many at every length.
+    /// Short sufficient slew sequence, by beam search.
     fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<Walk> {
         let mut rng = SplitMix64::new(seed);
         let mut beam: Vec<Walk> = (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
@@ -297,9 +298,9 @@ impl Space {
     }
 }
 
-/// Finds the fewest positions of a walk over candidates that make the required coefficients observable under
-/// the assumptions of `base`, whose carry is inertial and whose torquer errors are unknown. `going` is asked
-/// whether to go on.
+/// Finds the fewest positions of a slew sequence over candidates that makes the required coefficients
+/// observable under the assumptions of `base`. Its carry must be inertial and its torquer errors
+/// unknown. Stops when `going` returns false.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -359,7 +360,7 @@ pub fn walks(
         decisions: space.required.len(),
         order,
         row_degree: 4,
-        // as of a verdict, and of so many turns by parts of half a turn
+        // as for a verdict, with turns given as multiples of half a turn
         row_bits: 60.0 + (length as f64).log2(),
     };
     let whole = space.along(&tour);
@@ -431,15 +432,15 @@ pub fn walks(
     Ok(out)
 }
 
-/// The walk as a scheme under the assumptions of `base`; `None` where none was found.
+/// Slew sequence as a scheme under the assumptions of `base`; `None` where none was found.
 pub fn scheme_of_walk(found: &Walks, base: &Scheme) -> Option<Scheme> {
     let attitudes: Result<Vec<Euler>, _> = found.angles.iter().map(|a| parse_attitude(a)).collect();
     let positions = Scheme::of_angles(attitudes.ok()?).positions;
     (!positions.is_empty()).then(|| Scheme { positions, path: Some(Path::OneAxis), ..base.clone() })
 }
 
-/// Of every candidate those that a turn of at most so many degrees leads to, and a tour that takes every such
-/// turn.
+/// Candidates that a turn of at most `most_turn_deg` degrees leads to, by candidate, and a tour that
+/// contains every such turn.
 fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>) {
     let matrices: Vec<Matrix3<f64>> = attitudes.iter().map(c_n_f64).collect();
     let angle = |i: usize, j: usize| {
@@ -450,7 +451,7 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
         (0..attitudes.len()).filter(|&j| j != i && angle(i, j) <= most_turn_deg + 1e-6).collect()
     };
     let neighbours: Vec<Vec<usize>> = (0..attitudes.len()).map(near).collect();
-    // Hierholzer: as many turns lead to a candidate as away from it
+    // Hierholzer: every candidate has as many turns to it as away from it
     let mut left = neighbours.clone();
     let mut tour = Vec::new();
     for start in 0..attitudes.len() {
@@ -469,8 +470,8 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
     (neighbours, tour)
 }
 
-/// True if the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets
-/// does.
+/// True if torquer errors act in the turns of `base`: then [`walks`] finds schemes, and no search over
+/// sets does.
 pub fn is_walk(base: &Scheme) -> bool {
     base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)
 }
