@@ -1,5 +1,5 @@
-//! Search for sets of candidates: the cheapest for a goal, and all minimal ones, with the failing sets that
-//! prove them.
+//! Search for sets of candidates: the cheapest for a goal, and all minimal ones, with the failing sets
+//! that prove them.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -8,21 +8,21 @@ use rayon::prelude::*;
 use super::cuts::{Cheapest, Transversals, cost_of, members, smallest};
 use super::ranks::{NONE, Ranks, Set};
 
-/// Most nodes of a search for a cheapest set.
+/// Largest number of nodes of a search for a cheapest set.
 const NODES: u64 = 4_000_000;
-/// Orders in which candidates are added to a failing set at once.
+/// Number of orders in which candidates are added to a failing set at once.
 const ORDERS: usize = 4;
-/// Failing sets of a goal that are made to cuts before all sets of a cost are judged one by one: where many
-/// sets are alike, a cut excludes few.
+/// Number of rounds of cuts before all sets of a cost are judged one by one: if many sets are alike, a
+/// cut excludes few.
 const ROUNDS: usize = 40;
-/// Sets that are judged at once where all of a cost are.
+/// Number of sets judged at once if all sets of a cost are judged.
 const BATCH: usize = 4096;
-/// Sets that are judged at once in the search for all minimal ones.
+/// Number of sets judged at once in the search for all minimal ones.
 const AT_ONCE: usize = 64;
-/// Most minimal sets that are held.
+/// Largest number of minimal sets that are stored.
 const HELD: usize = 5_000;
 
-/// What a set of candidates should do.
+/// Goal of a set of candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Goal {
     /// Make every required unknown observable, each with a degree of at most its own limit and this one.
@@ -31,30 +31,30 @@ pub(crate) enum Goal {
     One(usize, u16),
 }
 
-/// Why a search ended before its end.
+/// Reason why a search ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stopped {
-    /// More sets would be judged than the limit of work allows.
+    /// Limit of work: more sets would be judged than it allows.
     Work,
-    /// Too many ways to hit all cuts.
+    /// Limit of nodes: too many sets hit all cuts.
     Nodes,
-    /// Nobody waits for it.
+    /// Interruption by the caller.
     Interrupted,
 }
 
-/// A cheapest set.
+/// Cheapest set with its proof.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Best {
     pub(crate) set: Set,
-    /// Degree in question.
+    /// Degree of the goal.
     pub(crate) degree: u16,
-    /// Cuts that show that no cheaper set reaches the goal, beside those that were examined.
+    /// Cuts that prove, with the examined sets, that no cheaper set reaches the goal.
     pub(crate) cuts: Vec<Set>,
     /// Number of cheaper sets that hit all these cuts and were judged one by one.
     pub(crate) examined: usize,
 }
 
-/// Most sums of costs that are told apart.
+/// Largest number of different sums of costs.
 const SUMS: usize = 20_000;
 
 /// All sums of costs, ascending; `None` if there are too many.
@@ -70,17 +70,18 @@ fn sums(costs: &[u64]) -> Option<BTreeSet<u64>> {
     Some(out)
 }
 
-/// All sets of one cost that hit every cut.
+/// Enumeration of all sets of one cost that hit every cut.
 struct OfCost<'a> {
     cuts: &'a [Set],
     costs: &'a [u64],
-    /// Nodes that may still be visited.
+    /// Number of nodes that may still be visited.
     nodes: u64,
     out: Vec<Set>,
 }
 
 impl OfCost<'_> {
-    /// Goes on from a set with candidates from one on, for what is left of the cost; `None` beyond the limit.
+    /// Extends a set by candidates from `next` on with the total cost `left`; `None` at the limit of
+    /// nodes.
     fn go_on(&mut self, set: Set, next: usize, left: u64) -> Option<()> {
         self.nodes = self.nodes.checked_sub(1)?;
         let later = if next >= 64 { 0 } else { Set::MAX << next };
@@ -106,15 +107,15 @@ pub(crate) struct Search<'a> {
     ranks: &'a dyn Ranks,
     /// Cost of each candidate, in millionths.
     pub(crate) costs: Vec<u64>,
-    /// All candidates.
+    /// Set of all candidates.
     pub(crate) all: Set,
-    /// Per unknown in question: the largest degree that is allowed, `None` of one that is not required.
+    /// Largest degree allowed for each unknown in question; `None` if it is not required.
     pub(crate) limits: Vec<Option<u16>>,
     /// Degrees under every set that was judged.
     pub(crate) judged: HashMap<Set, Box<[u16]>>,
-    /// Maximal failing sets that were found, for whatever goal.
+    /// Maximal failing sets that were found, for any goal.
     failing: Vec<Set>,
-    /// Sets that may still be judged.
+    /// Number of sets that may still be judged.
     left: u64,
     going: &'a (dyn Fn(u64) -> bool + Sync),
 }
@@ -153,13 +154,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The degrees under a set.
+    /// Degrees under a set.
     pub(crate) fn degrees(&mut self, set: Set) -> Result<&[u16], Stopped> {
         self.judge(&[set])?;
         self.judged.get(&set).map(|d| &**d).ok_or(Stopped::Work)
     }
 
-    /// The largest degree of the required unknowns under a set, `NONE` where one is not observable by its
+    /// Largest degree of the required unknowns under a set; `NONE` if one is not observable within its
     /// limit.
     pub(crate) fn worst(&mut self, set: Set) -> Result<u16, Stopped> {
         self.judge(&[set])?;
@@ -184,13 +185,14 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The cuts of the failing sets known so far, for a goal.
+    /// Cuts of the failing sets known so far, for a goal.
     pub(crate) fn cuts(&self, goal: Goal) -> Vec<Set> {
         let failing = self.failing.iter().filter(|set| !self.reaches(**set, goal));
         smallest(failing.map(|set| self.all & !set).collect())
     }
 
-    /// Adds candidates to failing sets while they fail, each in its own order; what cannot grow is kept.
+    /// Adds candidates to failing sets as long as they fail, each in its own order, and keeps the
+    /// maximal ones.
     fn grow(&mut self, sets: Vec<(Set, usize)>, goal: Goal) -> Result<(), Stopped> {
         let n = self.costs.len();
         let mut sets = sets;
@@ -212,8 +214,9 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// A cheapest set that reaches a goal, which all candidates together must, and the number of cheaper ones
-    /// that hit all cuts and were judged one by one; `None` if every one costs more than `most`.
+    /// Cheapest set that reaches a goal, and the number of cheaper sets that hit all cuts and were
+    /// judged one by one. All candidates together must reach the goal. `None` if every set costs more
+    /// than `most`.
     fn cheapest(&mut self, goal: Goal, most: u64) -> Result<Option<(Set, usize)>, Stopped> {
         for _ in 0..ROUNDS {
             let cuts = self.cuts(goal);
@@ -247,8 +250,8 @@ impl<'a> Search<'a> {
         Ok(None)
     }
 
-    /// A cheapest set that reaches a goal, of the smallest degree at this cost, with what proves its cost;
-    /// `with` is the goal of a degree.
+    /// Cheapest set that reaches a goal, of the smallest degree at this cost, with the proof of its
+    /// cost; `with` is the goal for a degree.
     pub(crate) fn best(&mut self, with: &dyn Fn(u16) -> Goal, most: u16) -> Result<Best, Stopped> {
         let (mut set, examined) = self.cheapest(with(most), u64::MAX)?.ok_or(Stopped::Nodes)?;
         let cuts = self.cuts(with(most));
@@ -272,8 +275,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Cuts without those that the proof of a cheapest set needs not: where no set was judged one by one, all
-    /// sets that hit the others cost as much.
+    /// Cuts that the proof of a cheapest set needs. If no set was judged one by one, a cut is dropped
+    /// if all sets that hit the others cost as much.
     pub(crate) fn needed(&self, best: &Best) -> Vec<Set> {
         let (mut cuts, cost) = (best.cuts.clone(), cost_of(best.set, &self.costs));
         let mut at = if best.examined > 0 { 0 } else { cuts.len() };
@@ -289,13 +292,13 @@ impl<'a> Search<'a> {
         cuts
     }
 
-    /// All minimal sets that reach a goal, and the number of members up to which they are all; with what
-    /// ended the search early.
+    /// All minimal sets that reach a goal, the number of members up to which the list is complete, and
+    /// the reason for an early end.
     pub(crate) fn minimal(&mut self, goal: Goal) -> (Vec<Set>, u32, Option<Stopped>) {
         let mut found = Transversals::new(HELD);
         let all_added = |found: &mut Transversals, cuts: Vec<Set>| cuts.into_iter().all(|cut| found.add(cut));
         let mut within = all_added(&mut found, self.cuts(goal));
-        // sets of fewer members than this one are all judged
+        // all sets with fewer members than this one are judged
         let mut shortest;
         let stopped = loop {
             let mut open: Vec<Set> =
@@ -345,8 +348,8 @@ mod tests {
     use super::*;
     use obsdeg_exact::SplitMix64;
 
-    /// Degrees that an output more never raises: per unknown some sets with a degree each, the least of those
-    /// inside counts.
+    /// Random degrees that another output never raises: per unknown some sets with a degree each; the
+    /// least degree of the sets contained counts.
     struct Drawn(Vec<Vec<(Set, u16)>>);
 
     impl Ranks for Drawn {
@@ -359,7 +362,8 @@ mod tests {
         }
     }
 
-    /// Drawn degrees against all sets one by one: cheapest sets and their degrees, minimal sets, proofs.
+    /// Random degrees compared with all sets one by one: cheapest sets and their degrees, minimal sets,
+    /// proofs.
     #[test]
     fn sets_are_those_of_exhaustion() {
         let mut rng = SplitMix64::new(2);
@@ -414,8 +418,8 @@ mod tests {
         }
     }
 
-    /// Where any five of 14 candidates do and no four, cuts are too many: all sets of four are judged one by
-    /// one.
+    /// 14 candidates of which any five reach the goal and no four: cuts are too many, so all sets of
+    /// four are judged one by one.
     #[test]
     fn alike_candidates_are_judged_one_by_one() {
         struct AnyFive;
@@ -434,7 +438,7 @@ mod tests {
         assert_eq!((sets.out, sums(&[1, 1, 3])), (vec![0b1001, 0b0110], Some([0, 1, 2, 3, 4, 5].into())));
     }
 
-    /// The limit of sets, and an interruption.
+    /// The limit of sets and an interruption are reported.
     #[test]
     fn what_ends_a_search_is_said() {
         let drawn = Drawn(vec![vec![(0b11_1000, 1), (0b111, 0)]]);

@@ -1,4 +1,4 @@
-//! Parts of an exhaustive search put together to the answer of the whole.
+//! Merge of the parts of an exhaustive search into the answer of the whole.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_evidence::simulation::Conditions;
@@ -15,16 +15,16 @@ use crate::design::run::prepared::Prepared;
 use crate::design::search::best::Best;
 use crate::design::search::progress::Progress;
 
-/// A part with its name.
+/// Part with its name.
 type Named = (String, Part);
 
-/// What all parts of an exhaustive search found together: the answer of the whole, if the parts were searched
-/// as they state. The parts are named, and come in any order. Everything that they list is evaluated again,
-/// their starts and counts must add up to the whole, and `check` of their blocks, chosen at random, are
-/// searched again.
+/// Merges all parts of an exhaustive search into the answer of the whole, valid if the parts were
+/// searched as they state. The parts are named and may come in any order. All listed sequences are
+/// evaluated again, starts and counts must add up to the whole, and `check` of the blocks, chosen at
+/// random, are searched again.
 ///
 /// # Errors
-/// [`DesignError::Part`] for one that is foreign, changed, doubled or not done,
+/// [`DesignError::Part`] for a part that is foreign, changed, doubled or not done,
 /// [`DesignError::MissingParts`]; [`DesignError`].
 pub fn design_merged(
     base: &Scheme,
@@ -58,7 +58,7 @@ pub fn design_merged(
     answered(base, conditions, options, progress, Some(&together))
 }
 
-/// The parts by number, each once.
+/// Parts by number, each once.
 fn in_order<'a>(parts: &'a [Named], inputs: &Inputs) -> Result<Vec<&'a Named>, DesignError> {
     let Some((_, first)) = parts.first() else { return Err(DesignError::Parts) };
     let of = first.part[1];
@@ -87,13 +87,13 @@ fn in_order<'a>(parts: &'a [Named], inputs: &Inputs) -> Result<Vec<&'a Named>, D
     }
 }
 
-/// What the parts found, and at how many worst degrees they had to search.
+/// Results of all parts together, and the number of worst degrees that they had to search.
 fn merged(sorted: &[&Named], keep: usize) -> Result<(Best, usize), DesignError> {
     let mut all = Best { complete: true, ..Best::default() };
     let most = sorted.iter().map(|(_, part)| part.levels.len()).max().unwrap_or(0);
     for i in 0..most {
         for (name, part) in sorted {
-            // a part ends early only when it has found enough by itself
+            // a part ends early only if it has found enough by itself
             let unfinished =
                 || DesignError::Part { name: name.clone(), why: PartError::Unfinished { part: part.part } };
             all.merge(keep, part.levels.get(i).ok_or_else(unfinished)?.best.clone());
@@ -124,8 +124,8 @@ fn versions(sorted: &[&Named]) -> Vec<String> {
     out
 }
 
-/// Random numbers for the choice of blocks: they change with every part, so that no part is written for the
-/// choice.
+/// Random numbers for the choice of blocks. They depend on every part, so no part can be written to
+/// suit the choice.
 fn choice(sorted: &[&Named], seed: u64) -> SplitMix64 {
     let seals: Vec<&str> = sorted.iter().map(|(_, part)| part.seal.as_str()).collect();
     SplitMix64::of(seed, "blocks of parts", &seals)
