@@ -1,6 +1,6 @@
 //! The bound on the probability that a verdict computed modulo random primes is wrong.
 
-/// What the bound depends on.
+/// Quantities that the error bound depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Claim {
     /// Number of unknowns: no minor that decides a rank is larger.
@@ -51,7 +51,8 @@ pub fn error_bound(claim: &Claim, fields: i32) -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand from the two sentences of [`error_bound`], with powers of two as exact decimals.
+    /// Values computed by hand from the two items of [`error_bound`], with powers of two as exact
+    /// decimals.
     #[test]
     fn hand_computed_values() {
         const TWO60: f64 = 1_152_921_504_606_846_976.0;
