@@ -19,7 +19,7 @@
 //! };
 //! let job = Job::Derive { dynamics: oscillator, order: 2 };
 //! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
-//! // a program that is not there costs an answer, nothing else
+//! a missing program is an error, without further effect
 //! let config = WorkerConfig {
 //!     program: "no/such/program".into(),
 //!     arguments: vec![],

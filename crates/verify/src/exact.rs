@@ -1,4 +1,4 @@
-//! The check in exact arithmetic: numbers `sum q sqrt(r) wN^a wU^b` with rational `q`.
+//! Check in exact arithmetic: numbers `sum q sqrt(r) wN^a wU^b` with rational `q`.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::file::{Certificate, Functional, Number, RowName};
 use crate::problem::{Matrix, ORDERS, Problem, Ring, TURN};
 use crate::{Claim, Refused, need};
 
-/// Exact numbers, with the rates of a problem.
+/// Ring of exact numbers, with the rates of a problem.
 struct Exact {
     rates: [Number; 2],
 }
@@ -78,7 +78,7 @@ impl Ring for Exact {
         self.rates.clone()
     }
     fn left(&self, _: &Problem, _: &[Matrix<Number>]) -> Vec<Matrix<Number>> {
-        // refused before: certificates with slews are modular
+        // certificates with slews are modular, so slews are refused earlier
         Vec::new()
     }
 }
@@ -144,7 +144,8 @@ pub(crate) fn check(
     Ok(())
 }
 
-/// Every null vector is 1 at its free unknown, 0 at the others, and taken to 0 by all rows up to its order.
+/// Checks that every null vector is 1 at its free unknown, 0 at the others, and orthogonal to all rows
+/// up to its order.
 fn null_vectors(
     problem: &Problem,
     file: &Certificate,

@@ -1,5 +1,5 @@
-//! Certificates of optima: the best of all sequences of candidates, by blocks that any checker can search
-//! again.
+//! Certificates of optima: the best of all sequences of candidates, with blocks that any checker can
+//! search again.
 
 mod accuracy;
 mod space;
@@ -15,24 +15,24 @@ use space::{Space, multisets, power};
 
 /// Layout of certificates of optima.
 pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
-/// Number of sequences up to which all blocks are searched again, unless a number of blocks is asked for.
+/// Number of sequences up to which all blocks are searched again, unless a number of blocks is given.
 const ALL_UP_TO: u64 = 2_000_000;
-/// Part by which a printed lower bound is smaller: it is not rounded up.
+/// Relative margin by which a printed lower bound is reduced, so that printing does not round it up.
 const DIGITS: f64 = 1e-6;
-/// Relative tolerance of every value and bound: of the value, the bound and what is found together three
-/// times that.
+/// Relative tolerance of every value and bound; three times that for value, bound and found result
+/// together.
 const TOLERANCE: f64 = 1e-5;
-/// Most blocks of a certificate.
+/// Largest number of blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
-/// Dwell of a position, in s.
+/// Range of the dwell of a position, in s.
 const DWELL_S: [f64; 2] = [10.0, 1e6];
-/// Noise of a sample of Z, in g.
+/// Range of the noise of a sample of Z, in g.
 const NOISE_G: [f64; 2] = [1e-9, 1e-2];
-/// Noise of a sample of the azimuth, in degrees.
+/// Range of the noise of a sample of the azimuth, in degrees.
 const AZIMUTH_NOISE_DEG: [f64; 2] = [1e-6, 10.0];
-/// Required sigma of a coefficient, in its unit.
+/// Range of the required sigma of a coefficient, in its unit.
 const LIMIT: [f64; 2] = [1e-12, 1e12];
-/// Latitude, north or south, in degrees.
+/// Range of the latitude, north or south, in degrees.
 const LATITUDE_DEG: [f64; 2] = [1.0, 89.0];
 
 #[derive(Deserialize)]
@@ -67,7 +67,7 @@ struct RawSearch {
     required: Vec<Required>,
 }
 
-/// A coefficient that must be observable.
+/// Coefficient that must be observable.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Required {
@@ -94,14 +94,14 @@ struct RawBlock {
     bound: Option<f64>,
 }
 
-/// The search, checked.
+/// Checked search.
 struct Search {
     problem: Problem,
     carry: String,
     positions: usize,
     accuracy: Accuracy,
     space: Space,
-    /// Probability that all primes mislead about any set.
+    /// Bound on the probability that all primes give a wrong result for any set.
     error: f64,
     primes: usize,
     unit: &'static str,
@@ -143,11 +143,11 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
     Ok(search.sentences(&file, (&firsts, depth), (chosen.len(), seed), &found))
 }
 
-/// Findings of replays.
+/// Results of replays.
 #[derive(Default)]
 struct Found {
     sequences: u64,
-    /// Sequences of the degree of the optimum within the caps.
+    /// Number of sequences with the degree of the optimum within the caps.
     counted: u64,
     at_least: f64,
     least: Option<(Vec<usize>, Value)>,
@@ -169,7 +169,7 @@ fn listed(sequence: &[usize]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// The best sequences are what they seem; the value of the first.
+/// Checks the best sequences, and returns the value of the first.
 fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
     let (n, k) = (search.problem.positions.len(), search.positions);
     need((1..=1000).contains(&file.best.len()), "best", "1 to 1000 sequences", file.best.len())?;
@@ -188,7 +188,7 @@ fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
         let value = search.value(&sequence);
         let near = (best.value / value.computed - 1.0).abs() <= TOLERANCE;
         need(near, &place, &format!("{:e}", value.computed), best.value)?;
-        // double precision decides it
+        // decided by double precision
         let sure = value.pivot >= SURE_PIVOT && value.left_out <= undetermined;
         let expected = format!("pivots from {SURE_PIVOT:e} on, and {undetermined} unknowns left out at most");
         need(sure, &place, &expected, format!("{:e}, {} left out", value.pivot, value.left_out))?;
@@ -198,7 +198,7 @@ fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
     Ok(file.best[0].value)
 }
 
-/// The blocks that are searched again, and the seed of the choice if there is one.
+/// Blocks that are searched again, and the seed of the choice if there is one.
 fn chosen(file: &Optimum, certificate: &[u8], replay: &Replay) -> Result<(Vec<usize>, Option<u64>), Refused> {
     let all = file.blocks.len();
     let count = match replay.blocks {
@@ -224,21 +224,21 @@ fn chosen(file: &Optimum, certificate: &[u8], replay: &Replay) -> Result<(Vec<us
     Ok((places, Some(seed)))
 }
 
-/// A number that nobody knew when the certificate was written.
+/// Random number of the system, unknown when the certificate was written.
 fn of_the_system() -> u64 {
     use std::hash::{BuildHasher, Hasher};
     std::collections::hash_map::RandomState::new().build_hasher().finish()
 }
 
-/// A number of a file within limits.
+/// Number of a file, refused unless it is within limits.
 fn between(place: &str, x: f64, [least, most]: [f64; 2]) -> Result<f64, Refused> {
     need((least..=most).contains(&x), place, &format!("a number from {least:e} to {most:e}"), x)?;
     Ok(x)
 }
 
-/// Searches that double precision decides: cardinal candidates, all coefficients required, a latitude away
-/// from the equator and the poles. Elsewhere a sequence may determine so little that rounding decides its
-/// value.
+/// Refuses searches that double precision cannot decide. It decides those with cardinal candidates, all
+/// coefficients required, and a latitude away from the equator and the poles. Elsewhere a sequence may
+/// determine so little that rounding decides its value.
 fn within_precision(raw: &RawSearch, problem: &Problem) -> Result<(), Refused> {
     let right = |text: &String| text.parse::<f64>().is_ok_and(|x| x % 90.0 == 0.0);
     let other = raw.candidates.iter().flatten().find(|text| !right(text));
@@ -275,7 +275,7 @@ fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
 impl Search {
     fn new(raw: &RawSearch, certificate: &[u8]) -> Result<Self, Refused> {
         known_carry(&raw.carry)?;
-        // rows of the candidates; the carry acts where they are put together
+        // rows of the candidates; the carry acts when positions are combined
         let problem = Problem::new(&RawProblem {
             carry: "platform".into(),
             latitude_deg: Some(raw.latitude_deg.clone()),
@@ -332,8 +332,8 @@ impl Search {
         self.accuracy.value(&state)
     }
 
-    /// Number of sequences behind a start: n^left where order matters, otherwise multisets of what is not
-    /// below its last.
+    /// Number of sequences behind a start: n^left where order matters, otherwise multisets of
+    /// candidates from its last one on.
     fn behind(&self, start: &[usize]) -> Option<u64> {
         let (n, left) = (self.problem.positions.len() as u64, (self.positions - start.len()) as u64);
         match (self.carry.as_str(), start.last()) {
@@ -342,7 +342,8 @@ impl Search {
         }
     }
 
-    /// The blocks cover all sequences up to turns of the platform axes; the firsts, and the length of starts.
+    /// Checks that the blocks cover all sequences up to turns of the platform axes. Returns the first
+    /// candidates and the length of starts.
     fn cover(&self, file: &Optimum, least: f64) -> Result<(Vec<usize>, usize), Refused> {
         let n = self.problem.positions.len();
         let found = file.blocks.len();
@@ -440,7 +441,7 @@ impl Search {
         for c in from..self.problem.positions.len() {
             sequence.push(c);
             let whole = sequence.len() == self.positions;
-            // what is not of the degree is not evaluated
+            // sequences of a larger degree are not evaluated
             let counts = !whole || self.space.worst_degree(sequence).is_some_and(|own| own <= degree);
             if counts {
                 let next = self.accuracy.extended(state, c);
@@ -523,7 +524,7 @@ impl Search {
     }
 }
 
-/// The first start of so many candidates that begins with some.
+/// First start of `depth` candidates that begins with `start`.
 fn filled(mut start: Vec<usize>, depth: usize, reset: bool) -> Vec<usize> {
     while start.len() < depth {
         start.push(if reset { start[start.len() - 1] } else { 1 });
@@ -531,7 +532,7 @@ fn filled(mut start: Vec<usize>, depth: usize, reset: bool) -> Vec<usize> {
     start
 }
 
-/// The next start in lexicographic order with the same first candidate; empty after the last.
+/// Next start in lexicographic order with the same first candidate; empty after the last.
 fn next_start(mut start: Vec<usize>, n: usize, depth: usize, reset: bool) -> Vec<usize> {
     while let Some(last) = start.pop() {
         if last < n && !start.is_empty() {
@@ -542,7 +543,7 @@ fn next_start(mut start: Vec<usize>, n: usize, depth: usize, reset: bool) -> Vec
     start
 }
 
-/// The coefficients that count: column, largest degree, and the sigma that is 1 in the criterion.
+/// Coefficients that count: column, largest degree, and the sigma that is 1 in the criterion.
 type Counting = Vec<(usize, usize, f64)>;
 
 fn required(raw: &RawSearch, problem: &Problem) -> Result<(Criterion, Counting), Refused> {
@@ -574,7 +575,7 @@ fn required(raw: &RawSearch, problem: &Problem) -> Result<(Criterion, Counting),
     Ok((criterion, out))
 }
 
-/// The unit of a criterion, after a blank; empty where it has none.
+/// Unit of a criterion, after a blank; empty if it has none.
 fn unit(problem: &Problem, criterion: Criterion, required: &Counting) -> Result<&'static str, Refused> {
     let of = |column: usize| unit_of(problem, column);
     let first = of(required[0].0);
@@ -590,7 +591,7 @@ fn unit(problem: &Problem, criterion: Criterion, required: &Counting) -> Result<
     }
 }
 
-/// The unit of a coefficient, after a blank.
+/// Unit of a coefficient, after a blank.
 fn unit_of(problem: &Problem, column: usize) -> &'static str {
     match &problem.names[problem.psi + column] {
         name if name.starts_with("D_") => " deg/h",
