@@ -146,7 +146,7 @@ impl<X: Manifold> Filter<X> {
     /// Updates by the measurement `z` (shape m) at `t`, with all components present.
     ///
     /// # Errors
-    /// As [`Self::update_with`].
+    /// [`EkfError`] as for [`Self::update_with`].
     pub fn update(
         &mut self,
         m: &impl Measurement<X>,

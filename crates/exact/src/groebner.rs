@@ -612,7 +612,10 @@ mod tests {
             prop_assert_eq!(basis.dimension(50), Ok(Some(xs.len())));
             let mut values = |v: u32| {
                 let element = Polynomial::variable(&f, v);
-                let minimal = basis.minimal_polynomial(&element, 50, &mut ENOUGH.clone()).expect("work").expect("finite");
+                let minimal = basis
+                    .minimal_polynomial(&element, 50, &mut ENOUGH.clone())
+                    .expect("work")
+                    .expect("finite");
                 crate::polynomial::distinct_roots(&f, &minimal)
             };
             let found = [values(0), values(1), values(2)];

@@ -301,7 +301,7 @@ mod tests {
         assert_eq!(put_and_counted(&p, &value), (3 * 35 + 21 + 3, 3 * 35 + 21 + 3));
     }
 
-    /// Where products of monomials are equal, fewer operations are done than predicted.
+    /// Fewer operations are done than predicted if products of monomials are equal.
     #[test]
     fn equal_products_are_counted_apart() {
         let f = Field::new((1 << 60) + 33);

@@ -7,7 +7,8 @@ use crate::{Field, SplitMix64};
 pub enum PrimeError {
     /// Order that is not usable.
     #[error(
-        "the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime factor but 2, 3 and 5"
+        "the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime \
+         factor but 2, 3 and 5"
     )]
     Order {
         /// The order that was asked for.

@@ -297,12 +297,14 @@ mod tests {
                 });
                 prop_assert_eq!(module.order(&unit), smallest);
             }
-            // combinations too: those of order d are the constants whose T^d multiple is a member
+            // combinations of order d are the constants whose T^d multiple is a member
             for d in 0..3 {
                 let found = module.constants_of_order(d);
                 let multiple = |c: &[u64]| c.iter().flat_map(|&x| r.monomial(x, d)).collect::<Vec<_>>();
                 prop_assert!(found.iter().all(|c| span.contains(&multiple(c))));
-                let members = (0..2).filter(|&c| module.order(&[0, 1].map(|j| if j == c { r.field.one() } else { 0 })).is_some_and(|k| k <= d));
+                let members = (0..2).filter(|&c| module
+                    .order(&[0, 1].map(|j| if j == c { r.field.one() } else { 0 }))
+                    .is_some_and(|k| k <= d));
                 let least = members.count();
                 let some = (-3i64..=3).any(|x| span.contains(&multiple(&[r.field.one(), r.field.from_i64(x)])));
                 prop_assert!(found.len() >= least.max(usize::from(some)));

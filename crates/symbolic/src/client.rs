@@ -415,7 +415,8 @@ mod tests {
         }
         assert!(start.elapsed() >= Duration::from_secs(1) && start.elapsed() < Duration::from_secs(30));
         // the wait for the first turn leaves less time for the second; it counts from its report on
-        let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo 'obsdeg:\"over_limit\"'";
+        let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo \
+            'obsdeg:\"over_limit\"'";
         let mut worker = scripted(turn);
         (worker.config.wait, worker.patience) = (Duration::from_secs(1000), Duration::from_secs(1000));
         assert!(matches!(worker.ask(&request()), Err(WorkerError::OverLimit { .. })));

@@ -305,7 +305,8 @@ fn sentences(problem: &Problem, claims: &[Claim<'_>], rank: usize, how: &str, co
     if let Some(fewest) = problem.fewest_positions(seen) {
         let as_few = if fewest == problem.positions.len() { " This one has as few." } else { "" };
         out.push(format!(
-            "Counting: no scheme of fewer than {fewest} positions makes {seen} coefficients observable under {} carry.{as_few}",
+            "Counting: no scheme of fewer than {fewest} positions makes {seen} coefficients observable \
+             under {} carry.{as_few}",
             problem.carry
         ));
     }

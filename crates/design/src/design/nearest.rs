@@ -103,7 +103,8 @@ impl fmt::Display for Nearest {
         let ended = if self.unfinished { "; not all was tried" } else { "" };
         write!(
             f,
-            "by exchange, {} sequences evaluated{ended}: there may be nearer schemes, and shorter dwells or fewer positions that do",
+            "by exchange, {} sequences evaluated{ended}: there may be nearer schemes, and shorter dwells or \
+             fewer positions that do",
             self.examined
         )
     }

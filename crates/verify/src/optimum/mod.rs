@@ -466,7 +466,8 @@ impl Search {
         let names: Vec<String> = file.problem.required.iter().map(|r| r.name.clone()).collect();
         let how = by_primes(self.primes, self.error);
         let mut out = vec![format!(
-            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell {} s, {} samples.",
+            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell \
+             {} s, {} samples.",
             self.carry,
             file.problem.latitude_deg,
             file.problem.criterion,
@@ -489,7 +490,8 @@ impl Search {
             out.push(format!("{} more sequences of the list; evaluated again.", file.best.len() - 3));
         }
         out.push(format!(
-            "Blocks: {} of starts of {depth}, {} sequences, stand for all: first candidates {}, {} turns of the platform axes.",
+            "Blocks: {} of starts of {depth}, {} sequences, stand for all: first candidates {}, {} turns of \
+             the platform axes.",
             file.blocks.len(),
             file.sequences,
             listed(&firsts.iter().map(|c| c - 1).collect::<Vec<_>>()),
@@ -501,11 +503,18 @@ impl Search {
             _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
         };
         out.push(match replayed {
-            0 => format!("No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."),
+            0 => format!(
+                "No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."
+            ),
             _ => format!(
-            "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of a smaller one, {least}; {} sets judged {how}.",
-            file.blocks.len(), found.sequences, found.counted, file.degree, self.space.judged_sets()
-        ),
+                "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of \
+                 a smaller one, {least}; {} sets judged {how}.",
+                file.blocks.len(),
+                found.sequences,
+                found.counted,
+                file.degree,
+                self.space.judged_sets()
+            ),
         });
         out.push(match file.blocks.len() - replayed {
             0 => {
@@ -519,7 +528,11 @@ impl Search {
                 file.sequences - found.sequences
             ),
         });
-        out.push("Assumption: the model of book/src/certificate.md, white noise of Z, nothing known beforehand, repositioning at once.".into());
+        out.push(
+            "Assumption: the model of book/src/certificate.md, white noise of Z, nothing known beforehand, \
+             repositioning at once."
+                .into(),
+        );
         out
     }
 }

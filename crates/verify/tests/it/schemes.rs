@@ -64,7 +64,8 @@ fn draw(rng: &mut SplitMix64) -> String {
         text += &format!("[[position]]\nangles_deg = [{}, {}, {}]\n", angle(), angle(), angle());
     }
     if rng.below(5) == 0 {
-        text += "[geometry]\nX = { I = \"+y\", O = \"+x\", S = \"-z\" }\nY = { I = \"-x\", O = \"+z\", S = \"+y\" }\nZ = { I = \"z\", O = \"x\", S = \"y\" }\n";
+        text += "[geometry]\nX = { I = \"+y\", O = \"+x\", S = \"-z\" }\nY = { I = \"-x\", O = \"+z\", S = \
+            \"+y\" }\nZ = { I = \"z\", O = \"x\", S = \"y\" }\n";
     }
     text
 }

@@ -1,12 +1,12 @@
 //! Lower bounds on the criterion of every scheme of given candidates, where information adds over
 //! positions: duality of optimal design.
 //!
-//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: known beforehand). For every
+//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: the prior). For every
 //! matrix X
 //!
 //! ```text
 //! tr(V^T M^-1 V) >= tr(V^T X)^2 / tr(X^T M X)            (Cauchy and Schwarz in the inner product of M)
-//! log det M_S    <= d log(tr(X^T M X) / d) - 2 log |det X_S|   (M_S: without the nuisance; X_S: those rows of X)
+//! log det M_S    <= d log(tr(X^T M X) / d) - 2 log |det X_S|   (M_S, X_S: without the nuisance)
 //! tr(X^T M X)    <= tr(X^T P X) + k max_i tr(X^T A_i X)
 //! ```
 //!

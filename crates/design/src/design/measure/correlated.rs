@@ -9,7 +9,7 @@
 //! sample by sample. Adding a position adds this information after elimination of b at the start, up to
 //! its mean, and b at the end: information only grows, and nothing large is subtracted from it.
 //!
-//! So information is no sum over positions under any carry, and order matters: bounds that rest on such
+//! Information is thus no sum over positions under any carry, and order matters: bounds that rest on such
 //! a sum do not hold here.
 
 use nalgebra::Matrix3 as Small;

@@ -52,8 +52,9 @@ pub enum DesignError {
     },
     /// No certificate of an optimum covers the search or its answer.
     #[error(
-        "no certificate: found {found}; certificates of optima cover an exhaustive search that proves the best sequence of given candidates, \
-         equal dwells, repositioning at once, white noise of Z and nothing known beforehand"
+        "no certificate: found {found}; certificates of optima cover an exhaustive search that proves the \
+         best sequence of given candidates, equal dwells, repositioning at once, white noise of Z and \
+         nothing known beforehand"
     )]
     NoCertificate {
         /// Part of the search that is not covered.
@@ -69,7 +70,8 @@ pub enum DesignError {
     },
     /// Name that is no error of this scheme.
     #[error(
-        "immune to `{found}`: no error that this scheme does not estimate has this name; expected some such as K0, M, latitude"
+        "immune to `{found}`: no error that this scheme does not estimate has this name; expected some such \
+         as K0, M, latitude"
     )]
     Immune {
         /// Name that was found.
@@ -77,8 +79,8 @@ pub enum DesignError {
     },
     /// Size at which double precision cannot decide whether a record shows an error.
     #[error(
-        "immune to `{found}`: beyond {most:.3e} {unit} a search does not tell an error that a record hardly shows from one that none shows; \
-         expected a smaller size"
+        "immune to `{found}`: beyond {most:.3e} {unit} a search does not tell an error that a record hardly \
+         shows from one that none shows; expected a smaller size"
     )]
     ImmuneSize {
         /// Error with its size.
@@ -90,13 +92,15 @@ pub enum DesignError {
     },
     /// Turns along gimbal paths that take time: a design evaluates turns about one axis only.
     #[error(
-        "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave one of them out"
+        "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave \
+         one of them out"
     )]
     GimbalPath,
     /// Option that needs a requirement, with none stated.
     #[error(
-        "{what} needs a requirement, and none is stated on what must be observable; expected --requirement NAME=SIGMA (as in --requirement D=0.05 for all drift \
-         coefficients, psi=0.01 for psi), or [requirements] in a scheme file"
+        "{what} needs a requirement, and none is stated on what must be observable; expected --requirement \
+         NAME=SIGMA (as in --requirement D=0.05 for all drift coefficients, psi=0.01 for psi), or \
+         [requirements] in a scheme file"
     )]
     NoRequirement {
         /// Option that needs a requirement.
@@ -138,7 +142,8 @@ pub enum DesignError {
     },
     /// Search by exchange that found no sufficient sequence.
     #[error(
-        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were looked at {wanted}; there are too many to look at all"
+        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were \
+         looked at {wanted}; there are too many to look at all"
     )]
     NotFound {
         /// Number of positions.
@@ -213,7 +218,8 @@ pub enum DesignError {
     Verdict(#[from] EnsembleError),
     /// No turn between candidates, or too many, where torquer errors act in turns.
     #[error(
-        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or other candidates"
+        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or \
+         other candidates"
     )]
     Turns {
         /// Number of turns.
@@ -223,8 +229,9 @@ pub enum DesignError {
     },
     /// Option that does not apply where torquer errors act in turns.
     #[error(
-        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected slews that take time (--slew-rate), about one \
-         axis, between cardinal attitudes, by exchange (no --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
+        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected \
+         slews that take time (--slew-rate), about one axis, between cardinal attitudes, by exchange (no \
+         --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
     )]
     Walks {
         /// Option or input that does not apply.
@@ -232,8 +239,9 @@ pub enum DesignError {
     },
     /// Criterion that compares sigmas in several units.
     #[error(
-        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over requirements), or D (their geometric mean), or \
-         --observable with coefficients of one unit: the others are estimated with them"
+        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over \
+         requirements), or D (their geometric mean), or --observable with coefficients of one unit: the \
+         others are estimated with them"
     )]
     Units {
         /// Name of the criterion.

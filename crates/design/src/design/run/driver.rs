@@ -218,8 +218,8 @@ fn examined(lost: u64, slews: bool) -> String {
     match lost {
         0 => "every sequence was examined".into(),
         _ => format!(
-            "every sequence was examined; the samples of {lost} with observable positions do not determine it{with}, as far as double precision \
-             tells"
+            "every sequence was examined; the samples of {lost} with observable positions do not determine \
+             it{with}, as far as double precision tells"
         ),
     }
 }
