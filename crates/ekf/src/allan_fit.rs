@@ -173,19 +173,19 @@ pub struct NoiseFit {
 }
 
 /// Allan variances with the sums from which their covariances follow.
-struct Fitting<'a> {
+struct FitProblem<'a> {
     points: &'a [AllanPoint],
     pairs: Vec<[[f64; TERMS]; TERMS]>,
 }
 
 /// Squared coefficients and their covariance (zero for noises that were left out).
-struct Solved {
+struct Solution {
     x: [f64; TERMS],
     covariance: DMatrix<f64>,
     left: f64,
 }
 
-impl Fitting<'_> {
+impl FitProblem<'_> {
     /// Covariance of the variances for squared coefficients `x`.
     fn covariance(&self, x: &[f64; TERMS]) -> DMatrix<f64> {
         let n = self.points.len();
@@ -196,7 +196,7 @@ impl Fitting<'_> {
     }
 
     /// Least squares for the noises `kept` with weights by squared coefficients `by`.
-    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solved> {
+    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solution> {
         let n = self.points.len();
         let root = Cholesky::new(self.covariance(&by.map(|x| x.max(0.0))))?.l();
         let design = DMatrix::from_fn(n, kept.len(), |i, j| shapes(self.points[i].samples)[kept[j]]);
@@ -208,7 +208,7 @@ impl Fitting<'_> {
         let inverse = (scaled.transpose() * &scaled).try_inverse()?;
         let found = &inverse * (scaled.transpose() * &b);
         let left = (&b - &scaled * &found).norm_squared();
-        let mut out = Solved { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
+        let mut out = Solution { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
         for (i, &k) in kept.iter().enumerate() {
             out.x[k] = found[i] / scale[i];
             for (j, &l) in kept.iter().enumerate() {
@@ -219,7 +219,7 @@ impl Fitting<'_> {
     }
 
     /// Least squares as [`Self::solve`], with weights from its own solution.
-    fn settle(&self, kept: &[usize]) -> Option<Solved> {
+    fn settle(&self, kept: &[usize]) -> Option<Solution> {
         let mut by = [0.0; TERMS];
         // initial weights: each noise as large as it can be alone
         for &k in kept {
@@ -260,7 +260,7 @@ impl Fitting<'_> {
 
     /// Standard deviation of the squared coefficient of `k` if only the noises `others` are present,
     /// with the coefficients of `solved`.
-    fn without(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
+    fn without(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
         let mut by = solved.x;
         by[k] = 0.0;
         // without others, the noise itself gives the weights
@@ -272,7 +272,7 @@ impl Fitting<'_> {
     /// found has probability 1 - [`LIMIT`]. Estimate and standard deviation are those by its own
     /// weights (Neyman). The estimate is skewed to the right, so the normal quantile is on the safe
     /// side.
-    fn limit(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
+    fn limit(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
         let all = Self::with(others, k);
         let beyond = |x: f64| -> Option<bool> {
             let mut by = solved.x;
@@ -309,7 +309,7 @@ pub fn fit(points: &[AllanPoint], lengths: &[usize], confidence: f64) -> Result<
     }
     let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
     let pairs = pairs.map(|(i, j)| pair(lengths, points[i].samples, points[j].samples)).collect();
-    let fitting = Fitting { points, pairs };
+    let fitting = FitProblem { points, pairs };
     let none =
         || EkfError::NotFinite { what: "the Allan variances", value: points[0].variance, row: 0, column: 0 };
     let mut kept: Vec<usize> = (0..TERMS).collect();

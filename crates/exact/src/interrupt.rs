@@ -12,18 +12,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Source of the decision to continue, for the work of one thread.
-enum Hearing {
+enum Cancellation {
     /// Callback of this thread, called when the interval has passed.
-    Asked { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
+    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
     /// Flag that another thread sets.
-    Told(Arc<AtomicBool>),
+    Flag(Arc<AtomicBool>),
 }
 
 /// Payload of the unwinding.
 struct Interrupted;
 
 thread_local! {
-    static HEARING: Cell<Option<Hearing>> = const { Cell::new(None) };
+    static CANCELLATION: Cell<Option<Cancellation>> = const { Cell::new(None) };
 }
 
 /// Runs `work` and calls `goes_on` on this thread whenever `interval` has passed, at the next
@@ -33,18 +33,18 @@ pub fn hearing<T>(
     goes_on: impl FnMut() -> bool + 'static,
     work: impl FnOnce() -> T,
 ) -> Option<T> {
-    run(Hearing::Asked { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
+    run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
 }
 
 /// Runs `work` until `wanted` is false, then returns `None`. [`parts`] carries this to other threads.
 pub fn while_wanted<T>(wanted: Arc<AtomicBool>, work: impl FnOnce() -> T) -> Option<T> {
-    run(Hearing::Told(wanted), work)
+    run(Cancellation::Flag(wanted), work)
 }
 
-fn run<T>(own: Hearing, work: impl FnOnce() -> T) -> Option<T> {
-    let before = HEARING.replace(Some(own));
+fn run<T>(own: Cancellation, work: impl FnOnce() -> T) -> Option<T> {
+    let before = CANCELLATION.replace(Some(own));
     let done = catch_unwind(AssertUnwindSafe(work));
-    HEARING.set(before);
+    CANCELLATION.set(before);
     match done {
         Ok(done) => Some(done),
         Err(reason) if reason.is::<Interrupted>() => None,
@@ -55,17 +55,17 @@ fn run<T>(own: Hearing, work: impl FnOnce() -> T) -> Option<T> {
 /// Called by long loops, at least every tenth of a second. Does not return if the work must end.
 pub fn check() {
     // the callback may run other work on this thread
-    let Some(mut hearing) = HEARING.take() else { return };
+    let Some(mut hearing) = CANCELLATION.take() else { return };
     let goes_on = match &mut hearing {
-        Hearing::Told(wanted) => wanted.load(Ordering::Relaxed),
-        Hearing::Asked { last, interval, .. } if last.elapsed() < *interval => true,
-        Hearing::Asked { goes_on, last, .. } => {
+        Cancellation::Flag(wanted) => wanted.load(Ordering::Relaxed),
+        Cancellation::Callback { last, interval, .. } if last.elapsed() < *interval => true,
+        Cancellation::Callback { goes_on, last, .. } => {
             let goes_on = goes_on();
             *last = Instant::now();
             goes_on
         }
     };
-    HEARING.set(Some(hearing));
+    CANCELLATION.set(Some(hearing));
     if !goes_on {
         resume_unwind(Box::new(Interrupted));
     }
@@ -77,12 +77,12 @@ pub struct Parts(Option<Arc<AtomicBool>>);
 
 /// Handle for the parts of the work of this thread.
 pub fn parts() -> Parts {
-    let hearing = HEARING.take();
+    let hearing = CANCELLATION.take();
     let wanted = match &hearing {
-        Some(Hearing::Told(wanted)) => Some(wanted.clone()),
+        Some(Cancellation::Flag(wanted)) => Some(wanted.clone()),
         _ => None,
     };
-    HEARING.set(hearing);
+    CANCELLATION.set(hearing);
     Parts(wanted)
 }
 

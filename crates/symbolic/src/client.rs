@@ -103,7 +103,7 @@ fn over_limit(limit: u64) -> String {
     }
 }
 
-struct Running {
+struct WorkerProcess {
     child: Child,
     input: Option<ChildStdin>,
     lines: Receiver<Vec<u8>>,
@@ -111,7 +111,7 @@ struct Running {
     chatter: usize,
 }
 
-impl Drop for Running {
+impl Drop for WorkerProcess {
     fn drop(&mut self) {
         self.input.take(); // end of input: the worker ends by itself at any point
         let patience = Instant::now() + Duration::from_millis(500);
@@ -134,7 +134,7 @@ pub struct Worker {
     config: WorkerConfig,
     /// Remaining time for waits for other processes.
     patience: Duration,
-    running: Option<Running>,
+    running: Option<WorkerProcess>,
     failure: Option<WorkerError>,
     banner: Vec<String>,
 }
@@ -273,7 +273,7 @@ fn garbled(found: String) -> WorkerError {
     WorkerError::Garbled { found }
 }
 
-fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
+fn start(config: &WorkerConfig) -> Result<WorkerProcess, WorkerError> {
     let mut child = Command::new(&config.program)
         .args(&config.arguments)
         .stdin(Stdio::piped())
@@ -301,7 +301,7 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
             }
         });
     }
-    Ok(Running { child, input, lines, chatter: 0 })
+    Ok(WorkerProcess { child, input, lines, chatter: 0 })
 }
 
 #[cfg(test)]

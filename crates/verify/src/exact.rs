@@ -10,7 +10,7 @@ use crate::problem::{Matrix, ORDERS, Problem, Ring, TURN};
 use crate::{Claim, Refused, need};
 
 /// Ring of exact numbers, with the rates of a problem.
-struct Exact {
+struct ExactRing {
     rates: [Number; 2],
 }
 
@@ -23,7 +23,7 @@ fn radicals<const N: usize>(terms: [(i64, i64, u8); N]) -> Number {
     Number(terms.into_iter().map(|(p, q, r)| ((r, 0, 0), rational(p, q))).collect())
 }
 
-impl Ring for Exact {
+impl Ring for ExactRing {
     type Element = Number;
     fn zero(&self) -> Number {
         Number::default()
@@ -104,7 +104,7 @@ pub(crate) fn check(
     let power = |zero: bool, a, b| {
         if zero { Number::default() } else { Number([((1, a, b), rational(1, 1))].into()) }
     };
-    let ring = Exact { rates: [power(problem.pole, 1, 0), power(problem.equator, 0, 1)] };
+    let ring = ExactRing { rates: [power(problem.pole, 1, 0), power(problem.equator, 0, 1)] };
     let sparse = |row: Vec<Number>| -> Row<'_> {
         problem.names.iter().map(String::as_str).zip(row).filter(|(_, x)| !ring.is_zero(x)).collect()
     };
@@ -149,7 +149,7 @@ pub(crate) fn check(
 fn null_vectors(
     problem: &Problem,
     file: &Certificate,
-    ring: &Exact,
+    ring: &ExactRing,
     rows: &BTreeMap<RowName, Row<'_>>,
 ) -> Result<(), Refused> {
     let levels = file.null_vectors.as_deref().unwrap_or_default();

@@ -4,7 +4,7 @@ use num_bigint::BigInt;
 use sha2::{Digest, Sha256};
 
 use crate::file::{Functional, Number, RowName, Witness};
-use crate::problem::{About, Matrix, Problem, Ring, Slew, Source, TURN, times as product};
+use crate::problem::{Matrix, Problem, Ring, Slew, Source, TURN, TurnAxis, times as product};
 use crate::{Refused, need, refusal};
 
 /// Random numbers that the writer of a certificate cannot choose: SHA-256 of it, with a counter.
@@ -170,14 +170,14 @@ impl PrimeField {
         let back: Matrix<u64> = (0..3).map(|i| a.iter().map(|row| row[i]).collect()).collect();
         let unit = |i: usize| (0..3).map(|j| u64::from(i == j)).collect::<Vec<u64>>();
         let v = match &turn.about {
-            About::Platform(i) => return unit(*i),
-            About::Middle(gamma) => {
+            TurnAxis::Platform(i) => return unit(*i),
+            TurnAxis::Middle(gamma) => {
                 let (cos, sin) = self.cos_sin(*gamma);
                 return vec![self.neg(&sin), cos, 0];
             }
-            About::Geographic(i) => unit(*i),
-            About::Direction(v) => v.iter().map(|x| self.image(x)).collect(),
-            About::Shortest => {
+            TurnAxis::Geographic(i) => unit(*i),
+            TurnAxis::Direction(v) => v.iter().map(|x| self.image(x)).collect(),
+            TurnAxis::Shortest => {
                 let (r, sin) = (product(self, to, &back), self.cos_sin(turn.angle).1);
                 let half = self.inverse(self.add(&sin, &sin));
                 let difference =
@@ -425,7 +425,7 @@ fn of_turns(problem: &Problem) -> f64 {
     let common = turns.iter().fold(half, |g, turn| gcd(g, turn.angle.unsigned_abs()));
     let largest = turns.iter().map(|turn| turn.angle.unsigned_abs()).max().unwrap_or(0);
     let denominators: BigInt = turns.iter().fold(BigInt::from(1), |all, turn| match &turn.about {
-        About::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
+        TurnAxis::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
         _ => all,
     });
     // exponents of 2 and of the common denominator that make an attitude integer, and the largest of a
@@ -435,18 +435,18 @@ fn of_turns(problem: &Problem) -> f64 {
         let mut attitude = (3, 0);
         for turn in turns {
             let axis = match turn.about {
-                About::Platform(_) => (0, 0),
-                About::Middle(_) => (1, 0),
-                About::Geographic(_) => attitude,
-                About::Direction(_) => (attitude.0, attitude.1 + 1),
-                About::Shortest => (6, 0),
+                TurnAxis::Platform(_) => (0, 0),
+                TurnAxis::Middle(_) => (1, 0),
+                TurnAxis::Geographic(_) => attitude,
+                TurnAxis::Direction(_) => (attitude.0, attitude.1 + 1),
+                TurnAxis::Shortest => (6, 0),
             };
             two = two.max(attitude.0 + 1 + 3 * axis.0);
             own = own.max(attitude.1 + 3 * axis.1);
             attitude = (attitude.0 + 1 + 2 * axis.0, attitude.1 + 2 * axis.1);
         }
     }
-    let shortest = turns.iter().filter(|turn| matches!(turn.about, About::Shortest)).count();
+    let shortest = turns.iter().filter(|turn| matches!(turn.about, TurnAxis::Shortest)).count();
     f64::from(two)
         + f64::from(own) * (denominators - BigInt::from(1)).bits() as f64
         + 3.0 * shortest as f64
@@ -472,13 +472,13 @@ mod tests {
     use super::*;
     use crate::file::{RawAxis, RawGyro, RawProblem, RawTurn};
 
-    type Exact = Vec<Vec<BigRational>>;
+    type ExactMatrix = Vec<Vec<BigRational>>;
 
     fn rational(p: i64, q: i64) -> BigRational {
         BigRational::new(p.into(), q.into())
     }
 
-    fn product_of(a: &Exact, b: &Exact) -> Exact {
+    fn product_of(a: &ExactMatrix, b: &ExactMatrix) -> ExactMatrix {
         let entry = |row: &[BigRational], j: usize| {
             row.iter().zip(b).fold(rational(0, 1), |sum, (x, row)| sum + x * &row[j])
         };
@@ -486,7 +486,7 @@ mod tests {
     }
 
     /// Matrix `a 1 + b [u x] + c u u^T`.
-    fn mixed(u: &[BigRational], [a, b, c]: [i64; 3]) -> Exact {
+    fn mixed(u: &[BigRational], [a, b, c]: [i64; 3]) -> ExactMatrix {
         let [a, b, c] = [a, b, c].map(|x| rational(x, 1));
         let skew = [
             [None, Some((2, -1)), Some((1, 1))],

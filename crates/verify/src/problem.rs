@@ -60,13 +60,13 @@ pub(crate) enum Source {
 
 /// One turn of a slew.
 pub(crate) struct Slew {
-    pub about: About,
+    pub about: TurnAxis,
     /// Angle in 1e-9 degrees.
     pub angle: i64,
 }
 
 /// Axis of a turn.
-pub(crate) enum About {
+pub(crate) enum TurnAxis {
     /// Axis of the shortest turn between the attitudes before and after it.
     Shortest,
     /// Platform axis X_p, Y_p or Z_p.
@@ -379,21 +379,21 @@ fn slews(raw: &RawProblem, positions: &[[i64; 3]]) -> Result<Vec<Vec<Slew>>, Ref
         need(turns.len() <= most, &place, &format!("at most {most} turns"), turns.len())?;
         let turn = |turn: &crate::file::RawTurn| {
             let about = match &turn.about {
-                None if turns.len() == 1 => About::Shortest,
+                None if turns.len() == 1 => TurnAxis::Shortest,
                 None => return Err(refusal(&place, "an axis where there are several turns", "null")),
                 Some(RawAxis::Direction(v)) => {
                     let plain = v.iter().all(|x| x.0.keys().all(|(_, a, b)| *a == 0 && *b == 0));
                     need(plain, &place, "numbers without rates", "a rate")?;
-                    About::Direction(v.clone())
+                    TurnAxis::Direction(v.clone())
                 }
                 Some(RawAxis::Named(name)) => match name.as_str() {
-                    "X_p" => About::Platform(0),
-                    "Y_p" => About::Platform(1),
-                    "Z_p" => About::Platform(2),
-                    "N" => About::Geographic(0),
-                    "U" => About::Geographic(1),
-                    "E" => About::Geographic(2),
-                    "middle" => About::Middle(positions[i - 1][2]),
+                    "X_p" => TurnAxis::Platform(0),
+                    "Y_p" => TurnAxis::Platform(1),
+                    "Z_p" => TurnAxis::Platform(2),
+                    "N" => TurnAxis::Geographic(0),
+                    "U" => TurnAxis::Geographic(1),
+                    "E" => TurnAxis::Geographic(2),
+                    "middle" => TurnAxis::Middle(positions[i - 1][2]),
                     _ => return Err(refusal(&place, "an axis of a turn", name)),
                 },
             };

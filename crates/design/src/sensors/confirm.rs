@@ -6,21 +6,21 @@ use obsdeg_core::system::{Candidate, judge};
 
 use super::cuts::members;
 use super::ranks::Set;
-use super::{SensorError, Task, degree, names};
+use super::{SensorError, SensorTask, degree, names};
 
 /// Largest number of sets that are judged again.
 const MOST: usize = 48;
 
 /// Result of the confirmation.
-pub(super) struct Confirmed {
+pub(super) struct Confirmation {
     /// Number of sets judged again.
     pub(super) sets: usize,
 }
 
-impl Confirmed {
+impl Confirmation {
     /// Judges sets again in their order, as far as the limit of work of one verdict goes. Empty sets
     /// without own outputs have no model and are skipped.
-    pub(super) fn of(task: &mut Task<'_>, sets: Vec<Set>) -> Result<Self, SensorError> {
+    pub(super) fn of(task: &mut SensorTask<'_>, sets: Vec<Set>) -> Result<Self, SensorError> {
         let (mut seen, mut left, mut alike) = (HashSet::new(), task.model.work_limit.operations(), 0);
         for set in sets.into_iter().filter(|set| *set != 0 || task.options.own_outputs) {
             if seen.len() >= MOST || left == 0 {
@@ -41,7 +41,7 @@ impl Confirmed {
 
 /// Compares the degrees under a set with those of a model with these outputs. Returns the number of
 /// operations; `None` if that model is not judged.
-fn judged_alike(task: &Task<'_>, set: Set, found: &[u16]) -> Result<Option<u64>, SensorError> {
+fn judged_alike(task: &SensorTask<'_>, set: Set, found: &[u16]) -> Result<Option<u64>, SensorError> {
     let options = task.options;
     let chosen: Vec<Candidate> = members(set).map(|c| options.candidates[c].clone()).collect();
     let (model, _) = task.model.measuring(&chosen, options.own_outputs);

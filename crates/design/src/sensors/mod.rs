@@ -29,11 +29,11 @@ use obsdeg_core::system::{
 use rayon::prelude::*;
 
 pub use answer::{FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable};
-use confirm::Confirmed;
+use confirm::Confirmation;
 use cuts::{cost_of, members};
 use ranks::NONE;
 pub use ranks::{Ordered, Ranks, Set};
-use search::{Best, Goal, Search, Stopped};
+use search::{CheapestSet, Goal, SetSearch, StopReason};
 
 /// Largest number of candidates.
 pub const MAX_SENSORS: usize = 64;
@@ -119,7 +119,7 @@ pub enum SensorError {
 }
 
 /// Unknown whose degree is computed.
-struct Asked {
+struct TargetUnknown {
     name: String,
     unit: String,
     column: usize,
@@ -155,8 +155,9 @@ pub fn sensors(
         };
         let n = gathered.judged.layout.unknowns.len() as u64;
         let most = (LIMITS * model.work_limit.operations() / (n * n * n / 2 + 1)).max(LEAST);
-        let search = Search::new(&*first, costs.clone(), asked.len(), most, going);
-        let mut task = Task { model, options, gathered: &gathered, asked, search, required: Vec::new() };
+        let search = SetSearch::new(&*first, costs.clone(), asked.len(), most, going);
+        let mut task =
+            SensorTask { model, options, gathered: &gathered, asked, search, required: Vec::new() };
         let answer = task.answer()?;
         match task.differs(&*second) {
             None if first.is_clear() && second.is_clear() => return Ok(answer),
@@ -193,7 +194,7 @@ fn owners(outputs: usize, ranges: &[std::ops::Range<usize>]) -> Vec<Set> {
 }
 
 /// Unknowns of the model with their units.
-fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<Asked> {
+fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<TargetUnknown> {
     let unit = |role: Role| match role {
         Role::State(i) => model.states[i].named.unit.clone(),
         Role::Parameter(i) => model.parameters[i].unit.clone(),
@@ -201,7 +202,7 @@ fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<Asked> {
         _ => String::new(),
     };
     let all = judged.layout.unknowns.iter().enumerate().filter(|(c, _)| judged.shown(model, *c));
-    all.map(|(column, u)| Asked { name: u.name.clone(), unit: unit(u.role), column }).collect()
+    all.map(|(column, u)| TargetUnknown { name: u.name.clone(), unit: unit(u.role), column }).collect()
 }
 
 fn names(set: Set, options: &SensorOptions) -> Vec<String> {
@@ -213,20 +214,22 @@ fn degree(degree: u16) -> Option<usize> {
 }
 
 /// Search with its options.
-struct Task<'a> {
+struct SensorTask<'a> {
     model: &'a SystemModel,
     options: &'a SensorOptions,
     gathered: &'a Gathered,
-    asked: Vec<Asked>,
-    search: Search<'a>,
+    asked: Vec<TargetUnknown>,
+    search: SetSearch<'a>,
     /// Required unknowns: indices among all.
     required: Vec<usize>,
 }
 
-impl Task<'_> {
+impl SensorTask<'_> {
     /// Indices of the unknowns with this name: one, or one per experiment.
     fn named(&self, name: &str) -> Result<Vec<usize>, SensorError> {
-        let is = |u: &Asked| u.name == name || u.name.split_once('@').is_some_and(|(base, _)| base == name);
+        let is = |u: &TargetUnknown| {
+            u.name == name || u.name.split_once('@').is_some_and(|(base, _)| base == name)
+        };
         let found: Vec<usize> = (0..self.asked.len()).filter(|&u| is(&self.asked[u])).collect();
         match found.is_empty() {
             false => Ok(found),
@@ -277,12 +280,12 @@ impl Task<'_> {
     }
 
     /// Adds the front of cost against degree to `out`, as far as it is found: sets with their proofs.
-    fn front(&mut self, out: &mut Vec<(Set, FrontSet)>) -> Result<(), Stopped> {
+    fn front(&mut self, out: &mut Vec<(Set, FrontSet)>) -> Result<(), StopReason> {
         let (mut most, everything) = (NONE - 1, self.search.worst(self.search.all)?);
         loop {
             let best = self.search.best(&Goal::All, most)?;
             let cuts = self.search.needed(&best);
-            let Best { set, degree: worst, examined, .. } = best;
+            let CheapestSet { set, degree: worst, examined, .. } = best;
             let one_of_each = cuts.into_iter().map(|cut| names(cut, self.options)).collect();
             let SensorSet { outputs, cost, degree } = self.set(set, worst);
             let below = (most < NONE - 1).then_some(most.into());
@@ -295,7 +298,7 @@ impl Task<'_> {
     }
 
     /// Cheapest set for every unknown.
-    fn of_unknowns(&mut self, stopped: &mut Option<Stopped>) -> Vec<SensorUnknown> {
+    fn of_unknowns(&mut self, stopped: &mut Option<StopReason>) -> Vec<SensorUnknown> {
         let reached = self.search.degrees(self.search.all).map(<[u16]>::to_vec).unwrap_or_default();
         let mut out = Vec::new();
         for u in 0..self.asked.len() {
@@ -348,7 +351,7 @@ impl Task<'_> {
         if any {
             stopped = self.front(&mut front).err();
             complete = if stopped.is_some() { 0 } else { complete };
-            if front.is_empty() && stopped == Some(Stopped::Interrupted) {
+            if front.is_empty() && stopped == Some(StopReason::Interrupted) {
                 return Err(SensorError::Interrupted);
             }
         }
@@ -366,7 +369,7 @@ impl Task<'_> {
         }
         let least = self.search.worst(self.search.all).ok().filter(|_| any);
         let relied = front.iter().map(|f| f.0).chain(sets).chain(self.proofs(&front));
-        let confirmed = Confirmed::of(self, relied.collect())?;
+        let confirmed = Confirmation::of(self, relied.collect())?;
         Ok(Sensors {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -424,7 +427,7 @@ impl Task<'_> {
     }
 }
 
-impl Stopped {
+impl StopReason {
     fn words(self) -> &'static str {
         match self {
             Self::Work => {

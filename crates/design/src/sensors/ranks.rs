@@ -114,7 +114,8 @@ where
     <Reals<N> as Scalars>::Element: Sync,
 {
     fn degrees(&self, set: Set) -> Box<[u16]> {
-        let mut space = Space(<<Reals<N> as Scalars>::Space as RowSpace>::new(Reals::<N>, self.columns));
+        let mut space =
+            AnyBasis(<<Reals<N> as Scalars>::AnyBasis as RowSpace>::new(Reals::<N>, self.columns));
         let degrees = self.climb(set, &mut space);
         if let Ok(mut gap) = self.gap.lock() {
             *gap = gap.and(space.0.gap());
@@ -128,9 +129,9 @@ where
 }
 
 /// Basis from any row space.
-struct Space<R>(R);
+struct AnyBasis<R>(R);
 
-impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for Space<R> {
+impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for AnyBasis<R> {
     fn add(&mut self, row: &[E]) -> bool {
         self.0.insert(row)
     }

@@ -33,7 +33,7 @@ pub(crate) enum Goal {
 
 /// Reason why a search ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Stopped {
+pub(crate) enum StopReason {
     /// Limit of work: more sets would be judged than it allows.
     Work,
     /// Limit of nodes: too many sets hit all cuts.
@@ -44,7 +44,7 @@ pub(crate) enum Stopped {
 
 /// Cheapest set with its proof.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Best {
+pub(crate) struct CheapestSet {
     pub(crate) set: Set,
     /// Degree of the goal.
     pub(crate) degree: u16,
@@ -71,7 +71,7 @@ fn sums(costs: &[u64]) -> Option<BTreeSet<u64>> {
 }
 
 /// Enumeration of all sets of one cost that hit every cut.
-struct OfCost<'a> {
+struct EqualCostSets<'a> {
     cuts: &'a [Set],
     costs: &'a [u64],
     /// Number of nodes that may still be visited.
@@ -79,7 +79,7 @@ struct OfCost<'a> {
     out: Vec<Set>,
 }
 
-impl OfCost<'_> {
+impl EqualCostSets<'_> {
     /// Extends a set by candidates from `next` on with the total cost `left`; `None` at the limit of
     /// nodes.
     fn go_on(&mut self, set: Set, next: usize, left: u64) -> Option<()> {
@@ -103,7 +103,7 @@ impl OfCost<'_> {
 }
 
 /// Search among sets of candidates of one model.
-pub(crate) struct Search<'a> {
+pub(crate) struct SetSearch<'a> {
     ranks: &'a dyn Ranks,
     /// Cost of each candidate, in millionths.
     pub(crate) costs: Vec<u64>,
@@ -120,7 +120,7 @@ pub(crate) struct Search<'a> {
     going: &'a (dyn Fn(u64) -> bool + Sync),
 }
 
-impl<'a> Search<'a> {
+impl<'a> SetSearch<'a> {
     pub(crate) fn new(
         ranks: &'a dyn Ranks,
         costs: Vec<u64>,
@@ -134,14 +134,14 @@ impl<'a> Search<'a> {
     }
 
     /// Judges sets that are not judged yet, on all cores.
-    pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), Stopped> {
+    pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), StopReason> {
         let mut new: Vec<Set> = sets.iter().copied().filter(|s| !self.judged.contains_key(s)).collect();
         new.sort_unstable();
         new.dedup();
         if new.is_empty() {
             return Ok(());
         }
-        self.left = self.left.checked_sub(new.len() as u64).ok_or(Stopped::Work)?;
+        self.left = self.left.checked_sub(new.len() as u64).ok_or(StopReason::Work)?;
         let ranks = self.ranks;
         let found: Vec<_> = match new.len() {
             1 => vec![ranks.degrees(new[0])],
@@ -150,19 +150,19 @@ impl<'a> Search<'a> {
         self.judged.extend(new.into_iter().zip(found));
         match (self.going)(self.judged.len() as u64) {
             true => Ok(()),
-            false => Err(Stopped::Interrupted),
+            false => Err(StopReason::Interrupted),
         }
     }
 
     /// Degrees under a set.
-    pub(crate) fn degrees(&mut self, set: Set) -> Result<&[u16], Stopped> {
+    pub(crate) fn degrees(&mut self, set: Set) -> Result<&[u16], StopReason> {
         self.judge(&[set])?;
-        self.judged.get(&set).map(|d| &**d).ok_or(Stopped::Work)
+        self.judged.get(&set).map(|d| &**d).ok_or(StopReason::Work)
     }
 
     /// Largest degree of the required unknowns under a set; `NONE` if one is not observable within its
     /// limit.
-    pub(crate) fn worst(&mut self, set: Set) -> Result<u16, Stopped> {
+    pub(crate) fn worst(&mut self, set: Set) -> Result<u16, StopReason> {
         self.judge(&[set])?;
         Ok(self.worst_of(set))
     }
@@ -193,7 +193,7 @@ impl<'a> Search<'a> {
 
     /// Adds candidates to failing sets as long as they fail, each in its own order, and keeps the
     /// maximal ones.
-    fn grow(&mut self, sets: Vec<(Set, usize)>, goal: Goal) -> Result<(), Stopped> {
+    fn grow(&mut self, sets: Vec<(Set, usize)>, goal: Goal) -> Result<(), StopReason> {
         let n = self.costs.len();
         let mut sets = sets;
         for step in 0..n {
@@ -217,10 +217,10 @@ impl<'a> Search<'a> {
     /// Cheapest set that reaches a goal, and the number of cheaper sets that hit all cuts and were
     /// judged one by one. All candidates together must reach the goal. `None` if every set costs more
     /// than `most`.
-    fn cheapest(&mut self, goal: Goal, most: u64) -> Result<Option<(Set, usize)>, Stopped> {
+    fn cheapest(&mut self, goal: Goal, most: u64) -> Result<Option<(Set, usize)>, StopReason> {
         for _ in 0..ROUNDS {
             let cuts = self.cuts(goal);
-            let set = Cheapest::of(&cuts, &self.costs, NODES).ok_or(Stopped::Nodes)?;
+            let set = Cheapest::of(&cuts, &self.costs, NODES).ok_or(StopReason::Nodes)?;
             if cost_of(set, &self.costs) > most {
                 return Ok(None);
             }
@@ -233,12 +233,13 @@ impl<'a> Search<'a> {
             self.grow(starts, goal)?;
         }
         let cuts = self.cuts(goal);
-        let least = Cheapest::of(&cuts, &self.costs, NODES).ok_or(Stopped::Nodes)?;
+        let least = Cheapest::of(&cuts, &self.costs, NODES).ok_or(StopReason::Nodes)?;
         let (from, mut failed) = (cost_of(least, &self.costs), 0);
-        let sums = sums(&self.costs).ok_or(Stopped::Nodes)?;
+        let sums = sums(&self.costs).ok_or(StopReason::Nodes)?;
         for cost in sums.into_iter().filter(|cost| (from..=most).contains(cost)) {
-            let mut sets = OfCost { cuts: &cuts, costs: &self.costs.clone(), nodes: NODES, out: Vec::new() };
-            sets.go_on(0, 0, cost).ok_or(Stopped::Nodes)?;
+            let mut sets =
+                EqualCostSets { cuts: &cuts, costs: &self.costs.clone(), nodes: NODES, out: Vec::new() };
+            sets.go_on(0, 0, cost).ok_or(StopReason::Nodes)?;
             for batch in sets.out.chunks(BATCH) {
                 self.judge(batch)?;
                 if let Some(set) = batch.iter().find(|set| self.reaches(**set, goal)) {
@@ -252,23 +253,23 @@ impl<'a> Search<'a> {
 
     /// Cheapest set that reaches a goal, of the smallest degree at this cost, with the proof of its
     /// cost; `with` is the goal for a degree.
-    pub(crate) fn best(&mut self, with: &dyn Fn(u16) -> Goal, most: u16) -> Result<Best, Stopped> {
-        let (mut set, examined) = self.cheapest(with(most), u64::MAX)?.ok_or(Stopped::Nodes)?;
+    pub(crate) fn best(&mut self, with: &dyn Fn(u16) -> Goal, most: u16) -> Result<CheapestSet, StopReason> {
+        let (mut set, examined) = self.cheapest(with(most), u64::MAX)?.ok_or(StopReason::Nodes)?;
         let cuts = self.cuts(with(most));
         let everything = self.degree_of(self.all, with(most))?;
         loop {
             let degree = self.degree_of(set, with(most))?;
             if degree <= everything {
-                return Ok(Best { set, degree, cuts, examined });
+                return Ok(CheapestSet { set, degree, cuts, examined });
             }
             match self.cheapest(with(degree - 1), cost_of(set, &self.costs))? {
                 Some((other, _)) => set = other,
-                None => return Ok(Best { set, degree, cuts, examined }),
+                None => return Ok(CheapestSet { set, degree, cuts, examined }),
             }
         }
     }
 
-    fn degree_of(&mut self, set: Set, goal: Goal) -> Result<u16, Stopped> {
+    fn degree_of(&mut self, set: Set, goal: Goal) -> Result<u16, StopReason> {
         match goal {
             Goal::All(_) => self.worst(set),
             Goal::One(u, _) => Ok(self.degrees(set)?[u]),
@@ -277,7 +278,7 @@ impl<'a> Search<'a> {
 
     /// Cuts that the proof of a cheapest set needs. If no set was judged one by one, a cut is dropped
     /// if all sets that hit the others cost as much.
-    pub(crate) fn needed(&self, best: &Best) -> Vec<Set> {
+    pub(crate) fn needed(&self, best: &CheapestSet) -> Vec<Set> {
         let (mut cuts, cost) = (best.cuts.clone(), cost_of(best.set, &self.costs));
         let mut at = if best.examined > 0 { 0 } else { cuts.len() };
         while at > 0 {
@@ -294,7 +295,7 @@ impl<'a> Search<'a> {
 
     /// All minimal sets that reach a goal, the number of members up to which the list is complete, and
     /// the reason for an early end.
-    pub(crate) fn minimal(&mut self, goal: Goal) -> (Vec<Set>, u32, Option<Stopped>) {
+    pub(crate) fn minimal(&mut self, goal: Goal) -> (Vec<Set>, u32, Option<StopReason>) {
         let mut found = Transversals::new(HELD);
         let all_added = |found: &mut Transversals, cuts: Vec<Set>| cuts.into_iter().all(|cut| found.add(cut));
         let mut within = all_added(&mut found, self.cuts(goal));
@@ -308,7 +309,7 @@ impl<'a> Search<'a> {
             let mut failing: Vec<Set> =
                 found.sets.iter().copied().filter(|s| self.known_failing(*s, goal)).collect();
             if !within {
-                break Some(Stopped::Nodes);
+                break Some(StopReason::Nodes);
             }
             if failing.is_empty() && open.is_empty() {
                 break None;
@@ -375,7 +376,7 @@ mod tests {
             };
             let drawn = Drawn((0..3).map(|_| unknown(&mut rng)).collect());
             let costs: Vec<u64> = (0..n).map(|_| 1 + if round % 2 == 0 { 0 } else { rng.below(4) }).collect();
-            let mut search = Search::new(&drawn, costs.clone(), 3, u64::MAX, &|_| true);
+            let mut search = SetSearch::new(&drawn, costs.clone(), 3, u64::MAX, &|_| true);
             search.limits = vec![Some(NONE - 1), Some(4), None];
             let all: Vec<Set> = (0..1 << n).collect();
             search.judge(&all).expect("few");
@@ -408,7 +409,8 @@ mod tests {
                 assert_eq!((sets, stopped), (minimal, None));
                 assert!(complete >= n as u32);
             }
-            let Best { set: found, degree, .. } = search.best(&|k| Goal::One(2, k), NONE - 1).expect("few");
+            let CheapestSet { set: found, degree, .. } =
+                search.best(&|k| Goal::One(2, k), NONE - 1).expect("few");
             let degree_of = |s: Set| drawn.degrees(s)[2];
             let fits = || all.iter().filter(|s| degree_of(**s) < NONE);
             let cheapest = fits().map(|s| cost(*s)).min();
@@ -428,12 +430,12 @@ mod tests {
                 Box::new([if set.count_ones() >= 5 { 1 } else { NONE }])
             }
         }
-        let mut search = Search::new(&AnyFive, vec![1; 14], 1, u64::MAX, &|_| true);
+        let mut search = SetSearch::new(&AnyFive, vec![1; 14], 1, u64::MAX, &|_| true);
         search.limits = vec![Some(NONE - 1)];
         let best = search.best(&Goal::All, NONE - 1).expect("few");
         assert_eq!((best.set.count_ones(), best.degree), (5, 1));
         assert!(best.examined > 500 && best.examined <= 2002, "{}", best.examined);
-        let mut sets = OfCost { cuts: &[0b11], costs: &[1, 2, 3, 4], nodes: 99, out: Vec::new() };
+        let mut sets = EqualCostSets { cuts: &[0b11], costs: &[1, 2, 3, 4], nodes: 99, out: Vec::new() };
         assert_eq!(sets.go_on(0, 0, 5), Some(()));
         assert_eq!((sets.out, sums(&[1, 1, 3])), (vec![0b1001, 0b0110], Some([0, 1, 2, 3, 4, 5].into())));
     }
@@ -442,15 +444,15 @@ mod tests {
     #[test]
     fn what_ends_a_search_is_said() {
         let drawn = Drawn(vec![vec![(0b11_1000, 1), (0b111, 0)]]);
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 3, &|_| true);
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 3, &|_| true);
         search.limits = vec![Some(NONE - 1)];
-        assert_eq!(search.cheapest(Goal::All(9), 9), Err(Stopped::Work));
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 99, &|_| false);
+        assert_eq!(search.cheapest(Goal::All(9), 9), Err(StopReason::Work));
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 99, &|_| false);
         search.limits = vec![Some(NONE - 1)];
-        assert_eq!(search.cheapest(Goal::All(9), 9), Err(Stopped::Interrupted));
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 5, &|_| true);
+        assert_eq!(search.cheapest(Goal::All(9), 9), Err(StopReason::Interrupted));
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 5, &|_| true);
         search.limits = vec![Some(NONE - 1)];
         let (sets, complete, stopped) = search.minimal(Goal::All(9));
-        assert!(sets.is_empty() && complete == 0 && stopped == Some(Stopped::Work));
+        assert!(sets.is_empty() && complete == 0 && stopped == Some(StopReason::Work));
     }
 }

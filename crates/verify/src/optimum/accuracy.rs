@@ -129,7 +129,7 @@ pub(super) struct Accuracy {
 
 /// State of a sequence of positions.
 #[derive(Clone)]
-pub(super) struct State {
+pub(super) struct SequenceState {
     /// psi in the carried axes as a function of the unknowns (3 x n).
     psi: Rows,
     /// Rows Y of the positions so far.
@@ -142,7 +142,7 @@ pub(super) struct State {
 
 /// Value of a criterion with its lower bound.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Value {
+pub(super) struct BoundedValue {
     pub computed: f64,
     pub at_least: f64,
     /// Smallest pivot of the root relative to its diagonal entry, without those that are left out; 0 if
@@ -304,14 +304,19 @@ impl Accuracy {
         if self.carry == "reset" { 0 } else { 3 }
     }
 
-    pub(super) fn start(&self) -> State {
+    pub(super) fn start(&self) -> SequenceState {
         let n = self.psi() + self.d;
         let unit = |r: usize| (0..n).map(|j| f64::from(u8::from(j == r))).collect();
-        State { psi: (0..3).map(unit).collect(), rows: Vec::new(), own: Vec::new(), information: zeros(n, n) }
+        SequenceState {
+            psi: (0..3).map(unit).collect(),
+            rows: Vec::new(),
+            own: Vec::new(),
+            information: zeros(n, n),
+        }
     }
 
     /// State of the sequence with one more candidate.
-    pub(super) fn extended(&self, state: &State, candidate: usize) -> State {
+    pub(super) fn extended(&self, state: &SequenceState, candidate: usize) -> SequenceState {
         let mut out = state.clone();
         let (c, effects) = &self.candidates[candidate];
         let rows = if self.carry == "reset" {
@@ -338,7 +343,7 @@ impl Accuracy {
     }
 
     /// Criterion of a sequence.
-    pub(super) fn value(&self, state: &State) -> Value {
+    pub(super) fn value(&self, state: &SequenceState) -> BoundedValue {
         let root = Root::new(&state.information, self.psi() + self.nuisance);
         let n = root.l.len();
         let (first, d) = (n - self.limits.len(), self.limits.len() as f64);
@@ -374,7 +379,7 @@ impl Accuracy {
             }
         };
         // rounding of the bound itself
-        Value {
+        BoundedValue {
             computed: squared.sqrt(),
             at_least: (bound.sqrt() * (1.0 - 1e-13)).max(0.0),
             pivot: root.pivot,
@@ -383,7 +388,7 @@ impl Accuracy {
     }
 
     /// Upper bound on `|Y x|`, valid despite rounding.
-    fn energy(&self, state: &State, x: &[f64]) -> f64 {
+    fn energy(&self, state: &SequenceState, x: &[f64]) -> f64 {
         let psi = self.psi();
         let (mut sum, mut hidden) = (0.0, 0.0);
         let sizes = |of: usize| x[psi..].iter().zip(&self.scales).map(|(x, s)| x.abs() * s[of]).sum::<f64>();

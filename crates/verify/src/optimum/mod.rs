@@ -10,8 +10,8 @@ use crate::file::{RawGyro, RawProblem};
 use crate::modular::{Randomness, chance};
 use crate::problem::{Problem, known_carry};
 use crate::{Refused, Replay, by_primes, need, parsed, refusal, same};
-use accuracy::{Accuracy, Criterion, Dwell, SURE_PIVOT, State, Value};
-use space::{Space, multisets, power};
+use accuracy::{Accuracy, BoundedValue, Criterion, Dwell, SURE_PIVOT, SequenceState};
+use space::{SetVerdicts, multisets, power};
 
 /// Layout of certificates of optima.
 pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
@@ -95,12 +95,12 @@ struct RawBlock {
 }
 
 /// Checked search.
-struct Search {
+struct CheckedSearch {
     problem: Problem,
     carry: String,
     positions: usize,
     accuracy: Accuracy,
-    space: Space,
+    space: SetVerdicts,
     /// Bound on the probability that all primes give a wrong result for any set.
     error: f64,
     primes: usize,
@@ -116,11 +116,11 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
         "one",
     )?;
     let file: Optimum = parsed(certificate)?;
-    let mut search = Search::new(&file.problem, certificate)?;
+    let mut search = CheckedSearch::new(&file.problem, certificate)?;
     let least = winners(&mut search, &file)?;
     let (firsts, depth) = search.cover(&file, least)?;
     let (chosen, seed) = chosen(&file, certificate, replay)?;
-    let mut found = Found { at_least: f64::INFINITY, ..Found::default() };
+    let mut found = ReplayResult { at_least: f64::INFINITY, ..ReplayResult::default() };
     for &i in &chosen {
         let block = &file.blocks[i];
         let start: Vec<usize> = block.start.iter().map(|c| c - 1).collect();
@@ -145,15 +145,15 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
 
 /// Results of replays.
 #[derive(Default)]
-struct Found {
+struct ReplayResult {
     sequences: u64,
     /// Number of sequences with the degree of the optimum within the caps.
     counted: u64,
     at_least: f64,
-    least: Option<(Vec<usize>, Value)>,
+    least: Option<(Vec<usize>, BoundedValue)>,
 }
 
-impl Found {
+impl ReplayResult {
     fn add(&mut self, other: Self) {
         self.sequences += other.sequences;
         self.counted += other.counted;
@@ -170,7 +170,7 @@ fn listed(sequence: &[usize]) -> String {
 }
 
 /// Checks the best sequences, and returns the value of the first.
-fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
+fn winners(search: &mut CheckedSearch, file: &Optimum) -> Result<f64, Refused> {
     let (n, k) = (search.problem.positions.len(), search.positions);
     need((1..=1000).contains(&file.best.len()), "best", "1 to 1000 sequences", file.best.len())?;
     let mut before = 0.0;
@@ -272,7 +272,7 @@ fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
     })
 }
 
-impl Search {
+impl CheckedSearch {
     fn new(raw: &RawSearch, certificate: &[u8]) -> Result<Self, Refused> {
         known_carry(&raw.carry)?;
         // rows of the candidates; the carry acts when positions are combined
@@ -314,7 +314,7 @@ impl Search {
         };
         let caps = required.iter().map(|r| (r.0, r.1)).collect();
         let random = &mut Randomness::new(certificate);
-        let space = Space::new(&problem, &raw.carry, caps, primes as usize, random, &alike);
+        let space = SetVerdicts::new(&problem, &raw.carry, caps, primes as usize, random, &alike);
         Ok(Self {
             accuracy: Accuracy::new(&problem, &raw.carry, &dwell, criterion, &columns),
             unit: unit(&problem, criterion, &required)?,
@@ -327,7 +327,7 @@ impl Search {
         })
     }
 
-    fn value(&self, sequence: &[usize]) -> Value {
+    fn value(&self, sequence: &[usize]) -> BoundedValue {
         let state = sequence.iter().fold(self.accuracy.start(), |s, &c| self.accuracy.extended(&s, c));
         self.accuracy.value(&state)
     }
@@ -402,12 +402,12 @@ impl Search {
     }
 
     /// Searches all sequences of a block.
-    fn replay(&mut self, start: &[usize], file: &Optimum) -> Result<Found, Refused> {
+    fn replay(&mut self, start: &[usize], file: &Optimum) -> Result<ReplayResult, Refused> {
         let mut states = vec![self.accuracy.start()];
         for &c in start {
             states.push(self.accuracy.extended(&states[states.len() - 1], c));
         }
-        let mut found = Found { at_least: f64::INFINITY, ..Found::default() };
+        let mut found = ReplayResult { at_least: f64::INFINITY, ..ReplayResult::default() };
         let state = states.swap_remove(start.len());
         self.visit(&mut start.to_vec(), &state, file.degree, &mut found)?;
         Ok(found)
@@ -416,9 +416,9 @@ impl Search {
     fn visit(
         &mut self,
         sequence: &mut Vec<usize>,
-        state: &State,
+        state: &SequenceState,
         degree: usize,
-        found: &mut Found,
+        found: &mut ReplayResult,
     ) -> Result<(), Refused> {
         if sequence.len() == self.positions {
             found.sequences += 1;
@@ -459,7 +459,7 @@ impl Search {
         file: &Optimum,
         (firsts, depth): (&[usize], usize),
         (replayed, seed): (usize, Option<u64>),
-        found: &Found,
+        found: &ReplayResult,
     ) -> Vec<String> {
         let (n, k) = (self.problem.positions.len(), self.positions);
         let order = if self.carry == "reset" { ", order is of no account" } else { "" };

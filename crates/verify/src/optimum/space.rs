@@ -8,11 +8,11 @@ use crate::modular::{PrimeField, Randomness, inverse, judge, subtract, times};
 use crate::problem::{Matrix, Problem, Ring, times as product};
 
 /// Rows of one candidate by order and component: psi first, then the coefficients.
-type RowsOf = Vec<(RowName, Vec<u64>)>;
+type CandidateRows = Vec<(RowName, Vec<u64>)>;
 
 /// Verdicts on sets of candidates.
-pub(super) struct Space {
-    fields: Vec<(u64, Vec<RowsOf>)>,
+pub(super) struct SetVerdicts {
+    fields: Vec<(u64, Vec<CandidateRows>)>,
     reset: bool,
     /// Names of the unknowns of one candidate.
     names: Vec<String>,
@@ -23,7 +23,7 @@ pub(super) struct Space {
     pub maps: Vec<Vec<usize>>,
 }
 
-impl Space {
+impl SetVerdicts {
     /// Verdicts for a problem with the candidates as positions and carry platform; `alike(i, j)` is
     /// true if coefficients i and j are equivalent for the criterion.
     pub(super) fn new(
@@ -37,7 +37,7 @@ impl Space {
         let (mut fields, mut maps) = (Vec::new(), None::<Vec<Option<Vec<usize>>>>);
         for _ in 0..primes {
             let field = PrimeField::new(problem, random);
-            let mut of: Vec<RowsOf> = vec![Vec::new(); problem.positions.len()];
+            let mut of: Vec<CandidateRows> = vec![Vec::new(); problem.positions.len()];
             let attitudes = problem.attitudes(&field);
             for (name, mut row) in problem.rows(&field) {
                 let i = name.0 - 1;
@@ -111,16 +111,16 @@ impl Space {
         self.known.len()
     }
 
-    fn judged(&self, field: &(u64, Vec<RowsOf>), set: &[usize]) -> Option<usize> {
+    fn judged(&self, field: &(u64, Vec<CandidateRows>), set: &[usize]) -> Option<usize> {
         self.found(field, set).map(|found| found.0)
     }
 
     /// Worst degree and number of undetermined unknowns by one prime.
-    fn found(&self, (p, candidates): &(u64, Vec<RowsOf>), set: &[usize]) -> Option<(usize, usize)> {
+    fn found(&self, (p, candidates): &(u64, Vec<CandidateRows>), set: &[usize]) -> Option<(usize, usize)> {
         let d = self.names.len() - 3;
         // under reset carry no row has entries at psi
         let psi = if self.reset { 0 } else { 3 };
-        let mut rows: RowsOf = Vec::new();
+        let mut rows: CandidateRows = Vec::new();
         for (i, &c) in set.iter().enumerate() {
             rows.extend(candidates[c].iter().map(|(name, row)| ((i + 1, name.1, name.2), row.clone())));
         }
@@ -138,7 +138,7 @@ impl Space {
 
 /// Combinations of the rows of one candidate without entries at its psi, by order, on the coefficients
 /// alone: its contribution to candidates with a psi of their own.
-fn without_psi(p: u64, rows: &RowsOf) -> RowsOf {
+fn without_psi(p: u64, rows: &CandidateRows) -> CandidateRows {
     let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
     let mut out = Vec::new();
     for (name, row) in rows {

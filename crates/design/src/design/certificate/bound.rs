@@ -21,7 +21,7 @@ use super::bounded::rounding;
 /// Objective to minimise: a function of the inverse of an information matrix M. S is the block of this
 /// inverse for the d unknowns that count.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Aim {
+pub(super) enum Objective {
     /// `det(S)^(1/d)` (D-optimal).
     Volume,
     /// `mean_j v_j^T M^-1 v_j` (A-optimal), `v_j` the columns (m x t).
@@ -42,7 +42,7 @@ pub(super) struct Additive {
     /// Number of unknowns that do not count.
     pub(super) nuisance: usize,
     /// Objective to minimise.
-    pub(super) aim: Aim,
+    pub(super) objective: Objective,
 }
 
 /// Dual variables: a matrix X with weights of the columns. They prove a lower bound.
@@ -99,15 +99,15 @@ impl Additive {
             sum.max(0.0).powi(2) / energy
         };
         let d = self.counting() as f64;
-        let bound = match &self.aim {
-            Aim::Volume => {
+        let bound = match &self.objective {
+            Objective::Volume => {
                 let logs = || (0..self.counting()).map(|j| x[(self.nuisance + j, j)].abs().ln());
                 let sizes: f64 = logs().map(f64::abs).sum();
                 d * (2.0 * logs().sum::<f64>() / d - 4.0 * f64::EPSILON * sizes).exp() / energy
             }
-            Aim::Least => x.rows(self.nuisance, self.counting()).norm_squared() / energy,
-            Aim::Mean(vectors) => shared(vectors),
-            Aim::Largest(vectors, offsets) => {
+            Objective::Least => x.rows(self.nuisance, self.counting()).norm_squared() / energy,
+            Objective::Mean(vectors) => shared(vectors),
+            Objective::Largest(vectors, offsets) => {
                 let known: f64 = offsets.iter().zip(&dual.shares).map(|(o, s)| o * s).sum();
                 known + shared(vectors)
             }
@@ -162,19 +162,19 @@ mod tests {
             over(sum.mul(&sum), &energy)
         };
         let shares = dual.shares.iter().fold(Real::ZERO, |sum, s| sum.add(&real(*s)));
-        match &problem.aim {
-            Aim::Volume => {
+        match &problem.objective {
+            Objective::Volume => {
                 let logs = (0..d).map(|j| columns[j][counting(j)].abs().ln().expect("positive"));
                 let sum = logs.fold(Real::ZERO, |sum, x| sum.add(&x));
                 let mean = over(sum.shifted(1), &Real::from_i64(d as i64));
                 over(mean.exp().expect("finite").mul(&Real::from_i64(d as i64)), &energy)
             }
-            Aim::Least => {
+            Objective::Least => {
                 let squares = columns.iter().flat_map(|x| x[problem.nuisance..].iter().map(|x| x.mul(x)));
                 over(squares.fold(Real::ZERO, |sum, x| sum.add(&x)), &energy)
             }
-            Aim::Mean(vectors) => over(shared(vectors), &shares),
-            Aim::Largest(vectors, offsets) => {
+            Objective::Mean(vectors) => over(shared(vectors), &shares),
+            Objective::Largest(vectors, offsets) => {
                 let known = offsets.iter().zip(&dual.shares).map(|(o, s)| real(*o).mul(&real(*s)));
                 over(known.fold(shared(vectors), |sum, x| sum.add(&x)), &shares)
             }
@@ -208,7 +208,7 @@ mod tests {
             let conditions = Conditions::default();
             let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
             let k = 3 + below(9);
-            let problem = evaluator.additive(evaluator.aim(criterion), k);
+            let problem = evaluator.additive(evaluator.objective(criterion), k);
             let Some(found) = weigh(&problem, &|| true) else { continue };
             let bound = problem.lower_bound(&found.dual);
             let truth = proven(&evaluator, k, &problem, &found.dual);

@@ -93,14 +93,14 @@ pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x
 type Matrix = Vec<Vec<Real>>;
 
 /// Information of a scheme on the coefficients, the sum over its positions, and its inverse.
-pub(super) struct Exact {
+pub(super) struct ExactInformation {
     /// Inverse of the information (m x m).
     inverse: Matrix,
     nuisance: usize,
     dph: f64,
 }
 
-impl Exact {
+impl ExactInformation {
     pub(super) fn of(evaluator: &Evaluator, sequence: &[Stop]) -> Self {
         let (n, m) = (evaluator.n, evaluator.n - 3);
         let start = evaluator.start().information;

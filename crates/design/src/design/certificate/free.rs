@@ -18,7 +18,7 @@ use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, e
 use rayon::prelude::*;
 
 use super::bounded::{Bounded, Bounds, rounding};
-use super::weights::{Weighed, listed, weigh};
+use super::weights::{OptimalWeights, listed, weigh};
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
 
@@ -65,15 +65,15 @@ impl Evaluator {
         if self.ordered() || k == 0 || !self.prior.is_alike() {
             return None;
         }
-        let aim = match criterion {
+        let objective = match criterion {
             Criterion::Margin(limits) => {
-                self.aim(&Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }))
+                self.objective(&Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }))
             }
-            other => self.aim(other),
+            other => self.objective(other),
         };
         let mut here = self.clone();
-        let mut problem = here.additive(aim, k);
-        let mut found: Weighed = weigh(&problem, going)?;
+        let mut problem = here.additive(objective, k);
+        let mut found: OptimalWeights = weigh(&problem, going)?;
         let scale = k as f64 * self.dph * self.dph;
         for _ in 0..ROUNDS {
             let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
@@ -91,7 +91,7 @@ impl Evaluator {
             let mut attitudes: Vec<Matrix3<f64>> = kept.map(|(c, _)| c.c).collect();
             attitudes.extend(new.iter().map(c_n_f64));
             here.stand_at(&attitudes);
-            problem = here.additive(problem.aim.clone(), k);
+            problem = here.additive(problem.objective.clone(), k);
             found = weigh(&problem, going)?;
         }
         // h: changes of three angles, of which two axes may coincide, are a rotation by at most sqrt(5)
@@ -111,7 +111,7 @@ impl Evaluator {
         let (support, weights) = merged(support.map(|(c, w)| (&c.c, *w)));
         // listed figures are those of the listed attitudes and weights
         here.stand_at(&support.iter().map(c_n_f64).collect::<Vec<_>>());
-        let problem = here.additive(problem.aim, k);
+        let problem = here.additive(problem.objective, k);
         let exact = || (weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &weights).unwrap_or_else(exact);
         let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
-use bound::{Additive, Aim};
+use bound::{Additive, Objective};
 use weights::{listed, weigh};
 
 /// Largest number of first positions for which psi is bounded one by one, for requirements on psi.
@@ -54,22 +54,22 @@ impl Evaluator {
             Criterion::Margin(limits) if limits.psi.iter().any(|l| l.is_finite()) => {
                 self.with_psi(limits, k, firsts, going)?
             }
-            _ => self.weighed(self.aim(criterion), k, going)?,
+            _ => self.weighed(self.objective(criterion), k, going)?,
         };
         (going() && found.value > 0.0).then_some(found)
     }
 
     /// Objective of a criterion, as a function of the information on the coefficients.
-    fn aim(&self, criterion: &Criterion) -> Aim {
+    fn objective(&self, criterion: &Criterion) -> Objective {
         match criterion {
             Criterion::Margin(limits) => self.largest(limits),
             Criterion::Worst => {
                 let d = self.n - 3 - self.nuisance;
                 self.largest(&Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] })
             }
-            Criterion::A => Aim::Mean(self.units()),
-            Criterion::D => Aim::Volume,
-            Criterion::E => Aim::Least,
+            Criterion::A => Objective::Mean(self.units()),
+            Criterion::D => Objective::Volume,
+            Criterion::E => Objective::Least,
         }
     }
 
@@ -80,13 +80,13 @@ impl Evaluator {
     }
 
     /// Objective: largest variance over the square of its limit.
-    fn largest(&self, limits: &Limits) -> Aim {
+    fn largest(&self, limits: &Limits) -> Objective {
         let mut vectors = self.units();
         for (mut column, limit) in vectors.column_iter_mut().zip(&limits.coefficients) {
             column /= *limit;
         }
         let offsets = vec![0.0; vectors.ncols()];
-        Aim::Largest(vectors, offsets)
+        Objective::Largest(vectors, offsets)
     }
 
     /// Objective as [`Self::largest`], with psi of one position added: every scheme, up to its images,
@@ -99,7 +99,7 @@ impl Evaluator {
         going: &dyn Fn() -> bool,
     ) -> Option<Bound> {
         let every: Vec<usize> = if firsts.len() <= MOST_PSI { firsts.to_vec() } else { Vec::new() };
-        let Aim::Largest(coefficients, none) = self.largest(limits) else { return None };
+        let Objective::Largest(coefficients, none) = self.largest(limits) else { return None };
         let mut least: Option<Bound> = None;
         for candidate in every.iter().map(Some).chain(every.is_empty().then_some(None)) {
             let (mut vectors, mut offsets) = (coefficients.clone(), none.clone());
@@ -115,7 +115,7 @@ impl Evaluator {
                 vectors.set_column(at, &DVector::from_iterator(psi.moved.len(), moved));
                 offsets.push(psi.variances[k] * unit * unit);
             }
-            let found = self.weighed(Aim::Largest(vectors, offsets), k, going)?;
+            let found = self.weighed(Objective::Largest(vectors, offsets), k, going)?;
             if least.as_ref().is_none_or(|l| found.value < l.value) {
                 least = Some(found);
             }
@@ -124,8 +124,8 @@ impl Evaluator {
     }
 
     /// Weights that minimise the objective, with their bound.
-    fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
-        let problem = self.additive(aim, k);
+    fn weighed(&self, objective: Objective, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        let problem = self.additive(objective, k);
         let found = weigh(&problem, going)?;
         let exact = || (found.weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
@@ -140,7 +140,7 @@ impl Evaluator {
     }
 
     /// Information of the candidates, times k; numbers are in deg/h (per g).
-    fn additive(&self, aim: Aim, k: usize) -> Additive {
+    fn additive(&self, objective: Objective, k: usize) -> Additive {
         let (n, m) = (self.n, self.n - 3);
         let unit = k as f64 * self.dph * self.dph;
         let known = |i: usize, j: usize| match i == j {
@@ -153,7 +153,7 @@ impl Evaluator {
             candidates: self.candidates.iter().map(|c| information(&c.own)).collect(),
             prior: DMatrix::from_fn(m, m, known),
             nuisance: self.nuisance,
-            aim,
+            objective,
         }
     }
 }

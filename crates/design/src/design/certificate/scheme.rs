@@ -105,7 +105,7 @@ fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Exact, square_root};
+    use super::super::exact::{ExactInformation, square_root};
     use super::*;
     use crate::design::measure::criterion::Limits;
     use crate::design::{Candidates, Stop};
@@ -160,7 +160,7 @@ mod tests {
                 (0..candidates.len() + drawn(3)).map(|i| Stop::from(i % candidates.len())).collect();
             let computed = evaluator.of_sequence(&sequence, &criterion);
             let Some(most) = evaluator.at_most(&sequence, &criterion, None) else { continue };
-            let exact = Exact::of(&evaluator, &sequence);
+            let exact = ExactInformation::of(&evaluator, &sequence);
             let part = most / computed - 1.0;
             if criterion == Criterion::E {
                 // the largest eigenvalue is below a number where that number times 1, minus S, is

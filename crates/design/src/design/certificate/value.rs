@@ -7,7 +7,7 @@ pub(crate) fn excess(value: f64, bound: f64) -> f64 {
 
 /// Criterion with its rounding tolerance.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Value {
+pub(crate) struct CriterionValue {
     /// Criterion as the search computes it.
     pub(crate) computed: f64,
     /// Upper bound on the criterion; the computed value where its rounding error is unknown.
@@ -16,7 +16,7 @@ pub(crate) struct Value {
     pub(crate) rounding: Option<f64>,
 }
 
-impl Value {
+impl CriterionValue {
     pub(crate) fn new(computed: f64, at_most: Option<f64>) -> Self {
         let rounding = at_most.map(|most| (most / computed - 1.0).max(0.0));
         Self { computed, at_most: at_most.unwrap_or(computed).max(computed), rounding }

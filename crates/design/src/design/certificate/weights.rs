@@ -9,7 +9,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::bound::{Additive, Aim, Dual};
+use super::bound::{Additive, Dual, Objective};
 
 /// Relative gap between the objective and its bound at which the search for weights ends.
 const GAP: f64 = 1e-7;
@@ -37,7 +37,7 @@ const RIDGE: f64 = 1e-13;
 
 /// Optimal weights with the bound that they prove.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Weighed {
+pub(super) struct OptimalWeights {
     /// Weight of every candidate, dimensionless (sum 1).
     pub(super) weights: Vec<f64>,
     /// Objective at these weights.
@@ -49,7 +49,7 @@ pub(super) struct Weighed {
 }
 
 /// Barrier function at some weights, with the Cholesky factor of the information.
-struct At {
+struct BarrierPoint {
     root: Cholesky<f64, Dyn>,
     /// `tau f`, with the barriers of the constraints of the objective itself.
     value: f64,
@@ -73,7 +73,7 @@ struct ByS {
 }
 
 /// Barrier problem for a subset of the candidates.
-struct Weighing<'a> {
+struct WeightProblem<'a> {
     problem: &'a Additive,
     /// Indices of the candidates.
     active: Vec<usize>,
@@ -84,12 +84,12 @@ struct Weighing<'a> {
 
 /// Optimal weights and the bound that they prove; stops when `going` returns false. `None` where all
 /// candidates together do not determine the unknowns that count in double precision.
-pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weighed> {
+pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
     // the result is unknown if it depends on the ridge, and if rounding decides without the ridge
     [RIDGE, 0.0].into_iter().find_map(|ridge| {
         let found = generated(problem, ridge, going)?;
         let singular = found.bound > found.attained * (1.0 + SINGULAR);
-        (!singular).then(|| Weighed { attained: found.attained.max(found.bound), ..found })
+        (!singular).then(|| OptimalWeights { attained: found.attained.max(found.bound), ..found })
     })
 }
 
@@ -101,18 +101,18 @@ pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f
         let active: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
         let sum: f64 = weights.iter().sum();
         let parts: Vec<f64> = active.iter().map(|&i| weights[i] / sum).collect();
-        Weighing::new(problem, active, 0.0).aim(&parts)
+        WeightProblem::new(problem, active, 0.0).objective(&parts)
     };
     let least = of(weights)?;
     let found = DIGITS.iter().filter_map(|&digits| {
         let weights: Vec<f64> = weights.iter().map(|&w| rounded(w, digits)).collect();
-        let aim = of(&weights)?;
-        Some((weights, aim))
+        let objective = of(&weights)?;
+        Some((weights, objective))
     });
     let mut last = None;
-    for (weights, aim) in found {
-        let near = aim <= least * (1.0 + COARSE);
-        last = Some((weights, aim));
+    for (weights, objective) in found {
+        let near = objective <= least * (1.0 + COARSE);
+        last = Some((weights, objective));
         if near {
             break;
         }
@@ -130,15 +130,15 @@ fn rounded(weight: f64, digits: i32) -> f64 {
 }
 
 /// Optimal weights as [`weigh`], by column generation with the given ridge.
-fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<Weighed> {
+fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
     let all = problem.candidates.len();
     let mean = problem.candidates.iter().map(DMatrix::trace).sum::<f64>() / all as f64;
     let ridge = ridge * (mean + problem.prior.trace()) / problem.unknowns() as f64;
     let every = all.div_ceil(ACTIVE).max(1);
     let mut active: Vec<usize> = (0..all).step_by(every).collect();
-    let mut best: Option<Weighed> = None;
+    let mut best: Option<OptimalWeights> = None;
     for _ in 0..ROUNDS {
-        let weighing = Weighing::new(problem, active.clone(), ridge);
+        let weighing = WeightProblem::new(problem, active.clone(), ridge);
         let Some(found) = weighing.weigh(going) else {
             // these candidates do not determine the unknowns that count: add more
             let missing = (0..all).filter(|i| !active.contains(i)).step_by(2).collect::<Vec<_>>();
@@ -191,7 +191,7 @@ fn factor(a: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), m, |i, j| rows[i][j])
 }
 
-impl<'a> Weighing<'a> {
+impl<'a> WeightProblem<'a> {
     fn new(problem: &'a Additive, active: Vec<usize>, ridge: f64) -> Self {
         let factors = active.iter().map(|&i| factor(&problem.candidates[i])).collect();
         Self { problem, active, factors, ridge }
@@ -209,7 +209,7 @@ impl<'a> Weighing<'a> {
     /// Information reduced for E-optimality: `M - s` on the unknowns that count.
     fn reduced(&self, w: &[f64], s: f64) -> DMatrix<f64> {
         let mut out = self.information(w);
-        if self.problem.aim == Aim::Least {
+        if self.problem.objective == Objective::Least {
             (self.problem.nuisance..self.problem.unknowns()).for_each(|i| out[(i, i)] -= s);
         }
         out
@@ -217,13 +217,13 @@ impl<'a> Weighing<'a> {
 
     /// `M^-1 v_j` of the columns of the objective (m x t), and `v_j^T M^-1 v_j` (shape t).
     fn solved(&self, root: &Cholesky<f64, Dyn>) -> (DMatrix<f64>, Vec<f64>) {
-        match &self.problem.aim {
-            Aim::Mean(vectors) | Aim::Largest(vectors, _) => {
+        match &self.problem.objective {
+            Objective::Mean(vectors) | Objective::Largest(vectors, _) => {
                 let u = root.solve(vectors);
                 let values = (0..vectors.ncols()).map(|j| vectors.column(j).dot(&u.column(j))).collect();
                 (u, values)
             }
-            Aim::Volume | Aim::Least => (DMatrix::zeros(self.problem.unknowns(), 0), Vec::new()),
+            Objective::Volume | Objective::Least => (DMatrix::zeros(self.problem.unknowns(), 0), Vec::new()),
         }
     }
 
@@ -235,15 +235,15 @@ impl<'a> Weighing<'a> {
     }
 
     /// Objective at the weights `w`.
-    fn aim(&self, w: &[f64]) -> Option<f64> {
+    fn objective(&self, w: &[f64]) -> Option<f64> {
         let root = self.information(w).cholesky()?;
-        let value = match &self.problem.aim {
-            Aim::Volume => self.volume(&root).exp(),
-            Aim::Mean(vectors) => self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64,
-            Aim::Largest(_, offsets) => {
+        let value = match &self.problem.objective {
+            Objective::Volume => self.volume(&root).exp(),
+            Objective::Mean(vectors) => self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64,
+            Objective::Largest(_, offsets) => {
                 self.solved(&root).1.iter().zip(offsets).map(|(v, o)| v + o).fold(0.0, f64::max)
             }
-            Aim::Least => {
+            Objective::Least => {
                 let (first, d) = (self.problem.nuisance, self.problem.counting());
                 root.inverse().view((first, first), (d, d)).into_owned().symmetric_eigenvalues().max()
             }
@@ -253,33 +253,33 @@ impl<'a> Weighing<'a> {
 
     /// `tau f / scale` with the barriers of the objective, not those of the weights; `None` outside its
     /// domain.
-    fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<At> {
+    fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<BarrierPoint> {
         let root = self.reduced(w, s).cholesky()?;
-        let value = match &self.problem.aim {
-            Aim::Volume => tau * self.volume(&root),
-            Aim::Mean(vectors) => {
+        let value = match &self.problem.objective {
+            Objective::Volume => tau * self.volume(&root),
+            Objective::Mean(vectors) => {
                 tau * self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64 / scale
             }
-            Aim::Largest(_, offsets) => {
-                let (s, left) = left_of(&self.solved(&root).1, offsets, tau / scale)?;
+            Objective::Largest(_, offsets) => {
+                let (s, left) = slacks_of(&self.solved(&root).1, offsets, tau / scale)?;
                 tau * s / scale - left.iter().map(|left| (left / scale).ln()).sum::<f64>()
             }
-            Aim::Least => {
+            Objective::Least => {
                 let l = root.l_dirty();
                 -tau * s / scale - 2.0 * (0..l.nrows()).map(|j| l[(j, j)].ln()).sum::<f64>()
             }
         };
-        value.is_finite().then_some(At { root, value })
+        value.is_finite().then_some(BarrierPoint { root, value })
     }
 
     /// Weights that minimise the objective, step by step, with the best bound of all steps.
-    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<Weighed> {
+    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
         let n = self.active.len();
         let mut w = vec![1.0 / n as f64; n];
-        let mut scale = self.aim(&w)?;
-        let least = self.problem.aim == Aim::Least;
+        let mut scale = self.objective(&w)?;
+        let least = self.problem.objective == Objective::Least;
         let mut s = if least { 0.5 / scale } else { 0.0 };
-        let mut best: Option<Weighed> = None;
+        let mut best: Option<OptimalWeights> = None;
         let mut tau = n as f64;
         let mut multipliers: Vec<f64> = w.iter().map(|w| 1.0 / w).collect();
         while tau < 1e3 * n as f64 / GAP {
@@ -290,13 +290,13 @@ impl<'a> Weighing<'a> {
                     break;
                 }
             }
-            scale = self.aim(&w)?;
+            scale = self.objective(&w)?;
             let dual = self.dual(&w, s, tau / unit)?;
             let bound = self.problem.lower_bound(&dual);
             if best.as_ref().is_none_or(|b| bound > b.bound) {
                 let mut weights = vec![0.0; self.problem.candidates.len()];
                 self.active.iter().zip(&w).for_each(|(&i, &w)| weights[i] = w);
-                best = Some(Weighed { weights, attained: scale, bound, dual });
+                best = Some(OptimalWeights { weights, attained: scale, bound, dual });
             }
             let sought = best.as_ref().map_or(0.0, |b| b.attained / b.bound - 1.0);
             if sought < GAP || !going() {
@@ -317,25 +317,25 @@ impl<'a> Weighing<'a> {
             let upper = root.l().transpose();
             upper.solve_upper_triangular(&DMatrix::identity(m, m))
         };
-        match &problem.aim {
-            Aim::Volume => {
+        match &problem.objective {
+            Objective::Volume => {
                 let root = self.information(w).cholesky()?;
                 let x = inverse_root(&root)?.columns(problem.nuisance, problem.counting()).into_owned();
                 Some(Dual { x, shares: Vec::new() })
             }
-            Aim::Least => {
+            Objective::Least => {
                 Some(Dual { x: inverse_root(&self.reduced(w, s).cholesky()?)?, shares: Vec::new() })
             }
-            Aim::Mean(vectors) => {
+            Objective::Mean(vectors) => {
                 let share = 1.0 / vectors.ncols() as f64;
                 let root = self.information(w).cholesky()?;
                 let x = self.solved(&root).0 * share.sqrt();
                 Some(Dual { x, shares: vec![share; vectors.ncols()] })
             }
-            Aim::Largest(_, offsets) => {
+            Objective::Largest(_, offsets) => {
                 let root = self.information(w).cholesky()?;
                 let (mut x, values) = self.solved(&root);
-                let shares = multipliers_of(&left_of(&values, offsets, rate)?.1);
+                let shares = multipliers_of(&slacks_of(&values, offsets, rate)?.1);
                 let sum: f64 = shares.iter().sum();
                 let shares: Vec<f64> = shares.iter().map(|x| x / sum).collect();
                 for (j, share) in shares.iter().enumerate() {
@@ -429,8 +429,8 @@ impl<'a> Weighing<'a> {
             }
             h
         };
-        Some(match &problem.aim {
-            Aim::Volume => {
+        Some(match &problem.objective {
+            Objective::Volume => {
                 let d = problem.counting() as f64;
                 let nuisance = problem.nuisance;
                 // from the information on the nuisance alone
@@ -451,7 +451,7 @@ impl<'a> Weighing<'a> {
                     |i: usize, j: usize| tau / d * (pair(i, j).norm_squared() - hidden(i, j).norm_squared());
                 Slopes { gradient, hessian: symmetric(&entry), by_s: None }
             }
-            Aim::Least => {
+            Objective::Least => {
                 // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on the unknowns
                 // that count
                 let r = root
@@ -472,7 +472,7 @@ impl<'a> Weighing<'a> {
                     by_s: Some(ByS { gradient: unit.trace() - tau / scale, curvature, follows }),
                 }
             }
-            Aim::Mean(vectors) => {
+            Objective::Mean(vectors) => {
                 let factor = tau / scale / vectors.ncols() as f64;
                 let (u, _) = self.solved(root);
                 let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
@@ -481,9 +481,9 @@ impl<'a> Weighing<'a> {
                     |i: usize, j: usize| 2.0 * factor * pair(i, j).dot(&(&seen[i] * seen[j].transpose()));
                 Slopes { gradient, hessian: symmetric(&entry), by_s: None }
             }
-            Aim::Largest(_, offsets) => {
+            Objective::Largest(_, offsets) => {
                 let (u, values) = self.solved(root);
-                let shares = multipliers_of(&left_of(&values, offsets, tau / scale)?.1);
+                let shares = multipliers_of(&slacks_of(&values, offsets, tau / scale)?.1);
                 let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
                 let weighted: Vec<DMatrix<f64>> = seen
                     .iter()
@@ -517,21 +517,21 @@ impl<'a> Weighing<'a> {
 
 /// Minimum over s of `rate s - sum_j ln(s - o_j - v_j)`: s, and the distance of each `o_j + v_j` below
 /// s; `None` where values are not finite.
-fn left_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
-    let aims: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
-    let largest = aims.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn slacks_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
+    let totals: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
+    let largest = totals.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // distance of s above the largest value: the sum of the inverses falls with it and is convex, so
     // Newton's steps increase to the end
     let mut above = 1.0 / rate;
     for _ in 0..100 {
-        let left = || aims.iter().map(|a| above + (largest - a));
+        let left = || totals.iter().map(|a| above + (largest - a));
         let beyond = left().map(|x| 1.0 / x).sum::<f64>() - rate;
         if beyond.is_nan() || beyond.abs() <= 1e-13 * rate {
             break;
         }
         above += beyond / left().map(|x| 1.0 / (x * x)).sum::<f64>();
     }
-    let left: Vec<f64> = aims.iter().map(|a| above + (largest - a)).collect();
+    let left: Vec<f64> = totals.iter().map(|a| above + (largest - a)).collect();
     (largest.is_finite() && left.iter().all(|x| *x > 0.0)).then_some((largest + above, left))
 }
 
@@ -544,7 +544,7 @@ mod tests {
     use super::*;
 
     /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at `points` points.
-    fn quadratic(points: usize, nuisance: usize, aim: Aim) -> Additive {
+    fn quadratic(points: usize, nuisance: usize, aim: Objective) -> Additive {
         let at = |i: usize| -> DMatrix<f64> {
             let x = 2.0 * i as f64 / (points - 1) as f64 - 1.0;
             // unknowns that count come last
@@ -556,7 +556,7 @@ mod tests {
             &f * f.transpose()
         };
         let candidates = (0..points).map(at).collect();
-        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, aim }
+        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, objective: aim }
     }
 
     /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and
@@ -567,12 +567,12 @@ mod tests {
         let units = DMatrix::identity(3, 3);
         let square = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 1.0]);
         let cases = [
-            (0, Aim::Volume, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]),
-            (0, Aim::Mean(units.clone()), [0.25, 0.5, 0.25]),
-            (0, Aim::Least, [0.2, 0.6, 0.2]),
-            (2, Aim::Volume, [0.25, 0.5, 0.25]),
-            (2, Aim::Least, [0.25, 0.5, 0.25]),
-            (2, Aim::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
+            (0, Objective::Volume, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]),
+            (0, Objective::Mean(units.clone()), [0.25, 0.5, 0.25]),
+            (0, Objective::Least, [0.2, 0.6, 0.2]),
+            (2, Objective::Volume, [0.25, 0.5, 0.25]),
+            (2, Objective::Least, [0.25, 0.5, 0.25]),
+            (2, Objective::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
         ];
         for points in [3, 41, 401] {
             for (nuisance, aim, expected) in &cases {
@@ -591,20 +591,20 @@ mod tests {
     fn slopes_are_differences() {
         let units = DMatrix::identity(3, 3);
         let aims = [
-            (0, Aim::Volume),
-            (1, Aim::Volume),
-            (0, Aim::Mean(units.clone())),
-            (0, Aim::Least),
-            (1, Aim::Least),
-            (0, Aim::Largest(units, vec![0.1, 0.0, 0.3])),
+            (0, Objective::Volume),
+            (1, Objective::Volume),
+            (0, Objective::Mean(units.clone())),
+            (0, Objective::Least),
+            (1, Objective::Least),
+            (0, Objective::Largest(units, vec![0.1, 0.0, 0.3])),
         ];
         for (nuisance, aim) in aims {
             let mut problem = quadratic(5, 0, aim.clone());
             problem.nuisance = nuisance;
-            let weighing = Weighing::new(&problem, (0..5).collect(), 0.0);
+            let weighing = WeightProblem::new(&problem, (0..5).collect(), 0.0);
             let w = [0.3, 0.1, 0.25, 0.15, 0.2];
-            let scale = weighing.aim(&w).expect("regular");
-            let s = if aim == Aim::Least { 0.5 / scale } else { 2.0 * scale };
+            let scale = weighing.objective(&w).expect("regular");
+            let s = if aim == Objective::Least { 0.5 / scale } else { 2.0 * scale };
             let (tau, unit) = (7.0, 1.3);
             let root = weighing.at(&w, s, tau, unit).expect("inside").root;
             // with s as a sixth variable

@@ -7,8 +7,8 @@ use obsdeg_evidence::simulation::omitted::SEEN;
 use obsdeg_evidence::simulation::{Conditions, si_per_shown};
 
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Dwelling, Evaluator, State};
-use crate::design::measure::omitted::{Beside, Omitted, OmittedAt};
+use crate::design::measure::evaluator::{Dwelling, Evaluator, SequenceState};
+use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::Immune;
@@ -105,7 +105,7 @@ impl Evaluator {
         let Some(of) = &self.omitted else { return OmittedAt::default() };
         let (drift, output) = (self.omitted_drift(of, c, None), of.model.output_rows(&Float, c));
         let one = |j: usize| std::array::from_fn(|r| if r < 3 { drift[r][j] } else { output[r - 3][j] });
-        let mut out = OmittedAt { effects: (0..of.fixed()).map(one).collect(), own: Beside::default() };
+        let mut out = OmittedAt { effects: (0..of.fixed()).map(one).collect(), own: OmittedSums::default() };
         if self.carry() == Carry::Reset {
             out.own = self.omitted_alone(of, c, unknowns, dwelling, &out.effects);
         }
@@ -120,7 +120,7 @@ impl Evaluator {
         unknowns: &[Vec<f64>; LOCAL - 3],
         dwelling: &Dwelling,
         effects: &[[f64; LOCAL - 3]],
-    ) -> Beside {
+    ) -> OmittedSums {
         let n = self.n;
         let m = effects.len() + if of.attitudes { 3 } else { 0 };
         // columns: psi, coefficients, errors
@@ -152,7 +152,7 @@ impl Evaluator {
             }
         }
         let cross = (n..n + m).flat_map(|j| (0..n).map(move |i| (i, j)));
-        Beside {
+        OmittedSums {
             cross: cross.map(|(i, j)| if i < 3 { 0.0 } else { g[i][j] }).collect(),
             squares: (n..n + m).map(|j| g[j][j]).collect(),
             psi: vec![[0.0; 3]; m],
@@ -160,15 +160,15 @@ impl Evaluator {
     }
 
     /// Sums of a sequence without positions; `None` where no errors count.
-    pub(crate) fn beside_at_start(&self) -> Option<Box<Beside>> {
+    pub(crate) fn beside_at_start(&self) -> Option<Box<OmittedSums>> {
         let of = self.omitted.as_ref()?;
         let fixed = of.fixed();
         let (cross, squares) = (vec![0.0; fixed * self.n], vec![0.0; fixed]);
-        Some(Box::new(Beside { cross, squares, psi: vec![[0.0; 3]; fixed] }))
+        Some(Box::new(OmittedSums { cross, squares, psi: vec![[0.0; 3]; fixed] }))
     }
 
     /// Adds a position under reset carry.
-    pub(crate) fn add_beside(&self, state: &State, candidate: usize, out: &mut State) {
+    pub(crate) fn add_beside(&self, state: &SequenceState, candidate: usize, out: &mut SequenceState) {
         let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
             return;
         };
@@ -186,10 +186,10 @@ impl Evaluator {
     /// Adds a position whose local unknowns are the functionals `local` of the unknowns.
     pub(crate) fn extend_beside<const L: usize, const N: usize>(
         &self,
-        state: &State,
+        state: &SequenceState,
         (candidate, turn): (usize, Option<&SlewPath>),
         local: &[[f64; N]; L],
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
             return;
@@ -251,7 +251,7 @@ impl Evaluator {
 
     /// Changes of the coefficients that count by one sigma of every error with a size (shape d each, in units
     /// of the evaluator), one after the other; `l` is the root of the information.
-    fn each_contribution(&self, of: &Omitted, beside: &Beside, l: &[f64], mut take: impl FnMut(&[f64])) {
+    fn each_contribution(&self, of: &Omitted, beside: &OmittedSums, l: &[f64], mut take: impl FnMut(&[f64])) {
         let (n, begin) = (self.n, 3 + self.nuisance);
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         let mut y = vec![0.0; n];
@@ -270,7 +270,7 @@ impl Evaluator {
     }
 
     /// Variances that the errors add to each coefficient that counts (shape d); empty without errors.
-    pub(crate) fn added_variances(&self, state: &State, l: &[f64]) -> Vec<f64> {
+    pub(crate) fn added_variances(&self, state: &SequenceState, l: &[f64]) -> Vec<f64> {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return Vec::new() };
         let mut out = vec![0.0; self.n - 3 - self.nuisance];
         self.each_contribution(of, beside, l, |change| {
@@ -281,7 +281,12 @@ impl Evaluator {
 
     /// Criteria D and E of the covariance of the coefficients that count, with the errors: in deg/h
     /// (per g).
-    pub(crate) fn of_total_covariance(&self, state: &State, criterion: &Criterion, l: &[f64]) -> Option<f64> {
+    pub(crate) fn of_total_covariance(
+        &self,
+        state: &SequenceState,
+        criterion: &Criterion,
+        l: &[f64],
+    ) -> Option<f64> {
         let (of, beside) = (self.omitted.as_ref()?, state.beside.as_ref()?);
         let (n, begin) = (self.n, 3 + self.nuisance);
         let d = n - begin;
@@ -304,7 +309,7 @@ impl Evaluator {
     /// Distance of a sequence from immunity, dimensionless; 0 if immune. Each error adds 1 if it has an
     /// effect that it must not have or that no record shows, and less than 1 if a record shows it at a
     /// larger size than required. `root` is working space.
-    pub(crate) fn not_immune(&self, state: &State, root: &mut Vec<f64>) -> f64 {
+    pub(crate) fn not_immune(&self, state: &SequenceState, root: &mut Vec<f64>) -> f64 {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return 0.0 };
         if of.immune.iter().all(Option::is_none) {
             return 0.0;

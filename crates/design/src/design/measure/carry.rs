@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{Carry, Matrix3};
 
-use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, State};
+use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
@@ -11,12 +11,12 @@ impl Evaluator {
     #[inline]
     pub(crate) fn functionals<const L: usize, const N: usize>(
         &self,
-        state: &State,
+        state: &SequenceState,
         stop: Stop,
     ) -> [[f64; N]; L] {
         let (n, carry) = (self.n, self.carry());
         let Candidate { c, effects, .. } = &self.candidates[stop.candidate];
-        let turn = self.way_to(state.path.last().copied(), stop);
+        let turn = self.path_to(state.path.last().copied(), stop);
         let mut local = [[0.0; N]; L];
         for (row, effect) in local[3..].iter_mut().zip(&effects[..self.locals - 3]) {
             row[3..n].copy_from_slice(effect);
@@ -48,7 +48,12 @@ impl Evaluator {
     /// Prior information on psi^n, the carried quantity under inertial carry: about the axes of the
     /// first position.
     #[inline]
-    pub(crate) fn know_first(&self, state: &State, c: &Matrix3<f64>, mut add: impl FnMut(usize, usize, f64)) {
+    pub(crate) fn know_first(
+        &self,
+        state: &SequenceState,
+        c: &Matrix3<f64>,
+        mut add: impl FnMut(usize, usize, f64),
+    ) {
         if self.carry() != Carry::Inertial || !state.path.is_empty() {
             return;
         }
@@ -66,7 +71,7 @@ impl Evaluator {
         dwelling: &Dwelling,
         c: &Matrix3<f64>,
         local: &[[f64; N]; L],
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let n = self.n;
         if self.carry() == Carry::Reset {

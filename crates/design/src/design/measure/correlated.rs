@@ -17,8 +17,8 @@ use obsdeg_core::model::{Carry, LOCAL};
 use obsdeg_ekf::BiasState;
 
 use crate::design::measure::elimination::eliminate;
-use crate::design::measure::evaluator::{Evaluator, State};
-use crate::design::measure::noise_process::{Joint, STEP, times};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
+use crate::design::measure::noise_process::{BiasDistribution, STEP, times};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
@@ -28,21 +28,21 @@ impl Evaluator {
     pub(crate) fn extend_correlated(
         &self,
         bias: &BiasState,
-        state: &State,
+        state: &SequenceState,
         stop: Stop,
         kept: bool,
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let n = self.n;
         let reset = self.carry() == Carry::Reset;
-        let seconds = self.way_to(state.path.last().copied(), stop).map_or(0.0, |t| t.seconds);
+        let seconds = self.path_to(state.path.last().copied(), stop).map_or(0.0, |t| t.seconds);
         let (c, dwelling) = self.stands(stop.candidate);
         let Some(of_dwell) = &dwelling.correlated else { return };
         // b^n = C b
         let axes = Small::from_fn(|i, j| c[i][j]);
         let before = match &state.joint {
             Some(joint) => joint.wait(bias, seconds, &axes),
-            None => Joint::start(bias, n),
+            None => BiasDistribution::start(bias, n),
         };
         // order: b at the start minus its mean, psi of this position alone (if it is), b at the end;
         // then the other local unknowns, and the mean
@@ -123,7 +123,7 @@ impl Evaluator {
         // back into platform axes
         let mean = times(&(axes.transpose() * covariance), &through);
         let covariance = axes.transpose() * covariance * axes;
-        out.joint = Some(Joint { covariance, mean });
+        out.joint = Some(BiasDistribution { covariance, mean });
         self.go_on(dwelling, c, &local, out);
         out.path.clone_from(&state.path);
         out.path.push(stop.candidate);

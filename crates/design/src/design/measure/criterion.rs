@@ -6,7 +6,7 @@ use obsdeg_ekf::EkfError;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Attained, si_per_shown};
 
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
 
@@ -86,12 +86,12 @@ impl Evaluator {
     /// Cholesky factor of the information, with psi and the coefficients that do not count first. The
     /// block of the others is the factor of the inverse of their covariance. False if one of them is
     /// not determined.
-    pub(crate) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+    pub(crate) fn root(&self, state: &SequenceState, root: &mut Vec<f64>) -> bool {
         self.root_from(if self.carry() == Carry::Reset { 3 } else { 0 }, state, root)
     }
 
     /// Factor as [`Self::root`], for the unknowns from `first` on.
-    pub(crate) fn root_from(&self, first: usize, state: &State, root: &mut Vec<f64>) -> bool {
+    pub(crate) fn root_from(&self, first: usize, state: &SequenceState, root: &mut Vec<f64>) -> bool {
         let n = self.n;
         root.resize(n * n, 0.0);
         let l = &mut root[..];
@@ -119,7 +119,7 @@ impl Evaluator {
     /// Criterion of a sequence, smaller is better. It is infinite, or as large as rounding makes it, if
     /// a coefficient that counts is not determined. Sigmas are in deg/h (per g); where errors that are
     /// not estimated count they are total uncertainties. `root` is working space.
-    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+    pub fn value(&self, state: &SequenceState, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
         match self.root(state, root) {
             true => self.by_root(state, criterion, root, &mut Vec::new(), true),
             false => f64::INFINITY,
@@ -130,7 +130,7 @@ impl Evaluator {
     /// receives the variances of the coefficients that count if the criterion is computed from them.
     pub(crate) fn sigma_value(
         &self,
-        state: &State,
+        state: &SequenceState,
         criterion: &Criterion,
         root: &mut Vec<f64>,
         variances: &mut Vec<f64>,
@@ -147,7 +147,7 @@ impl Evaluator {
     /// the sigmas.
     pub(crate) fn by_root(
         &self,
-        state: &State,
+        state: &SequenceState,
         criterion: &Criterion,
         root: &[f64],
         own: &mut Vec<f64>,
@@ -210,7 +210,7 @@ impl Evaluator {
     }
 
     /// State after a whole sequence.
-    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
+    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> SequenceState {
         let (mut now, mut next) = (self.start(), self.start());
         for &stop in sequence {
             self.extend(&now, stop.into(), &mut next);

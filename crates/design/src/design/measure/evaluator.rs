@@ -13,8 +13,8 @@ use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{Conditions, Plan, steps};
 
 use crate::design::measure::elimination::eliminate;
-use crate::design::measure::noise_process::{Joint, OfDwell, Output, of_dwell};
-use crate::design::measure::omitted::{Beside, Omitted, OmittedAt, with_accelerometer};
+use crate::design::measure::noise_process::{BiasDistribution, DwellInformation, Output, of_dwell};
+use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums, with_accelerometer};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
@@ -60,7 +60,7 @@ pub(crate) struct Dwelling {
     /// `psi^n` after the dwell as a function of `(psi^n, eps^n)` before it.
     pub(crate) phi: [[f64; PSI_EPS]; 3],
     /// Information of the samples where the noise of Z is correlated; `None` for white noise.
-    pub(crate) correlated: Option<Box<OfDwell>>,
+    pub(crate) correlated: Option<Box<DwellInformation>>,
 }
 
 /// Prior information; zero where none is stated.
@@ -94,7 +94,7 @@ pub struct Evaluator {
     pub(crate) dwells: Vec<Dwelling>,
     pub(crate) candidates: Vec<Candidate>,
     /// Slew path from candidate i to j at `i * candidates + j`; empty if repositioning takes no time.
-    pub(crate) ways: Vec<SlewPath>,
+    pub(crate) slew_paths: Vec<SlewPath>,
     pub(crate) prior: Prior,
     /// Bias process of each accelerometer beside its white noise; `None` for white noise alone.
     pub(crate) bias: Option<BiasState>,
@@ -107,15 +107,15 @@ pub struct Evaluator {
 
 /// Information of a sequence of positions.
 #[derive(Debug, Clone)]
-pub struct State {
+pub struct SequenceState {
     /// Information (n x n), row by row, lower triangle.
     pub(crate) information: Vec<f64>,
     /// Psi in the carried axes as a functional of the unknowns (3 x n).
     pub(crate) psi: [Vec<f64>; 3],
     /// Distribution of the accelerometer biases given the unknowns; `None` for white noise of Z.
-    pub(crate) joint: Option<Joint>,
+    pub(crate) joint: Option<BiasDistribution>,
     /// Effects of errors that are not estimated; `None` where they do not count.
-    pub(crate) beside: Option<Box<Beside>>,
+    pub(crate) beside: Option<Box<OmittedSums>>,
     /// Candidates in order: index of each.
     pub(crate) path: Vec<usize>,
     /// Time of dwells and turns so far, in s.
@@ -130,9 +130,9 @@ impl Evaluator {
     pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
         self.dwells = vec![self.dwelling(dwell_s)?];
         let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
-        let ways = std::mem::take(&mut self.ways);
+        let slew_paths = std::mem::take(&mut self.slew_paths);
         self.stand_at(&attitudes);
-        self.ways = ways;
+        self.slew_paths = slew_paths;
         Ok(self)
     }
 
@@ -228,7 +228,7 @@ impl Evaluator {
                 }
             })
             .collect();
-        self.ways.clear();
+        self.slew_paths.clear();
     }
 
     /// Attitude and dwell of a candidate.
@@ -323,7 +323,7 @@ impl Evaluator {
         let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
         let mut out = Self { prior, ..self.clone() };
         out.stand_at(&attitudes);
-        out.ways.clone_from(&self.ways);
+        out.slew_paths.clone_from(&self.slew_paths);
         out
     }
 

@@ -14,11 +14,11 @@ pub(crate) const STEP: usize = SIZE + 3;
 
 /// Information of a dwell on its local unknowns, b at its start and b at its end, in n (lower
 /// triangle).
-pub(crate) type OfDwell = [[f64; SIZE]; SIZE];
+pub(crate) type DwellInformation = [[f64; SIZE]; SIZE];
 
 /// Distribution of b given the unknowns, in platform axes.
 #[derive(Debug, Clone)]
-pub(crate) struct Joint {
+pub(crate) struct BiasDistribution {
     /// Covariance in g^2 (3 x 3).
     pub(crate) covariance: Small<f64>,
     /// Mean as a functional of the unknowns (3 x n).
@@ -31,7 +31,7 @@ fn step(bias: &BiasState, seconds: f64) -> (f64, f64) {
     ((-x).exp(), bias.variance * -(-2.0 * x).exp_m1())
 }
 
-impl Joint {
+impl BiasDistribution {
     /// Stationary distribution, before any sample (n unknowns).
     pub(crate) fn start(bias: &BiasState, n: usize) -> Self {
         Self { covariance: Small::identity() * bias.variance, mean: std::array::from_fn(|_| vec![0.0; n]) }
@@ -67,7 +67,7 @@ pub(crate) fn of_dwell(
     transition: &DMatrix<f64>,
     steps: usize,
     dt: f64,
-) -> OfDwell {
+) -> DwellInformation {
     let (left, variance) = step(bias, dt);
     let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
     // order: b of the previous sample, local unknowns, b at the start, b of this sample

@@ -41,12 +41,12 @@ pub(crate) struct OmittedAt {
     /// Drift, then output, of every error at this attitude (errors x 6).
     pub(super) effects: Vec<[f64; LOCAL - 3]>,
     /// Contribution of a position under reset carry, psi eliminated.
-    pub(super) own: Beside,
+    pub(super) own: OmittedSums,
 }
 
 /// Sums over a sequence for the errors that are not estimated.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Beside {
+pub(crate) struct OmittedSums {
     /// `J^T R^-1 O`, error by error (errors x n).
     pub(super) cross: Vec<f64>,
     /// `O^T R^-1 O` of every error.

@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use crate::design::measure::evaluator::{Candidate, Evaluator, OwnPsi, State};
+use crate::design::measure::evaluator::{Candidate, Evaluator, OwnPsi, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
@@ -16,7 +16,7 @@ impl Evaluator {
     }
 
     /// Largest ratio of a sigma of psi to its limit in deg, dimensionless.
-    pub(crate) fn psi_over(&self, state: &State, root: &[f64], limits: &[f64; 3]) -> f64 {
+    pub(crate) fn psi_over(&self, state: &SequenceState, root: &[f64], limits: &[f64; 3]) -> f64 {
         if limits.iter().all(|l| l.is_infinite()) {
             return 0.0;
         }
@@ -25,7 +25,7 @@ impl Evaluator {
     }
 
     /// Sigmas as [`Self::psi_sigmas`], from the Cholesky factor of the information of the sequence.
-    fn psi_of(&self, state: &State, root: &[f64]) -> Vec<[f64; 3]> {
+    fn psi_of(&self, state: &SequenceState, root: &[f64]) -> Vec<[f64; 3]> {
         let n = self.n;
         let sigma = |root: &[f64], psi: &[f64]| {
             solved(root, n, psi.iter().copied()).map_or(f64::INFINITY, |y| norm(&y).to_degrees())

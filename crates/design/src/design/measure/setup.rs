@@ -76,7 +76,7 @@ impl Evaluator {
             w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
             dwells: Vec::new(),
             candidates: Vec::new(),
-            ways: Vec::new(),
+            slew_paths: Vec::new(),
             dph,
         };
         let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(c_n_f64).collect();

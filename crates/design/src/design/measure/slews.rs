@@ -24,11 +24,11 @@ impl Evaluator {
             if found > MAX_TURNING {
                 return Err(DesignError::Pairs { found });
             }
-            let ways = (0..found * found).into_par_iter().map(|k| {
-                let way = || self.way(&attitudes[k / found], &attitudes[k % found]);
-                going().then(way).ok_or(DesignError::Interrupted)
+            let slew_paths = (0..found * found).into_par_iter().map(|k| {
+                let shortest_path = || self.shortest_path(&attitudes[k / found], &attitudes[k % found]);
+                going().then(shortest_path).ok_or(DesignError::Interrupted)
             });
-            self.ways = ways.collect::<Result<_, _>>()?;
+            self.slew_paths = slew_paths.collect::<Result<_, _>>()?;
         }
         Ok(self)
     }
@@ -41,15 +41,16 @@ impl Evaluator {
         if self.conditions.slew_rate_deg_s.is_some() {
             let n = attitudes.len();
             let next = |k: usize| k % n == k / n + 1;
-            let way =
-                |k: usize| if next(k) { out.way(&attitudes[k / n], &attitudes[k % n]) } else { out.stay() };
-            out.ways = (0..n * n).map(way).collect();
+            let shortest_path = |k: usize| {
+                if next(k) { out.shortest_path(&attitudes[k / n], &attitudes[k % n]) } else { out.stay() }
+            };
+            out.slew_paths = (0..n * n).map(shortest_path).collect();
         }
         out
     }
 
     /// Shortest slew path from one attitude to another, with the opposite one if that is as short.
-    fn way(&self, from: &Matrix3<f64>, to: &Matrix3<f64>) -> SlewPath {
+    fn shortest_path(&self, from: &Matrix3<f64>, to: &Matrix3<f64>) -> SlewPath {
         let rate = self.conditions.slew_rate_deg_s.unwrap_or(f64::INFINITY);
         // there is always a shortest way
         let slew = Slew::to(from, to, &SlewTo::default(), rate.to_radians()).ok().flatten();
@@ -70,21 +71,22 @@ impl Evaluator {
 
     /// Duration of the turn from one candidate to another, in s.
     pub fn slew_s(&self, from: usize, to: usize) -> f64 {
-        self.ways.get(from * self.candidates.len() + to).map_or(0.0, |w| w.seconds)
+        self.slew_paths.get(from * self.candidates.len() + to).map_or(0.0, |w| w.seconds)
     }
 
     /// Slew paths from the previous position (`None` for the first position) to a candidate: one, or
     /// two for a half turn.
     pub fn stops(&self, last: Option<usize>, candidate: usize) -> impl Iterator<Item = Stop> {
-        let way = last.and_then(|last| self.ways.get(last * self.candidates.len() + candidate));
-        let two = way.is_some_and(|w| w.other.is_some());
+        let shortest_path =
+            last.and_then(|last| self.slew_paths.get(last * self.candidates.len() + candidate));
+        let two = shortest_path.is_some_and(|w| w.other.is_some());
         [false, true].into_iter().take(1 + usize::from(two)).map(move |reversed| Stop { candidate, reversed })
     }
 
     /// Slew path to a stop from the previous candidate; `None` for the first position.
-    pub(crate) fn way_to(&self, last: Option<usize>, stop: Stop) -> Option<&SlewPath> {
-        let way = self.ways.get(last? * self.candidates.len() + stop.candidate)?;
-        Some(way.other.as_deref().filter(|_| stop.reversed).unwrap_or(way))
+    pub(crate) fn path_to(&self, last: Option<usize>, stop: Stop) -> Option<&SlewPath> {
+        let shortest_path = self.slew_paths.get(last? * self.candidates.len() + stop.candidate)?;
+        Some(shortest_path.other.as_deref().filter(|_| stop.reversed).unwrap_or(shortest_path))
     }
 
     /// Canonical form, which makes equal sequences compare equal: only half turns have a second slew
@@ -99,14 +101,14 @@ impl Evaluator {
 
     /// Half turns of a sequence, each with the index of the position that it leads to.
     pub fn half_turns(&self, sequence: &[Stop]) -> Vec<(usize, Turn)> {
-        let turn = |k: usize| self.way_to(Some(sequence[k - 1].candidate), sequence[k])?.turn;
+        let turn = |k: usize| self.path_to(Some(sequence[k - 1].candidate), sequence[k])?.turn;
         (1..sequence.len()).filter_map(|k| Some((k, turn(k).filter(Turn::is_half)?))).collect()
     }
 
     /// Number of sequences of `k` positions that begin with one of `firsts`; `None` beyond 2^64.
     pub(crate) fn sequences(&self, firsts: &[usize], k: usize) -> Option<u64> {
         let n = self.candidates.len();
-        if self.ways.is_empty() {
+        if self.slew_paths.is_empty() {
             return (firsts.len() as u64).checked_mul((n as u64).checked_pow(k as u32 - 1)?);
         }
         // number of sequences that end with each candidate

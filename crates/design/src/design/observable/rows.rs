@@ -27,7 +27,7 @@ const PATIENCE: u64 = 256;
 #[derive(Debug, Clone)]
 pub struct Rows {
     /// Rows in independent random fields.
-    fields: Vec<InField>,
+    fields: Vec<FieldRows>,
     columns: usize,
     /// Columns of the coefficients that must be observable.
     required: Vec<usize>,
@@ -38,7 +38,7 @@ pub struct Rows {
 
 /// Rows of all candidates in one field.
 #[derive(Debug, Clone)]
-struct InField {
+struct FieldRows {
     field: Field,
     /// All rows, by candidate.
     rows: Vec<Vec<Vec<u64>>>,
@@ -51,14 +51,14 @@ struct InField {
 }
 
 /// Limits of an enumeration of sets.
-pub struct Patience<'a> {
+pub struct EnumerationLimits<'a> {
     /// Number of prefixes and sets that may still be examined.
     pub budget: u64,
     /// Cancellation callback: false ends the enumeration.
     pub going: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Patience<'a> {
+impl<'a> EnumerationLimits<'a> {
     /// No limit of work; stops when `going` returns false.
     pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { budget: u64::MAX, going }
@@ -102,7 +102,7 @@ impl Rows {
         let (mut fields, mut miss) = (Vec::new(), 1.0);
         while fields.len() < 2 || f64::powi(miss, fields.len() as i32) > MISS {
             let values = RandomValues::draw(platform.scheme(), &mut rng).map_err(EnsembleError::from)?;
-            let here = InField::new(&platform, &values, first);
+            let here = FieldRows::new(&platform, &values, first);
             // a rank is one minor: of the rows of all orders of some positions, each with a psi of its own
             // under reset carry
             let psi = if reset { 3 * candidates.len() } else { 3 };
@@ -149,7 +149,7 @@ impl Rows {
     /// Rows of the candidates with these indices, in this order.
     pub fn select(&self, order: &[usize]) -> Self {
         let of = |rows: &Vec<Vec<Vec<u64>>>| order.iter().map(|&i| rows[i].clone()).collect();
-        let fields = self.fields.iter().map(|here| InField {
+        let fields = self.fields.iter().map(|here| FieldRows {
             field: here.field,
             rows: of(&here.rows),
             by_order: here.by_order.iter().map(of).collect(),
@@ -219,7 +219,7 @@ impl Rows {
     pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
         let behind = |first: usize| {
             let mut out = Vec::new();
-            self.each(&[first], size, false, &mut Patience::while_going(&|| true), &mut |set| {
+            self.each(&[first], size, false, &mut EnumerationLimits::while_going(&|| true), &mut |set| {
                 out.push(set.to_vec());
                 true
             });
@@ -241,7 +241,7 @@ impl Rows {
         let found: Vec<(Option<Vec<usize>>, bool)> = firsts
             .par_iter()
             .map(|&first| {
-                let (mut out, mut patience) = (None, Patience { budget, going });
+                let (mut out, mut patience) = (None, EnumerationLimits { budget, going });
                 self.each(&[first], size, false, &mut patience, &mut |set| {
                     out = Some(set.to_vec());
                     false
@@ -261,7 +261,7 @@ impl Rows {
         prefix: &[usize],
         size: usize,
         repeat: bool,
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) {
         let Some((&last, before)) = prefix.split_last() else { return };
@@ -281,21 +281,22 @@ impl Rows {
         set: &mut Vec<usize>,
         candidate: usize,
         (size, step): (usize, usize),
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) -> bool {
         if !patience.goes_on() {
             return false;
         }
         let left = size - set.len() - 1;
-        let longer = |(here, basis): (&InField, &Echelon)| {
+        let longer = |(here, basis): (&FieldRows, &Echelon)| {
             let mut basis = basis.clone();
             here.add(&mut basis, candidate);
             basis
         };
         let mut bases = self.fields.iter().zip(bases);
         // every further position adds at most its rows
-        let may_do = |here: &InField, basis: &Echelon| basis.rank() + left * here.most >= self.required.len();
+        let may_do =
+            |here: &FieldRows, basis: &Echelon| basis.rank() + left * here.most >= self.required.len();
         set.push(candidate);
         let mut go_on = true;
         if left == 0 {
@@ -331,11 +332,11 @@ impl Rows {
         bases: &[Echelon],
         set: &mut Vec<usize>,
         first: usize,
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) -> bool {
         // in further fields only if the first one says no
-        let mut unseen: Vec<Unseen> = Vec::with_capacity(bases.len());
+        let mut unseen: Vec<NullSpace> = Vec::with_capacity(bases.len());
         let mut scratch = Vec::new();
         for next in first..self.candidates() {
             if !patience.goes_on() {
@@ -343,7 +344,7 @@ impl Rows {
             }
             let does = self.fields.iter().zip(bases).enumerate().any(|(i, (here, basis))| {
                 if unseen.len() == i {
-                    unseen.push(Unseen::new(basis, &self.required));
+                    unseen.push(NullSpace::new(basis, &self.required));
                 }
                 unseen[i].is_seen(&here.rows[next], &mut scratch)
             });
@@ -361,14 +362,14 @@ impl Rows {
 }
 
 /// Null space of the rows of a set, with basis v_1 .. v_m.
-struct Unseen {
+struct NullSpace {
     field: Field,
     vectors: Vec<Vec<u64>>,
     /// Independent rows of the matrix of the required components of v_1 .. v_m.
     wanted: Vec<Vec<u64>>,
 }
 
-impl Unseen {
+impl NullSpace {
     fn new(basis: &Echelon, required: &[usize]) -> Self {
         let f = basis.field();
         // with pivot entries d_i and D their product: D at a free column, -row_i (D / d_i) at pivot i
@@ -439,7 +440,7 @@ impl Unseen {
     }
 }
 
-impl InField {
+impl FieldRows {
     /// Rows of every position of `platform` at random values; psi, the first `leading` columns, is
     /// eliminated.
     fn new(platform: &Platform, values: &RandomValues, leading: usize) -> Self {

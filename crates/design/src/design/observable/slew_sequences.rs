@@ -101,7 +101,7 @@ pub struct Walks {
 }
 
 /// Rows of all candidates and turns in one field.
-struct InField {
+struct TourRows {
     field: Field,
     /// Rows of the local chain on psi (3 each), by candidate; `rows` are theirs on the coefficients.
     of_psi: Vec<[u64; 3]>,
@@ -113,14 +113,14 @@ struct InField {
 
 /// Slew sequence with its echelon basis.
 #[derive(Clone)]
-struct Walk {
+struct SlewSequence {
     places: Vec<usize>,
     /// Sum `J` of the effects of the turns so far on `psi^n`.
     torqued: [Vec<u64>; 3],
     basis: Echelon,
 }
 
-impl InField {
+impl TourRows {
     fn new(tour: &Platform, values: &RandomValues, first_visit: &[usize], turn_at: &[usize]) -> Self {
         let sample = values.sample(tour.scheme(), 1);
         let (f, point) = (sample.point.ring, &sample.point);
@@ -148,16 +148,16 @@ impl InField {
         }
     }
 
-    fn start(&self, place: usize) -> Walk {
+    fn start(&self, place: usize) -> SlewSequence {
         let zero = vec![0; self.coefficients];
         let torqued = [zero.clone(), zero.clone(), zero];
         let basis = Echelon::new(self.field, 3 + self.coefficients);
-        let mut walk = Walk { places: Vec::new(), torqued, basis };
+        let mut walk = SlewSequence { places: Vec::new(), torqued, basis };
         self.arrive(&mut walk, place);
         walk
     }
 
-    fn arrive(&self, walk: &mut Walk, place: usize) {
+    fn arrive(&self, walk: &mut SlewSequence, place: usize) {
         let f = &self.field;
         walk.places.push(place);
         let mut row = vec![0; 3 + self.coefficients];
@@ -170,7 +170,7 @@ impl InField {
         }
     }
 
-    fn go(&self, walk: &Walk, turn: usize, to: usize) -> Walk {
+    fn go(&self, walk: &SlewSequence, turn: usize, to: usize) -> SlewSequence {
         let mut next = walk.clone();
         for (sum, left) in next.torqued.iter_mut().zip(&self.turns[turn]) {
             for (x, y) in sum.iter_mut().zip(left) {
@@ -183,8 +183,8 @@ impl InField {
 }
 
 /// Data of a search, shared by all its branches.
-struct Space {
-    fields: [InField; 2],
+struct SequenceSearch {
+    fields: [TourRows; 2],
     /// Candidates that one turn leads to, by candidate: `(turn, candidate)`.
     neighbours: Vec<Vec<(usize, usize)>>,
     required: Vec<usize>,
@@ -192,7 +192,7 @@ struct Space {
     most: usize,
 }
 
-impl Space {
+impl SequenceSearch {
     fn does(&self, basis: &Echelon) -> bool {
         self.required.iter().all(|c| basis.has_unit(3 + c))
     }
@@ -200,7 +200,7 @@ impl Space {
     /// First sufficient slew sequence of `length` positions that begins with `walk`.
     fn search(
         &self,
-        walk: &Walk,
+        walk: &SlewSequence,
         length: usize,
         seen: &AtomicU64,
         going: &(dyn Fn() -> bool + Sync),
@@ -243,7 +243,7 @@ impl Space {
 
     /// Sequence through the given candidates in the first field; a candidate that no turn leads to
     /// begins a new one.
-    fn along(&self, places: &[usize]) -> Walk {
+    fn along(&self, places: &[usize]) -> SlewSequence {
         let field = &self.fields[0];
         let mut walk = field.start(places[0]);
         for &to in &places[1..] {
@@ -271,9 +271,10 @@ impl Space {
     }
 
     /// Short sufficient slew sequence, by beam search.
-    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<Walk> {
+    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<SlewSequence> {
         let mut rng = SplitMix64::new(seed);
-        let mut beam: Vec<Walk> = (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
+        let mut beam: Vec<SlewSequence> =
+            (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
         for _ in 1..LONGEST {
             if let Some(done) = beam.iter().find(|w| self.does(&w.basis)) {
                 return Some(done.clone());
@@ -281,11 +282,11 @@ impl Space {
             if !going() {
                 return None;
             }
-            let grown = |walk: &Walk| -> Vec<Walk> {
+            let grown = |walk: &SlewSequence| -> Vec<SlewSequence> {
                 let here = walk.places[walk.places.len() - 1];
                 self.neighbours[here].iter().map(|&(turn, to)| self.fields[0].go(walk, turn, to)).collect()
             };
-            let next: Vec<Walk> = beam.par_iter().flat_map_iter(grown).collect();
+            let next: Vec<SlewSequence> = beam.par_iter().flat_map_iter(grown).collect();
             let mut order: Vec<(usize, u64, usize)> = next
                 .iter()
                 .enumerate()
@@ -351,9 +352,9 @@ pub fn walks(
     let [first, second] = values;
     let (first, second) = (first.map_err(EnsembleError::from)?, second.map_err(EnsembleError::from)?);
     let order = first.roots().order;
-    let fields = [first, second].map(|v| InField::new(&platform, &v, &first_visit, &turn_at));
+    let fields = [first, second].map(|v| TourRows::new(&platform, &v, &first_visit, &turn_at));
     let most = fields[0].of_psi.len();
-    let space = Space { fields, neighbours, required, most };
+    let space = SequenceSearch { fields, neighbours, required, most };
     let counting_bound = space.required.len().div_ceil(most).max(1);
     let claim = |length: usize| Claim {
         unknowns: 3 + d,

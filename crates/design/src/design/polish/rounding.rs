@@ -20,7 +20,7 @@ const CYCLES: usize = 6;
 
 /// Scheme after the local search.
 #[derive(Debug, Clone)]
-pub(crate) struct Moved {
+pub(crate) struct MovedScheme {
     /// Violation of the limits, dimensionless; 0 when kept.
     pub(crate) violation: f64,
     /// Criterion of the scheme.
@@ -30,7 +30,7 @@ pub(crate) struct Moved {
     pub(crate) examined: u64,
 }
 
-impl Moved {
+impl MovedScheme {
     pub(crate) fn order(&self, other: &Self) -> std::cmp::Ordering {
         self.violation.total_cmp(&other.violation).then(self.value.total_cmp(&other.value))
     }
@@ -39,9 +39,9 @@ impl Moved {
 /// Results of the local search on two grids of angles.
 pub(crate) struct OnGrids {
     /// On the grid of hundredths of a degree.
-    pub(crate) finer: Moved,
+    pub(crate) finer: MovedScheme,
     /// On the grid of the step asked for.
-    pub(crate) on_step: Moved,
+    pub(crate) on_step: MovedScheme,
 }
 
 /// Move of angles by `by` on the grid of `step`, both in 1e-9 degrees.
@@ -83,8 +83,8 @@ pub(crate) fn random(k: usize, step: i64, gimbals: &Gimbals, rng: &mut SplitMix6
 fn around(euler: &Euler, by: i64, step: i64) -> impl Iterator<Item = Euler> {
     let at = euler.each_ref().map(Angle::nanodeg);
     (0..27).filter(|i| *i != 13).filter_map(move |i| {
-        let ways: [i64; 3] = [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1];
-        within_a_turn(std::array::from_fn(|axis| at[axis] + ways[axis] * by), step)
+        let signs: [i64; 3] = [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1];
+        within_a_turn(std::array::from_fn(|axis| at[axis] + signs[axis] * by), step)
     })
 }
 
@@ -121,22 +121,22 @@ impl Moves<'_> {
         };
         let first = self.moved(&to_step(start), step);
         if step <= FINE {
-            return OnGrids { finer: first.clone(), on_step: Moved { examined: 0, ..first } };
+            return OnGrids { finer: first.clone(), on_step: MovedScheme { examined: 0, ..first } };
         }
         let finer = self.moved(&first.scheme, FINE);
         let again = self.moved(&to_step(&finer.scheme), step);
         let examined = first.examined + again.examined;
         let best = if again.order(&first).is_lt() { again } else { first };
-        OnGrids { finer, on_step: Moved { examined, ..best } }
+        OnGrids { finer, on_step: MovedScheme { examined, ..best } }
     }
 
     /// Local search on the grid of multiples of `step` 1e-9 degrees. One position after the other moves
     /// to the best attitude around it, by smaller and smaller moves, until no move helps.
-    fn moved(&self, start: &[Euler], step: i64) -> Moved {
+    fn moved(&self, start: &[Euler], step: i64) -> MovedScheme {
         let mut here = self.evaluator.along(&start.iter().map(c_n_f64).collect::<Vec<_>>());
         let order: Vec<Stop> = (0..start.len()).map(Stop::from).collect();
         let mut root = Vec::new();
-        let mut best = Moved { examined: 1, ..self.scored(&here, &order, start.to_vec(), &mut root) };
+        let mut best = MovedScheme { examined: 1, ..self.scored(&here, &order, start.to_vec(), &mut root) };
         let sizes = std::iter::successors(Some(step), |by| Some(by * 2));
         let farthest = sizes.take_while(|by| *by <= FARTHEST).last().unwrap_or(step);
         for _ in 0..CYCLES {
@@ -166,7 +166,7 @@ impl Moves<'_> {
     fn move_one(
         &self,
         here: &mut Evaluator,
-        best: &mut Moved,
+        best: &mut MovedScheme,
         place: usize,
         GridMove { by, step }: GridMove,
         root: &mut Vec<f64>,
@@ -191,7 +191,13 @@ impl Moves<'_> {
     }
 
     /// Criterion of a scheme and violation of the limits; `examined` is not counted here.
-    fn scored(&self, here: &Evaluator, sequence: &[Stop], scheme: Vec<Euler>, root: &mut Vec<f64>) -> Moved {
+    fn scored(
+        &self,
+        here: &Evaluator,
+        sequence: &[Stop],
+        scheme: Vec<Euler>,
+        root: &mut Vec<f64>,
+    ) -> MovedScheme {
         let state = here.state_of(sequence);
         let violation = if scheme.iter().all(|e| self.gimbals.reach(e)) {
             self.constraints.violation(here, sequence, &state, root)
@@ -199,6 +205,6 @@ impl Moves<'_> {
             f64::INFINITY
         };
         let value = here.value(&state, self.criterion, root);
-        Moved { violation, value, scheme, examined: 0 }
+        MovedScheme { violation, value, scheme, examined: 0 }
     }
 }

@@ -29,7 +29,7 @@ const LONGEST: f64 = 1024.0;
 const GRIDS: [i64; 2] = [45_000_000_000, 30_000_000_000];
 
 /// Search for changes that would meet every requirement.
-struct Seeking<'a> {
+struct AlternativeSearch<'a> {
     base: &'a Scheme,
     conditions: &'a Conditions,
     options: DesignOptions,
@@ -38,7 +38,7 @@ struct Seeking<'a> {
 }
 
 /// Best sequence of an exchange, and its scheme with the outcome of the requirements.
-type Best = (Scored, Found);
+type BestScheme = (Scored, Found);
 
 /// Changes that would meet every requirement; no scheme of `k` positions for `options` meets them.
 pub(crate) fn seek(
@@ -58,7 +58,7 @@ pub(crate) fn seek(
         free: None,
         ..options.clone()
     };
-    let mut seeking = Seeking { base, conditions, options, progress, out: Nearest::default() };
+    let mut seeking = AlternativeSearch { base, conditions, options, progress, out: Nearest::default() };
     match seeking.all(k) {
         Err(DesignError::Interrupted) => seeking.out.unfinished = true,
         done => done?,
@@ -66,7 +66,7 @@ pub(crate) fn seek(
     Ok(seeking.out)
 }
 
-impl Seeking<'_> {
+impl AlternativeSearch<'_> {
     /// Tries all changes, one kind after the other.
     fn all(&mut self, k: usize) -> Result<(), DesignError> {
         let nearest = self.exchanged(k, None, RESTARTS.min(self.options.restarts), Vec::new())?;
@@ -93,7 +93,7 @@ impl Seeking<'_> {
         candidates: Option<Candidates>,
         restarts: u64,
         given: Vec<Vec<Stop>>,
-    ) -> Result<Option<Best>, DesignError> {
+    ) -> Result<Option<BestScheme>, DesignError> {
         if !self.goes_on() {
             return Ok(None);
         }

@@ -5,11 +5,11 @@ use obsdeg_core::model::{Euler, angles_text};
 use rayon::prelude::*;
 
 use crate::design::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
-use crate::design::certificate::value::{Value, excess};
+use crate::design::certificate::value::{CriterionValue, excess};
 use crate::design::certificate::{Bound, Everywhere};
 use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::stop::Stop;
-use crate::design::polish::rounding::Moved;
+use crate::design::polish::rounding::MovedScheme;
 use crate::design::run::task::{DWELLS, Task};
 use crate::design::search::score::Scored;
 
@@ -19,8 +19,8 @@ const LISTED: usize = 10;
 /// Report of the bound over all attitudes, beside the criterion `value` of the best scheme found.
 pub(crate) fn everywhere(
     found: &Everywhere,
-    value: Value,
-    rounded: Option<(i64, Option<&Moved>)>,
+    value: CriterionValue,
+    rounded: Option<(i64, Option<&MovedScheme>)>,
 ) -> EverywhereReport {
     let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
     let (listed, lighter) = found.support.split_at(found.support.len().min(LISTED));
@@ -48,16 +48,16 @@ impl Task<'_> {
     }
 
     /// Criterion of a scheme with its rounding tolerance, for its information as evaluated.
-    pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> Value {
-        Value::new(of.worth.value, self.at_most(evaluator, of, None))
+    pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
+        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, None))
     }
 
     /// Criterion with its rounding tolerance, for the information as it is bounded over all attitudes:
     /// without psi.
-    pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+    pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
         let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
         let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
-        Value::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
+        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
     }
 
     /// Upper bound on the criterion of a scheme; `None` for total uncertainties, whose rounding is
@@ -68,7 +68,7 @@ impl Task<'_> {
     }
 
     /// Report of the bound over the candidates, beside the criterion `value` of the best scheme found.
-    pub(crate) fn certificate(&self, bound: &Bound, value: Value) -> Certificate {
+    pub(crate) fn certificate(&self, bound: &Bound, value: CriterionValue) -> Certificate {
         let excess = excess(value.at_most, bound.value);
         let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
         Certificate {

@@ -35,7 +35,8 @@ pub fn design(
 }
 
 /// Source of search results instead of a search: merged parts, with their report.
-pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
+pub(crate) type ResultSource<'a> =
+    &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
 /// Answer of a design; `elsewhere` provides the results instead of a search.
 pub(crate) fn answered(
@@ -43,7 +44,7 @@ pub(crate) fn answered(
     conditions: &Conditions,
     options: &DesignOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-    elsewhere: Option<Elsewhere<'_>>,
+    elsewhere: Option<ResultSource<'_>>,
 ) -> Result<Design, DesignError> {
     let stated = conditions;
     let conditions = &asked(base, conditions, &options.required)?;

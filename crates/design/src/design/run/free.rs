@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::design::certificate::Everywhere;
 use crate::design::measure::stop::Stop;
-use crate::design::polish::rounding::{Moved, Moves, OnGrids, random, rounded};
+use crate::design::polish::rounding::{MovedScheme, Moves, OnGrids, random, rounded};
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::QUICK;
@@ -49,7 +49,7 @@ pub(crate) struct Free {
     /// unknown.
     cardinal: Option<(usize, f64)>,
     /// Best scheme with angles in hundredths of a degree; `None` if none was found.
-    pub(crate) finer: Option<Moved>,
+    pub(crate) finer: Option<MovedScheme>,
 }
 
 /// Options of the same task with the cardinal attitudes.
@@ -133,7 +133,7 @@ impl Free {
         let finer = moved.iter().map(|m| &m.finer).min_by(|a, b| a.order(b));
         out.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();
         moved.sort_by(|a, b| a.on_step.order(&b.on_step));
-        for OnGrids { on_step: Moved { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
+        for OnGrids { on_step: MovedScheme { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
             scheme.iter().for_each(|euler| out.candidates.add(euler.clone()));
             out.starts.push(scheme);
         }

@@ -16,7 +16,7 @@ use crate::design::search::score::Scored;
 use crate::design::search::scoring::{Search, candidates};
 
 /// Whole search that parts are compared with.
-pub(crate) struct Whole<'a> {
+pub(crate) struct WholeSearch<'a> {
     prepared: &'a Prepared<'a>,
     search: Search<'a>,
     k: usize,
@@ -28,9 +28,9 @@ pub(crate) struct Whole<'a> {
 }
 
 /// Block of a part: index of the part, of the level, of the block.
-pub(crate) type BlockAt = [usize; 3];
+pub(crate) type BlockIndex = [usize; 3];
 
-impl<'a> Whole<'a> {
+impl<'a> WholeSearch<'a> {
     /// Search of `k` positions, without the steps that take long.
     ///
     /// # Errors
@@ -224,7 +224,7 @@ impl<'a> Whole<'a> {
     pub(crate) fn search_again(
         &self,
         parts: &[&(String, Part)],
-        blocks: Vec<BlockAt>,
+        blocks: Vec<BlockIndex>,
         count: usize,
         random: &mut SplitMix64,
     ) -> Result<usize, DesignError> {
@@ -233,7 +233,7 @@ impl<'a> Whole<'a> {
             return Ok(0);
         }
         let pruning = self.prepared.pruning(&self.search, self.k);
-        let of_one_level = |a: &BlockAt, b: &BlockAt| a[..2] == b[..2];
+        let of_one_level = |a: &BlockIndex, b: &BlockIndex| a[..2] == b[..2];
         for group in chosen.chunk_by(of_one_level) {
             let [part, level, _] = group[0];
             let (name, part) = parts[part];
@@ -324,7 +324,7 @@ fn blocks_add_up(level: &Level, from: usize, to: usize) -> Result<(), PartError>
 }
 
 /// Random choice of `count` of the blocks, in their order.
-fn chosen(mut blocks: Vec<BlockAt>, count: usize, random: &mut SplitMix64) -> Vec<BlockAt> {
+fn chosen(mut blocks: Vec<BlockIndex>, count: usize, random: &mut SplitMix64) -> Vec<BlockIndex> {
     while blocks.len() > count {
         let place = random.below(blocks.len() as u64) as usize;
         blocks.swap_remove(place);

@@ -341,7 +341,7 @@ impl<'a> Task<'a> {
     /// Sets `image_of` of schemes that a turn of the platform axes makes of earlier ones.
     pub(crate) fn mark_images(&self, found: &mut [Found], ordered: bool) {
         // candidates in order, and half turns with their axes
-        type Way = (Vec<usize>, Vec<(usize, [i64; 3])>);
+        type Arrangement = (Vec<usize>, Vec<(usize, [i64; 3])>);
         let names: HashMap<&str, usize> = self.candidates.names.iter().map(String::as_str).zip(0..).collect();
         let arranged = |mut sequence: Vec<usize>| {
             if !ordered {
@@ -350,7 +350,7 @@ impl<'a> Task<'a> {
             sequence
         };
         // all images of the schemes that are no images themselves
-        let mut known: HashMap<Way, usize> = HashMap::new();
+        let mut known: HashMap<Arrangement, usize> = HashMap::new();
         for (i, f) in found.iter_mut().enumerate() {
             let sequence: Option<Vec<usize>> =
                 f.positions.iter().map(|p| names.get(p.as_str()).copied()).collect();

@@ -3,7 +3,7 @@
 use obsdeg_evidence::requirements::meets;
 
 use crate::design::measure::criterion::{Criterion, Limits};
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
 /// Constraints on a scheme besides observability.
@@ -31,7 +31,7 @@ impl Constraints {
         &self,
         evaluator: &Evaluator,
         sequence: &[Stop],
-        state: &State,
+        state: &SequenceState,
         root: &mut Vec<f64>,
     ) -> f64 {
         let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);

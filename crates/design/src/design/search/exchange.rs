@@ -3,7 +3,7 @@
 use obsdeg_exact::SplitMix64;
 use rayon::prelude::*;
 
-use crate::design::measure::evaluator::State;
+use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{Meter, PATIENCE};
@@ -18,11 +18,11 @@ impl Search<'_> {
     fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
         let last = place.checked_sub(1).map(|p| now[p].candidate);
         let next = now.get(place + 1).map(|next| next.candidate);
-        let ways = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
+        let with_next = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
             let Some(next) = next else { return vec![(stop, None)] };
             self.evaluator.stops(Some(stop.candidate), next).map(|next| (stop, Some(next))).collect()
         };
-        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
+        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(with_next).collect()
     }
 
     /// Coordinate exchange: each place of the sequence takes its best candidate and the better path of
@@ -60,7 +60,7 @@ impl Search<'_> {
             let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
             let mut trial = Trial::new(self.evaluator);
             // keeps a better sequence; false when the search is stopped
-            let mut try_out = |before: (&State, usize), now: &[Stop], held: &mut Scored| {
+            let mut try_out = |before: (&SequenceState, usize), now: &[Stop], held: &mut Scored| {
                 best.examined += 1;
                 let other = self.worth_behind(before, now, &mut trial);
                 if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::design::measure::evaluator::State;
+use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
-use crate::design::observable::rows::Patience;
+use crate::design::observable::rows::EnumerationLimits;
 use crate::design::observable::sets::Sets;
 use crate::design::observable::symmetry::Symmetry;
 use crate::design::search::best::Best;
@@ -41,7 +41,7 @@ pub(crate) struct Pruning<'a> {
 }
 
 /// Pruning data of one traversal.
-struct Pruned<'a> {
+struct ActivePruning<'a> {
     screen: &'a Screen<'a>,
     known: &'a Best,
     scratch: Scratch,
@@ -49,23 +49,23 @@ struct Pruned<'a> {
 }
 
 /// Traversal of sequences that shares the states of their prefixes.
-struct Walk<'a> {
+struct Traversal<'a> {
     search: &'a Search<'a>,
     meter: &'a Meter<'a>,
-    states: Vec<State>,
+    states: Vec<SequenceState>,
     root: Vec<f64>,
     variances: Vec<f64>,
     sequence: Vec<Stop>,
     /// Working space.
     members: Vec<usize>,
     best: Best,
-    pruned: Option<Pruned<'a>>,
+    pruned: Option<ActivePruning<'a>>,
     /// Number of positions added to sequences.
     pushed: u64,
     stopped: bool,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> Traversal<'a> {
     fn new(search: &'a Search<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
         Self {
             search,
@@ -191,9 +191,9 @@ impl<'a> Walk<'a> {
     }
 
     /// Visits all pairs of last positions except those that a bound excludes.
-    fn visit_pairs(&mut self, sets: &Sets, degree: usize, pruned: &mut Pruned<'_>) {
+    fn visit_pairs(&mut self, sets: &Sets, degree: usize, pruned: &mut ActivePruning<'_>) {
         let depth = self.sequence.len();
-        let Pruned { screen, known, scratch, alive } = pruned;
+        let ActivePruning { screen, known, scratch, alive } = pruned;
         let candidates = self.search.rows.candidates();
         alive.clear();
         alive.resize(candidates * candidates, true);
@@ -385,43 +385,49 @@ impl Search<'_> {
         (degree, sets): (usize, &Sets),
         known: Option<(&Screen<'_>, &Best)>,
     ) -> Best {
-        let mut walk = Walk::new(self, meter, k);
-        walk.pruned = known.map(|(screen, known)| Pruned {
+        let mut traversal = Traversal::new(self, meter, k);
+        traversal.pruned = known.map(|(screen, known)| ActivePruning {
             screen,
             known,
             scratch: screen.scratch(),
             alive: Vec::new(),
         });
-        if walk.go_to(start) {
+        if traversal.go_to(start) {
             if start.len() < k {
-                walk.visit(sets, degree, k);
+                traversal.visit(sets, degree, k);
             } else {
-                set_of(start, &mut walk.members);
-                if sets.contains(&walk.members) {
-                    walk.score(degree, 1);
+                set_of(start, &mut traversal.members);
+                if sets.contains(&traversal.members) {
+                    traversal.score(degree, 1);
                 }
             }
         }
-        walk.best
+        traversal.best
     }
 
     /// Searches the sets behind a start, where order does not matter.
     fn exhaust_sets(&self, meter: &Meter<'_>, start: &[Stop], k: usize, symmetry: &Symmetry) -> Best {
         let going = || meter.report(0, 0, None);
-        let mut walk = Walk::new(self, meter, k);
+        let mut traversal = Traversal::new(self, meter, k);
         let mut sequence = Vec::with_capacity(k);
-        self.rows.each(&candidates(start), k, true, &mut Patience::while_going(&going), &mut |set| {
-            let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
-            sequence.clear();
-            sequence.extend(set.iter().map(|&c| Stop::from(c)));
-            if let Some(degree) = degree
-                && walk.go_to(&sequence)
-            {
-                walk.score(degree, symmetry.searched_images(set));
-            }
-            !walk.stopped
-        });
-        walk.best
+        self.rows.each(
+            &candidates(start),
+            k,
+            true,
+            &mut EnumerationLimits::while_going(&going),
+            &mut |set| {
+                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+                sequence.clear();
+                sequence.extend(set.iter().map(|&c| Stop::from(c)));
+                if let Some(degree) = degree
+                    && traversal.go_to(&sequence)
+                {
+                    traversal.score(degree, symmetry.searched_images(set));
+                }
+                !traversal.stopped
+            },
+        );
+        traversal.best
     }
 
     /// All observable sets of up to `k` candidates within the caps, by worst degree; `None` when the
@@ -432,7 +438,7 @@ impl Search<'_> {
         let candidates = self.rows.candidates();
         let levels: Vec<Sets> = (0..=self.rows.last_order()).map(|_| Sets::none(candidates, k)).collect();
         let judged = |prefix: &[usize], size: usize| {
-            let mut patience = Patience::while_going(&going);
+            let mut patience = EnumerationLimits::while_going(&going);
             self.rows.each(prefix, size, false, &mut patience, &mut |set| {
                 let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
                 degree.inspect(|&degree| levels[degree].add(set));

@@ -1,7 +1,7 @@
 //! Search: candidates, criterion, constraints, and the score of one sequence.
 
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::Rows;
 use crate::design::search::constraints::Constraints;
@@ -31,8 +31,8 @@ pub struct Search<'a> {
 
 /// Working space for successive trials.
 pub(crate) struct Trial {
-    now: State,
-    next: State,
+    now: SequenceState,
+    next: SequenceState,
     root: Vec<f64>,
 }
 
@@ -62,7 +62,7 @@ impl Search<'_> {
     /// follows. Degrees are those of one field.
     pub(crate) fn worth_behind(
         &self,
-        (state, known): (&State, usize),
+        (state, known): (&SequenceState, usize),
         sequence: &[Stop],
         trial: &mut Trial,
     ) -> Scored {

@@ -29,7 +29,7 @@
 //! no condition number enters: the energy of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. The
 //! information of a position is `L^T G L` with `|G_ab| <= sqrt(G_aa G_bb)`; the rounding of its sums
 //! and products is likewise at most `gamma (sum_i |x_i| s_i)^2`, `s_i = sum_a sqrt(G_aa) |L_ai|`
-//! ([`Reach`]). Eigenvalues (E) are those of a matrix that is off by a small multiple of n u of its
+//! ([`MagnitudeBounds`]). Eigenvalues (E) are those of a matrix that is off by a small multiple of n u of its
 //! norm, as for any backward stable method (G. H. Golub, C. F. Van Loan, *Matrix Computations*, section
 //! 8.3); for the library used it is assumed to be [`EIGENVALUES`] n u at most. A pivot that the search
 //! skips as a rounding residue of an undetermined direction counts as zero here too.
@@ -39,7 +39,7 @@ use obsdeg_exact::SplitMix64;
 
 use crate::design::certificate::bounded::rounding;
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 /// Error of eigenvalues, in n u times the norm (an assumption).
@@ -50,7 +50,7 @@ const DIRECTIONS: usize = 2;
 const MEAN: f64 = 1e-3;
 /// Cost of a vector, in evaluations of a pair; initial and largest credit. Each excluded pair adds to
 /// the credit; when it is used up, the remaining pairs are evaluated.
-const WORTH: usize = 4;
+const COST: usize = 4;
 const CREDIT: usize = 40;
 const MOST_CREDIT: usize = 80;
 /// Number of power iterations towards the largest principal sigma.
@@ -60,14 +60,14 @@ const POWERS: usize = 4;
 pub(crate) struct Screen<'a> {
     evaluator: &'a Evaluator,
     criterion: &'a Criterion,
-    positions: Positions,
+    positions: CandidateInformation,
     /// Mean information of two positions (n x n, lower triangle).
     mean: Vec<f64>,
-    reach: Reach,
+    magnitudes: MagnitudeBounds,
 }
 
 /// Largest magnitudes over all candidates, for bounds on rounding.
-struct Reach {
+struct MagnitudeBounds {
     /// `sum_a sqrt(G_aa) |L_ai|` of psi, summed over its components.
     psi: f64,
     /// `sum_a sqrt(G_aa) |L_ai|` of every unknown (shape n); zero for psi.
@@ -80,7 +80,7 @@ struct Reach {
 
 /// Information of every candidate as a scheme of its own, on psi at its start, as it is carried, and on
 /// the coefficients. Each vector holds one entry of all candidates.
-struct Positions {
+struct CandidateInformation {
     /// Information on psi: xx, 2 xy, yy, 2 xz, 2 yz, zz.
     psi: [Vec<f64>; 6],
     /// Twice the information between psi and every coefficient (3 x d).
@@ -94,14 +94,14 @@ struct Positions {
 
 /// Vectors of a bound: the square of the criterion, in units of the evaluator, is at least `most`
 /// divided by the sum of their `x^T M x`.
-struct Test {
+struct ExclusionTest {
     vectors: Vec<[f64; MAX_UNKNOWNS]>,
     most: f64,
 }
 
 /// Energy of one vector at every candidate: a position adds `constant + linear z + psi(z)`, and carries
 /// on `turned z + shift`.
-struct Lanes {
+struct VectorEnergy {
     linear: [Vec<f64>; 3],
     constant: Vec<f64>,
     shift: [Vec<f64>; 3],
@@ -109,11 +109,11 @@ struct Lanes {
 
 /// Working space of one thread.
 pub(crate) struct Scratch {
-    one: State,
-    two: State,
+    one: SequenceState,
+    two: SequenceState,
     /// Information with the mean of two further positions.
     mean: Vec<f64>,
-    mixed: State,
+    mixed: SequenceState,
     tried: Vec<bool>,
     draw: SplitMix64,
     root: Vec<f64>,
@@ -121,7 +121,7 @@ pub(crate) struct Scratch {
     /// Bounds on the root of the contribution of every unknown to M: of the prefix, and of two further
     /// positions.
     sizes: Vec<[f64; 3]>,
-    lanes: Lanes,
+    lanes: VectorEnergy,
     energy: Vec<f64>,
 }
 
@@ -129,7 +129,7 @@ impl<'a> Screen<'a> {
     /// Screen for `evaluator`; `None` where order does not matter, where turns take time, or where the
     /// noise of Z is correlated, so that continuations have no information of their own.
     pub(crate) fn new(evaluator: &'a Evaluator, criterion: &'a Criterion) -> Option<Self> {
-        if !evaluator.ordered() || !evaluator.ways.is_empty() || evaluator.bias.is_some() {
+        if !evaluator.ordered() || !evaluator.slew_paths.is_empty() || evaluator.bias.is_some() {
             return None;
         }
         let (n, count) = (evaluator.n, evaluator.candidates.len());
@@ -147,13 +147,13 @@ impl<'a> Screen<'a> {
             alone.push(one.clone());
         }
         mean.iter_mut().for_each(|x| *x /= (count * count) as f64);
-        let reach = Reach::of(&bare, &alone);
-        Some(Self { evaluator, criterion, positions: Positions::of(&alone, n), mean, reach })
+        let magnitudes = MagnitudeBounds::of(&bare, &alone);
+        Some(Self { evaluator, criterion, positions: CandidateInformation::of(&alone, n), mean, magnitudes })
     }
 
     pub(crate) fn scratch(&self) -> Scratch {
         let count = self.evaluator.candidates.len();
-        let lanes = Lanes {
+        let lanes = VectorEnergy {
             linear: std::array::from_fn(|_| vec![0.0; count]),
             constant: vec![0.0; count],
             shift: std::array::from_fn(|_| vec![0.0; count]),
@@ -176,9 +176,9 @@ impl<'a> Screen<'a> {
 
     /// Clears the entries of `alive` for pairs of candidates after `state` whose criterion exceeds
     /// `limit`. Pairs are ordered by first candidate, then by second.
-    pub(crate) fn pairs(&self, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) {
+    pub(crate) fn pairs(&self, state: &SequenceState, limit: f64, alive: &mut [bool], on: &mut Scratch) {
         self.with_mean(state, on);
-        self.reach.behind(state, &mut on.sizes);
+        self.magnitudes.behind(state, &mut on.sizes);
         on.mixed.information.copy_from_slice(&on.mean);
         // a pair that no vector excludes is tried once
         on.tried.clear();
@@ -188,10 +188,10 @@ impl<'a> Screen<'a> {
             for test in self.tests(directions, on) {
                 credit += self.apply(&test, state, limit, alive, on) / test.vectors.len();
             }
-            (directions, credit) = (1, credit.min(MOST_CREDIT).saturating_sub(WORTH));
+            (directions, credit) = (1, credit.min(MOST_CREDIT).saturating_sub(COST));
             let open = |i: &usize| alive[*i] && !on.tried[*i];
             let left = (0..alive.len()).filter(open).count();
-            if left < WORTH || credit == 0 {
+            if left < COST || credit == 0 {
                 return;
             }
             // a random pair: neighbouring pairs are alike
@@ -212,7 +212,14 @@ impl<'a> Screen<'a> {
     }
 
     /// Clears the entries of `alive` that a test excludes, and returns their number.
-    fn apply(&self, test: &Test, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) -> usize {
+    fn apply(
+        &self,
+        test: &ExclusionTest,
+        state: &SequenceState,
+        limit: f64,
+        alive: &mut [bool],
+        on: &mut Scratch,
+    ) -> usize {
         let Scratch { energy, lanes, sizes, .. } = on;
         energy.clear();
         energy.resize(alive.len(), 0.0);
@@ -246,7 +253,7 @@ impl<'a> Screen<'a> {
     /// Returns `P x`; adds `x^T M_prefix x` and the rounding bound of the whole energy to `known`.
     fn behind(
         &self,
-        state: &State,
+        state: &SequenceState,
         x: &[f64; MAX_UNKNOWNS],
         sizes: &[[f64; 3]],
         known: &mut f64,
@@ -278,7 +285,7 @@ impl<'a> Screen<'a> {
     }
 
     /// Information of `state` with the mean of two further positions.
-    fn with_mean(&self, state: &State, on: &mut Scratch) {
+    fn with_mean(&self, state: &SequenceState, on: &mut Scratch) {
         let n = self.evaluator.n;
         // P^T S_zz P + P^T S_zx + S_xz P + S_xx, with S_zz / 2 P + S_zx first
         let symmetric = |i: usize, j: usize| self.mean[i.max(j) * n + i.min(j)];
@@ -303,7 +310,7 @@ impl<'a> Screen<'a> {
 
     /// Tests from some information; `directions` of them for criteria in which every coefficient is
     /// one.
-    fn tests(&self, directions: usize, on: &mut Scratch) -> Vec<Test> {
+    fn tests(&self, directions: usize, on: &mut Scratch) -> Vec<ExclusionTest> {
         if !self.evaluator.root(&on.mixed, &mut on.root) {
             return Vec::new();
         }
@@ -312,7 +319,7 @@ impl<'a> Screen<'a> {
     }
 
     /// Tests from the inverse of the factor, `M^-1 = K^T K`.
-    fn of_inverse(&self, k: &[f64], most: usize) -> Vec<Test> {
+    fn of_inverse(&self, k: &[f64], most: usize) -> Vec<ExclusionTest> {
         let n = self.evaluator.n;
         let begin = 3 + self.evaluator.nuisance;
         let d = (n - begin) as f64;
@@ -330,7 +337,7 @@ impl<'a> Screen<'a> {
         let variance = |j: usize| (j..n).map(|r| k[r * n + j] * k[r * n + j]).sum::<f64>();
         let alone = |j: usize, limit: f64| {
             let x = solved(&unit(j));
-            Test { most: (x[j] / limit).powi(2), vectors: vec![x] }
+            ExclusionTest { most: (x[j] / limit).powi(2), vectors: vec![x] }
         };
         let directions = |limit: &dyn Fn(usize) -> f64| {
             let mut order: Vec<(f64, usize)> =
@@ -345,12 +352,15 @@ impl<'a> Screen<'a> {
             Criterion::A => {
                 let vectors: Vec<_> = (begin..n).map(|j| solved(&unit(j))).collect();
                 let trace: f64 = vectors.iter().zip(begin..).map(|(x, j)| x[j]).sum();
-                vec![Test { vectors, most: trace * trace / d }]
+                vec![ExclusionTest { vectors, most: trace * trace / d }]
             }
             Criterion::D => {
                 let row = |j: usize| std::array::from_fn(|i| if i <= j { k[j * n + i] } else { 0.0 });
                 let logs: f64 = (begin..n).map(|j| k[j * n + j].ln()).sum();
-                vec![Test { vectors: (begin..n).map(row).collect(), most: d * (2.0 * logs / d).exp() }]
+                vec![ExclusionTest {
+                    vectors: (begin..n).map(row).collect(),
+                    most: d * (2.0 * logs / d).exp(),
+                }]
             }
             Criterion::E => {
                 let largest = (begin..n).max_by(|a, b| variance(*a).total_cmp(&variance(*b)));
@@ -361,16 +371,16 @@ impl<'a> Screen<'a> {
                     let u = std::array::from_fn(|i| if i >= begin { x[i] / size } else { 0.0 });
                     x = solved(&u);
                 }
-                vec![Test { most: counting(&x), vectors: vec![x] }]
+                vec![ExclusionTest { most: counting(&x), vectors: vec![x] }]
             }
         }
     }
 }
 
-impl Reach {
+impl MagnitudeBounds {
     /// Bounds for the candidates of an evaluator without priors; `alone` are their states as first
     /// positions.
-    fn of(evaluator: &Evaluator, alone: &[State]) -> Self {
+    fn of(evaluator: &Evaluator, alone: &[SequenceState]) -> Self {
         let n = evaluator.n;
         let mut out = Self { psi: 0.0, own: vec![0.0; n], grow: 1.0, gain: vec![0.0; n] };
         let start = evaluator.start();
@@ -395,7 +405,7 @@ impl Reach {
 
     /// Bounds on the root of the contribution of every unknown to M, of the prefix and of two further
     /// positions.
-    fn behind(&self, state: &State, sizes: &mut Vec<[f64; 3]>) {
+    fn behind(&self, state: &SequenceState, sizes: &mut Vec<[f64; 3]>) {
         let n = self.own.len();
         sizes.clear();
         sizes.extend((0..n).map(|i| {
@@ -407,8 +417,8 @@ impl Reach {
     }
 }
 
-impl Positions {
-    fn of(alone: &[State], n: usize) -> Self {
+impl CandidateInformation {
+    fn of(alone: &[SequenceState], n: usize) -> Self {
         let entry = |i: usize, j: usize| -> Vec<f64> {
             let factor = if i == j { 1.0 } else { 2.0 };
             alone.iter().map(|a| factor * a.information[i * n + j]).collect()
@@ -425,15 +435,15 @@ impl Positions {
     }
 }
 
-/// `sum += factor * lane`, entry by entry.
-fn add(sum: &mut [f64], factor: f64, lane: &[f64]) {
-    sum.iter_mut().zip(lane).for_each(|(s, x)| *s += factor * x);
+/// `sum += factor * entries`, entry by entry.
+fn add(sum: &mut [f64], factor: f64, entries: &[f64]) {
+    sum.iter_mut().zip(entries).for_each(|(s, x)| *s += factor * x);
 }
 
-impl Lanes {
-    fn take(&mut self, positions: &Positions, x: &[f64; MAX_UNKNOWNS]) {
+impl VectorEnergy {
+    fn take(&mut self, positions: &CandidateInformation, x: &[f64; MAX_UNKNOWNS]) {
         let all = self.linear.iter_mut().chain(&mut self.shift).chain(std::iter::once(&mut self.constant));
-        all.for_each(|lane| lane.fill(0.0));
+        all.for_each(|entries| entries.fill(0.0));
         let d = positions.cross[0].len();
         let coefficients = &x[3..3 + d];
         for (j, &xj) in coefficients.iter().enumerate().filter(|(_, x)| **x != 0.0) {
@@ -442,33 +452,34 @@ impl Lanes {
                 add(&mut self.shift[r], xj, &positions.shifted[r][j]);
             }
             let row = &positions.coefficients[j * (j + 1) / 2..];
-            for (lane, xi) in row.iter().zip(&coefficients[..=j]) {
-                add(&mut self.constant, xj * xi, lane);
+            for (entries, xi) in row.iter().zip(&coefficients[..=j]) {
+                add(&mut self.constant, xj * xi, entries);
             }
         }
     }
 
     /// Contribution of candidate `c` if psi is z.
-    fn at(&self, c: usize, positions: &Positions, z: &[f64; 3]) -> f64 {
+    fn at(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> f64 {
         let [x, y, w] = *z;
         let products = [x * x, x * y, y * y, x * w, y * w, w * w];
-        let square: f64 = positions.psi.iter().zip(products).map(|(lane, p)| lane[c] * p).sum();
-        let linear: f64 = self.linear.iter().zip(z).map(|(lane, z)| lane[c] * z).sum();
+        let square: f64 = positions.psi.iter().zip(products).map(|(entries, p)| entries[c] * p).sum();
+        let linear: f64 = self.linear.iter().zip(z).map(|(entries, z)| entries[c] * z).sum();
         self.constant[c] + linear + square
     }
 
     /// Psi after a dwell at candidate `c`.
-    fn behind(&self, c: usize, positions: &Positions, z: &[f64; 3]) -> [f64; 3] {
-        let turned = |r: usize| positions.turned[r].iter().zip(z).map(|(lane, z)| lane[c] * z).sum::<f64>();
+    fn behind(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> [f64; 3] {
+        let turned =
+            |r: usize| positions.turned[r].iter().zip(z).map(|(entries, z)| entries[c] * z).sum::<f64>();
         std::array::from_fn(|r| self.shift[r][c] + turned(r))
     }
 
     /// Adds `before` and the contribution of every candidate, if psi is z, to `energy`.
-    fn all(&self, positions: &Positions, z: &[f64; 3], before: f64, energy: &mut [f64]) {
+    fn all(&self, positions: &CandidateInformation, z: &[f64; 3], before: f64, energy: &mut [f64]) {
         let n = energy.len();
         let [x, y, w] = *z;
-        let [lx, ly, lw] = self.linear.each_ref().map(|lane| &lane[..n]);
-        let [xx, xy, yy, xw, yw, ww] = positions.psi.each_ref().map(|lane| &lane[..n]);
+        let [lx, ly, lw] = self.linear.each_ref().map(|entries| &entries[..n]);
+        let [xx, xy, yy, xw, yw, ww] = positions.psi.each_ref().map(|entries| &entries[..n]);
         let constant = &self.constant[..n];
         for c in 0..n {
             energy[c] += before
@@ -507,7 +518,7 @@ fn inverse(root: &[f64], n: usize, out: &mut Vec<f64>) {
 mod tests {
     use super::*;
     use crate::design::measure::criterion::Limits;
-    use crate::design::{Candidates, State};
+    use crate::design::{Candidates, SequenceState};
     use obsdeg_core::model::settings::Assignment;
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
@@ -564,7 +575,7 @@ mod tests {
             let screen = Screen::new(&evaluator, &criterion).expect("a screen");
             let count = candidates.len();
             let prefix: Vec<usize> = (0..1 + below(5)).map(|_| below(count as u64)).collect();
-            let state: State = evaluator.state_of(&prefix);
+            let state: SequenceState = evaluator.state_of(&prefix);
             let values: Vec<f64> = (0..count * count)
                 .map(|pair| {
                     let sequence: Vec<usize> =
