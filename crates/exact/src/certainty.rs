@@ -26,7 +26,7 @@ pub struct Claim {
 ///   `unknowns * row_bits / 60` over the number of primes `p = 1 mod n` of 61 bits, taken by their
 ///   density `2^60 / (phi(n) ln 2^61)`.
 ///
-/// Primes and points are random to whoever wrote the input, since a hash of the input chooses them
+/// Primes and points are random to the author of the input, since a hash of the input chooses them
 /// ([`crate::SplitMix64::of`]); every field has a stream of its own.
 ///
 /// ```

@@ -255,7 +255,7 @@ pub fn nonzero_columns<'a>(n: usize, rows: impl Iterator<Item = &'a [u64]>) -> V
 /// Solves `sum_i y_i rows[i] = target` (each of shape n): a solution `y` with zeros for the rows that
 /// depend on earlier ones, or `None` when `target` is not in their span.
 pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>> {
-    // columns that are zero everywhere say nothing
+    // columns that are zero everywhere give no condition
     let used = nonzero_columns(target.len(), rows.iter().copied().chain([target]));
     let short = |row: &[u64]| -> Vec<u64> { used.iter().map(|&c| row[c]).collect() };
     // echelon form of [rows | identity]: the right part remembers how each basis row was made

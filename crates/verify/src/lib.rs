@@ -21,7 +21,7 @@ use problem::Problem;
 /// Largest certificate, in bytes.
 const MOST_BYTES: usize = 16_000_000;
 
-/// Reason why a certificate is not accepted: the place, what the certificate says, what is found.
+/// Reason why a certificate is not accepted: the place, the certificate's value and the value found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refused {
     text: String,
@@ -62,7 +62,7 @@ impl std::fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// A refusal: the place, what was expected there, what was found.
+/// Refusal with the place, the expectation and the value found.
 fn refusal(place: &str, expected: &str, found: impl std::fmt::Display) -> Refused {
     Refused::new(format!("{place}: expected {expected}; found {}", short(&found.to_string())))
 }

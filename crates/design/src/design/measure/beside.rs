@@ -47,9 +47,10 @@ impl Evaluator {
         rows
     }
 
-    /// Refuses sizes of immunity that [`Self::not_immune`] cannot decide in `most` positions. It takes
-    /// an error for silent below the fraction [`SILENT`] of the information of its samples; from the
-    /// largest size allowed here on, a record might show such an error.
+    /// Refuses sizes of immunity that [`Self::not_immune`] cannot decide in `most` positions. An error counts
+    /// as silent below the fraction [`SILENT`] of the information of its samples. Beyond the largest size
+    /// allowed here, a record might show such an error.
+    ///
     /// # Errors
     /// [`DesignError::ImmuneSize`].
     pub(crate) fn check_immune(

@@ -52,7 +52,7 @@ impl Evaluator {
     /// Shortest slew path from one attitude to another, with the opposite one if that is as short.
     fn shortest_path(&self, from: &Matrix3<f64>, to: &Matrix3<f64>) -> SlewPath {
         let rate = self.conditions.slew_rate_deg_s.unwrap_or(f64::INFINITY);
-        // there is always a shortest way
+        // a shortest path always exists
         let slew = Slew::to(from, to, &SlewTo::default(), rate.to_radians()).ok().flatten();
         let Some(slew) = slew else { return self.stay() };
         let other = slew.reversed().map(|other| Box::new(self.turned(&other)));

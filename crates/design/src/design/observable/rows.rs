@@ -40,7 +40,7 @@ pub struct Rows {
 #[derive(Debug, Clone)]
 struct FieldRows {
     field: Field,
-    /// All rows, by candidate.
+    /// Rows of each candidate, of all orders.
     rows: Vec<Vec<Vec<u64>>>,
     /// Rows that derivatives of an order add, by order and candidate.
     by_order: Vec<Vec<Vec<Vec<u64>>>>,
@@ -59,7 +59,7 @@ pub struct EnumerationLimits<'a> {
 }
 
 impl<'a> EnumerationLimits<'a> {
-    /// No limit of work; stops when `going` returns false.
+    /// Limits without a budget: the enumeration stops when `going` returns false.
     pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { budget: u64::MAX, going }
     }

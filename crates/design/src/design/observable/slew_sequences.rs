@@ -1,6 +1,6 @@
 //! Fewest positions where torquer errors act in every turn. A scheme is then a slew sequence over
 //! candidates: the rows of a position depend on all turns before it.
-//! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows
+//!
 //! In n a position at `C_i`, with `J` the sum of the effects of all turns so far on `psi^n`, adds the
 //! rows `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most.
 //! Sequences are enumerated depth first with the echelon bases of their beginnings. A branch ends where

@@ -38,9 +38,9 @@ impl MovedScheme {
 
 /// Results of the local search on two grids of angles.
 pub(crate) struct OnGrids {
-    /// On the grid of hundredths of a degree.
+    /// Result on the grid of hundredths of a degree.
     pub(crate) finer: MovedScheme,
-    /// On the grid of the step asked for.
+    /// Result on the grid of the step asked for.
     pub(crate) on_step: MovedScheme,
 }
 
