@@ -89,8 +89,8 @@ impl Evaluator {
         Objective::Largest(vectors, offsets)
     }
 
-    /// Objective as [`Self::largest`], with psi of one position added: every scheme, up to its images,
-    /// contains one of `firsts`.
+    /// Bound for margin with requirements on psi: the objective of [`Self::largest`] with psi of one position
+    /// added. It is the least bound over `firsts`: every scheme, up to its images, contains one of them.
     fn with_psi(
         &self,
         limits: &Limits,
@@ -123,7 +123,7 @@ impl Evaluator {
         least
     }
 
-    /// Weights that minimise the objective, with their bound.
+    /// Bound by the weights that minimise the objective.
     fn weighed(&self, objective: Objective, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
         let problem = self.additive(objective, k);
         let found = weigh(&problem, going)?;

@@ -121,7 +121,7 @@ impl Part {
     }
 }
 
-/// Starts of part `number` of `of`, counted from 1: all parts have about as many sequences.
+/// Starts of part `number` of `of`, counted from 1: all parts have about the same work.
 pub(crate) fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
     let total: f64 = work.iter().sum();
     // middle of a start on the scale of work

@@ -32,8 +32,8 @@ impl Search<'_> {
         self.exchange_from(k, given, restarts, seed, None)
     }
 
-    /// Exchange as [`Self::exchange`]. With `firsts` all sequences begin with one of them, and all
-    /// evaluated sequences are kept too.
+    /// Exchange as [`Self::exchange`]. With `firsts` all sequences begin with one of them, and
+    /// every evaluated sequence may be kept, not only the results.
     pub(crate) fn exchange_from(
         &self,
         k: usize,
