@@ -120,7 +120,7 @@ impl Additive {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Real, Reals, real};
+    use super::super::exact::{Real, BallRing, real};
     use super::super::weights::weigh;
     use super::*;
     use crate::design::measure::criterion::{Criterion, Limits};
@@ -157,7 +157,7 @@ mod tests {
             for (j, x) in columns.iter().enumerate() {
                 let v: Vec<Real> = vectors.column(j).iter().copied().map(real).collect();
                 let root = real(dual.shares[j]).sqrt().unwrap_or(Real::ZERO);
-                sum = sum.add(&root.mul(&Reals.dot(v.iter().zip(x))));
+                sum = sum.add(&root.mul(&BallRing.dot(v.iter().zip(x))));
             }
             over(sum.mul(&sum), &energy)
         };

@@ -15,9 +15,9 @@ pub(super) fn real(x: f64) -> Real {
 }
 
 /// Ring of balls of 512 bits.
-pub(super) struct Reals;
+pub(super) struct BallRing;
 
-impl Ring for Reals {
+impl Ring for BallRing {
     type Element = Real;
     fn zero(&self) -> Real {
         Real::ZERO
@@ -58,15 +58,15 @@ pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>>
         let angle: &Angle = &euler[axis];
         let radians = Real::from_i64(angle.nanodeg()).mul(&Real::pi()).div(&half).expect("not zero");
         let (sin, cos) = radians.sin_cos().expect("small");
-        elementary(&Reals, axis, &(cos, sin))
+        elementary(&BallRing, axis, &(cos, sin))
     };
-    let c = product(&Reals, &product(&Reals, &turn(0), &turn(1)), &turn(2));
+    let c = product(&BallRing, &product(&BallRing, &turn(0), &turn(1)), &turn(2));
     let [w_u, w_n] = [evaluator.w[1][2], -evaluator.w[0][2]].map(real);
     let errors = evaluator.platform.errors();
     let mut rows: Vec<Vec<Real>> =
-        errors.drift_rows(&Reals, &c, || earth_rate_in(&Reals, &c, &w_n, &w_u)).into();
+        errors.drift_rows(&BallRing, &c, || earth_rate_in(&BallRing, &c, &w_n, &w_u)).into();
     if evaluator.platform.observed().accelerometers {
-        rows.extend(errors.accelerometer_rows(&Reals, &c));
+        rows.extend(errors.accelerometer_rows(&BallRing, &c));
     }
     let ordered = |row: Vec<Real>| {
         let row: Vec<Scaled> = row.into_iter().map(Scaled).collect();
@@ -80,7 +80,7 @@ pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x
     let mut sum = Real::ZERO;
     for column in x.column_iter() {
         let x: Vec<Real> = column.iter().copied().map(real).collect();
-        let y: Vec<Real> = rows.iter().map(|row| Reals.dot(row.iter().zip(&x))).collect();
+        let y: Vec<Real> = rows.iter().map(|row| BallRing.dot(row.iter().zip(&x))).collect();
         for (a, row) in y.iter().zip(g) {
             for (b, g) in y.iter().zip(row) {
                 sum = sum.add(&a.mul(b).mul(&real(*g)));
@@ -149,9 +149,9 @@ impl ExactInformation {
                     let own = evaluator.own_psi(stop.candidate);
                     for k in (0..3).filter(|&k| limits.psi[k].is_finite()) {
                         let moved: Vec<Real> = own.moved.iter().map(|x| real(x[k])).collect();
-                        let dot = |row: &Vec<Real>| Reals.dot(row.iter().zip(&moved));
+                        let dot = |row: &Vec<Real>| BallRing.dot(row.iter().zip(&moved));
                         let through: Vec<Real> = self.inverse.iter().map(dot).collect();
-                        let variance = real(own.variances[k]).add(&Reals.dot(through.iter().zip(&moved)));
+                        let variance = real(own.variances[k]).add(&BallRing.dot(through.iter().zip(&moved)));
                         let unit = to_degrees.div(&real(limits.psi[k])).expect("a limit");
                         all.push(variance.mul(&unit).mul(&unit));
                     }
