@@ -129,9 +129,9 @@ fn both_checkers_refuse_1000_single_changes_of_models_of_every_kind() {
     refuse(1000);
 }
 
-/// By hand: x' = -a x + u, y = b x. From y, y' and y'' follow b x, then a (the input is known, so b as
-/// well). Every unknown is observable, x and b with degree 1 (y' = -a y + b u holds two more unknowns,
-/// a and b), so all of them need y''.
+/// Hand computation: x' = -a x + u, y = b x. From y, y' and y'' follow b x, then a (the input is known,
+/// so b as well). Every unknown is observable, x and b with degree 1 (y' = -a y + b u holds two more
+/// unknowns, a and b), so all of them need y''.
 const DECAY: &str = r#"
 name = "decay"
 [known_inputs]

@@ -122,8 +122,8 @@ fn fewest_of(sentences: &[String]) -> Option<usize> {
     rest.split(' ').next()?.parse().ok()
 }
 
-/// By hand: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, with slews too; the
-/// twelve drifts need 4, 5 and 6.
+/// Hand computation: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, also with
+/// slews; the twelve drifts need 4, 5 and 6.
 #[test]
 fn fewest_positions_by_counting() {
     let root =
@@ -347,8 +347,8 @@ fn a_true_statement_about_another_scheme() {
     assert!(verify(pole.as_bytes(), None).is_err());
 }
 
-/// By hand: at p1 p2 the D_FX of the paper, 1/2 [wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2], and psi_y with D_FZ
-/// as null vector.
+/// Hand computation: at p1 p2 the D_FX of the paper, 1/2 [wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2], and
+/// psi_y with D_FZ as null vector.
 #[test]
 fn the_solution_of_the_paper() {
     let (certificate, json) = certified(P1_P2);

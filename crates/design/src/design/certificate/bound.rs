@@ -120,7 +120,7 @@ impl Additive {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Real, BallRing, real};
+    use super::super::exact::{BallRing, Real, real};
     use super::super::weights::weigh;
     use super::*;
     use crate::design::measure::criterion::{Criterion, Limits};
