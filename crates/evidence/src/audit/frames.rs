@@ -1,4 +1,4 @@
-//! The equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random
+//! Equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random
 //! prime fields.
 
 use obsdeg_core::analysis::AnalysisError;
@@ -24,18 +24,18 @@ fn sum(f: &Field, a: &[u64; 3], b: &[u64; 3]) -> [u64; 3] {
     std::array::from_fn(|i| f.add(a[i], b[i]))
 }
 
-/// `a x b`.
+/// Cross product `a x b`.
 fn cross(f: &Field, a: &[u64; 3], b: &[u64; 3]) -> [u64; 3] {
     apply(f, &skew(f, a), b)
 }
 
-/// `[v x]`.
+/// Skew-symmetric matrix `[v x]`.
 fn skew(f: &Field, v: &[u64; 3]) -> Matrix3<u64> {
     let [x, y, z] = *v;
     [[0, f.neg(z), y], [z, 0, f.neg(x)], [f.neg(y), x, 0]]
 }
 
-/// `a + k b`.
+/// Matrix sum `a + k b`.
 fn plus(f: &Field, a: &Matrix3<u64>, k: u64, b: &Matrix3<u64>) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| f.add(a[i][j], f.mul(k, b[i][j]))))
 }
@@ -44,8 +44,8 @@ fn identity(f: &Field) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { f.one() } else { 0 }))
 }
 
-/// Whether a polynomial of degree two in a small quantity has no terms of degree 0 and 1: whether it is `h^2`
-/// times its value at 1 at the random size h of the point.
+/// True if a polynomial of degree two in a small quantity has no terms of degree 0 and 1: its value at the
+/// random size h of the point is `h^2` times its value at 1.
 fn of_second_order(at: &At, polynomial: impl Fn(u64) -> Matrix3<u64>) -> Result<bool, AnalysisError> {
     let (f, h) = (&at.field, at.value("h")?);
     let zero = [[0; 3]; 3];
@@ -62,8 +62,8 @@ const EPS: [&str; 3] = ["cx", "cy", "cz"];
 const GRAVITY: [&str; 3] = ["gx", "gy", "gz"];
 const RATES: [&str; 3] = ["wN", "wU", "0"];
 
-/// True if the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with
-/// `omega_c` has, in the first order of psi and eps, the derivative of psi that (2) says.
+/// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with `omega_c +
+/// eps` in inertial space, the computed frame with `omega_c`.
 fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
@@ -91,15 +91,15 @@ fn mountings() -> impl Iterator<Item = Mounting> {
     })
 }
 
-/// `I x O = S`.
+/// True if `I x O = S`.
 fn right_handed([i, o, s]: &Mounting) -> bool {
     let (a, b) = (i.vector(), o.vector());
     let at = |k: usize| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
     [at(0), at(1), at(2)] == s.vector()
 }
 
-/// The mountings of a gyro with which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28);
-/// eps counted positive about +I or about -I.
+/// Mountings of a gyro for which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28); eps
+/// is counted positive about +I or about -I.
 fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<Vec<Mounting>, AnalysisError> {
     let mut fitting: Vec<Mounting> = mountings().collect();
     everywhere(ANY, seed, |at| {
@@ -120,7 +120,7 @@ fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<V
     Ok(fitting)
 }
 
-/// One mounting in words, or how many there are.
+/// Mounting in words, or the number of mountings if several fit.
 fn shown(fitting: &[Vec<Mounting>; 3]) -> String {
     let one = |(gyro, found): (char, &Vec<Mounting>)| match found[..] {
         [[i, o, s]] => {
@@ -132,7 +132,7 @@ fn shown(fitting: &[Vec<Mounting>; 3]) -> String {
     GYROS.into_iter().zip(fitting).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// (3) and (4): how the gyros would have to be mounted.
+/// Audit of (3) and (4): mountings of the gyros that these equations require.
 fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     let fit = |along_g: bool, about_plus: bool| -> Result<[Vec<Mounting>; 3], AnalysisError> {
         let [x, y, z] = [0, 1, 2].map(|gyro| that_fit(gyro, along_g, about_plus, seed));
@@ -168,8 +168,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     Ok([three, line("(4)", "the g-sensitive terms multiply a = C_n^c (-g^n) = -g^c", finding, reason)])
 }
 
-/// The derivative of eps in c while c turns with `rate` against n: the first-order terms take
-/// `g^c' = g^c x rate`.
+/// Derivative of eps in c while c turns with `rate` against n: the first-order terms take `g^c' = g^c x
+/// rate`.
 fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
@@ -185,8 +185,8 @@ fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     ])
 }
 
-/// Which of the eight choices of passive and active elementary matrices give (20) and (24); bit k set: axis k
-/// is active.
+/// Choices, out of eight, of passive and active elementary matrices that give (20) and (24); bit k is set if
+/// axis k is active.
 fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
     let mut right = Vec::new();
     for active in 0..8usize {
@@ -285,7 +285,7 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         })
     };
     let printed = from_c(true)? || from_c(false)?;
-    // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) and at any other
+    // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) or at a random one
     let rate = |at: &At, tracks: bool| -> Result<[u64; 3], AnalysisError> {
         let f = &at.field;
         let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);

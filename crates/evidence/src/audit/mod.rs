@@ -1,8 +1,9 @@
 //! The paper against the algebra: every numbered equation and claim, recomputed.
 //!
 //! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with
-//! the model as identities in random prime fields; claims about degrees are judged by the engine, those of
-//! section 3.3 by the filter under the conditions of section 3.1. What is not covered is a line of its own.
+//! the model as identities in random prime fields. Claims about degrees are judged by the engine, those of
+//! section 3.3 by the filter under the conditions of section 3.1. Every statement that is not covered has a
+//! line of its own.
 
 mod claims;
 mod equations;
@@ -58,7 +59,7 @@ pub struct Audit {
     pub lines: Vec<Line>,
 }
 
-/// Why the paper cannot be audited.
+/// Reason why the paper cannot be audited.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AuditError {
     /// A verdict cannot be reached.
@@ -72,7 +73,7 @@ pub enum AuditError {
     Simulation(#[from] SimulationError),
 }
 
-/// What no line judges, and why.
+/// Place, claim and reason of every statement of the paper that is not judged.
 const NOT_COVERED: [[&str; 3]; 8] = [
     [
         "introduction",
@@ -112,7 +113,7 @@ const NOT_COVERED: [[&str; 3]; 8] = [
     ],
 ];
 
-/// Recomputes every line.
+/// Recomputes every line of the audit.
 ///
 /// # Errors
 /// [`AuditError`].
@@ -139,8 +140,8 @@ fn finding(holds: bool) -> Finding {
 mod tests {
     use super::*;
 
-    /// What the paper says, line by line: the slips, the conditions, what is not covered, and that the rest
-    /// agrees, whatever the seed.
+    /// The audit finds the slips, conditions and uncovered statements listed here and agrees with all other
+    /// lines, whatever the seed.
     #[test]
     fn the_findings_are_these() {
         use Finding::{Conditional, Disagree, NotCovered};
@@ -185,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Every numbered equation has a line that judges it, in order.
+    /// Every numbered equation has a line that judges it, in the paper's order.
     #[test]
     fn no_equation_is_left_out() {
         let audit = audit(3).expect("computed");
@@ -194,8 +195,8 @@ mod tests {
         assert_eq!(numbers.collect::<Vec<_>>(), (1..=28).collect::<Vec<_>>());
     }
 
-    /// What the reasons say in numbers, by hand: wN psi_y(0) at 28.2 degrees, the fewest positions of the
-    /// reference verdicts, the accuracy orders, the mounting of the paper.
+    /// Numbers in the reasons equal those computed by hand: wN psi_y(0) at 28.2 degrees, the fewest positions
+    /// of the reference verdicts, the accuracy orders, the mounting of the paper.
     #[test]
     fn the_reasons_say_these_numbers() {
         let audit = audit(1).expect("computed");

@@ -1,8 +1,8 @@
-//! What section 3.3 says of its figures, judged by the filter under the conditions of section 3.1.
+//! Statements of section 3.3 about its figures, judged by the filter under the conditions of section 3.1.
 //!
-//! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are
-//! read from such a run, made with the gains for the noise of the paper; sigma says how far one run lies from
-//! it.
+//! The filter is linear, so its error without noise is the mean of its errors over all noise. Offsets are
+//! read from such a run, made with the gains for the noise of the paper. Sigma is the scatter of one run
+//! about it.
 
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
@@ -15,14 +15,14 @@ use crate::simulation::conditions::Conditions;
 use crate::simulation::record::{Record, RunStart, Series, run};
 use crate::simulation::{Plan, SimulationError, simulate};
 
-/// An estimate is at the truth where error and sigma are within this part of the true value at the start.
+/// Relative limit, by the true value at the start, for error and sigma of an estimate that has converged.
 const WITHIN: f64 = 0.01;
-/// A value agrees with what is said of it within this part.
+/// Relative tolerance for a value that the paper states as approximate.
 const ABOUT: f64 = 0.1;
-/// Quickly: within this part of a segment.
+/// Fraction of a segment within which an estimate must converge to count as quick.
 const QUICK: f64 = 0.1;
 
-/// The conditions of section 3.1, with the program's own where it gives none.
+/// Conditions of section 3.1; those that the paper does not state are the program's own.
 fn conditions() -> Conditions {
     Conditions { propagation: Propagation::Rk4, ..Conditions::default() }
 }
@@ -31,7 +31,7 @@ fn scheme(carry: Carry) -> Scheme {
     Scheme { carry, ..positions(&PAPER) }
 }
 
-/// A run of the filter; of [`Mean::of`] the one without noise in truth and samples.
+/// Run of the filter; [`Mean::of`] makes it without noise in truth and samples.
 struct Mean {
     plan: Plan,
     record: Record,
@@ -55,7 +55,7 @@ impl Mean {
         Some((&self.record.traces.series[i], self.record.traces.scales[i]))
     }
 
-    /// The samples of a segment.
+    /// Indices of the samples of a segment.
     fn samples(&self, segment: usize) -> std::ops::Range<usize> {
         let position = &self.record.traces.position;
         let first = position.iter().position(|p| *p == segment).unwrap_or(position.len());
@@ -63,8 +63,8 @@ impl Mean {
         first..end
     }
 
-    /// How many seconds into a segment error and sigma of `name` are within 1 % of its true value at the
-    /// start, and stay so.
+    /// Time within a segment, in s, from which error and sigma of `name` stay within 1 % of its true value at
+    /// the start; `None` if they do not.
     fn settled(&self, name: &str, segment: usize) -> Option<f64> {
         let (series, _) = self.series(name)?;
         let within = WITHIN * series.truth[0].abs();
@@ -81,7 +81,7 @@ impl Mean {
         self.settled(name, segment).is_some_and(|t| t <= QUICK * s.dt * s.steps as f64)
     }
 
-    /// Estimate minus truth of a sample in shown units.
+    /// Estimate minus truth of a sample, in the shown unit of `name`.
     fn error(&self, name: &str, sample: usize) -> f64 {
         self.series(name).map_or(f64::NAN, |(s, scale)| (s.estimate[sample] - s.truth[sample]) / scale)
     }
@@ -94,7 +94,7 @@ impl Mean {
         self.series(name).map_or(f64::NAN, |(s, scale)| s.sigma[sample] / scale)
     }
 
-    /// The times at which they settle in a segment.
+    /// Times within a segment at which the estimates of `names` settle, in words.
     fn times(&self, names: &[&str], segment: usize) -> String {
         let one = |name: &&str| match self.settled(name, segment) {
             Some(t) => format!("{name} after {t} s"),
@@ -107,7 +107,7 @@ impl Mean {
 fn is_about(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= ABOUT * expected.abs()
 }
-/// Section 3.3.
+/// Lines about section 3.3.
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
     let means = Carry::ALL.map(|carry| Mean::of(carry, seed));
     let degrees = Carry::ALL.map(|carry| Judged::of(scheme(carry), seed));
@@ -147,7 +147,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
     Ok(out)
 }
 
-/// Whether the mean error of psi_y is about -psi_y(0) in the second half of a segment.
+/// True if the mean error of psi_y is about -psi_y(0) in the second half of a segment, with the reason in
+/// words.
 fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
     let samples = mean.samples(segment);
     let (first, last) = (samples.start, samples.end.saturating_sub(1));
@@ -164,7 +165,7 @@ fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
     (holds, reason)
 }
 
-/// Agrees if it holds under every carry, under a condition if under some.
+/// Finding from the outcomes under the three carries: conditional if they differ.
 fn under(holds: [bool; 3]) -> Finding {
     match holds {
         [true, true, true] => Finding::Agree,
@@ -175,7 +176,7 @@ fn under(holds: [bool; 3]) -> Finding {
 
 type Carries = [(Mean, Judged); 3];
 
-/// A phrase for each carry.
+/// Phrases of all carries, joined.
 fn each(carries: &Carries, phrase: impl Fn(&Mean, &Judged) -> String) -> String {
     let one = |(carry, (mean, judged)): (Carry, &(Mean, Judged))| {
         format!("{}, {carry} carry", phrase(mean, judged))
@@ -262,10 +263,10 @@ fn slow(carries: &Carries) -> Line {
     )
 }
 
-/// What one run with noise says of the model that is simulated.
+/// Consistency of one run with noise, by an exact truth and by the linear one.
 fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
     let linear = simulate(&scheme(Carry::Platform), &conditions(), seed)?.0;
-    // the filter of the paper, which is linear
+    // the filter of the paper is linear
     let exact = Conditions { truth: Truth::Exact, filter: Some(FilterKind::Linear), ..conditions() };
     let exact = simulate(&scheme(Carry::Platform), &exact, seed)?.0;
     let d_fy = exact.quantities.iter().find(|q| q.name == "D_FY").map_or(f64::NAN, |q| q.error);
@@ -309,7 +310,7 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
 mod tests {
     use super::*;
 
-    /// The run without noise is the mean of runs with it: their average lies within four of its standard
+    /// The run without noise is the mean of runs with noise: their average lies within four of its standard
     /// deviations, and the average of another carry does not.
     #[test]
     fn the_error_without_noise_is_the_mean() {
@@ -342,7 +343,7 @@ mod tests {
         }
     }
 
-    /// When an estimate has settled, looked at sample by sample.
+    /// The time at which an estimate has settled, checked sample by sample.
     #[test]
     fn settled_means_from_then_on() {
         for carry in [Carry::Platform, Carry::Inertial] {
@@ -360,8 +361,8 @@ mod tests {
                     assert_eq!(mean.settled(name, segment), expected, "{carry}: {name} {segment}");
                 }
             }
-            // and by hand: noise of Z of one sample is 0.6 % of psi(0), a first-order coefficient is not told
-            // in segment 1
+            // and by hand: noise of Z of one sample is 0.6 % of psi(0); segment 1 does not determine a
+            // first-order coefficient
             assert_eq!((mean.settled("psi_x", 0), mean.settled("D_FX", 0)), (Some(10.0), None));
         }
     }

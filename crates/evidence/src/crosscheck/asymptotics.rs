@@ -1,19 +1,19 @@
-//! Log-log slopes of sigma against the dwell where the dwell goes to zero, and what is seen there.
+//! Log-log slopes of sigma against the dwell as the dwell goes to zero, and the observable directions there.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::slew::W_IE;
 
 use super::precise::{self, Between, Digits, Functional, Seen};
 
-/// Digits that are tried in turn.
+/// Precisions that are tried in turn, in bits.
 const BITS: [usize; 2] = [1024, 2048];
-/// Dwells of the first position, in 1/w_ie: 2^-133 is 9e-41. Angles and latitudes are whole 1e-9 degrees,
-/// 2e-11 rad, so that what hardly differs still differs by far more.
+/// Dwells of the first position as powers of two, in 1/w_ie: 2^-133 is 9e-41. Angles and latitudes are whole
+/// 1e-9 degrees, 2e-11 rad, so directions that hardly differ still differ by far more.
 const DWELLS: [i32; 3] = [-133, -140, -147];
-/// How far slopes between neighbouring dwells may differ.
+/// Largest difference of the slopes between neighbouring dwells that counts as settled, dimensionless.
 const SETTLED: f64 = 0.01;
 
-/// How slopes are measured and what counts, in words.
+/// Method and limits of the slopes, in words.
 pub(super) fn method() -> Vec<String> {
     let [first, .., last] = DWELLS;
     let [few, many] = BITS;
@@ -30,41 +30,42 @@ pub(super) fn method() -> Vec<String> {
     ]
 }
 
-/// How sigma of a functional goes with the dwell.
+/// Dependence of the sigma of a functional on the dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Course {
-    /// It falls, or stays, with this slope on logarithmic axes.
+    /// Sigma falls, or stays, with this slope on logarithmic axes.
     Slope(f64),
-    /// The samples do not determine it.
+    /// The samples do not determine the functional.
     Unseen,
     /// The slope still changes with the dwell.
     Bends,
 }
 
-/// A functional whose course is asked for.
+/// Functional whose slope is requested.
 pub(super) struct Question {
     /// `(unknown, coefficient)`, drifts in rad/s.
     pub(super) terms: Vec<(usize, f64)>,
-    /// True if its coefficients are exact, or rounded to doubles.
+    /// True if the coefficients are exact, false if they are rounded to doubles.
     pub(super) exact: bool,
-    /// True if its psi is that of the end.
+    /// True if the psi of the functional is that of the end.
     pub(super) at_end: bool,
 }
 
-/// Relative errors of rounded coefficients, at most and at least: where the difference matters, nothing is
-/// resolvable.
+/// Largest and smallest assumed relative errors of rounded coefficients: a functional for which the choice
+/// matters is not resolvable.
 pub(super) const ROUNDED: [f64; 2] = [1e-7, 1e-12];
 
-/// What samples show as the dwell goes to zero.
+/// Behaviour of the samples as the dwell goes to zero.
 pub(super) struct Asymptotics {
     pub(super) courses: Vec<Course>,
-    /// dim V_0, dim V_1, ..., from how the pivots fall; `None` where they do not settle.
+    /// dim V_0, dim V_1, ..., from the slopes of the pivots; `None` where they do not settle.
     pub(super) profile: Option<Vec<usize>>,
-    /// What is seen at the shortest dwell.
+    /// Observable directions at the shortest dwell.
     pub(super) seen: Seen,
 }
 
-/// Terms with drifts in units of the earth rate: of a functional, or (`change`) of a change of the unknowns.
+/// Terms with drifts in units of the earth rate, of a functional or (if `change`) of a change of the
+/// unknowns.
 pub(super) fn functional(
     digits: Digits,
     is_psi: &dyn Fn(usize) -> bool,
@@ -79,7 +80,7 @@ pub(super) fn functional(
     terms.iter().map(|&(c, k)| (c, digits.double(scaled(c, k)))).collect()
 }
 
-/// Samples of a scheme at the dwells.
+/// Samples of a scheme at the dwells, in every precision of `BITS`.
 pub(super) type Samples<'a> = precise::Samples<'a, { BITS.len() }>;
 
 /// Samples of `scheme` at the dwells.
@@ -87,7 +88,7 @@ pub(super) fn samples(scheme: &Scheme) -> Samples<'_> {
     Samples::new(scheme, DWELLS.iter().map(|&k| 2f64.powi(k)).collect(), BITS)
 }
 
-/// The courses of `questions`; `None` where no digits tell what is seen from rounding.
+/// Slopes of `questions`; `None` where no precision separates observable directions from rounding.
 pub(super) fn asymptotics(
     samples: &Samples<'_>,
     between: Between,
@@ -133,7 +134,7 @@ pub(super) fn asymptotics(
     })
 }
 
-/// The slope of binary logarithms at the dwells, if it settles.
+/// Slope of binary logarithms at the dwells; `None` if it does not settle.
 fn slope(values: &[f64]) -> Option<f64> {
     let [a, b, c] = *values else { return None };
     let between = |y: f64, x: f64, i: usize| (y - x) / f64::from(DWELLS[i + 1] - DWELLS[i]);
@@ -177,7 +178,7 @@ mod tests {
 
     const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
 
-    /// Section 9 of the method, by samples alone.
+    /// Verdicts of section 9 of the method, by samples alone.
     #[test]
     fn published_verdicts() {
         let p1p2 = ["0,0,0", "180,0,0"];
