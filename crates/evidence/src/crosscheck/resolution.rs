@@ -1,5 +1,5 @@
-//! What evidence b must show in a filter of doubles, by many digits: whether the filter's prior is wide
-//! enough for it, and the rounding of doubles small enough.
+//! Resolution of evidence b by a filter in doubles, computed in high precision: width of the filter's prior
+//! and effect of rounding.
 
 use std::cell::OnceCell;
 
@@ -12,22 +12,23 @@ use crate::prediction::Combination;
 use crate::simulation::conditions::is_rate;
 use crate::simulation::{Conditions, Plan};
 
-/// Bits of this evaluation: information of 1e30 of a prior, and what cancels in it.
+/// Bits of this evaluation: enough for information of 1e30 of a prior, and for the cancellation in it.
 const BITS: usize = 512;
-/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-46 is 64
-/// units of the last place, for some hundreds of steps of the filter.
+/// Binary logarithm of the change that rounding makes to a number of a model of doubles, whose largest are
+/// about one. 2^-46 is 64 units of the last place, for some hundreds of steps of the filter.
 pub(super) const ROUNDING: i32 = -46;
-/// Models that are rounded at random.
+/// Number of models with randomly rounded numbers.
 const DRAWS: usize = 2;
-/// The factor between the two priors of evidence b.
+/// Factor between the two priors of evidence b.
 const WIDER: f64 = 10.0;
-/// How far a number of the filter may be from that by many digits to be called the same, relative.
+/// Relative difference from the value in high precision up to which a number of the filter counts as the
+/// same.
 const SAME: f64 = 0.01;
-/// How far the value by many digits may be from what a prior without bounds shows, a fifth of the tolerance
-/// of what is measured in doubles: of an inflation, relative, and of a correlation.
+/// Largest difference of a value in high precision from that of an infinitely wide prior: relative for an
+/// inflation, absolute for a correlation. It is a fifth of the tolerance for values measured in doubles.
 const CLOSE: [f64; 2] = [2e-3, 2e-4];
 
-/// A model with both priors of evidence b.
+/// Covariances of a model with both priors of evidence b.
 struct Filtered {
     prior: Posterior,
     wider: Posterior,
@@ -39,22 +40,22 @@ impl Filtered {
     }
 }
 
-/// The filter's covariance at the end by many digits, computed where it is asked for.
+/// Covariance of the filter at the end in high precision, computed on demand.
 pub(super) struct Resolution<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
     /// Standard deviations of the prior, in SI units.
     prior: &'a [f64],
-    /// The model in many digits; `None` where these do not give it, here and below.
+    /// Model in high precision; `None` where it cannot be computed, here and below.
     model: OnceCell<Option<Model>>,
-    /// The filter of the model.
+    /// Filter of the model.
     exact: OnceCell<Option<Filtered>>,
-    /// Filters of the model with rounded numbers.
+    /// Filters of the model with randomly rounded numbers.
     rounded: OnceCell<Option<Vec<Filtered>>>,
 }
 
 impl<'a> Resolution<'a> {
-    /// Of the filter of `plan` with a prior of these standard deviations.
+    /// Resolution for the filter of `plan` with a prior of these standard deviations.
     pub(super) fn new(plan: &'a Plan, conditions: &'a Conditions, prior: &'a [f64]) -> Self {
         Self {
             plan,
@@ -78,7 +79,7 @@ impl<'a> Resolution<'a> {
         self.model.get_or_init(compute).as_ref()
     }
 
-    /// The filter of a model, at the times of its samples.
+    /// Filter of a model, at the times of its samples.
     fn filtered(&self, model: &Model) -> Option<Filtered> {
         let conditions = self.conditions;
         let dwell_s = self.plan.segments.first().map(|s| s.dt * s.steps as f64)?;
@@ -106,8 +107,8 @@ impl<'a> Resolution<'a> {
         self.rounded.get_or_init(compute).as_deref()
     }
 
-    /// Why doubles, which show `measured`, may show something else than `limit`, to which a prior without
-    /// bounds leads by many digits; `None` where they must show it. `of` is what is shown.
+    /// Reason why doubles, which show `measured`, need not show `limit`, the value of an infinitely wide
+    /// prior; `None` where they must show it. `of` computes the value from a model.
     fn why(&self, limit: f64, measured: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
         const UNKNOWN: &str = "many digits do not tell what the filter must show";
         let close = |x: f64| (x - limit).abs() <= close * limit;
@@ -131,16 +132,16 @@ impl<'a> Resolution<'a> {
         ))
     }
 
-    /// Why the prior inflation of a combination of the filter's unknowns, which is `measured`, may be another
-    /// than that of what is determined, or is not.
+    /// Reason why `measured`, the prior inflation of a combination of the filter's unknowns, may differ from
+    /// its limit; `determined` says which limit it has.
     pub(super) fn inflation(&self, terms: &Combination, determined: bool, measured: f64) -> Option<String> {
         let f = functional(Digits { bits: BITS }, &|c| self.is_psi(c), terms, false);
         let limit = if determined { 1.0 } else { WIDER };
         self.why(limit, measured, CLOSE[0], &|filtered| filtered.inflation(&f))
     }
 
-    /// Why the correlation of two unknowns, with the sign that it must have, may be another than one;
-    /// `measured` is that of the filter, with this sign.
+    /// Reason why the correlation of two unknowns, times its expected sign, may differ from one; `measured`
+    /// is that of the filter, with this sign.
     pub(super) fn correlation(&self, pair: [usize; 2], sign: f64, measured: f64) -> Option<String> {
         let unit = |c: usize| functional(Digits { bits: BITS }, &|c| self.is_psi(c), &[(c, 1.0)], false);
         let [a, b] = pair.map(unit);

@@ -1,4 +1,5 @@
-//! Evidence a and b: what the filter's model can tell apart, against what the exact verdicts say of it.
+//! Evidence a and b: observable and unobservable directions of the filter's model, compared with the exact
+//! verdicts.
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
@@ -20,12 +21,12 @@ use crate::simulation::conditions::{is_rate, shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
-/// What of a column is rounding, relative to the longest of its kind.
+/// Relative rounding tolerance of a column, by the longest column of its kind.
 const NOTHING: f64 = 1e-14;
-/// What counts as not seen, relative to the best seen direction.
+/// Singular value below which a direction counts as unobservable, relative to the largest.
 const UNSEEN: f64 = 1e-10;
 
-/// Evidence a and b: what the filter's model can tell apart.
+/// Evidence a and b, with the outcomes of their checks.
 pub(super) struct Structure {
     pub(super) quantities: Vec<QuantityEvidence>,
     pub(super) spaces: Vec<SpaceCheck>,
@@ -33,11 +34,11 @@ pub(super) struct Structure {
     pub(super) defect: Count,
     pub(super) slopes: Vec<SlopeCurve>,
     pub(super) correlation: Correlation,
-    /// Why evidence b is not resolvable, one reason for each check of it that is not.
+    /// Reasons why checks of evidence b are not resolvable, one for each.
     pub(super) unresolved: Vec<String>,
 }
 
-/// The outcomes of evidence a and b.
+/// Outcomes of evidence a and b.
 pub(super) fn outcomes(
     quantities: &[QuantityEvidence],
     spaces: &[SpaceCheck],
@@ -55,13 +56,14 @@ pub(super) fn outcomes(
 }
 
 impl Structure {
-    /// How its checks came out.
+    /// Counts of the outcomes of its checks.
     pub(super) fn counts(&self) -> Counts {
         Counts::of(outcomes(&self.quantities, &self.spaces, &self.null_space, &self.defect))
     }
 }
 
-/// Repositioning is instantaneous here, as in the exact verdicts: a slew moves psi by drifts of its own.
+/// Structure of the filter's model. Repositioning is instantaneous here, as in the exact verdicts, since a
+/// slew moves psi by drifts of its own.
 pub(super) fn structure(
     truth: &Plan,
     prediction: &Prediction,
@@ -88,7 +90,7 @@ pub(super) fn structure(
     unresolved.extend(null_space.iter_mut().filter_map(decide_seen));
     unresolved.extend(null_space.iter_mut().filter_map(|v| decide_correlation(v, &resolution)));
     let null_space = null_space.into_iter().map(|v| v.evidence).collect();
-    // at a pole drift moves psi that nobody sees, and directions without numbers are not listed
+    // at a pole unobservable drift moves psi, and directions without numbers are not listed
     let pole = truth.platform.scheme().latitude.is_some_and(Latitude::is_pole);
     let partial = pole || prediction.unseen_by_derivatives.is_none();
     let hidden = shown.rank().map(|rank| filter.unknowns() - rank);
@@ -111,9 +113,9 @@ pub(super) fn structure(
     })
 }
 
-/// The prior inflation of a quantity, by many digits first: whether the samples determine it is what its
-/// slope at the end shows. What the filter in doubles shows counts where many digits say that it must show
-/// it. The reason, where it is not resolvable.
+/// Decides the prior inflation of a quantity, by high precision first: its slope at the end shows whether the
+/// samples determine it. The value of the filter in doubles counts only where high precision says that it
+/// must show. Returns the reason where the check is not resolvable.
 fn decide_inflation(
     q: &mut QuantityEvidence,
     terms: &Combination,
@@ -139,8 +141,8 @@ fn decide_inflation(
     Some(format!("{}: prior inflation {measured:.3}: {why}", q.name))
 }
 
-/// That a filter in doubles sees a direction counts where rounding does not show as much of it; the reason,
-/// where it is not resolvable.
+/// Decides whether a filter in doubles observes a direction: its value counts where rounding cannot cause as
+/// much. Returns the reason where the check is not resolvable.
 fn decide_seen(v: &mut Direction) -> Option<String> {
     let NullEvidence { direction, seen, .. } = &mut v.evidence;
     let measured = seen.measured.filter(|x| seen.fails() && *x <= v.rounding)?;
@@ -151,8 +153,8 @@ fn decide_seen(v: &mut Direction) -> Option<String> {
     ))
 }
 
-/// The correlation along a direction counts where many digits say that the filter must show it; the reason,
-/// where it is not resolvable.
+/// Decides the correlation along a direction: its value counts where high precision says that the filter must
+/// show it. Returns the reason where the check is not resolvable.
 fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<String> {
     let NullEvidence { direction, correlation, .. } = &mut v.evidence;
     let check = correlation.as_mut().filter(|c| c.fails())?;
@@ -162,12 +164,12 @@ fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<
     Some(format!("{direction}: correlation {measured:.6}: {why}"))
 }
 
-/// What samples show as the dwell goes to zero.
+/// Behaviour of the samples as the dwell goes to zero.
 struct Shown {
-    /// Of every functional of the filter: psi handed on as it was at the start of a position.
+    /// Slopes by derivatives: psi is handed on as it was at the start of a position.
     derivatives: Option<Asymptotics>,
-    /// With dwells: first with psi of the start, then with psi of the end. `None` where psi is not handed on,
-    /// and both are the same.
+    /// Slopes with dwells: first with psi of the start, then with psi of the end. The outer `None` marks
+    /// cases without carried psi, in which both equal the slopes by derivatives.
     dwells: Option<Option<Asymptotics>>,
 }
 
@@ -177,7 +179,7 @@ impl Shown {
         let units = filter.platform.units();
         let is_psi = |c: usize| !is_rate(units[c]);
         let questions = |at_end: bool| {
-            // the coefficients of unknowns are exact, those of combinations doubles
+            // coefficients of unknowns are exact, those of combinations are doubles
             let present = functionals.iter().enumerate().filter_map(|(i, f)| Some((i, f.clone()?)));
             present.map(move |(i, terms)| Question { terms, exact: i < truth.unknowns(), at_end })
         };
@@ -192,7 +194,7 @@ impl Shown {
         Self { derivatives, dwells }
     }
 
-    /// Of the functional of this number: the courses by derivatives, with dwells, and with dwells at the end.
+    /// Slopes of the functional with index `i`: by derivatives, with dwells, and with dwells at the end.
     fn courses(&self, i: usize) -> [Option<Course>; 3] {
         let by_derivatives = self.derivatives.as_ref().map(|a| a.courses[i]);
         let dwells = |a: &Asymptotics, half: usize| a.courses[half * (a.courses.len() / 2) + i];
@@ -205,23 +207,23 @@ impl Shown {
         }
     }
 
-    /// What is seen with dwells.
+    /// Behaviour with dwells.
     fn with_dwells(&self) -> Option<&Asymptotics> {
         self.dwells.as_ref().unwrap_or(&self.derivatives).as_ref()
     }
 
-    /// The rank with dwells.
+    /// Rank with dwells.
     fn rank(&self) -> Option<usize> {
         Some(self.with_dwells()?.seen.rank())
     }
 }
 
-/// The check of an order against a course; what bends, or is not told from rounding, is neither for nor
-/// against.
+/// Check of an order against a slope; it is not resolvable if the slope bends or cannot be separated from
+/// rounding.
 fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check {
     let measured = match course {
         Some(Course::Slope(s)) => Some(s),
-        // whatever prior there is, sigma stays that of it
+        // sigma stays that of the prior, whatever the prior is
         Some(Course::Unseen) => Some(0.0),
         Some(Course::Bends) | None => None,
     };
@@ -232,18 +234,19 @@ fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check 
     check
 }
 
-/// Without drift noise and slews.
+/// Conditions without drift noise and slews.
 pub(super) fn still(conditions: &Conditions) -> Conditions {
     Conditions { slews: false, ..conditions.clone().without_drift_noise() }
 }
 
-/// Unknowns, then combinations.
+/// Names of the unknowns, then expressions of the combinations.
 fn names(plan: &Plan, prediction: &Prediction) -> Vec<String> {
     let combinations = prediction.combinations.iter().map(|c| c.expression.clone());
     plan.platform.names().iter().cloned().chain(combinations).collect()
 }
 
-/// Each of them as a functional of the filter's unknowns; `None` when the filter does not have them.
+/// Unknowns and combinations as functionals of the filter's unknowns; `None` for one that the filter does not
+/// have.
 fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Option<Combination>> {
     let index = |c: usize| {
         let name = &truth.platform.names()[c];
@@ -256,13 +259,13 @@ fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Opti
         .collect()
 }
 
-/// Evidence b.
+/// Evidence b: factors on sigma when the prior is ten times as wide.
 struct Inflation {
-    /// Of every functional: the factor on sigma.
+    /// Factor on sigma of each functional, dimensionless.
     ratios: Vec<f64>,
-    /// Correlation under the diffuse prior.
+    /// Correlation matrix under the diffuse prior.
     correlation: DMatrix<f64>,
-    /// Standard deviations of that.
+    /// Standard deviations of the diffuse prior.
     prior: Vec<f64>,
 }
 
@@ -338,9 +341,9 @@ fn quantities(
                 let found = partners.as_ref().map(|p| p[c].as_slice());
                 spaces::named(&u.partners, found, truth.platform.names())
             };
-            // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as
-            // rounding: so does what dwells add to it, a part as small as the dwell, and the slope is then
-            // that of the degree
+            // the coefficients of a combination are doubles, so a rest of it below 2^-46 counts as rounding;
+            // the contribution of the dwells, as small as the dwell, is then lost too, and the slope is that
+            // of the degree
             let rounded = |check: Check, order: Option<usize>| {
                 let hides = c >= n && degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
                 let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
@@ -367,16 +370,17 @@ fn quantities(
         .collect()
 }
 
-/// A direction that Z does not see, as the verdicts say.
+/// Direction unobservable from Z by the verdicts.
 struct Direction {
     evidence: NullEvidence,
-    /// The two of its unknowns that are correlated least, and the sign of their correlation.
+    /// Its two unknowns of least correlation, and the sign of their correlation.
     weakest: Option<([usize; 2], f64)>,
-    /// The part of it that rounding of the model may show.
+    /// Largest part of the direction that rounding of the model may make observable, dimensionless.
     rounding: f64,
 }
 
-/// What Z does not see: the predicted null vectors against the information, and their number.
+/// Evidence on the unobservable directions: the predicted null vectors against the information, and their
+/// number.
 fn null_evidence(
     truth: &Plan,
     filter: &Plan,
@@ -386,8 +390,8 @@ fn null_evidence(
 ) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();
     let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is
-    // nothing
+    // columns of unit length, so that units do not matter; the rest that cosines of right angles leave of a
+    // column counts as zero
     let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
     let units = filter.platform.units();
     let largest_of = |unit: &str| {
@@ -406,7 +410,7 @@ fn null_evidence(
     let predicted = truth.unknowns() - prediction.rank;
     let defect = match shown.rank() {
         Some(rank) => Count { predicted, measured: n - rank, outcome: Agreement::of(predicted == n - rank) },
-        // doubles may lose what is hardly seen
+        // doubles may lose a hardly observable direction
         None => Count { outcome: Agreement::NotResolvable, ..rules::defect(predicted, &values, UNSEEN) },
     };
     let mut evidence = Vec::new();
@@ -422,7 +426,7 @@ fn null_evidence(
             }
             (&scaled * &v).norm() / (v.norm() * largest)
         });
-        // only where all null vectors are known is it known that no other shares its unknowns
+        // shared unknowns are known only where all null vectors are
         let shares = |other: &Combination| other.iter().any(|(c, _)| vector.iter().any(|(d, _)| c == d));
         let alone = prediction
             .whole_null_space()
@@ -450,7 +454,7 @@ fn null_evidence(
     Ok((evidence, defect))
 }
 
-/// A number in few digits.
+/// Number in few digits.
 fn short(x: f64) -> String {
     let text = format!("{x:.4e}");
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
