@@ -1,4 +1,4 @@
-//! A torquing scheme run through the filter: one run against one truth, and what it says.
+//! Torquing scheme run through the filter: one run against one truth, and its results.
 
 pub(crate) mod answer;
 pub(crate) mod attained;
