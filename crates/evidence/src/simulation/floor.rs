@@ -8,7 +8,7 @@
 //! of the floor. A coefficient whose sigma comes that close only in the last two octaves still falls, and has
 //! no floor in this range. One that is there at the shortest dwell may have its least sigma at a shorter one.
 //! Within a long position samples are merged at constant noise density: twice as many after every 20 steps,
-//! from its start and from its end, since a random walk is observable there.
+//! from its start and from its end, since the walk erases information in between.
 //!
 //! # One position in closed form
 //! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`,
