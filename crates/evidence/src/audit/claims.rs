@@ -210,7 +210,8 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
         "eps_x^n at several attitudes tells D_F, D_O, D_S apart, of the D_I only differences",
         finding(others && !inputs && x.differences),
         format!(
-            "the coefficients that (22) tells at {ATTITUDES} generic attitudes: D_F, D_O, D_S {}, differences of the D_I {}, a D_I by itself {}",
+            "the coefficients that (22) tells at {ATTITUDES} generic attitudes: D_F, D_O, D_S {}, \
+             differences of the D_I {}, a D_I by itself {}",
             yes(others),
             yes(x.differences),
             yes(inputs)
@@ -283,8 +284,10 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
         "at least two different positions are needed for psi",
         finding(needs_two && together),
         format!(
-            "psi^n = (0,1,0) with eps^n = (0,0,wN), which D_F can make, leaves Z and all derivatives zero at {} attitude and under {} carry; \
-             the squares of the coefficients of psi_y^n in (24) {} to 1, so they are never all zero. Two generic positions suffice under {} carry, not under {} carry",
+            "psi^n = (0,1,0) with eps^n = (0,0,wN), which D_F can make, leaves Z and all derivatives zero at \
+             {} attitude and under {} carry; \
+             the squares of the coefficients of psi_y^n in (24) {} to 1, so they are never all zero. Two \
+             generic positions suffice under {} carry, not under {} carry",
             if needs_two { "every" } else { "not every" },
             if needs_two { "every" } else { "not every" },
             if together { "add up" } else { "do not add up" },
@@ -309,7 +312,8 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             _ => Finding::Disagree,
         },
         format!(
-            "it has {}; at the paper's p1 p2 D_FX, D_FY, D_FZ: {list}; at six generic positions, platform and inertial carry, {}",
+            "it has {}; at the paper's p1 p2 D_FX, D_FY, D_FZ: {list}; at six generic positions, platform \
+             and inertial carry, {}",
             show(local.combination),
             if enough { "all three have its degree" } else { "not all have its degree" }
         ),
@@ -401,7 +405,8 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
         "psi_x, psi_z best; eps_x, psi_y', wN psi_y(0) - eps_z in the middle; eps_y worst",
         finding(classes),
         format!(
-            "degrees: psi_x, psi_z {}, {}; eps_x {}; wN psi_y - eps_z {}; eps_y {}; psi_y' = wN psi_z + eps_y needs eps_y: {} ({} not observable \
+            "degrees: psi_x, psi_z {}, {}; eps_x {}; wN psi_y - eps_z {}; eps_y {}; psi_y' = wN psi_z + \
+             eps_y needs eps_y: {} ({} not observable \
              by themselves)",
             show(best_x),
             show(best_z),
@@ -439,7 +444,8 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
         "the D_I always have a poor degree, whatever the scheme",
         finding(lemma.vertical && lemma.unseen && lemma.ends_at_two && tried),
         format!(
-            "D_IX = D_IY = D_IZ = d makes eps^n = (0,-d,0) {}, and eps_y^n is {} Z and Z': so no scheme brings a D_I below degree 2, {} \
+            "D_IX = D_IY = D_IZ = d makes eps^n = (0,-d,0) {}, and eps_y^n is {} Z and Z': so no scheme \
+             brings a D_I below degree 2, {} \
              (24 cardinal and 12 generic attitudes, every carry: {}){}. Accuracy orders of D_IX D_IY D_IZ, \
              which count the dwell, at generic positions: {} carry",
             if lemma.vertical { "at every attitude" } else { "not at every attitude" },

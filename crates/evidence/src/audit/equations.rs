@@ -282,7 +282,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         holds(ANY, &[("ey", &mended)])?,
     ];
     let reason = format!(
-        "as printed {}; with the first D_FZ read as D_FY and the last factor of (D_OX sin g - D_OY cos g) sin a cos b sin b \
+        "as printed {}; with the first D_FZ read as D_FY and the last factor of (D_OX sin g - D_OY cos g) \
+         sin a cos b sin b \
          read as cos a {}; with one of the two alone {}",
         plain(a),
         if d { "an identity" } else { "still none" },

@@ -62,8 +62,8 @@ const EPS: [&str; 3] = ["cx", "cy", "cz"];
 const GRAVITY: [&str; 3] = ["gx", "gy", "gz"];
 const RATES: [&str; 3] = ["wN", "wU", "0"];
 
-/// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with `omega_c +
-/// eps` in inertial space, the computed frame with `omega_c`.
+/// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with
+/// `omega_c + eps` in inertial space, the computed frame with `omega_c`.
 fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
@@ -147,7 +147,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
         "eps = D_F + D_I a_I + D_O a_O + D_S a_S along the axes of each gyro",
         finding([&plus, &plus_reversed, &minus, &minus_reversed].into_iter().any(every)),
         format!(
-            "of the 48 ways to mount a gyro along platform axes, with a = g^c and eps positive about +I, these give the drift of \
+            "of the 48 ways to mount a gyro along platform axes, with a = g^c and eps positive about +I, \
+             these give the drift of \
              (22), (27), (28): {} (Fig. 1, the mounting, is missing)",
             shown(&plus)
         ),
@@ -158,7 +159,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
         _ => Finding::Conditional,
     };
     let reason = format!(
-        "when eps is positive about +I, {} with -g^c gives the drift of (22), (27), (28), {} with +g^c; when eps is positive about -I: {} with \
+        "when eps is positive about +I, {} with -g^c gives the drift of (22), (27), (28), {} with +g^c; when \
+         eps is positive about -I: {} with \
          -g^c, {} with +g^c. Fig. 1, which would tell, is missing; obsdeg takes eps positive about +I, and +g^c",
         if none(&minus) { "no mounting".into() } else { shown(&minus) },
         if every(&plus) { "that of (3)".into() } else { shown(&plus) },
@@ -168,8 +170,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     Ok([three, line("(4)", "the g-sensitive terms multiply a = C_n^c (-g^n) = -g^c", finding, reason)])
 }
 
-/// Derivative of eps in c while c turns with `rate` against n: the first-order terms take `g^c' = g^c x
-/// rate`.
+/// Derivative of eps in c while c turns with `rate` against n: the first-order terms take
+/// `g^c' = g^c x rate`.
 fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
@@ -238,7 +240,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         "psi' = [psi x] omega_c + eps",
         finding(sign),
         format!(
-            "what is of first order in psi and eps when the platform turns with omega_c + eps and the computed frame with omega_c, any \
+            "what is of first order in psi and eps when the platform turns with omega_c + eps and the \
+             computed frame with omega_c, any \
              omega_c: {}",
             plain(sign)
         ),
@@ -339,7 +342,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         "eps' = 0",
         finding(still && !turning),
         format!(
-            "with g^c' = g^c x omega_nc the derivative of (3) is {} at the omega_c of (7), {} at random ones; products of psi and \
+            "with g^c' = g^c x omega_nc the derivative of (3) is {} at the omega_c of (7), {} at random \
+             ones; products of psi and \
              coefficients are left out, as the paper says",
             if still { "zero" } else { "not zero" },
             if turning { "zero as well" } else { "not" }

@@ -109,7 +109,8 @@ const NOT_COVERED: [[&str; 3]; 8] = [
     [
         "section 4",
         "the analysis holds for all torquing schemes",
-        "its equations take (7), a platform that tracks the geographic frame; the lines here judge positions, no rotating segments",
+        "its equations take (7), a platform that tracks the geographic frame; the lines here judge \
+         positions, no rotating segments",
     ],
 ];
 
@@ -148,7 +149,8 @@ mod tests {
         for seed in [1, 2, 99] {
             let audit = audit(seed).expect("computed");
             let agree = audit.lines.iter().filter(|l| l.finding == Finding::Agree).map(|l| l.place.as_str());
-            let equations = "(1) (2) (3) (6) (8) (9) (10) (11) (12) (13) (14) (15) (16) (17) (18) (19) (20) (22) (24) (25) (27) (28)";
+            let equations = "(1) (2) (3) (6) (8) (9) (10) (11) (12) (13) (14) (15) (16) (17) (18) (19) (20) \
+                (22) (24) (25) (27) (28)";
             let claims = [["section 2.2"; 4].as_slice(), &["section 3.3"; 5], &["conclusion 2"]].concat();
             assert_eq!(
                 agree.collect::<Vec<_>>(),

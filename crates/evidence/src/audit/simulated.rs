@@ -158,7 +158,8 @@ fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
     let moved = mean.truth("psi_y", last) - mean.truth("psi_y", first);
     let spread = (sigma * sigma - start * start).max(0.0).sqrt();
     let reason = format!(
-        "mean error of psi_y at the end {:.4} deg with psi_y(0) = {start} deg while the truth moves by {moved:.2} deg; of one run sigma is {sigma:.3} deg, \
+        "mean error of psi_y at the end {:.4} deg with psi_y(0) = {start} deg while the truth moves by \
+         {moved:.2} deg; of one run sigma is {sigma:.3} deg, \
          {spread:.3} deg without that of psi_y(0)",
         mean.error("psi_y", last)
     );
@@ -218,7 +219,8 @@ fn offset(carries: &Carries) -> Line {
         "in segment 2 D_FZ quickly converges but stays off by about omega_ie psi_y(0)",
         under(carries.each_ref().map(holds)),
         format!(
-            "mean error at the end: {}; -wN psi_y(0) is {expected:.5} deg/h, with the whole earth rate {:.5}; of one run sigma is {:.3} deg/h under \
+            "mean error at the end: {}; -wN psi_y(0) is {expected:.5} deg/h, with the whole earth rate \
+             {:.5}; of one run sigma is {:.3} deg/h under \
              platform carry",
             each(carries, |mean, _| format!("{:.5} deg/h", end(mean))),
             -dph(W_IE) * start,
@@ -246,10 +248,12 @@ fn slow(carries: &Carries) -> Line {
     let every = [&fast[..], &slow[..]].concat();
     line(
         "section 3.3",
-        "D_FY and D_IY converge more slowly and less accurately than D_FX, D_FZ, D_SX, D_SZ, as eps_y has the worse degree",
+        "D_FY and D_IY converge more slowly and less accurately than D_FX, D_FZ, D_SX, D_SZ, as eps_y has \
+         the worse degree",
         under(carries.each_ref().map(holds)),
         format!(
-            "so under each carry: {}. Under platform carry within 1 %: {}; sigma at the end in deg/h: {}; degrees of these: {}",
+            "so under each carry: {}. Under platform carry within 1 %: {}; sigma at the end in deg/h: {}; \
+             degrees of these: {}",
             Carry::ALL
                 .into_iter()
                 .zip(carries)
@@ -285,9 +289,12 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
         "the simulation confirms the analysis",
         finding,
         format!(
-            "for the linear model: one run with noise is {} with it (mean NIS {:.2}, NEES {:.1} of {} unknowns). |psi| reaches {:.1} deg, and (6) leaves \
-             out {:.3} g, the noise of Z being {:e} g; with an exact truth the run is {}, D_FY off by {:.1} deg/h. Chosen where section 3.1 says nothing: \
-             latitude {} deg, psi(0) {} deg, prior sigma of psi {:.1} deg, of D_F {:.1} deg/h, of the other D {:.1} deg/h/g; platform carry, p1 and p2 1000 s each without a pause, seed {seed}",
+            "for the linear model: one run with noise is {} with it (mean NIS {:.2}, NEES {:.1} of {} \
+             unknowns). |psi| reaches {:.1} deg, and (6) leaves \
+             out {:.3} g, the noise of Z being {:e} g; with an exact truth the run is {}, D_FY off by {:.1} \
+             deg/h. Chosen where section 3.1 says nothing: \
+             latitude {} deg, psi(0) {} deg, prior sigma of psi {:.1} deg, of D_F {:.1} deg/h, of the other \
+             D {:.1} deg/h/g; platform carry, p1 and p2 1000 s each without a pause, seed {seed}",
             word(consistent),
             linear.consistency.nis,
             linear.consistency.nees,

@@ -19,11 +19,13 @@ pub(super) fn method() -> Vec<String> {
     let [few, many] = BITS;
     vec![
         format!(
-            "a: samples of Z in a model written apart from the exact engine's, in {few} bits ({many} where these do not tell what is seen from \
+            "a: samples of Z in a model written apart from the exact engine's, in {few} bits ({many} where \
+             these do not tell what is seen from \
              rounding; not resolvable where those do not), at dwells of 2^{first} to 2^{last} of 1/w_ie"
         ),
         format!(
-            "a: a slope counts where it changes by less than {SETTLED} between these dwells, for a combination whether its coefficients are \
+            "a: a slope counts where it changes by less than {SETTLED} between these dwells, for a \
+             combination whether its coefficients are \
              taken to 1e-7 or to 1e-12; it is not resolvable elsewhere, nor is what dwells \
              add to a combination beyond its degree (coefficients are doubles, and dwells smaller than their rounding)"
         ),

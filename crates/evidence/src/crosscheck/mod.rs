@@ -52,7 +52,8 @@ const NOT_TESTED: [&str; 7] = [
     "the conditions on angles under which verdicts change",
     "verdicts under the other carries, at other latitudes and angles: a cross-check of those schemes does that",
     "that the bound on the probability of a wrong verdict is right",
-    "that the equations of the paper, their signs and axes, are those of the platform: they are written here several times, as the paper has them",
+    "that the equations of the paper, their signs and axes, are those of the platform: they are written here \
+     several times, as the paper has them",
 ];
 /// Length of the unexplained rest of a unit column below which the other columns explain it.
 const UNEXPLAINED: f64 = 1e-7;
@@ -273,8 +274,10 @@ fn against(
 /// Conditions under which evidence b, c and f in doubles is not resolvable, in words.
 fn filter_method() -> String {
     format!(
-        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits say that the diffuse prior is \
-         too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding may make a tenth of the limit; f: where \
+        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits \
+         say that the diffuse prior is \
+         too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding \
+         may make a tenth of the limit; f: where \
          the filter is off by less than {OFF_DEG} deg, \
          or where what it cannot explain of the truths drawn need not show in {MANY_RUNS} runs",
         resolution::ROUNDING

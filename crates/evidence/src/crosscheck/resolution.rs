@@ -121,7 +121,8 @@ impl<'a> Resolution<'a> {
                 "the filter in doubles shows neither"
             };
             return Some(format!(
-                "by many digits {exact:.4} at the diffuse prior of this evidence (the program's own, whatever --prior says), which is too narrow to show \
+                "by many digits {exact:.4} at the diffuse prior of this evidence (the program's own, \
+                 whatever --prior says), which is too narrow to show \
                  {limit:.0}; {doubles}"
             ));
         }

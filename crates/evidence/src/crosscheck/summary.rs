@@ -104,7 +104,8 @@ pub(super) fn unresolved(c: &CrossCheck, filter: Vec<String>) -> Vec<String> {
         for (check, of) in slopes.into_iter().filter(|(check, _)| open(check.outcome)) {
             out.push(match check.measured {
                 Some(x) => format!(
-                    "{}: {of} {x:.3} is that of its degree: the coefficients are doubles, whose rounding hides what dwells add",
+                    "{}: {of} {x:.3} is that of its degree: the coefficients are doubles, whose rounding \
+                     hides what dwells add",
                     q.name
                 ),
                 None => format!("{}: {of}: it does not settle, or is not told from rounding", q.name),

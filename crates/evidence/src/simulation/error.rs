@@ -17,7 +17,8 @@ pub enum SimulationError {
     },
     /// Slews of finite duration carry psi^n: another carry is impossible.
     #[error(
-        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or no slew rate)"
+        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or \
+         no slew rate)"
     )]
     SlewCarry {
         /// Carry that was found.
@@ -48,7 +49,8 @@ pub enum SimulationError {
     ExactDrift,
     /// A truth of small angles is no motion of a platform.
     #[error(
-        "the {filter} filter has full attitudes, and a linear truth is the small-angle model itself, which no platform follows: expected \
+        "the {filter} filter has full attitudes, and a linear truth is the small-angle model itself, which \
+         no platform follows: expected \
          truth = \"exact\" (or none stated) with this filter, or filter = \"linear\""
     )]
     LinearTruth {
@@ -57,7 +59,8 @@ pub enum SimulationError {
     },
     /// A filter with another carry or without a position must be linear.
     #[error(
-        "a filter that is wrong on purpose (another carry, a position left out) is the linear one; found the {filter} filter"
+        "a filter that is wrong on purpose (another carry, a position left out) is the linear one; found the \
+         {filter} filter"
     )]
     WrongOnPurpose {
         /// Name of the filter.
@@ -65,7 +68,8 @@ pub enum SimulationError {
     },
     /// Full attitudes have no instantaneous turns.
     #[error(
-        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew rate (slew_rate_deg_s, --slew-rate), \
+        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew \
+         rate (slew_rate_deg_s, --slew-rate), \
          or filter = \"linear\" and truth = \"linear\""
     )]
     TorquedAtOnce,

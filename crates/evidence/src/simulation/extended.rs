@@ -7,14 +7,14 @@
 //! `delta` with `E_true = exp([delta x]) E`, so
 //!
 //! ```text
-//! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD        Gamma = d eps^p / d g^p,  N D = eps^n
-//! dZ^n   = -E^T [g^n x] delta + C_c^n (M(f^p) dK - A C_n^p [g^n x] delta)        A = d a^p / d f^p,  M K = a^p,  f^p = -C_n^p g^n
+//! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD
+//! dZ^n   = -E^T [g^n x] delta + C_c^n (M(f^p) dK - A C_n^p [g^n x] delta)
+//! Gamma = d eps^p / d g^p,  N D = eps^n,  A = d a^p / d f^p,  M K = a^p,  f^p = -C_n^p g^n
 //! ```
 //!
-//! with the error `a^p` of the accelerometers and the torqued rate among what `eps^p` is a function of,
-//!
-//! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn
-//! by `delta`).
+//! with the error `a^p` of the accelerometers, and `eps^p` a function of the torqued rate too. At `E = 1`,
+//! `D = 0` these are the equations of the linear model (`[g^n x] delta` is the change of g in platform axes
+//! that turn by `delta`).
 
 use std::borrow::Cow;
 

@@ -160,7 +160,8 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
         }
         if rows.row(k).iter().all(|g| *g == 0.0) {
             let text = &model.constraints[k % model.constraints.len()].text;
-            let message = "its gradient vanishes at the values under [simulation.values], so that a filter cannot hold it; \
+            let message = "its gradient vanishes at the values under [simulation.values], so that a filter \
+                cannot hold it; \
                            expected values at which it does not";
             return Err(missing(&format!("the constraint {text}"), message));
         }

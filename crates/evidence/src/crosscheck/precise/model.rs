@@ -335,8 +335,8 @@ impl Model {
         out
     }
 
-    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6), by the series of `psi'
-    /// = psi x omega + eps`.
+    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6), by the series of
+    /// `psi' = psi x omega + eps`.
     fn moved(&self, time: &Real) -> [Vector; 3] {
         let d = self.digits;
         let mut term: [Vector; 3] =
@@ -364,8 +364,8 @@ impl Model {
         sum
     }
 
-    /// Samples at the ends of equal steps over the dwell of each position; the first position lasts `dwell /
-    /// w_ie`. `samples` has the number per position. Positions of equal dwell share them.
+    /// Samples at the ends of equal steps over the dwell of each position; the first position lasts
+    /// `dwell / w_ie`. `samples` has the number per position. Positions of equal dwell share them.
     pub(super) fn moments(&self, dwell: f64, samples: &[usize], weights: &Weights) -> Vec<Arc<Moments>> {
         let d = self.digits;
         let mut out: Vec<Arc<Moments>> = Vec::new();
