@@ -140,14 +140,14 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
 }
 
 /// Coefficients that component `row` of eps^n (0: x, 1: y) determines at many generic attitudes.
-struct Told {
+struct DeterminedCoefficients {
     names: Vec<String>,
     single: Vec<bool>,
     /// True if the component determines the differences of the D_I.
     differences: bool,
 }
 
-impl Told {
+impl DeterminedCoefficients {
     /// Coefficients that every one of the samples determines, at `positions` generic attitudes.
     fn of(row: usize, positions: usize, seed: u64) -> Result<Self, AnalysisError> {
         let platform = Platform::new(generic(positions, Carry::Platform))?;
@@ -203,7 +203,7 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             if unit { "add up" } else { "do not add up" }
         ),
     ));
-    let x = Told::of(0, ATTITUDES, seed)?;
+    let x = DeterminedCoefficients::of(0, ATTITUDES, seed)?;
     let (others, inputs) = (x.all(|n| !input_axis(n)), x.any(input_axis));
     out.push(line(
         "section 2.2",
@@ -217,7 +217,7 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             yes(inputs)
         ),
     ));
-    let y = Told::of(1, ATTITUDES, seed)?.all(input_axis);
+    let y = DeterminedCoefficients::of(1, ATTITUDES, seed)?.all(input_axis);
     out.push(line(
         "section 2.2",
         "eps_y^n at several attitudes tells D_IX, D_IY, D_IZ",
@@ -326,7 +326,7 @@ fn yes(b: bool) -> &'static str {
 }
 
 /// Degrees at one position in terms of (psi^n, eps^n).
-struct Local {
+struct LocalDegrees {
     psi: [Option<usize>; 2],
     eps: [Option<usize>; 2],
     /// Degree of wN psi_y - eps_z.
@@ -337,7 +337,7 @@ struct Local {
     lost: Vec<String>,
 }
 
-fn single_position(seed: u64) -> Result<Local, AnalysisError> {
+fn single_position(seed: u64) -> Result<LocalDegrees, AnalysisError> {
     let scheme = Scheme {
         unknowns: Unknowns::Drift,
         combinations: vec!["wN*psi_y^n - eps_z^n".into(), "wN*psi_z^n + eps_y^n".into()],
@@ -349,7 +349,7 @@ fn single_position(seed: u64) -> Result<Local, AnalysisError> {
     let mut asked = local.combinations.iter().filter(|c| c.requested).map(|c| c.degree);
     let (combination, rate) = (asked.next().flatten(), asked.next().flatten());
     let lost = local.quantities.iter().filter(|q| q.status != Status::Observable).map(|q| q.name.clone());
-    Ok(Local {
+    Ok(LocalDegrees {
         psi: ["psi_x^n", "psi_z^n"].map(unknown),
         eps: ["eps_x^n", "eps_y^n"].map(unknown),
         combination,

@@ -16,7 +16,7 @@ use super::{Finding, Line, finding, line};
 const POINTS: usize = 6;
 
 /// Random point (angles, rates, psi and the twelve coefficients) with the values of the model there.
-pub(super) struct At {
+pub(super) struct RandomPoint {
     pub(super) field: Field,
     /// `C_c^n`.
     pub(super) attitude: Matrix3<u64>,
@@ -25,7 +25,7 @@ pub(super) struct At {
     names: Vec<(String, u64)>,
 }
 
-impl At {
+impl RandomPoint {
     /// Value of a formula at this point.
     pub(super) fn value(&self, text: &str) -> Result<u64, AnalysisError> {
         let wrap = |e: ExpressionError| CombinationError {
@@ -43,7 +43,7 @@ impl At {
     }
 }
 
-impl Environment for At {
+impl Environment for RandomPoint {
     fn name(&self, name: &str) -> Option<u64> {
         self.names.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
     }
@@ -59,7 +59,7 @@ impl Environment for At {
 /// and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in c, `Z1 Z3` with `p`, `pp`
 /// for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n. `t q h` are random numbers, `rx ry rz` a
 /// random rate.
-pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
+pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomPoint, AnalysisError> {
     let angles = parse_attitude(attitude)
         .unwrap_or_else(|_| std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0)));
     let platform = Platform::new(Scheme::of_angles([angles]))?;
@@ -108,7 +108,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
     for (name, value) in ["Zcx", "Zcy", "Zcz"].into_iter().zip(to_c(z_n)) {
         put(name, value);
     }
-    Ok(At {
+    Ok(RandomPoint {
         field: f,
         attitude: *c,
         angles: platform.scheme().positions[0]
@@ -124,7 +124,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
 pub(super) fn everywhere(
     attitude: &str,
     seed: u64,
-    mut holds: impl FnMut(&At) -> Result<bool, AnalysisError>,
+    mut holds: impl FnMut(&RandomPoint) -> Result<bool, AnalysisError>,
 ) -> Result<bool, AnalysisError> {
     let mut rng = SplitMix64::new(seed);
     for _ in 0..POINTS {

@@ -5,7 +5,7 @@ use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::model::{GYROS, Matrix3, SignedAxis, elementary, product};
 use obsdeg_exact::Field;
 
-use super::equations::{ANY, At, G, PSI_C, everywhere, plain};
+use super::equations::{ANY, G, PSI_C, RandomPoint, everywhere, plain};
 use super::{Finding, Line, finding, line};
 
 fn transpose(a: &Matrix3<u64>) -> Matrix3<u64> {
@@ -46,7 +46,10 @@ fn identity(f: &Field) -> Matrix3<u64> {
 
 /// True if a polynomial of degree two in a small quantity has no terms of degree 0 and 1: its value at the
 /// random size h of the point is `h^2` times its value at 1.
-fn of_second_order(at: &At, polynomial: impl Fn(u64) -> Matrix3<u64>) -> Result<bool, AnalysisError> {
+fn of_second_order(
+    at: &RandomPoint,
+    polynomial: impl Fn(u64) -> Matrix3<u64>,
+) -> Result<bool, AnalysisError> {
     let (f, h) = (&at.field, at.value("h")?);
     let zero = [[0; 3]; 3];
     Ok(polynomial(h) == plus(f, &zero, f.mul(h, h), &polynomial(f.one())))
@@ -64,7 +67,7 @@ const RATES: [&str; 3] = ["wN", "wU", "0"];
 
 /// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with
 /// `omega_c + eps` in inertial space, the computed frame with `omega_c`.
-fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
+fn kinematics(at: &RandomPoint, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
     let derivative = sum(f, &cross(f, &psi, &rate), &eps);
@@ -100,7 +103,12 @@ fn right_handed([i, o, s]: &Mounting) -> bool {
 
 /// Mountings of a gyro for which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28); eps
 /// is counted positive about +I or about -I.
-fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<Vec<Mounting>, AnalysisError> {
+fn fitting_mountings(
+    gyro: usize,
+    along_g: bool,
+    about_plus: bool,
+    seed: u64,
+) -> Result<Vec<Mounting>, AnalysisError> {
     let mut fitting: Vec<Mounting> = mountings().collect();
     everywhere(ANY, seed, |at| {
         let f = &at.field;
@@ -135,7 +143,7 @@ fn shown(fitting: &[Vec<Mounting>; 3]) -> String {
 /// Audit of (3) and (4): mountings of the gyros that these equations require.
 fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     let fit = |along_g: bool, about_plus: bool| -> Result<[Vec<Mounting>; 3], AnalysisError> {
-        let [x, y, z] = [0, 1, 2].map(|gyro| that_fit(gyro, along_g, about_plus, seed));
+        let [x, y, z] = [0, 1, 2].map(|gyro| fitting_mountings(gyro, along_g, about_plus, seed));
         Ok([x?, y?, z?])
     };
     let (plus, plus_reversed) = (fit(true, true)?, fit(true, false)?);
@@ -172,7 +180,7 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
 
 /// Derivative of eps in c while c turns with `rate` against n: the first-order terms take
 /// `g^c' = g^c x rate`.
-fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
+fn drift_rate(at: &RandomPoint, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
     let d = |name: &str| at.value(name);
@@ -213,7 +221,7 @@ fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
 }
 
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
-    let holds = |test: &dyn Fn(&At) -> Result<bool, AnalysisError>| everywhere(ANY, seed, test);
+    let holds = |test: &dyn Fn(&RandomPoint) -> Result<bool, AnalysisError>| everywhere(ANY, seed, test);
     let mut out = Vec::new();
 
     let rotation = holds(&|at| {
@@ -249,7 +257,7 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     out.extend(mounting_lines(seed)?);
 
     // C_n^p (-g^n) = -C_c^p C_n^c g^n
-    let output = |at: &At| -> Result<[u64; 3], AnalysisError> {
+    let output = |at: &RandomPoint| -> Result<[u64; 3], AnalysisError> {
         let f = &at.field;
         let to_p = product(f, &small_turn(f, &at.vector(PSI)?, f.one(), true), &transpose(&at.attitude));
         Ok(apply(f, &to_p, &[0, f.one(), 0]))
@@ -289,7 +297,7 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     };
     let printed = from_c(true)? || from_c(false)?;
     // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) or at a random one
-    let rate = |at: &At, tracks: bool| -> Result<[u64; 3], AnalysisError> {
+    let rate = |at: &RandomPoint, tracks: bool| -> Result<[u64; 3], AnalysisError> {
         let f = &at.field;
         let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);
         let commanded = if tracks { earth } else { at.vector(["rx", "ry", "rz"])? };

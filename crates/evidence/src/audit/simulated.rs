@@ -31,13 +31,13 @@ fn scheme(carry: Carry) -> Scheme {
     Scheme { carry, ..positions(&PAPER) }
 }
 
-/// Run of the filter; [`Mean::of`] makes it without noise in truth and samples.
-struct Mean {
+/// Run of the filter; [`MeanRun::of`] makes it without noise in truth and samples.
+struct MeanRun {
     plan: Plan,
     record: Record,
 }
 
-impl Mean {
+impl MeanRun {
     fn of(carry: Carry, seed: u64) -> Result<Self, SimulationError> {
         let conditions = conditions();
         let plan = Plan::new(&scheme(carry), &conditions)?;
@@ -109,7 +109,7 @@ fn is_about(found: f64, expected: f64) -> bool {
 }
 /// Lines about section 3.3.
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
-    let means = Carry::ALL.map(|carry| Mean::of(carry, seed));
+    let means = Carry::ALL.map(|carry| MeanRun::of(carry, seed));
     let degrees = Carry::ALL.map(|carry| Judged::of(scheme(carry), seed));
     let ([platform, inertial, reset], [p, i, r]) = (means, degrees);
     let carries = [(platform?, p?), (inertial?, i?), (reset?, r?)];
@@ -149,7 +149,7 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
 
 /// True if the mean error of psi_y is about -psi_y(0) in the second half of a segment, with the reason in
 /// words.
-fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
+fn psi_y(mean: &MeanRun, segment: usize) -> (bool, String) {
     let samples = mean.samples(segment);
     let (first, last) = (samples.start, samples.end.saturating_sub(1));
     let start = -mean.error("psi_y", 0);
@@ -175,11 +175,11 @@ fn under(holds: [bool; 3]) -> Finding {
     }
 }
 
-type Carries = [(Mean, Judged); 3];
+type Carries = [(MeanRun, Judged); 3];
 
 /// Phrases of all carries, joined.
-fn each(carries: &Carries, phrase: impl Fn(&Mean, &Judged) -> String) -> String {
-    let one = |(carry, (mean, judged)): (Carry, &(Mean, Judged))| {
+fn each(carries: &Carries, phrase: impl Fn(&MeanRun, &Judged) -> String) -> String {
+    let one = |(carry, (mean, judged)): (Carry, &(MeanRun, Judged))| {
         format!("{}, {carry} carry", phrase(mean, judged))
     };
     Carry::ALL.into_iter().zip(carries).map(one).collect::<Vec<_>>().join("; ")
@@ -187,7 +187,7 @@ fn each(carries: &Carries, phrase: impl Fn(&Mean, &Judged) -> String) -> String 
 
 fn fast(carries: &Carries) -> Line {
     let names = ["D_FX", "D_SX", "D_SZ"];
-    let holds = |(mean, judged): &(Mean, Judged)| {
+    let holds = |(mean, judged): &(MeanRun, Judged)| {
         names.iter().all(|n| judged.degree(n).is_some() && mean.quick(n, 1))
     };
     let lost = |judged: &Judged| -> String {
@@ -211,8 +211,8 @@ fn offset(carries: &Carries) -> Line {
     let start = (-mean.error("psi_y", 0)).to_radians();
     let dph = |rate: f64| rate.to_degrees() * 3600.0;
     let expected = -dph(mean.plan.point.w_n) * start;
-    let end = |mean: &Mean| mean.error("D_FZ", mean.record.traces.time.len() - 1);
-    let holds = |(mean, _): &(Mean, Judged)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
+    let end = |mean: &MeanRun| mean.error("D_FZ", mean.record.traces.time.len() - 1);
+    let holds = |(mean, _): &(MeanRun, Judged)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
     let last = mean.record.traces.time.len() - 1;
     line(
         "section 3.3",
@@ -231,12 +231,12 @@ fn offset(carries: &Carries) -> Line {
 
 fn slow(carries: &Carries) -> Line {
     let (slow, fast) = (["D_FY", "D_IY"], ["D_FX", "D_FZ", "D_SX", "D_SZ"]);
-    let later = |mean: &Mean, [s, f]: [&str; 2]| {
+    let later = |mean: &MeanRun, [s, f]: [&str; 2]| {
         let time = |n: &str| mean.settled(n, 1).unwrap_or(f64::INFINITY);
         let last = mean.record.traces.time.len() - 1;
         time(s) > time(f) && mean.sigma(s, last) > mean.sigma(f, last)
     };
-    let holds = |(mean, judged): &(Mean, Judged)| {
+    let holds = |(mean, judged): &(MeanRun, Judged)| {
         let better = fast.iter().all(|f| judged.degree(f).is_none_or(|k| k < 2));
         better && slow.iter().all(|s| judged.degree(s) == Some(2) && fast.iter().all(|f| later(mean, [s, f])))
     };
@@ -268,7 +268,7 @@ fn slow(carries: &Carries) -> Line {
 }
 
 /// Consistency of one run with noise, by an exact truth and by the linear one.
-fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
+fn whole(mean: &MeanRun, seed: u64) -> Result<Line, SimulationError> {
     let linear = simulate(&scheme(Carry::Platform), &conditions(), seed)?.0;
     // the filter of the paper is linear
     let exact = Conditions { truth: Truth::Exact, filter: Some(FilterKind::Linear), ..conditions() };
@@ -322,17 +322,17 @@ mod tests {
     #[test]
     fn the_error_without_noise_is_the_mean() {
         const RUNS: u64 = 40;
-        let mean = Mean::of(Carry::Platform, 1).expect("a run");
-        let other = Mean::of(Carry::Inertial, 1).expect("a run");
+        let mean = MeanRun::of(Carry::Platform, 1).expect("a run");
+        let other = MeanRun::of(Carry::Inertial, 1).expect("a run");
         let conditions = conditions();
         let plan = Plan::new(&scheme(Carry::Platform), &conditions).expect("a plan");
         let start = RunStart::new(&plan, &conditions).expect("a start");
         let prediction =
             Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], 1).expect("predicted");
-        let runs: Vec<Mean> = (0..RUNS)
+        let runs: Vec<MeanRun> = (0..RUNS)
             .map(|seed| {
                 let record = run(&plan, &conditions, &start, &prediction, seed).expect("a run");
-                Mean { plan: plan.clone(), record }
+                MeanRun { plan: plan.clone(), record }
             })
             .collect();
         for sample in [10, 100, 101, 150, 200] {
@@ -354,7 +354,7 @@ mod tests {
     #[test]
     fn settled_means_from_then_on() {
         for carry in [Carry::Platform, Carry::Inertial] {
-            let mean = Mean::of(carry, 1).expect("a run");
+            let mean = MeanRun::of(carry, 1).expect("a run");
             let traces = &mean.record.traces;
             for (i, name) in traces.names.iter().enumerate() {
                 let truth = traces.series[i].truth[0] / traces.scales[i];

@@ -3,7 +3,7 @@
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::slew::W_IE;
 
-use super::precise::{self, Between, Digits, Functional, Seen};
+use super::precise::{self, Between, Digits, Functional, ObservableDirections};
 
 /// Precisions that are tried in turn, in bits.
 const BITS: [usize; 2] = [1024, 2048];
@@ -34,7 +34,7 @@ pub(super) fn method() -> Vec<String> {
 
 /// Dependence of the sigma of a functional on the dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Course {
+pub(super) enum DwellSlope {
     /// Sigma falls, or stays, with this slope on logarithmic axes.
     Slope(f64),
     /// The samples do not determine the functional.
@@ -44,7 +44,7 @@ pub(super) enum Course {
 }
 
 /// Functional whose slope is requested.
-pub(super) struct Question {
+pub(super) struct SlopeRequest {
     /// `(unknown, coefficient)`, drifts in rad/s.
     pub(super) terms: Vec<(usize, f64)>,
     /// True if the coefficients are exact, false if they are rounded to doubles.
@@ -59,11 +59,11 @@ pub(super) const ROUNDED: [f64; 2] = [1e-7, 1e-12];
 
 /// Behaviour of the samples as the dwell goes to zero.
 pub(super) struct Asymptotics {
-    pub(super) courses: Vec<Course>,
+    pub(super) dwell_slopes: Vec<DwellSlope>,
     /// dim V_0, dim V_1, ..., from the slopes of the pivots; `None` where they do not settle.
     pub(super) profile: Option<Vec<usize>>,
     /// Observable directions at the shortest dwell.
-    pub(super) seen: Seen,
+    pub(super) seen: ObservableDirections,
 }
 
 /// Terms with drifts in units of the earth rate, of a functional or (if `change`) of a change of the
@@ -95,28 +95,31 @@ pub(super) fn asymptotics(
     samples: &Samples<'_>,
     between: Between,
     is_psi: &(dyn Fn(usize) -> bool + Sync),
-    questions: &[Question],
+    requests: &[SlopeRequest],
 ) -> Option<Asymptotics> {
     (0..BITS.len()).find_map(|bits| {
-        let seen: Vec<Seen> = samples.seen(bits, between)?;
+        let seen: Vec<ObservableDirections> = samples.seen(bits, between)?;
         let digits = Digits { bits: BITS[bits] };
-        let course = |q: &Question| {
+        let dwell_slope = |q: &SlopeRequest| {
             let terms = functional(digits, is_psi, &q.terms, false);
             let sigmas = |rounded: Option<f64>| -> Vec<Option<f64>> {
-                let moved = |s: &Seen| if q.at_end { s.at_start(&terms) } else { terms.clone() };
+                let moved =
+                    |s: &ObservableDirections| if q.at_end { s.at_start(&terms) } else { terms.clone() };
                 seen.iter().map(|s| s.sigma(&moved(s), rounded)).collect()
             };
             let [sigmas, closer] = if q.exact { [None; 2] } else { ROUNDED.map(Some) }.map(sigmas);
             if sigmas != closer {
-                return Course::Bends;
+                return DwellSlope::Bends;
             }
             if sigmas.iter().all(Option::is_none) {
-                return Course::Unseen;
+                return DwellSlope::Unseen;
             }
-            let Some(sigmas) = sigmas.into_iter().collect::<Option<Vec<f64>>>() else { return Course::Bends };
-            slope(&sigmas).map_or(Course::Bends, Course::Slope)
+            let Some(sigmas) = sigmas.into_iter().collect::<Option<Vec<f64>>>() else {
+                return DwellSlope::Bends;
+            };
+            slope(&sigmas).map_or(DwellSlope::Bends, DwellSlope::Slope)
         };
-        let courses = questions.iter().map(course).collect();
+        let dwell_slopes = requests.iter().map(dwell_slope).collect();
         let rank = seen[0].rank();
         let same = seen.iter().all(|s| s.rank() == rank);
         let orders: Option<Vec<usize>> = (0..rank)
@@ -132,7 +135,7 @@ pub(super) fn asymptotics(
             (0..=last).map(|k| orders.iter().filter(|o| **o <= k).count()).collect()
         });
         let seen = seen.into_iter().next_back()?;
-        Some(Asymptotics { courses, profile, seen })
+        Some(Asymptotics { dwell_slopes, profile, seen })
     })
 }
 
@@ -150,32 +153,32 @@ mod tests {
 
     use super::*;
 
-    fn courses(
+    fn dwell_slopes(
         attitudes: &[&str],
         latitude: &str,
         carry: Carry,
         between: Between,
-    ) -> (Vec<Course>, Vec<usize>) {
+    ) -> (Vec<DwellSlope>, Vec<usize>) {
         let angles = attitudes.iter().map(|a| parse_attitude(a).expect("an attitude"));
         let scheme = Scheme { carry, latitude: latitude.parse().ok(), ..Scheme::of_angles(angles) };
-        let ask = |c| Question { terms: vec![(c, 1.0)], exact: true, at_end: false };
+        let ask = |c| SlopeRequest { terms: vec![(c, 1.0)], exact: true, at_end: false };
         let n = if carry == Carry::Reset { 3 * attitudes.len() + 12 } else { 15 };
-        let questions: Vec<Question> = (0..n).map(ask).collect();
-        let found = asymptotics(&samples(&scheme), between, &|c| c + 12 < n, &questions).expect("resolved");
-        (found.courses, found.profile.expect("settled"))
+        let requests: Vec<SlopeRequest> = (0..n).map(ask).collect();
+        let found = asymptotics(&samples(&scheme), between, &|c| c + 12 < n, &requests).expect("resolved");
+        (found.dwell_slopes, found.profile.expect("settled"))
     }
 
-    fn orders(courses: &[Course]) -> Vec<Option<usize>> {
-        let order = |c: &Course| match c {
-            Course::Slope(s) => {
+    fn orders(dwell_slopes: &[DwellSlope]) -> Vec<Option<usize>> {
+        let order = |c: &DwellSlope| match c {
+            DwellSlope::Slope(s) => {
                 let order = -s - 0.5;
                 assert!((order - order.round()).abs() < 1e-6, "{s}");
                 Some(order.round() as usize)
             }
-            Course::Unseen => None,
-            Course::Bends => panic!("bends: {courses:?}"),
+            DwellSlope::Unseen => None,
+            DwellSlope::Bends => panic!("bends: {dwell_slopes:?}"),
         };
-        courses.iter().map(order).collect()
+        dwell_slopes.iter().map(order).collect()
     }
 
     const S6: [&str; 6] = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110", "170,15,-75"];
@@ -184,7 +187,7 @@ mod tests {
     #[test]
     fn published_verdicts() {
         let p1p2 = ["0,0,0", "180,0,0"];
-        let (found, profile) = courses(&p1p2, "28.2", Carry::Platform, Between::Nothing);
+        let (found, profile) = dwell_slopes(&p1p2, "28.2", Carry::Platform, Between::Nothing);
         let (zero, one, two) = (Some(0), Some(1), Some(2));
         assert_eq!(
             orders(&found),
@@ -198,14 +201,14 @@ mod tests {
             (5, Carry::Platform, &[3, 13, 15]),
             (4, Carry::Inertial, &[2, 10, 14]),
         ] {
-            assert_eq!(courses(&S6[..n], "28.2", carry, Between::Nothing).1, expected, "{n} {carry}");
+            assert_eq!(dwell_slopes(&S6[..n], "28.2", carry, Between::Nothing).1, expected, "{n} {carry}");
         }
-        let (found, _) = courses(&S6[..5], "28.2", Carry::Platform, Between::Nothing);
+        let (found, _) = dwell_slopes(&S6[..5], "28.2", Carry::Platform, Between::Nothing);
         assert_eq!(orders(&found), [vec![zero; 3], vec![two; 12]].concat());
         // with dwells
-        let (found, _) = courses(&S6[..5], "28.2", Carry::Platform, Between::Dwell);
+        let (found, _) = dwell_slopes(&S6[..5], "28.2", Carry::Platform, Between::Dwell);
         assert_eq!(orders(&found)[6..9], [one; 3]);
-        let (found, _) = courses(&S6[..4], "28.2", Carry::Platform, Between::Dwell);
+        let (found, _) = dwell_slopes(&S6[..4], "28.2", Carry::Platform, Between::Dwell);
         assert_eq!(orders(&found)[..3], [one; 3]);
     }
 }

@@ -7,7 +7,7 @@ use obsdeg_core::model::slew::W_IE;
 use obsdeg_exact::SplitMix64;
 
 use super::asymptotics::functional;
-use super::precise::{Digits, Functional, Information, Model, Posterior};
+use super::precise::{Digits, Functional, Model, Posterior, SampleInformation};
 use crate::prediction::Combination;
 use crate::simulation::conditions::is_rate;
 use crate::simulation::{Conditions, Plan};
@@ -29,12 +29,12 @@ const SAME: f64 = 0.01;
 const CLOSE: [f64; 2] = [2e-3, 2e-4];
 
 /// Covariances of a model with both priors of evidence b.
-struct Filtered {
+struct PosteriorPair {
     prior: Posterior,
     wider: Posterior,
 }
 
-impl Filtered {
+impl PosteriorPair {
     fn inflation(&self, functional: &Functional) -> f64 {
         self.wider.sigma(functional) / self.prior.sigma(functional)
     }
@@ -49,9 +49,9 @@ pub(super) struct Resolution<'a> {
     /// Model in high precision; `None` where it cannot be computed, here and below.
     model: OnceCell<Option<Model>>,
     /// Filter of the model.
-    exact: OnceCell<Option<Filtered>>,
+    exact: OnceCell<Option<PosteriorPair>>,
     /// Filters of the model with randomly rounded numbers.
-    rounded: OnceCell<Option<Vec<Filtered>>>,
+    rounded: OnceCell<Option<Vec<PosteriorPair>>>,
 }
 
 impl<'a> Resolution<'a> {
@@ -80,25 +80,25 @@ impl<'a> Resolution<'a> {
     }
 
     /// Filter of a model, at the times of its samples.
-    fn filtered(&self, model: &Model) -> Option<Filtered> {
+    fn filtered(&self, model: &Model) -> Option<PosteriorPair> {
         let conditions = self.conditions;
         let dwell_s = self.plan.segments.first().map(|s| s.dt * s.steps as f64)?;
         let samples: Vec<usize> = self.plan.segments.iter().map(|s| s.steps).collect();
         let noise = [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()];
-        let information = Information::of_filter(model, dwell_s * W_IE, &samples, noise);
+        let information = SampleInformation::of_filter(model, dwell_s * W_IE, &samples, noise);
         let prior = |factor: f64| -> Vec<f64> {
             let unit = |c: usize| if self.is_psi(c) { 1.0 } else { W_IE };
             self.prior.iter().enumerate().map(|(c, s)| s * factor / unit(c)).collect()
         };
         let at = |factor: f64| Posterior::new(&information, &prior(factor));
-        Some(Filtered { prior: at(1.0)?, wider: at(WIDER)? })
+        Some(PosteriorPair { prior: at(1.0)?, wider: at(WIDER)? })
     }
 
-    fn exact(&self) -> Option<&Filtered> {
+    fn exact(&self) -> Option<&PosteriorPair> {
         self.exact.get_or_init(|| self.filtered(self.model()?)).as_ref()
     }
 
-    fn rounded(&self) -> Option<&[Filtered]> {
+    fn rounded(&self) -> Option<&[PosteriorPair]> {
         let compute = || {
             let (own, mut rng) = (self.model()?, SplitMix64::new(1));
             let rounded: Vec<Model> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
@@ -109,7 +109,13 @@ impl<'a> Resolution<'a> {
 
     /// Reason why doubles, which show `measured`, need not show `limit`, the value of an infinitely wide
     /// prior; `None` where they must show it. `of` computes the value from a model.
-    fn why(&self, limit: f64, measured: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
+    fn why(
+        &self,
+        limit: f64,
+        measured: f64,
+        close: f64,
+        of: &dyn Fn(&PosteriorPair) -> f64,
+    ) -> Option<String> {
         const UNKNOWN: &str = "many digits do not tell what the filter must show";
         let close = |x: f64| (x - limit).abs() <= close * limit;
         let Some(exact) = self.exact().map(of) else { return Some(UNKNOWN.into()) };

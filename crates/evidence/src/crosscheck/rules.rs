@@ -10,17 +10,18 @@ pub(crate) const SLOPE_TOLERANCE: f64 = 0.1;
 
 /// Bands of the factor on sigma for a prior ten times as loose: for a determined quantity (1 in the limit)
 /// and for an undetermined one (10 in the limit).
-pub(crate) struct Inflation {
+pub(crate) struct InflationBands {
     pub(crate) determined: RangeInclusive<f64>,
     pub(crate) open: RangeInclusive<f64>,
 }
 
 /// Bands for a linear filter, whose prior is so diffuse that the limit is reached.
-pub(crate) const LINEAR: Inflation = Inflation { determined: 0.99..=1.01, open: 9.0..=11.0 };
+pub(crate) const LINEAR: InflationBands = InflationBands { determined: 0.99..=1.01, open: 9.0..=11.0 };
 /// Bands for a system linearised along its run, whose prior is a multiple of that of its file.
-pub(crate) const LINEARISED: Inflation = Inflation { determined: 0.0..=1.5, open: 5.0..=f64::INFINITY };
+pub(crate) const LINEARISED: InflationBands =
+    InflationBands { determined: 0.0..=1.5, open: 5.0..=f64::INFINITY };
 
-impl Inflation {
+impl InflationBands {
     /// Check of a measured factor.
     pub(crate) fn check(&self, determined: bool, measured: Option<f64>) -> Check {
         let (expected, band) = if determined { (1.0, &self.determined) } else { (10.0, &self.open) };
@@ -65,7 +66,8 @@ mod tests {
         // NaN agrees with no prediction; a missing measurement neither agrees nor disagrees
         assert_eq!([passes(Some(2), Some(f64::NAN)), passes(None, Some(f64::NAN))], [Disagrees; 2]);
         assert_eq!([passes(Some(2), None), passes(None, None)], [NotTested; 2]);
-        let inflated = |rules: &Inflation, determined, x| rules.check(determined, Some(x)).outcome == Agrees;
+        let inflated =
+            |rules: &InflationBands, determined, x| rules.check(determined, Some(x)).outcome == Agrees;
         assert_eq!([1.0, 1.02, 9.5].map(|x| inflated(&LINEAR, true, x)), [true, false, false]);
         assert_eq!([10.0, 8.9, 1.0].map(|x| inflated(&LINEAR, false, x)), [true, false, false]);
         assert_eq!([1.4, 1.6, f64::NAN].map(|x| inflated(&LINEARISED, true, x)), [true, false, false]);

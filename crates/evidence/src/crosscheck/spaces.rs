@@ -5,7 +5,7 @@ use obsdeg_core::degree::Status;
 
 use super::answer::{Agreement, Partners, SpaceCheck};
 use super::asymptotics::{Asymptotics, ROUNDED, functional};
-use super::precise::{Digits, Seen, add_up};
+use super::precise::{Digits, ObservableDirections, add_up};
 use crate::prediction::{Combination, Prediction};
 
 /// Bounds of a pivot of rows and columns of unit size: a pivot above the first is non-zero, one below the
@@ -78,7 +78,11 @@ fn null_space(
 }
 
 /// Number of vectors that change no observable direction.
-fn count_unseen(seen: &Seen, vectors: &[Combination], is_psi: &dyn Fn(usize) -> bool) -> usize {
+fn count_unseen(
+    seen: &ObservableDirections,
+    vectors: &[Combination],
+    is_psi: &dyn Fn(usize) -> bool,
+) -> usize {
     let (free, rows) = seen.reduced();
     let unseen = |v: &&Combination| {
         // change of drift in units of the earth rate
@@ -244,7 +248,7 @@ fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
 /// Partners of every unknown: the unknowns in a common unobservable direction that has no shorter one within
 /// it. They are the connected components of the graph of pivots and the free unknowns in their rows; the
 /// components do not depend on the choice of the pivots.
-pub(super) fn partners(seen: &Seen) -> Vec<Vec<usize>> {
+pub(super) fn partners(seen: &ObservableDirections) -> Vec<Vec<usize>> {
     let n = seen.excited.len();
     let (free, rows) = seen.reduced();
     let mut part: Vec<usize> = (0..n).collect();

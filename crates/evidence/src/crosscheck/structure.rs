@@ -10,7 +10,7 @@ use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
 use super::answer::{
     Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
 };
-use super::asymptotics::{Asymptotics, Course, Question, asymptotics, samples};
+use super::asymptotics::{Asymptotics, DwellSlope, SlopeRequest, asymptotics, samples};
 use super::precise::Between;
 use super::resolution::{ROUNDING, Resolution};
 use super::slopes::{self, slopes};
@@ -75,7 +75,7 @@ pub(super) fn structure(
     let names = names(truth, prediction);
     let functionals = functionals(truth, &filter, prediction);
     let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
-    let shown = Shown::of(&filter, truth, &functionals);
+    let shown = DwellLimit::of(&filter, truth, &functionals);
     let inflation = inflation(&filter, &known)?;
     let resolution = Resolution::new(&filter, conditions, &inflation.prior);
     let (mut null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
@@ -85,7 +85,7 @@ pub(super) fn structure(
     let mut unresolved = Vec::new();
     let present = quantities.iter_mut().zip(&functionals).filter_map(|(q, f)| Some((q, f.as_ref()?)));
     for (i, (q, terms)) in present.enumerate() {
-        unresolved.extend(decide_inflation(q, terms, shown.courses(i)[2], &resolution));
+        unresolved.extend(decide_inflation(q, terms, shown.dwell_slopes(i)[2], &resolution));
     }
     unresolved.extend(null_space.iter_mut().filter_map(decide_seen));
     unresolved.extend(null_space.iter_mut().filter_map(|v| decide_correlation(v, &resolution)));
@@ -119,13 +119,13 @@ pub(super) fn structure(
 fn decide_inflation(
     q: &mut QuantityEvidence,
     terms: &Combination,
-    at_end: Option<Course>,
+    at_end: Option<DwellSlope>,
     resolution: &Resolution<'_>,
 ) -> Option<String> {
     let determined = match at_end.filter(|_| q.slope_at_end.outcome.is_resolved()) {
-        Some(Course::Slope(_)) => Some(true),
-        Some(Course::Unseen) => Some(false),
-        Some(Course::Bends) | None => None,
+        Some(DwellSlope::Slope(_)) => Some(true),
+        Some(DwellSlope::Unseen) => Some(false),
+        Some(DwellSlope::Bends) | None => None,
     };
     let said = q.inflation.predicted == 1.0;
     if determined.is_some_and(|determined| determined != said) {
@@ -165,7 +165,7 @@ fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<
 }
 
 /// Behaviour of the samples as the dwell goes to zero.
-struct Shown {
+struct DwellLimit {
     /// Slopes by derivatives: psi is handed on as it was at the start of a position.
     derivatives: Option<Asymptotics>,
     /// Slopes with dwells: first with psi of the start, then with psi of the end. The outer `None` marks
@@ -173,19 +173,19 @@ struct Shown {
     dwells: Option<Option<Asymptotics>>,
 }
 
-impl Shown {
+impl DwellLimit {
     fn of(filter: &Plan, truth: &Plan, functionals: &[Option<Combination>]) -> Self {
         let scheme = filter.platform.scheme();
         let units = filter.platform.units();
         let is_psi = |c: usize| !is_rate(units[c]);
-        let questions = |at_end: bool| {
+        let requests = |at_end: bool| {
             // coefficients of unknowns are exact, those of combinations are doubles
             let present = functionals.iter().enumerate().filter_map(|(i, f)| Some((i, f.clone()?)));
-            present.map(move |(i, terms)| Question { terms, exact: i < truth.unknowns(), at_end })
+            present.map(move |(i, terms)| SlopeRequest { terms, exact: i < truth.unknowns(), at_end })
         };
-        let start: Vec<Question> = questions(false).collect();
+        let start: Vec<SlopeRequest> = requests(false).collect();
         let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
-        let both = || -> Vec<Question> { questions(false).chain(questions(true)).collect() };
+        let both = || -> Vec<SlopeRequest> { requests(false).chain(requests(true)).collect() };
         let samples = samples(scheme);
         let (derivatives, dwells) = rayon::join(
             || asymptotics(&samples, Between::Nothing, &is_psi, &start),
@@ -195,9 +195,9 @@ impl Shown {
     }
 
     /// Slopes of the functional with index `i`: by derivatives, with dwells, and with dwells at the end.
-    fn courses(&self, i: usize) -> [Option<Course>; 3] {
-        let by_derivatives = self.derivatives.as_ref().map(|a| a.courses[i]);
-        let dwells = |a: &Asymptotics, half: usize| a.courses[half * (a.courses.len() / 2) + i];
+    fn dwell_slopes(&self, i: usize) -> [Option<DwellSlope>; 3] {
+        let by_derivatives = self.derivatives.as_ref().map(|a| a.dwell_slopes[i]);
+        let dwells = |a: &Asymptotics, half: usize| a.dwell_slopes[half * (a.dwell_slopes.len() / 2) + i];
         match &self.dwells {
             None => [by_derivatives; 3],
             Some(found) => {
@@ -220,12 +220,12 @@ impl Shown {
 
 /// Check of an order against a slope; it is not resolvable if the slope bends or cannot be separated from
 /// rounding.
-fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check {
-    let measured = match course {
-        Some(Course::Slope(s)) => Some(s),
+fn slope(order: Option<usize>, modelled: bool, dwell_slope: Option<DwellSlope>) -> Check {
+    let measured = match dwell_slope {
+        Some(DwellSlope::Slope(s)) => Some(s),
         // sigma stays that of the prior, whatever the prior is
-        Some(Course::Unseen) => Some(0.0),
-        Some(Course::Bends) | None => None,
+        Some(DwellSlope::Unseen) => Some(0.0),
+        Some(DwellSlope::Bends) | None => None,
     };
     let mut check = rules::slope(order, measured);
     if modelled && measured.is_none() {
@@ -260,7 +260,7 @@ fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Opti
 }
 
 /// Evidence b: factors on sigma when the prior is ten times as wide.
-struct Inflation {
+struct InflationFactors {
     /// Factor on sigma of each functional, dimensionless.
     ratios: Vec<f64>,
     /// Correlation matrix under the diffuse prior.
@@ -269,7 +269,7 @@ struct Inflation {
     prior: Vec<f64>,
 }
 
-fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, SimulationError> {
+fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<InflationFactors, SimulationError> {
     let prior = diffuse_prior(plan)?;
     let end = |factor: f64| {
         let sigma = prior.iter().map(|s| s * factor).collect();
@@ -281,7 +281,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let n = plan.unknowns();
     let sigma = small.sigmas();
     let small = small.matrix();
-    Ok(Inflation {
+    Ok(InflationFactors {
         prior,
         ratios,
         correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
@@ -301,7 +301,7 @@ fn quantities(
     names: &[String],
     prediction: &Prediction,
     functionals: &[Option<Combination>],
-    shown: &Shown,
+    shown: &DwellLimit,
     ratios: &[f64],
 ) -> Vec<QuantityEvidence> {
     let n = truth.unknowns();
@@ -322,14 +322,14 @@ fn quantities(
         .enumerate()
         .map(|(c, ((name, (status, degree, orders, at_end)), functional))| {
             let found = functional.as_ref().and_then(|f| Some((f, measured.next()?)));
-            let courses = found.map_or([None; 3], |(_, (i, _))| shown.courses(i));
+            let dwell_slopes = found.map_or([None; 3], |(_, (i, _))| shown.dwell_slopes(i));
             let modelled = functional.is_some();
             let status_measured = found.and_then(|(f, _)| {
                 let excited = f.iter().any(|(c, _)| seen.is_some_and(|s| s.excited[*c]));
-                match courses[0]? {
-                    Course::Slope(_) => Some(Status::Observable),
-                    Course::Unseen => Some(Status::of(None, excited)),
-                    Course::Bends => None,
+                match dwell_slopes[0]? {
+                    DwellSlope::Slope(_) => Some(Status::Observable),
+                    DwellSlope::Unseen => Some(Status::of(None, excited)),
+                    DwellSlope::Bends => None,
                 }
             });
             let status_outcome = match (modelled, status_measured) {
@@ -358,12 +358,12 @@ fn quantities(
                 degree,
                 accuracy_order: orders[0],
                 modelled,
-                degree_slope: slope(degree, modelled, courses[0]),
+                degree_slope: slope(degree, modelled, dwell_slopes[0]),
                 status_measured,
                 status_outcome,
                 partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
-                slope: rounded(slope(orders[0], modelled, courses[1]), orders[0]),
-                slope_at_end: rounded(slope(orders[1], modelled, courses[2]), orders[1]),
+                slope: rounded(slope(orders[0], modelled, dwell_slopes[1]), orders[0]),
+                slope_at_end: rounded(slope(orders[1], modelled, dwell_slopes[2]), orders[1]),
                 inflation: rules::LINEAR.check(at_end, found.map(|(_, (_, ratio))| *ratio)),
             }
         })
@@ -385,7 +385,7 @@ fn null_evidence(
     truth: &Plan,
     filter: &Plan,
     prediction: &Prediction,
-    shown: &Shown,
+    shown: &DwellLimit,
     correlation: &DMatrix<f64>,
 ) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();

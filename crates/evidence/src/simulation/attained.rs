@@ -42,7 +42,7 @@ pub struct Attained {
     pub totals: Vec<Option<f64>>,
     /// True for an unknown that the samples do not determine and stated priors bound.
     pub by_prior: Vec<bool>,
-    known: Known,
+    known: EndCovariance,
     /// Prior standard deviations of the unknowns, in SI units: stated, or so wide that they do not matter.
     prior: Vec<f64>,
     /// True if random drift or biases require a filter.
@@ -55,14 +55,14 @@ pub struct Attained {
 /// Covariance of the unknowns at the end in SI units, as a root. An unbounded unknown has a huge variance; in
 /// a determined combination of such unknowns these cancel before squaring only.
 #[derive(Debug, Clone)]
-enum Known {
+enum EndCovariance {
     /// A root of the covariance (n x n).
     Root(DMatrix<f64>),
     /// The covariance of a filter as `U diag(d) U^T`; biases behind the unknowns.
     Filter(Covariance),
 }
 
-impl Known {
+impl EndCovariance {
     /// Variance of a combination of unknowns, `(unknown, coefficient)`.
     fn variance(&self, terms: &[(usize, f64)]) -> Result<f64, EkfError> {
         match self {
@@ -90,7 +90,7 @@ impl Attained {
         let prior = |narrower: f64| -> Vec<f64> {
             stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect()
         };
-        let with = |narrower: f64| -> Result<Known, SimulationError> {
+        let with = |narrower: f64| -> Result<EndCovariance, SimulationError> {
             let sigma = prior(narrower);
             if noisy { filtered(&plan, sigma) } else { by_information(&plan, sigma) }
         };
@@ -250,18 +250,18 @@ fn stated_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<Option<f64>>
 }
 
 /// Covariance at the end by the information of all samples, with white noise of the samples only.
-fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<Known, SimulationError> {
+fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<EndCovariance, SimulationError> {
     let Batch { information, to_end } = batch(plan, SquareRootInformation::prior(&prior)?)?;
     let root = information.inverse_root()?;
     let n = root.nrows();
     // sums in the same order on every machine: no product whose instructions depend on the processor
     let entry = |i: usize, j: usize| (0..n).map(|k| to_end[(i, k)] * root[(k, j)]).sum::<f64>();
-    Ok(Known::Root(DMatrix::from_fn(n, n, entry)))
+    Ok(EndCovariance::Root(DMatrix::from_fn(n, n, entry)))
 }
 
 /// Covariance at the end of a filter, with random drift and biases.
-fn filtered(plan: &Plan, sigma: Vec<f64>) -> Result<Known, SimulationError> {
-    Ok(Known::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma)?)?))
+fn filtered(plan: &Plan, sigma: Vec<f64>) -> Result<EndCovariance, SimulationError> {
+    Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma)?)?))
 }
 
 /// Covariance of a filter at its start, biases behind the unknowns.

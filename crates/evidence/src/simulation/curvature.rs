@@ -28,14 +28,14 @@ const MOST_DIRECTIONS: usize = 6;
 const SEEN: f64 = 0.1;
 
 /// Second-order terms of a run, over the likely starts.
-pub(super) struct Curvature {
+pub(super) struct SecondOrderTerms {
     /// Outputs of the run by row: first the mean run minus the run of the mean, then the columns.
     outputs: DMatrix<f64>,
     /// States of every step in local coordinates, with the same columns.
     states: DMatrix<f64>,
 }
 
-impl Curvature {
+impl SecondOrderTerms {
     /// Curvature of the run linearised in `stages` along the trajectory `at` from `x0`. The start has the
     /// covariance `p` (n x n) and had the standard deviations `prior`. `None` where the curvature is
     /// negligible.

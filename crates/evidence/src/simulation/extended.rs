@@ -87,7 +87,7 @@ const MOST_TURN: f64 = 100.0;
 /// Attitude `E` and the derivative of the local coordinates by those at the start of the step: three rows, by
 /// psi (3) and D (m), or none if they are not requested.
 #[derive(Clone)]
-struct Moving {
+struct AttitudeMotion {
     e: Matrix3<f64>,
     rows: Vec<f64>,
 }
@@ -129,10 +129,10 @@ impl PlatformMotion<'_> {
     fn slope(
         &self,
         t: f64,
-        moving: &Moving,
+        moving: &AttitudeMotion,
         [d, weights]: [&[f64]; 2],
         by_d: &mut Vec<(usize, f64)>,
-    ) -> Moving {
+    ) -> AttitudeMotion {
         let (e, earth) = (&moving.e, self.plan.earth_rate());
         let computed = self.plan.attitude(self.segment, t);
         let c = times(e, &computed);
@@ -161,7 +161,7 @@ impl PlatformMotion<'_> {
                 *x += c[i][axis] * value;
             }
         }
-        Moving { e: times(&cross(&rate), e), rows }
+        AttitudeMotion { e: times(&cross(&rate), e), rows }
     }
 }
 
@@ -248,7 +248,7 @@ impl PlatformMotion<'_> {
     }
 
     /// Turns the psi of `x` that moves by `dt`, and with it the `rows` of local coordinates (in n, as in
-    /// [`Moving`]).
+    /// [`AttitudeMotion`]).
     fn integrate(
         &self,
         t: f64,
@@ -259,7 +259,7 @@ impl PlatformMotion<'_> {
         let (p, d) = (self.to_n, &x.constants[..]);
         let weights = self.weights(dt);
         let back = transpose(p);
-        let mut now = Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
+        let mut now = AttitudeMotion { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
         let (coefficients, biases) = d.split_at(self.plan.platform.coefficients());
         let random = self.plan.drift_biases().map(|(k, _)| biases[k].abs()).sum::<f64>();
@@ -274,18 +274,18 @@ impl PlatformMotion<'_> {
             self.plan.substeps(self.segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = dt / substeps as f64;
         let mut by_d = Vec::with_capacity(d.len());
-        let add = |y: &mut Moving, k: &Moving, h: f64| {
+        let add = |y: &mut AttitudeMotion, k: &AttitudeMotion, h: f64| {
             y.e.iter_mut().flatten().zip(k.e.iter().flatten()).for_each(|(x, k)| *x += h * k);
             y.rows.iter_mut().zip(&k.rows).for_each(|(x, k)| *x += h * k);
         };
-        let moved = |y: &Moving, k: &Moving, h: f64| {
+        let moved = |y: &AttitudeMotion, k: &AttitudeMotion, h: f64| {
             let mut out = y.clone();
             add(&mut out, k, h);
             out
         };
         for i in 0..substeps {
             let t = t + i as f64 * h;
-            let mut slope = |t: f64, y: &Moving| self.slope(t, y, [d, &weights], &mut by_d);
+            let mut slope = |t: f64, y: &AttitudeMotion| self.slope(t, y, [d, &weights], &mut by_d);
             let k1 = slope(t, &now);
             let k2 = slope(t + h / 2.0, &moved(&now, &k1, h / 2.0));
             let k3 = slope(t + h / 2.0, &moved(&now, &k2, h / 2.0));
@@ -399,7 +399,7 @@ pub struct Extended<'a> {
 
 /// Result of a filter after its last step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ended {
+pub struct FilterResult {
     /// Estimate at the end.
     pub x: PlatformState,
     /// Covariance of the local coordinates of the estimate.
@@ -474,7 +474,7 @@ impl<'a> Extended<'a> {
         start: &RunStart,
         z: &[f64],
         mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
-    ) -> Result<Ended, EkfError> {
+    ) -> Result<FilterResult, EkfError> {
         let plan = self.plan;
         let outputs = plan.components.len();
         check_measurements(plan, z)?;
@@ -498,7 +498,7 @@ impl<'a> Extended<'a> {
             }
         }
         let (x, covariance) = (filter.x().clone(), filter.covariance().clone());
-        Ok(Ended { x, covariance, passes: 1, converged: true })
+        Ok(FilterResult { x, covariance, passes: 1, converged: true })
     }
 }
 

@@ -15,13 +15,13 @@ use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Update};
 
 use super::conditions::Conditions;
-use super::curvature::Curvature;
+use super::curvature::SecondOrderTerms;
 use super::error::SimulationError;
-use super::extended::{Ended, Extended, check_measurements};
+use super::extended::{Extended, FilterResult, check_measurements};
 use super::plan::Plan;
 use super::start::RunStart;
 use super::state::PlatformState;
-use super::trajectory::{Along, Trajectory};
+use super::trajectory::{LinearisedRun, Trajectory};
 use super::validity::Validity;
 
 /// Most steps of an iterated run: each step has a model of its own.
@@ -52,11 +52,11 @@ fn pass(
     start: &RunStart,
     z: &[f64],
     x0: &PlatformState,
-    curvature: Option<&Curvature>,
+    curvature: Option<&SecondOrderTerms>,
     mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
 ) -> Result<Pass, EkfError> {
     let (n, m) = (x0.dimension(), filter.plan().components.len());
-    let Along { mut stages, at } = Along::new(filter, z.len() / m, x0.clone())?;
+    let LinearisedRun { mut stages, at } = LinearisedRun::new(filter, z.len() / m, x0.clone())?;
     let mut p0 = start.variances();
     let mut from = start.state(filter.plan()).local(x0);
     if let Some(c) = curvature {
@@ -111,7 +111,7 @@ fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, Ek
 }
 
 /// Result of the iteration.
-struct Settled {
+struct IterationResult {
     /// Start of the trajectory.
     x0: PlatformState,
     passes: usize,
@@ -120,7 +120,7 @@ struct Settled {
     misfit: f64,
 }
 
-impl Settled {
+impl IterationResult {
     /// True if it is preferable: a converged one first, then the one with the smaller misfit.
     fn is_better_than(&self, other: &Self) -> bool {
         (self.converged, -self.misfit) > (other.converged, -other.misfit)
@@ -133,7 +133,7 @@ fn settle(
     start: &RunStart,
     z: &[f64],
     mut x0: PlatformState,
-) -> Result<Settled, EkfError> {
+) -> Result<IterationResult, EkfError> {
     let mut best = pass(filter, start, z, &x0, None, |_, _, _, _| {})?;
     let (mut passes, mut converged) = (1, false);
     while passes < PASSES && !converged {
@@ -156,12 +156,12 @@ fn settle(
         converged = Nees::of_covariance(&next.ended.1)?.of(&mut moved)? <= SETTLED * SETTLED;
         (x0, best) = (x, next);
     }
-    Ok(Settled { x0, passes, converged, misfit: best.misfit })
+    Ok(IterationResult { x0, passes, converged, misfit: best.misfit })
 }
 
 /// Converges on the first eighth of the run, then from there on the first quarter, and so on: each trajectory
 /// starts close enough for twice the duration.
-fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<Settled, EkfError> {
+fn settle_in_stages(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<IterationResult, EkfError> {
     let outputs = filter.plan().components.len();
     let mut x0 = start.state(filter.plan());
     let mut passes = 0;
@@ -172,7 +172,7 @@ fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Resul
         x0 = settled.x0;
     }
     let settled = settle(filter, start, z, x0)?;
-    Ok(Settled { passes: passes + settled.passes, ..settled })
+    Ok(IterationResult { passes: passes + settled.passes, ..settled })
 }
 
 /// Runs `filter` over the measurements `z` as [`Extended::run`] does, then again along the trajectory found,
@@ -186,27 +186,27 @@ pub fn iterated(
     start: &RunStart,
     z: &[f64],
     on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
-) -> Result<Ended, EkfError> {
+) -> Result<FilterResult, EkfError> {
     check_measurements(filter.plan(), z)?;
     let samples: usize = filter.plan().stages.iter().map(|s| s.steps * s.outputs.len()).sum();
-    let poor = |s: &Settled| !s.converged || s.misfit > POOR * samples as f64;
+    let poor = |s: &IterationResult| !s.converged || s.misfit > POOR * samples as f64;
     let once = filter.run(start, z, |_, _, _, _| {}).and_then(|once| back(filter, once.x));
     let mut found = once.and_then(|x| settle(filter, start, z, x));
     if found.as_ref().map_or(true, poor) {
-        let other = settle_by_and_by(filter, start, z);
+        let other = settle_in_stages(filter, start, z);
         found = match (found, other) {
             (Ok(a), Ok(b)) => {
                 let passes = a.passes + b.passes;
-                Ok(Settled { passes, ..if b.is_better_than(&a) { b } else { a } })
+                Ok(IterationResult { passes, ..if b.is_better_than(&a) { b } else { a } })
             }
             (Ok(a), Err(_)) | (Err(_), Ok(a)) => Ok(a),
             (Err(e), Err(_)) => Err(e),
         };
     }
-    let Settled { mut x0, passes, converged, .. } = found?;
+    let IterationResult { mut x0, passes, converged, .. } = found?;
     let curvature = if converged { bent(filter, start, z, &mut x0)? } else { None };
     let (x, covariance) = pass(filter, start, z, &x0, curvature.as_ref(), on_step)?.ended;
-    Ok(Ended { x, covariance, passes, converged })
+    Ok(FilterResult { x, covariance, passes, converged })
 }
 
 /// Curvature of the run about its most probable start `x0`, which becomes the mean of the likely starts.
@@ -215,10 +215,10 @@ fn bent(
     start: &RunStart,
     z: &[f64],
     x0: &mut PlatformState,
-) -> Result<Option<Curvature>, EkfError> {
-    let Along { stages, at } = Along::new(filter, usize::MAX, x0.clone())?;
+) -> Result<Option<SecondOrderTerms>, EkfError> {
+    let LinearisedRun { stages, at } = LinearisedRun::new(filter, usize::MAX, x0.clone())?;
     let p = pass(filter, start, z, x0, None, |_, _, _, _| {})?.start.covariance;
-    let curvature = Curvature::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
+    let curvature = SecondOrderTerms::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
     if let Some(c) = &curvature {
         x0.retract(&pass(filter, start, z, x0, Some(c), |_, _, _, _| {})?.start.correction);
     }

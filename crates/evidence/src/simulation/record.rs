@@ -7,7 +7,7 @@ use obsdeg_ekf::{Covariance, Form, Manifold, Update};
 use super::answer::{FilterReason, FilterReport};
 use super::conditions::{Conditions, shown_unit, si_per_shown};
 use super::error::SimulationError;
-use super::extended::{Ended, Extended};
+use super::extended::{Extended, FilterResult};
 use super::iterated::{MAX_ITERATED_STEPS, iterated};
 use super::noise::Noise;
 use super::plan::Plan;
@@ -69,13 +69,13 @@ pub struct Record {
 }
 
 /// Quantities that a run records: unknowns, then combinations, as functionals of the unknowns.
-struct Recorded<'a> {
+struct RecordedQuantities<'a> {
     /// Number of unknowns.
     unknowns: usize,
     combinations: Vec<&'a [(usize, f64)]>,
 }
 
-impl Recorded<'_> {
+impl RecordedQuantities<'_> {
     fn len(&self) -> usize {
         self.unknowns + self.combinations.len()
     }
@@ -108,7 +108,7 @@ impl Recorded<'_> {
 }
 
 /// Truth of a run and its measurements.
-pub(crate) struct Sampled {
+pub(crate) struct SampledTruth {
     /// True values by recorded quantity, from t = 0.
     truth: Vec<Vec<f64>>,
     /// Measurements, one per step and component; zero where none is taken.
@@ -146,9 +146,9 @@ fn sampled(
     plan: &Plan,
     conditions: &Conditions,
     start: &RunStart,
-    recorded: &Recorded<'_>,
+    recorded: &RecordedQuantities<'_>,
     seed: u64,
-) -> Result<Sampled, SimulationError> {
+) -> Result<SampledTruth, SimulationError> {
     let n = plan.unknowns();
     let first = n - plan.platform.coefficients();
     check_drifts(plan, conditions, plan.drift_bound(&start.truth[first..n]))?;
@@ -162,7 +162,7 @@ fn sampled(
     sample(&mut truth, plan, &mut noise, &mut z, |x| {
         values.iter_mut().zip(recorded.values(x)).for_each(|(v, x)| v.push(x));
     });
-    Ok(Sampled { truth: values, z, end: truth.x().to_vec(), largest_psi: truth.largest_psi })
+    Ok(SampledTruth { truth: values, z, end: truth.x().to_vec(), largest_psi: truth.largest_psi })
 }
 
 /// Largest `|psi|` of the run of `seed`, in rad.
@@ -175,12 +175,12 @@ pub(crate) fn largest_psi(
     start: &RunStart,
     seed: u64,
 ) -> Result<f64, SimulationError> {
-    let nothing = Recorded { unknowns: 0, combinations: Vec::new() };
+    let nothing = RecordedQuantities { unknowns: 0, combinations: Vec::new() };
     Ok(sampled(plan, conditions, start, &nothing, seed)?.largest_psi)
 }
 
 /// Results of a filter on some measurements.
-struct Filtered {
+struct FilterSeries {
     /// Estimates by quantity, from t = 0.
     estimate: Vec<Vec<f64>>,
     /// Standard deviations by quantity, from t = 0.
@@ -197,9 +197,9 @@ struct Filtered {
 fn linear(
     plan: &Plan,
     start: &RunStart,
-    sampled: &Sampled,
-    recorded: &Recorded<'_>,
-) -> Result<Filtered, SimulationError> {
+    sampled: &SampledTruth,
+    recorded: &RecordedQuantities<'_>,
+) -> Result<FilterSeries, SimulationError> {
     let prior = start.covariance(Form::Ud)?;
     let mut sigma = vec![Vec::new(); recorded.len()];
     let mut push = |p: &Covariance| {
@@ -227,7 +227,7 @@ fn linear(
         whitened.extend_from_slice(innovations);
     })?;
     let error = x.iter().zip(&sampled.end).map(|(a, b)| a - b).collect();
-    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (1, true) })
+    Ok(FilterSeries { estimate, sigma, whitened, covariance, error, passes: (1, true) })
 }
 
 /// Results of the extended filter, in one pass or iterated.
@@ -235,10 +235,10 @@ fn extended(
     plan: &Plan,
     conditions: &Conditions,
     start: &RunStart,
-    sampled: &Sampled,
-    recorded: &Recorded<'_>,
+    sampled: &SampledTruth,
+    recorded: &RecordedQuantities<'_>,
     again: bool,
-) -> Result<Filtered, SimulationError> {
+) -> Result<FilterSeries, SimulationError> {
     let filter = Extended::new(plan, conditions, Update::default())?;
     let (mut estimate, mut sigma) = (vec![Vec::new(); recorded.len()], vec![Vec::new(); recorded.len()]);
     let mut push = |state: &PlatformState, p: &Covariance| {
@@ -262,8 +262,8 @@ fn extended(
     };
     let truth = PlatformState::of_unknowns(&sampled.end, plan.constants());
     let error = truth.local(&ended.x).iter().map(|x| -x).collect();
-    let Ended { covariance, passes, converged, .. } = ended;
-    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
+    let FilterResult { covariance, passes, converged, .. } = ended;
+    Ok(FilterSeries { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
 }
 
 /// Runs the filter of `plan` against one truth with randomly drawn biases. The conditions select the filter,
@@ -281,7 +281,7 @@ pub fn run(
     seed: u64,
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
-    let recorded = Recorded {
+    let recorded = RecordedQuantities {
         unknowns: n,
         combinations: prediction.combinations.iter().map(|c| &c.terms[..]).collect(),
     };
@@ -322,7 +322,7 @@ pub fn run(
         let what = "the run of the filter ends in numbers that are none".into();
         return Err(SimulationError::Unresolvable { what });
     }
-    let series = |filtered: Filtered| -> Vec<Series> {
+    let series = |filtered: FilterSeries| -> Vec<Series> {
         let both = filtered.estimate.into_iter().zip(filtered.sigma).zip(&sampled.truth);
         both.map(|((estimate, sigma), truth)| Series { truth: truth.clone(), estimate, sigma }).collect()
     };

@@ -22,12 +22,12 @@ const MOSTLY: f64 = 9.0;
 
 /// Inverse roots of the information of all samples with either prior: of the unknowns at the start, and at
 /// the end.
-struct Seen {
+struct PriorRoots {
     start: [DMatrix<f64>; 2],
     end: [DMatrix<f64>; 2],
 }
 
-impl Seen {
+impl PriorRoots {
     /// Roots with the two priors that `priors` computes from the information.
     fn of(
         plan: &Plan,
@@ -61,7 +61,7 @@ fn with_slews(
     plan: &Plan,
     seed: u64,
     factor: f64,
-    seen: impl FnOnce() -> Result<Seen, EkfError>,
+    seen: impl FnOnce() -> Result<PriorRoots, EkfError>,
 ) -> Result<Prediction, SimulationError> {
     let mut out = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
     if plan.slews().next().is_none() {
@@ -98,7 +98,7 @@ pub fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
 /// [`SimulationError`].
 pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
     let wide = |information: &SquareRootInformation| WIDTHS.map(|w| wider(plan, information, w, w));
-    with_slews(plan, seed, ALONE, || Seen::of(plan, wide))
+    with_slews(plan, seed, ALONE, || PriorRoots::of(plan, wide))
 }
 
 /// Prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a prior
@@ -108,5 +108,5 @@ pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
 /// [`SimulationError`].
 pub fn predict_run(plan: &Plan, prior: &[f64], seed: u64) -> Result<Prediction, SimulationError> {
     let wide = [1.0, WIDER].map(|w| prior.iter().map(|s| s * w).collect());
-    with_slews(plan, seed, MOSTLY, || Seen::of(plan, |_| wide))
+    with_slews(plan, seed, MOSTLY, || PriorRoots::of(plan, |_| wide))
 }

@@ -43,14 +43,14 @@ impl Trajectory {
 }
 
 /// Run linearised along one trajectory.
-pub(super) struct Along {
+pub(super) struct LinearisedRun {
     /// Linearised stages, one per step.
     pub stages: Vec<Stage>,
     /// Trajectory of the linearisation.
     pub at: Trajectory,
 }
 
-impl Along {
+impl LinearisedRun {
     /// Linearisation along the trajectory from `x`, of at most `most` steps.
     pub(super) fn new(filter: &Extended<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
         let mut stages = Vec::new();

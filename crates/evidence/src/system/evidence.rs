@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::numeric::{FilterState, Numeric};
-use super::run::{RunError, Setup};
+use super::run::{RunError, RunNumbers};
 use crate::crosscheck::answer::{Agreement, Check, Count, Counts, Measured};
 use crate::crosscheck::rules::{self, SLOPE_TOLERANCE};
 
@@ -114,7 +114,7 @@ pub struct SymmetryEvidence {
 /// Rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start, and
 /// rows of the constraints, each weighted like the best sample. The second value is the size of all outputs,
 /// over their noise.
-fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
+fn rows(setup: &RunNumbers<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
     let numeric = &setup.numeric;
     let n = numeric.states.len();
     let segments = numeric.segments();
@@ -220,7 +220,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let found = symmetries(model, &compiled, &judged, seed)?;
-    let setup = Setup::new(model, &compiled)?;
+    let setup = RunNumbers::new(model, &compiled)?;
     let unknowns = &judged.layout.unknowns;
     let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
     if columns.len() != unknowns.len() {
@@ -352,7 +352,7 @@ fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f
 }
 
 /// Direction that is polynomial in unknowns and known constants, at the truth.
-fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
+fn polynomial_direction(d: &PolynomialDirection, setup: &RunNumbers<'_>, columns: &[usize]) -> DVector<f64> {
     let mut v = DVector::zeros(columns.len());
     let factor = |&j: &usize| match columns.get(j) {
         Some(&state) => setup.truth[state],
@@ -366,7 +366,11 @@ fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[u
 
 /// Factors by unknown: on its sigma at the start when a diffuse prior is ten times as loose, and sigma over
 /// the first prior.
-fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<(f64, f64)>, EkfError> {
+fn inflation(
+    setup: &RunNumbers<'_>,
+    rows: &DMatrix<f64>,
+    columns: &[usize],
+) -> Result<Vec<(f64, f64)>, EkfError> {
     let picked = rows.select_columns(columns);
     let sigmas = |factor: f64| {
         let prior: Vec<f64> = columns.iter().map(|&c| setup.prior[c] * factor).collect();
@@ -392,7 +396,7 @@ fn settled(slopes: &[f64]) -> Option<f64> {
 
 /// Slope of every unknown at the shortest horizon without visible rounding; `None` where the slopes before it
 /// do not settle.
-fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
+fn slopes(setup: &RunNumbers<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
     let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
     for j in 0..HORIZONS {
         let horizon = setup.duration * SHORTER.powi(-j);

@@ -178,7 +178,7 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
 
 /// Numbers of a run.
 #[derive(Debug, Clone)]
-pub(super) struct Setup<'a> {
+pub(super) struct RunNumbers<'a> {
     pub(super) numeric: Numeric<'a>,
     /// True states of the filter at the start, and the standard deviations of their first estimates.
     pub(super) truth: DVector<f64>,
@@ -189,7 +189,7 @@ pub(super) struct Setup<'a> {
     pub(super) step: f64,
 }
 
-impl<'a> Setup<'a> {
+impl<'a> RunNumbers<'a> {
     pub(super) fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
         let numeric = Numeric::new(model, compiled)?;
         let nominal = &model.simulation;
@@ -312,7 +312,7 @@ fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
-    let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
+    let RunNumbers { numeric, mut truth, prior, sigmas, duration, step } = RunNumbers::new(model, &compiled)?;
     let segments = numeric.segments();
     let parts = segments * numeric.experiments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);

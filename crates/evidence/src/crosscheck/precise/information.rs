@@ -15,13 +15,13 @@ pub(in super::super) enum Between {
 }
 
 /// Local unknown at the start of a position as a functional: nine rows, one entry per column.
-struct Local {
+struct LocalUnknown {
     columns: Vec<usize>,
     rows: [Vector; LOCAL],
 }
 
 /// Information of all samples on the unknowns at the start.
-pub(in super::super) struct Information {
+pub(in super::super) struct SampleInformation {
     pub(super) digits: Digits,
     /// Information matrix (n x n), symmetric.
     pub(super) matrix: Vec<Vector>,
@@ -30,7 +30,7 @@ pub(in super::super) struct Information {
     pub(super) psi_at_end: Vec<Functional>,
 }
 
-impl Information {
+impl SampleInformation {
     /// Information of the samples of a filter, at the ends of equal steps, `samples` of them per position.
     /// The first position lasts `dwell / w_ie`. `noise` has the standard deviations of Z and of a measured
     /// azimuth.
@@ -69,7 +69,7 @@ impl Information {
                 3..6 => behind(&drift[r - 3]),
                 _ => behind(&model.errors[i][r - 6]),
             });
-            let local = Local { columns, rows };
+            let local = LocalUnknown { columns, rows };
             local.add(d, &moments[i].gram, &mut matrix);
             if between == Between::Dwell {
                 let moved = &moments[i].end;
@@ -104,7 +104,7 @@ impl Information {
     }
 }
 
-impl Local {
+impl LocalUnknown {
     /// Adds `L^T G L` to `matrix`.
     fn add(&self, d: Digits, gram: &[Vector], matrix: &mut [Vector]) {
         let c = self.columns.len();

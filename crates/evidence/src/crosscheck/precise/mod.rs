@@ -12,10 +12,10 @@ mod posterior;
 mod seen;
 
 pub(super) use digits::{Digits, Functional, add_up, double};
-pub(super) use information::{Between, Information};
+pub(super) use information::{Between, SampleInformation};
 pub(super) use model::Model;
 pub(super) use posterior::Posterior;
-pub(super) use seen::Seen;
+pub(super) use seen::ObservableDirections;
 
 use std::sync::{Arc, OnceLock};
 
@@ -27,7 +27,7 @@ use model::Moments;
 const SAMPLES: usize = 6;
 
 /// Scheme in high precision, with samples over dwells.
-struct Sampled {
+struct SampledModel {
     model: Model,
     /// Samples by dwell, then by position.
     moments: Vec<Vec<Arc<Moments>>>,
@@ -39,7 +39,7 @@ pub(super) struct Samples<'a, const DIGITS: usize> {
     /// Dwells of the first position, in 1/w_ie.
     dwells: Vec<f64>,
     bits: [usize; DIGITS],
-    taken: [OnceLock<Option<Sampled>>; DIGITS],
+    taken: [OnceLock<Option<SampledModel>>; DIGITS],
 }
 
 impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
@@ -50,7 +50,7 @@ impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
 
     /// Observable directions at every dwell, at the precision of index `digits`; `None` where they cannot be
     /// separated from rounding.
-    pub(super) fn seen(&self, digits: usize, between: Between) -> Option<Vec<Seen>> {
+    pub(super) fn seen(&self, digits: usize, between: Between) -> Option<Vec<ObservableDirections>> {
         let sampled = self.taken[digits].get_or_init(|| {
             let model = Model::new(self.scheme, Digits { bits: self.bits[digits] })?;
             let samples = vec![SAMPLES; self.scheme.positions.len()];
@@ -58,9 +58,9 @@ impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
             let weights = |dwell: f64| std::array::from_fn(|_| model.digits.double(dwell));
             let of = |&dwell: &f64| model.moments(dwell, &samples, &weights(dwell));
             let moments = self.dwells.iter().map(of).collect();
-            Some(Sampled { model, moments })
+            Some(SampledModel { model, moments })
         });
-        let Sampled { model, moments } = sampled.as_ref()?;
-        moments.iter().map(|m| Information::new(model, m, between).seen()).collect()
+        let SampledModel { model, moments } = sampled.as_ref()?;
+        moments.iter().map(|m| SampleInformation::new(model, m, between).seen()).collect()
     }
 }

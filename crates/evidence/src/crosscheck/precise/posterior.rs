@@ -1,7 +1,7 @@
 //! Covariance of a filter in high precision.
 
 use super::digits::{Digits, Functional, ROUNDING, Vector, double};
-use super::information::Information;
+use super::information::SampleInformation;
 use super::seen::at_start;
 
 /// Covariance at the end, by its inverse: the information of samples and prior.
@@ -17,8 +17,8 @@ pub(in super::super) struct Posterior {
 impl Posterior {
     /// Covariance from the information of samples and a prior (standard deviations in rad and in w_ie).
     /// `None` when rounding destroys the information.
-    pub(in super::super) fn new(information: &Information, prior: &[f64]) -> Option<Self> {
-        let Information { digits: d, matrix, psi_at_end } = information;
+    pub(in super::super) fn new(information: &SampleInformation, prior: &[f64]) -> Option<Self> {
+        let SampleInformation { digits: d, matrix, psi_at_end } = information;
         let d = *d;
         let prior: Vector = prior.iter().map(|p| d.double(*p)).collect();
         let n = prior.len();

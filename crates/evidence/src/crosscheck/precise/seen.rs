@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::digits::{Digits, Functional, ROUNDING, Real, Vector, log2};
-use super::information::Information;
+use super::information::SampleInformation;
 
 /// Bounds of a pivot, as fractions of the bits below the diagonal. A pivot above the first is observable: the
 /// errors of Cholesky's elimination are within half of the digits. A pivot below the second is rounding.
@@ -17,7 +17,7 @@ const NEGLIGIBLE: f64 = -46.0;
 const SUMMED: f64 = 8.0;
 
 /// Observable directions: `N = sum l_k l_k^T`, best observable first.
-pub(in super::super) struct Seen {
+pub(in super::super) struct ObservableDirections {
     digits: Digits,
     /// Unknown of each pivot.
     pub(in super::super) pivots: Vec<usize>,
@@ -32,10 +32,10 @@ pub(in super::super) struct Seen {
     psi_at_end: Vec<Functional>,
 }
 
-impl Information {
+impl SampleInformation {
     /// Cholesky factors, the largest pivot first; `None` where observable directions cannot be separated from
     /// rounding.
-    pub(super) fn seen(mut self) -> Option<Seen> {
+    pub(super) fn seen(mut self) -> Option<ObservableDirections> {
         let d = self.digits;
         let n = self.matrix.len();
         let diagonal = |m: &[Vector], c: usize| log2(&m[c][c]);
@@ -80,7 +80,15 @@ impl Information {
             sizes.push(size);
         }
         let own = own.into_iter().map(|x| x.unwrap_or(f64::MIN)).collect();
-        Some(Seen { digits: d, pivots, columns, sizes, excited, own, psi_at_end: self.psi_at_end })
+        Some(ObservableDirections {
+            digits: d,
+            pivots,
+            columns,
+            sizes,
+            excited,
+            own,
+            psi_at_end: self.psi_at_end,
+        })
     }
 }
 
@@ -94,7 +102,7 @@ pub(super) fn at_start(d: Digits, psi: &[Functional], functional: &Functional) -
     moved.filter(|(_, x)| !x.is_zero()).collect()
 }
 
-impl Seen {
+impl ObservableDirections {
     pub(in super::super) fn digits(&self) -> Digits {
         self.digits
     }

@@ -37,7 +37,7 @@ pub struct OmittedColumns<'a> {
     /// `psi^n` of every error, including the offsets of the position.
     psi: Vectors,
     offset: Vectors,
-    current: Option<Dwelt>,
+    current: Option<DwellStep>,
     /// Outputs of the last step: one row per component, one entry per error.
     rows: Vec<f64>,
     /// Psi of the unknowns at the ends at which they are estimated: (unknown, one entry per error).
@@ -45,7 +45,7 @@ pub struct OmittedColumns<'a> {
 }
 
 /// One step at a position: `psi+ = phi psi + added`, and the errors of the accelerometers.
-struct Dwelt {
+struct DwellStep {
     phi: Matrix3<f64>,
     added: Vectors,
     outputs: Vectors,
@@ -202,7 +202,7 @@ impl<'a> OmittedColumns<'a> {
     }
 
     /// One step of `dt` seconds at an attitude.
-    fn dwelt(&self, c: &Matrix3<f64>, dt: f64, tilt: Option<&Tilt>) -> Result<Dwelt, SimulationError> {
+    fn dwelt(&self, c: &Matrix3<f64>, dt: f64, tilt: Option<&Tilt>) -> Result<DwellStep, SimulationError> {
         let [w_n, w_u, _] = self.plan.earth_rate();
         let f = local_dynamics(&Float, &w_n, &w_u);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
@@ -221,7 +221,7 @@ impl<'a> OmittedColumns<'a> {
                 (t.transition, there.iter().map(|a| apply(&back, a)).collect())
             }
         };
-        Ok(Dwelt { phi, added: drifts.iter().map(|d| apply(&gamma, d)).collect(), outputs })
+        Ok(DwellStep { phi, added: drifts.iter().map(|d| apply(&gamma, d)).collect(), outputs })
     }
 
     /// Drifts `eps^n` for the computed attitude `c` and the tilt `e` of the platform.

@@ -78,7 +78,7 @@ pub(crate) fn by_information(
     if m == 0 {
         return Ok(Influence { changes: DMatrix::zeros(n, 0), information: Vec::new(), squares: Vec::new() });
     }
-    let mut reduced = Reduced {
+    let mut reduced = ReducedColumns {
         root: SquareRootInformation::prior(prior)?.root().clone(),
         right: DMatrix::zeros(n, m),
         information: vec![0.0; m],
@@ -145,14 +145,14 @@ fn next_rows(
 }
 
 /// Matrix `[J O]` with J reduced to its root.
-struct Reduced {
+struct ReducedColumns {
     root: DMatrix<f64>,
     right: DMatrix<f64>,
     information: Vec<f64>,
     squares: Vec<f64>,
 }
 
-impl Reduced {
+impl ReducedColumns {
     fn add(&mut self, left: &[f64], right: &[f64]) {
         let (n, m) = (self.root.ncols(), self.right.ncols());
         let rows = left.len() / n;
