@@ -1,4 +1,4 @@
-//! How records are read, before anything is estimated.
+//! Report on how records are read, before anything is estimated.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_evidence::simulation::{Conditions, Plan};
@@ -102,7 +102,7 @@ pub struct CellRead {
     pub why: &'static str,
 }
 
-/// Reads records as [`super::calibrate`] does, and estimates nothing.
+/// Reads records as [`super::calibrate`] does, without an estimate.
 ///
 /// # Errors
 /// [`CalibrationError`].
