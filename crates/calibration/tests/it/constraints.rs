@@ -1,4 +1,5 @@
-//! Constraints of models: against the same models with an unknown less, and closed formulas of least squares.
+//! Constraints of models: compared with the same models with one unknown fewer, and closed formulas of least
+//! squares.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::system::SystemEstimated;
@@ -6,7 +7,7 @@ use obsdeg_calibration::{Before, SystemOptions};
 
 use crate::models::{calibrated, found, normals, options};
 
-/// Measurements of a direction at an angle of 0.7, and of a gain of 3, by `rows`.
+/// Measurements, for `rows`, of a direction at an angle of 0.7 and a gain of 3.
 fn turned(rows: std::ops::Range<i32>) -> String {
     let (angle, gain): (f64, f64) = (0.7, 3.0);
     let mut normal = normals(12);
@@ -20,14 +21,14 @@ fn turned(rows: std::ops::Range<i32>) -> String {
     text
 }
 
-/// The model of that with a direction that is written so.
+/// Model of these measurements with the direction `cos`, `sin`.
 fn direction(unknowns: &str, cos: &str, sin: &str, values: &str) -> String {
     format!(
         "{unknowns}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"k*{cos}*cos(u) + {sin}\"\nz = \"k*{sin}*sin(u)\"\n[simulation]\nvalues = {{ k = 2.5, {values} }}\nnoise = {{ y = 0.02, z = 0.02 }}\n"
     )
 }
 
-/// As two unknowns with constraints.
+/// Model with the direction as two unknowns with constraints.
 fn bound(constraints: &str, values: &str) -> String {
     direction(
         &format!("constraints = [{constraints}]\n[parameters]\nk = {{}}\nc = {{}}\ns = {{}}"),
@@ -39,7 +40,7 @@ fn bound(constraints: &str, values: &str) -> String {
 
 const UNIT: &str = "\"c^2 + s^2 = 1\"";
 
-/// As an angle.
+/// Model with the direction as an angle.
 fn free() -> String {
     direction("[parameters]\nk = {}\na = {}", "cos(a)", "sin(a)", "a = 0.6435")
 }
@@ -49,18 +50,18 @@ fn of(list: &[SystemEstimated], name: &str) -> (f64, f64, f64) {
     (u.estimate.expect(name), u.sigma.expect(name), u.sigma_rescaled.expect(name))
 }
 
-/// A direction of unit length, as two unknowns beside a constraint and as an angle: the same estimates,
-/// sigmas and degrees of freedom, from wherever it starts.
+/// A direction of unit length, as two unknowns with a constraint and as an angle, has the same estimates,
+/// sigmas and degrees of freedom, from any start.
 #[test]
 fn constraints_are_an_unknown_less() {
     let text = turned(0..40);
     for (constraints, values) in [
         (UNIT, "c = 0.8, s = 0.6"),
-        // starts at which nothing holds, or has no slope
+        // starts at which no constraint holds, or none has a slope
         (UNIT, "c = 0.1, s = 0.1"),
         (UNIT, "c = -5, s = 100"),
         (UNIT, "c = 0, s = 0"),
-        // the same twice, and once more as a quotient
+        // the same constraint twice, and once more as a quotient
         ("\"c^2 + s^2 = 1\", \"3*c^2 + 3*s^2 = 3\", \"s^2 = (1 - c)*(1 + c)\"", "c = 0.6, s = 0.6"),
     ] {
         as_an_angle(&bound(constraints, values), &text);
@@ -97,8 +98,8 @@ fn as_an_angle(bound: &str, text: &str) {
     assert!((c * c + s * s - 1.0).abs() < 1e-12, "{c} {s}");
 }
 
-/// Two weights of which the sum is known, far smaller than one and known far better than that: weighed apart
-/// and together, in closed form.
+/// Two masses with a known sum, far smaller than one and with a far smaller sigma: measured apart and
+/// together, in closed form.
 #[test]
 fn a_sum_that_is_known() {
     let mut normal = normals(3);
@@ -121,7 +122,7 @@ fn a_sum_that_is_known() {
         "{x} {mean} {s} {expected}"
     );
     assert_eq!((c.consistent, c.degrees_of_freedom), (Some(true), 23));
-    // known altogether: nothing is left to estimate, and nothing that moves
+    // fully known: nothing is estimated, and nothing moves
     let both = model("\"a + b = 0.000003\", \"a = 2*b\"");
     let c = calibrated(&both, &text, &SystemOptions { profiles: vec!["a".into()], ..options() })
         .expect("calibrated");
@@ -130,7 +131,7 @@ fn a_sum_that_is_known() {
     assert_eq!((c.degrees_of_freedom, c.profiles[0].points.len(), c.profiles[0].flat), (24, 1, false));
 }
 
-/// What does not hold anywhere, or says nothing where it holds, is refused by name.
+/// A constraint that holds nowhere, or has no slope where it holds, is refused by name.
 #[test]
 fn constraints_that_cannot_be_met() {
     let refused = |model: &str, text: &str, message: &str| {
@@ -154,7 +155,7 @@ fn constraints_that_cannot_be_met() {
     ] {
         refused(&rational(constraints), &text, message);
     }
-    // a start that is known, and that holds, or not
+    // a known start that satisfies the constraint, or does not
     let known = |x: f64| {
         format!(
             "constraints = [\"x^2 + v^2 = 4\", \"x = 1\"]\n[states]\nx = {{ equation = \"v\", initial = \"known\" }}\nv = \"0\"\n[outputs]\ny = \"x\"\n[simulation]\nvalues = {{ x = {x}, v = 1 }}\nnoise = {{ y = 0.1 }}\n"
@@ -166,7 +167,7 @@ fn constraints_that_cannot_be_met() {
     assert!((of(&c.quantities, "v").0 - 3f64.sqrt()).abs() < 1e-9 && c.degrees_of_freedom == 3);
 }
 
-/// Parameters that two experiments share are bound once, states at the start of each once each.
+/// Parameters common to two experiments are constrained once, states at the start of each once each.
 #[test]
 fn experiments_do_not_count_twice() {
     let mut normal = normals(31);
@@ -199,8 +200,8 @@ fn experiments_do_not_count_twice() {
     assert!((sigma("p") / sigma("q") - 1.0).abs() < 1e-9 && (sigma("x@1") / sigma("v@1") - 1.0).abs() < 1e-9);
 }
 
-/// A profile along a circle: chi-square at values of an unknown is that of the angle there, all else
-/// following; another solution beyond the end of the circle.
+/// Profile along a circle: chi-square at values of an unknown is that of the angle there, with all others
+/// fitted. Another solution lies beyond the end of the circle.
 #[test]
 fn profiles_and_other_solutions_keep_to_constraints() {
     let mut normal = normals(41);
@@ -230,8 +231,9 @@ fn profiles_and_other_solutions_keep_to_constraints() {
     assert!((other.values[0] + cos).abs() < 1e-6 && (other.values[1] - s).abs() < 1e-6, "{other:?}");
 }
 
-/// Half of the data, then the other half with what the first said: as all at once, and as with an angle; what
-/// holds by a constraint is no news to a model without.
+/// Half of the data, then the other half with the first as prior: the result equals that of all data at once,
+/// and that with an angle. For a model without the constraint, a direction fixed by it carries no
+/// information.
 #[test]
 fn what_was_known_before_keeps_to_constraints() {
     let (first, second) = (turned(0..5), turned(5..40));
@@ -258,8 +260,8 @@ fn what_was_known_before_keeps_to_constraints() {
     assert!(e.contains("the prior calibration knows k, c, s as constraints make them"), "{e}");
 }
 
-/// Three that hang together by two constraints, known before in part: rows of constraints are not what they
-/// say of these alone.
+/// Three unknowns with two constraints, partly known before: the rows of constraints differ from the
+/// conditions on single unknowns.
 #[test]
 fn what_was_known_of_some_is_as_it_was() {
     let mut normal = normals(51);
@@ -281,14 +283,14 @@ fn what_was_known_of_some_is_as_it_was() {
     let before = Before { priors: Vec::new(), estimates, rests_on: c.rests_on.clone(), of: c.model };
     let known = SystemOptions { prior: Some(before), ..options() };
     let c = calibrated(model, &text, &known).expect("calibrated");
-    // normal equations by a and b alone
+    // normal equations for a and b alone
     let ones = DMatrix::from_element(10, 2, -1.0);
     let w = p.try_inverse().expect("regular");
     let information = &w + ones.transpose() * &ones * 100.0;
     let y = DVector::from_iterator(10, rows.iter().map(|y| y - 4.0));
     let inverse = information.try_inverse().expect("regular");
     let x = &inverse * (w * mean + ones.transpose() * y * 100.0);
-    // what the model does not tell stays untold, whatever was known of it
+    // an unknown that the model does not determine stays undetermined, whatever the prior
     assert!(!found(&c.quantities, "a").determined);
     let (e, s, _) = of(&c.quantities, "c");
     assert!((e - 4.0 + x.sum()).abs() < 1e-6 && (s - inverse.sum().sqrt()).abs() < 1e-6, "{e} {s} {x}");
