@@ -19,8 +19,8 @@
 //! let model = model_file::read(model)?;
 //! let options = SystemOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
 //! let found = calibrate_system(&model, record, &options, &|_| true)?;
-//! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate).expect("it is determined");
-//! assert!((p - 0.5).abs() < 1e-4);
+//! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate);
+//! assert!((p.expect("it is determined") - 0.5).abs() < 1e-4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

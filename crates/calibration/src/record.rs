@@ -762,7 +762,9 @@ mod tests {
 
     #[test]
     fn rows_with_units_gaps_and_comments() {
-        let rows = all("\u{feff}# made by hand\nt [ms], f [g] ,position\n500,1.5,p1\n# a gap\n1500,,\n2500.5,-1e-3,p 2\n").expect("rows");
+        let rows = all("\u{feff}# made by hand\nt [ms], f [g] ,position\n500,1.5,p1\n# a gap\n1500,,\n\
+            2500.5,-1e-3,p 2\n")
+        .expect("rows");
         assert_eq!(rows[0], (3, vec![Some(0.5), Some(1.5)], "p1".to_string()));
         assert_eq!(rows[1], (5, vec![Some(1.5), None], String::new()));
         assert_eq!(rows[2], (6, vec![Some(2.5005), Some(-1e-3)], "p 2".to_string()));
@@ -871,7 +873,8 @@ mod tests {
             ("t [s],f [g]\n", "r.csv: no rows after the header"),
             (
                 "t [s],g [g]\n0,1\n",
-                "r.csv: no column `f [g]`; found `t [s]`, `g [g]`; a column of another name is given under [record.columns]",
+                "r.csv: no column `f [g]`; found `t [s]`, `g [g]`; a column of another name is given under \
+                 [record.columns]",
             ),
             ("t [s],f\n0,1\n", "r.csv: line 1, column `f`: expected a unit, `f [g]`"),
             ("t [h],f [g]\n0,1\n", "r.csv: line 1, column `t [h]`: expected a unit, `t [s]` or `t [ms]`"),
@@ -890,11 +893,13 @@ mod tests {
             ("t [s],f [g]\n0,1\n1,abc\n", "r.csv: line 3, column `f [g]`: expected a number, found `abc`"),
             (
                 "t [s],f [g]\n0,NaN\n",
-                "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a value that is not there)",
+                "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a \
+                 value that is not there)",
             ),
             (
                 "t [ms],f [g]\n100,1\n100,1\n",
-                "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; expected times that increase",
+                "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; \
+                 expected times that increase",
             ),
             (
                 "t [s],f [g]\n,1\n",
@@ -903,7 +908,8 @@ mod tests {
             ("t [s],f [g]\n0,1\n0.5\n", "r.csv: line 3: 1 cells; expected 2, as in the header"),
             (
                 "t [s],f [g]\n0,1\n0,1\n",
-                "r.csv: line 3, column `t [s]`: the time 0 is not after that of the row before, 0; expected times that increase",
+                "r.csv: line 3, column `t [s]`: the time 0 is not after that of the row before, 0; expected \
+                 times that increase",
             ),
         ] {
             assert_eq!(all(text).expect_err(text).to_string(), message);

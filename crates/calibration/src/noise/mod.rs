@@ -40,7 +40,8 @@ pub enum NoiseError {
     },
     /// No column of a sensor.
     #[error(
-        "{record}: no column of a sensor; expected columns with a unit, of a gyro (deg/h, deg/s, rad/s) or an accelerometer (g, mg, ug, m/s^2), found {found}"
+        "{record}: no column of a sensor; expected columns with a unit, of a gyro (deg/h, deg/s, rad/s) or \
+         an accelerometer (g, mg, ug, m/s^2), found {found}"
     )]
     Sensors {
         /// Name of the record.
@@ -50,7 +51,8 @@ pub enum NoiseError {
     },
     /// The record has too many numbers.
     #[error(
-        "{record}: more than {most} numbers in columns of sensors; expected fewer columns (--column) or a shorter record"
+        "{record}: more than {most} numbers in columns of sensors; expected fewer columns (--column) or a \
+         shorter record"
     )]
     Long {
         /// Name of the record.

@@ -93,14 +93,17 @@ pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     if let Some(n) = largest(&gyros, NoiseKind::RandomWalk) {
         let step: f64 = 10.0;
         out.push(format!(
-            "An angle random walk of {} deg/sqrt(h) is `drift_noise = \"{0} deg/sqrt(h)\"`, or as a bias held for a step of S s 60 N/sqrt(S): \"{} deg/h\" for step_s = {step}. State drift_noise or angle_random_walk_deg_sqrt_h, not both.",
+            "An angle random walk of {} deg/sqrt(h) is `drift_noise = \"{0} deg/sqrt(h)\"`, or as a bias \
+             held for a step of S s 60 N/sqrt(S): \"{} deg/h\" for step_s = {step}. State drift_noise or \
+             angle_random_walk_deg_sqrt_h, not both.",
             rounded(n),
             rounded(60.0 * n / step.sqrt()),
         ));
     }
     if let Some(n) = largest(&accelerometers, NoiseKind::RandomWalk) {
         out.push(format!(
-            "accelerometer_noise_g is the white noise of one sample, N/sqrt(interval): {} g for rows {} s apart; for means over S s it is {} g/sqrt(S).",
+            "accelerometer_noise_g is the white noise of one sample, N/sqrt(interval): {} g for rows {} s \
+             apart; for means over S s it is {} g/sqrt(S).",
             rounded(per_sample(n, dt)),
             rounded(dt),
             rounded(per_sample(n, 1.0)),
@@ -112,7 +115,8 @@ pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     for (of, kind) in [(&gyros, "gyros"), (&accelerometers, "accelerometers")] {
         if correlation_s(of).is_some() {
             out.push(format!(
-                "The bias instability of {kind} stands for a Gauss-Markov process; its correlation time puts the largest Allan deviation of the process where the fitted deviation is least."
+                "The bias instability of {kind} stands for a Gauss-Markov process; its correlation time puts \
+                 the largest Allan deviation of the process where the fitted deviation is least."
             ));
         }
     }

@@ -338,7 +338,8 @@ impl Forces {
         };
         let names = [0, 1, 2].map(name).join(", ");
         Some(format!(
-            "; with {names} in the place of fx, fy, fz every position is where the scheme has it: axes or signs are others than the header has"
+            "; with {names} in the place of fx, fy, fz every position is where the scheme has it: axes or \
+             signs are others than the header has"
         ))
     }
 

@@ -5,7 +5,8 @@
 pub enum Mistaken {
     /// Numbers of another unit.
     #[error(
-        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by what the header says, expected about 1; with the numbers as {units} it is"
+        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by \
+         what the header says, expected about 1; with the numbers as {units} it is"
     )]
     ForceUnit {
         /// Name of the record.
@@ -23,7 +24,8 @@ pub enum Mistaken {
     },
     /// Rows in another unit than the others.
     #[error(
-        "{record}: line {line}, columns {columns}: the specific force is {length_g} g long there; with these numbers as {units} it is as in the rows beside it{more}; expected every row in the units of the header"
+        "{record}: line {line}, columns {columns}: the specific force is {length_g} g long there; with these \
+         numbers as {units} it is as in the rows beside it{more}; expected every row in the units of the header"
     )]
     RowUnit {
         /// Name of the record.
@@ -41,7 +43,8 @@ pub enum Mistaken {
     },
     /// A force that does not fit gravity in any unit.
     #[error(
-        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and no unit of forces makes it that"
+        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and \
+         no unit of forces makes it that"
     )]
     ForceLength {
         /// Name of the record.
@@ -55,7 +58,8 @@ pub enum Mistaken {
     },
     /// Times of another unit.
     #[error(
-        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
+        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the \
+         scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
     )]
     TimeUnit {
         /// Name of the record.
@@ -71,7 +75,9 @@ pub enum Mistaken {
     },
     /// The platform leaves a position while samples still have its label, or arrives after the first of them.
     #[error(
-        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or by time) that begin and end where the platform does{clock}"
+        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} \
+         {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or \
+         by time) that begin and end where the platform does{clock}"
     )]
     Shifted {
         /// Name of the record.

@@ -89,7 +89,8 @@ pub enum CalibrationError {
     },
     /// A force in another direction than the scheme has.
     #[error(
-        "{record}: line {line}: at {position} the specific force is {off_deg} deg from where the scheme has it; it is that of {like}"
+        "{record}: line {line}: at {position} the specific force is {off_deg} deg from where the scheme has \
+         it; it is that of {like}"
     )]
     Attitude {
         /// Name of the record.
@@ -108,7 +109,8 @@ pub enum CalibrationError {
     Mistaken(Box<Mistaken>),
     /// Another number of intervals at rest than of positions.
     #[error(
-        "{record}: {found} intervals at rest; expected {expected}, one for each position of the scheme{spans} (record.static says how they are found; a column `position` says what is where)"
+        "{record}: {found} intervals at rest; expected {expected}, one for each position of the \
+         scheme{spans} (record.static says how they are found; a column `position` says what is where)"
     )]
     Rests {
         /// Name of the record.
@@ -148,7 +150,8 @@ pub enum CalibrationError {
     },
     /// A gap too short for the slew.
     #[error(
-        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the scheme takes {slew_s:.3} s{clock}"
+        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the \
+         scheme takes {slew_s:.3} s{clock}"
     )]
     Slew {
         /// Name of the record.
@@ -181,7 +184,8 @@ pub enum CalibrationError {
     NoRecord,
     /// A record that counts already.
     #[error(
-        "{record} has the same numbers as {other}; expected records of different runs, since what is the same says nothing twice"
+        "{record} has the same numbers as {other}; expected records of different runs, since what is the \
+         same says nothing twice"
     )]
     SameRecord {
         /// Name of the record.

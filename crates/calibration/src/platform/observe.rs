@@ -220,7 +220,8 @@ impl Layout {
         ];
         let there = |names: &[&str; 3]| names.iter().any(|n| record.find(n).is_some());
         let mut of = families.iter().filter(|(_, names)| there(names));
-        let expected = "`fx [g]`, `fy [g]`, `fz [g]` (outputs of the accelerometers in platform axes), or `Zx`, `Zy`, `Zz`, or `Z1`, `Z3`";
+        let expected = "`fx [g]`, `fy [g]`, `fz [g]` (outputs of the accelerometers in platform axes), or \
+            `Zx`, `Zy`, `Zz`, or `Z1`, `Z3`";
         let &(observed, names) = of.next().ok_or_else(|| record.missing(expected))?;
         if let Some((_, others)) = of.next() {
             let also = format!("either {}, {}, {} or {}", names[0], names[1], names[2], others.join(", "));

@@ -244,7 +244,8 @@ pub enum SystemCalibrationError {
     },
     /// The times need too many integration steps.
     #[error(
-        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
+        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected \
+         at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
     )]
     TooLong {
         /// Name of the record.
@@ -301,7 +302,8 @@ pub enum SystemCalibrationError {
     },
     /// A prior calibration with constraints, for a model without them.
     #[error(
-        "the prior calibration knows {found} as constraints make them, which the model has not; expected the same `constraints`"
+        "the prior calibration knows {found} as constraints make them, which the model has not; expected the \
+         same `constraints`"
     )]
     PriorHeld {
         /// Unknowns of the model that the prior calibration constrains.
@@ -309,7 +311,8 @@ pub enum SystemCalibrationError {
     },
     /// Constraints that cannot be met.
     #[error(
-        "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected constraints that hold at once, and values under [simulation.values] near the solution"
+        "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected \
+         constraints that hold at once, and values under [simulation.values] near the solution"
     )]
     Unheld {
         /// Number of starts that were tried.
@@ -319,7 +322,8 @@ pub enum SystemCalibrationError {
     },
     /// A constraint without slope at the solution.
     #[error(
-        "the constraint {constraint} has no slope at the solution, as a square has none where it is zero; expected one that changes with the unknowns in it"
+        "the constraint {constraint} has no slope at the solution, as a square has none where it is zero; \
+         expected one that changes with the unknowns in it"
     )]
     Flat {
         /// Name of the constraint.
@@ -337,7 +341,8 @@ pub enum SystemCalibrationError {
     },
     /// No start gives numbers at all rows.
     #[error(
-        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values under [simulation.values] near the solution"
+        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values \
+         under [simulation.values] near the solution"
     )]
     Nowhere {
         /// Number of starts that were tried.

@@ -258,7 +258,8 @@ fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
         let in_band = of == 0 || (low..=high).contains(&mean);
         let alarms = o.flagged as u64 > 1.max((seeds.end - seeds.start) / 100);
         let line = format!(
-            "{}: ANEES {mean:.2} of {} ({low:.2} to {high:.2}), largest {largest:.1}, {answers} answers, {} with some left open, {} outside the box, {} flagged, {} unsettled, {} refused {:?}",
+            "{}: ANEES {mean:.2} of {} ({low:.2} to {high:.2}), largest {largest:.1}, {answers} answers, {} \
+             with some left open, {} outside the box, {} flagged, {} unsettled, {} refused {:?}",
             case.name(),
             o.estimates,
             o.open,
@@ -286,7 +287,11 @@ fn records_of_random_platforms() {
 }
 
 /// 200 records of every case, or those of the environment:
-/// `CASES="Two inertial" FROM=1000 RECORDS=20 cargo test -p obsdeg-calibration --test it -- --ignored --nocapture random_platforms`.
+///
+/// ```text
+/// CASES="Two inertial" FROM=1000 RECORDS=20 cargo test -p obsdeg-calibration --test it -- \
+///     --ignored --nocapture random_platforms
+/// ```
 #[test]
 #[ignore = "hours"]
 fn records_of_all_random_platforms() {

@@ -24,7 +24,8 @@ fn turned(rows: std::ops::Range<i32>) -> String {
 /// Model of these measurements with the direction `cos`, `sin`.
 fn direction(unknowns: &str, cos: &str, sin: &str, values: &str) -> String {
     format!(
-        "{unknowns}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"k*{cos}*cos(u) + {sin}\"\nz = \"k*{sin}*sin(u)\"\n[simulation]\nvalues = {{ k = 2.5, {values} }}\nnoise = {{ y = 0.02, z = 0.02 }}\n"
+        "{unknowns}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"k*{cos}*cos(u) + {sin}\"\n\
+         z = \"k*{sin}*sin(u)\"\n[simulation]\nvalues = {{ k = 2.5, {values} }}\nnoise = {{ y = 0.02, z = 0.02 }}\n"
     )
 }
 
@@ -110,7 +111,8 @@ fn a_sum_that_is_known() {
         .collect();
     let model = |constraints: &str| {
         format!(
-            "constraints = [{constraints}]\n[parameters]\na = {{}}\nb = {{}}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\nvalues = {{ a = 1e-6, b = 1e-7 }}\nnoise = {{ y = 1e-10, z = 1e-10 }}\n"
+            "constraints = [{constraints}]\n[parameters]\na = {{}}\nb = {{}}\n[outputs]\ny = \"a\"\n\
+             z = \"b\"\n[simulation]\nvalues = {{ a = 1e-6, b = 1e-7 }}\nnoise = {{ y = 1e-10, z = 1e-10 }}\n"
         )
     };
     let c = calibrated(&model("\"a + b = 0.000003\""), &text, &options()).expect("calibrated");
@@ -145,12 +147,14 @@ fn constraints_that_cannot_be_met() {
     for (constraints, message) in [
         (
             "\"c^2 + s^2 = -1\"",
-            "the constraint c^2 + s^2 = -1: no real point meets it: its left side minus its right side is positive everywhere",
+            "the constraint c^2 + s^2 = -1: no real point meets it: its left side minus its right side is \
+             positive everywhere",
         ),
         ("\"c = 0.5\", \"c = 0.6\"", "no real point was found at which it holds together with the others"),
         (
             "\"(c - s)^2 = 0\"",
-            "the constraint (c - s)^2 = 0: its left side minus its right side is never negative: where it holds, if anywhere, its gradient",
+            "the constraint (c - s)^2 = 0: its left side minus its right side is never negative: where it \
+             holds, if anywhere, its gradient",
         ),
     ] {
         refused(&rational(constraints), &text, message);
@@ -158,7 +162,9 @@ fn constraints_that_cannot_be_met() {
     // a known start that satisfies the constraint, or does not
     let known = |x: f64| {
         format!(
-            "constraints = [\"x^2 + v^2 = 4\", \"x = 1\"]\n[states]\nx = {{ equation = \"v\", initial = \"known\" }}\nv = \"0\"\n[outputs]\ny = \"x\"\n[simulation]\nvalues = {{ x = {x}, v = 1 }}\nnoise = {{ y = 0.1 }}\n"
+            "constraints = [\"x^2 + v^2 = 4\", \"x = 1\"]\n[states]\n\
+             x = {{ equation = \"v\", initial = \"known\" }}\nv = \"0\"\n[outputs]\ny = \"x\"\n[simulation]\n\
+             values = {{ x = {x}, v = 1 }}\nnoise = {{ y = 0.1 }}\n"
         )
     };
     let text = "t,y\n0,1\n1,2.7\n2,4.5\n";
@@ -184,7 +190,9 @@ fn experiments_do_not_count_twice() {
             );
         }
     }
-    let model = "experiments = 2\nconstraints = [\"x + v = 3\", \"p + q = 1\"]\n[states]\nx = \"-p*x\"\nv = \"-q*v\"\n[parameters]\np = {}\nq = {}\n[outputs]\ny = \"x\"\nz = \"v\"\n[simulation]\nvalues = { x = 1, v = 1, p = 0.5, q = 0.5 }\nnoise = { y = 0.01, z = 0.01 }\n";
+    let model = "experiments = 2\nconstraints = [\"x + v = 3\", \"p + q = 1\"]\n[states]\nx = \"-p*x\"\n\
+        v = \"-q*v\"\n[parameters]\np = {}\nq = {}\n[outputs]\ny = \"x\"\nz = \"v\"\n[simulation]\n\
+        values = { x = 1, v = 1, p = 0.5, q = 0.5 }\nnoise = { y = 0.01, z = 0.01 }\n";
     let c = calibrated(model, &text, &options()).expect("calibrated");
     assert_eq!(
         (c.consistent, c.degrees_of_freedom),
@@ -212,7 +220,8 @@ fn profiles_and_other_solutions_keep_to_constraints() {
         (sum[0], sum[1], squares) = (sum[0] + u * u, sum[1] + u * y, squares + y * y);
         text += &format!("{i},{u},{y}\n");
     }
-    let model = "constraints = [\"c^2 + s^2 = 1\"]\n[known_inputs]\nu = \"generic\"\n[parameters]\nc = {}\ns = {}\n[outputs]\ny = \"s*u\"\n[simulation]\nvalues = { c = 0.9, s = 0.3 }\nnoise = { y = 0.2 }\n";
+    let model = "constraints = [\"c^2 + s^2 = 1\"]\n[known_inputs]\nu = \"generic\"\n[parameters]\nc = {}\n\
+        s = {}\n[outputs]\ny = \"s*u\"\n[simulation]\nvalues = { c = 0.9, s = 0.3 }\nnoise = { y = 0.2 }\n";
     let asked = SystemOptions { profiles: vec!["c".into()], ..options() };
     let c = calibrated(model, &text, &asked).expect("calibrated");
     let chi = |s: f64| (squares - 2.0 * s * sum[1] + s * s * sum[0]) / 0.04;
@@ -272,8 +281,10 @@ fn what_was_known_of_some_is_as_it_was() {
         text += &format!("{i},{y}\n");
     }
     // a and b were known, with a correlation; a + b + c = 4 and c is measured
-    let model = "constraints = [\"a + b + c = 4\"]\n[parameters]\na = {}\nb = {}\nc = {}\n[outputs]\ny = \"c + 0*a + 0*b\"\n[simulation]\nnoise = { y = 0.1 }\n";
-    let plain = "[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\nnoise = { y = 0.3, z = 0.4 }\n";
+    let model = "constraints = [\"a + b + c = 4\"]\n[parameters]\na = {}\nb = {}\nc = {}\n[outputs]\n\
+        y = \"c + 0*a + 0*b\"\n[simulation]\nnoise = { y = 0.1 }\n";
+    let plain = "[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\n\
+        noise = { y = 0.3, z = 0.4 }\n";
     let c = calibrated(plain, "t,y,z\n0,1.1,1.5\n1,1.2,1.4\n", &options()).expect("calibrated");
     let mut estimates = c.covariance.clone();
     estimates.covariance[0][1] = 0.03;

@@ -35,7 +35,8 @@ pub(crate) fn found<'a>(list: &'a [SystemEstimated], name: &str) -> &'a SystemEs
     list.iter().find(|u| u.name == name).unwrap_or_else(|| panic!("{name}: {list:?}"))
 }
 
-const LINE: &str = "[known_inputs]\nx = \"generic\"\n[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a + b*x\"\n[simulation]\nvalues = { a = 1, b = 1 }\n";
+const LINE: &str = "[known_inputs]\nx = \"generic\"\n[parameters]\na = {}\nb = {}\n[outputs]\n\
+    y = \"a + b*x\"\n[simulation]\nvalues = { a = 1, b = 1 }\n";
 
 /// A straight line with a spike: the spike is named with the distance and scatter by the line through the
 /// other points.
@@ -93,7 +94,8 @@ fn what_is_not_told_apart_has_its_product() {
         format!("{t},{}\n", 6.0 * (-0.7 * t).exp() + 0.05 * normal())
     };
     let text: String = std::iter::once("t,y\n".to_string()).chain((0..30).map(line)).collect();
-    let model = "[states]\nx = \"-k*x\"\n[parameters]\nk = {}\ns = {}\n[outputs]\ny = \"s*x\"\n[simulation]\nvalues = { x = 2, k = 1, s = 2 }\nnoise = { y = 0.05 }\n";
+    let model = "[states]\nx = \"-k*x\"\n[parameters]\nk = {}\ns = {}\n[outputs]\ny = \"s*x\"\n[simulation]\n\
+        values = { x = 2, k = 1, s = 2 }\nnoise = { y = 0.05 }\n";
     let c = calibrated(model, &text, &options()).expect("calibrated");
     let plain = model.replace("s = {}\n", "").replace("s*x", "x").replace(", s = 2", "");
     let own = calibrated(&plain, &text, &options()).expect("calibrated");
@@ -127,7 +129,9 @@ fn units_of_models() {
         let line = |(t, y): &(f64, f64)| format!("{},{}\n", t * by, y * scale);
         std::iter::once(format!("t{unit},y{of}\n")).chain(rows.iter().map(line)).collect()
     };
-    let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\nk = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\nvalues = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
+    let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\n\
+        k = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\n\
+        values = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
     let right = calibrated(model, &text("", 1.0, "", 1.0), &options()).expect("calibrated");
     let k = |c: &SystemCalibration| found(&c.quantities, "k").estimate.expect("determined");
     for (unit, by, of, scale) in [
@@ -159,7 +163,9 @@ fn units_of_models() {
     assert!(calibrated(&other, &text("", 1.0, "", 1.0), &options).expect("calibrated").shared);
 }
 
-const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n[outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\ncarry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
+const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n\
+    [outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\n\
+    carry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
 
 /// Doses at times stated in the record: the rest of the first dose is unknown, and the volume follows from
 /// the jumps of the next doses, whose sizes are known.
@@ -276,7 +282,8 @@ fn experiments_have_segments_of_their_own() {
 /// Times of another clock are converted; endless work is refused before it begins.
 #[test]
 fn times_of_another_clock() {
-    const DECAY: &str = "states = { x = '-k*x' }\nparameters = ['k']\noutputs = { z = 'x' }\n[simulation]\nvalues = { x = 1, k = 1 }\nstep = 0.1\nnoise = { z = 0.001 }";
+    const DECAY: &str = "states = { x = '-k*x' }\nparameters = ['k']\noutputs = { z = 'x' }\n[simulation]\n\
+        values = { x = 1, k = 1 }\nstep = 0.1\nnoise = { z = 0.001 }";
     let rows = |head: &str, time: &dyn Fn(f64) -> String| {
         let mut normal = normals(3);
         let of = |i: u32| {
