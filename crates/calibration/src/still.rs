@@ -11,7 +11,7 @@ use obsdeg_core::model::Still;
 
 /// Sample in the window: its time, the channels that decide, and its payload.
 #[derive(Debug, Clone)]
-struct Held<S> {
+struct WindowSample<S> {
     t: f64,
     x: Vec<f64>,
     carried: S,
@@ -19,7 +19,7 @@ struct Held<S> {
 
 /// Sample with its interval at rest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told<S> {
+pub struct DecidedSample<S> {
     /// Payload of the sample.
     pub sample: S,
     /// Index of its interval at rest, from 0; `None` in motion.
@@ -31,7 +31,7 @@ pub struct Told<S> {
 pub struct Detector<S> {
     of: Still,
     /// Samples from the start of the window of the next undecided sample on; those before `next` are decided.
-    held: VecDeque<Held<Option<S>>>,
+    samples: VecDeque<WindowSample<Option<S>>>,
     next: usize,
     /// Index of the first sample of the window about the next undecided one.
     first: usize,
@@ -56,7 +56,7 @@ impl<S> Detector<S> {
     pub fn new(of: &Still) -> Self {
         Self {
             of: of.clone(),
-            held: VecDeque::new(),
+            samples: VecDeque::new(),
             next: 0,
             first: 0,
             last: 0,
@@ -77,13 +77,13 @@ impl<S> Detector<S> {
     }
 
     /// Adds a sample with the channels `x` that decide; samples that are decided now go to `out`.
-    pub fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<Told<S>>) {
+    pub fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<DecidedSample<S>>) {
         if self.origin.is_empty() {
             self.sums = vec![[0.0; 2]; x.len()];
             self.origin.clone_from(&x);
             self.begin = t;
         }
-        self.held.push_back(Held { t, x, carried: Some(sample) });
+        self.samples.push_back(WindowSample { t, x, carried: Some(sample) });
         if self.limit.is_none() && t - self.begin >= self.of.initial {
             self.set_limit();
         }
@@ -91,7 +91,7 @@ impl<S> Detector<S> {
     }
 
     /// Decides the remaining samples at the end of the record.
-    pub fn end(&mut self, out: &mut Vec<Told<S>>) {
+    pub fn end(&mut self, out: &mut Vec<DecidedSample<S>>) {
         if self.limit.is_none() {
             self.set_limit();
         }
@@ -103,42 +103,42 @@ impl<S> Detector<S> {
     /// vector.
     fn set_limit(&mut self) {
         let mut sums = vec![[0.0; 2]; self.origin.len()];
-        self.held.iter().for_each(|h| add(&mut sums, &self.origin, &h.x, 1.0));
-        self.limit = Some(self.of.factor * spread(&sums, self.held.len()));
+        self.samples.iter().for_each(|h| add(&mut sums, &self.origin, &h.x, 1.0));
+        self.limit = Some(self.of.factor * spread(&sums, self.samples.len()));
     }
 
-    fn judge(&mut self, all: bool, out: &mut Vec<Told<S>>) {
+    fn judge(&mut self, all: bool, out: &mut Vec<DecidedSample<S>>) {
         let Some(limit) = self.limit else { return };
         let half = self.of.window / 2.0;
-        while let Some(middle) = self.held.get(self.next).map(|h| h.t) {
-            if !all && self.held.back().is_none_or(|h| h.t <= middle + half) {
+        while let Some(middle) = self.samples.get(self.next).map(|h| h.t) {
+            if !all && self.samples.back().is_none_or(|h| h.t <= middle + half) {
                 return;
             }
             // the window is cut at both ends of the record
-            while self.held.get(self.last).is_some_and(|h| h.t <= middle + half) {
-                add(&mut self.sums, &self.origin, &self.held[self.last].x, 1.0);
+            while self.samples.get(self.last).is_some_and(|h| h.t <= middle + half) {
+                add(&mut self.sums, &self.origin, &self.samples[self.last].x, 1.0);
                 self.last += 1;
             }
-            while self.held[self.first].t < middle - half {
-                add(&mut self.sums, &self.origin, &self.held[self.first].x, -1.0);
+            while self.samples[self.first].t < middle - half {
+                add(&mut self.sums, &self.origin, &self.samples[self.first].x, -1.0);
                 self.first += 1;
             }
             let still = spread(&self.sums, self.last - self.first) <= limit;
-            if let Some(sample) = self.held[self.next].carried.take() {
-                self.told(middle, sample, still, out);
+            if let Some(sample) = self.samples[self.next].carried.take() {
+                self.decide(middle, sample, still, out);
             }
             self.next += 1;
             while self.first > 0 {
-                self.held.pop_front();
+                self.samples.pop_front();
                 (self.first, self.next, self.last) = (self.first - 1, self.next - 1, self.last - 1);
             }
         }
     }
 
-    fn told(&mut self, t: f64, sample: S, still: bool, out: &mut Vec<Told<S>>) {
+    fn decide(&mut self, t: f64, sample: S, still: bool, out: &mut Vec<DecidedSample<S>>) {
         if !still {
             self.leave(out);
-            out.push(Told { sample, interval: None });
+            out.push(DecidedSample { sample, interval: None });
             return;
         }
         if !self.inside && self.waiting.is_empty() {
@@ -150,17 +150,17 @@ impl<S> Detector<S> {
                 self.inside = true;
                 self.found += 1;
                 let interval = Some(self.found - 1);
-                out.extend(self.waiting.drain(..).map(|sample| Told { sample, interval }));
+                out.extend(self.waiting.drain(..).map(|sample| DecidedSample { sample, interval }));
             }
             return;
         }
-        out.push(Told { sample, interval: Some(self.found - 1) });
+        out.push(DecidedSample { sample, interval: Some(self.found - 1) });
     }
 
     /// Ends an interval; one that was too short does not count.
-    fn leave(&mut self, out: &mut Vec<Told<S>>) {
+    fn leave(&mut self, out: &mut Vec<DecidedSample<S>>) {
         self.inside = false;
-        out.extend(self.waiting.drain(..).map(|sample| Told { sample, interval: None }));
+        out.extend(self.waiting.drain(..).map(|sample| DecidedSample { sample, interval: None }));
     }
 }
 
@@ -209,7 +209,7 @@ mod tests {
         let mut most = 0;
         for (i, (t, x)) in samples.iter().enumerate() {
             detector.push(*t, x.clone(), i, &mut out);
-            most = most.max(detector.held.len() + detector.waiting.len());
+            most = most.max(detector.samples.len() + detector.waiting.len());
         }
         detector.end(&mut out);
         assert_eq!(out.iter().map(|o| o.sample).collect::<Vec<_>>(), (0..2000).collect::<Vec<_>>());
@@ -223,7 +223,7 @@ mod tests {
             of(0).hypot(of(1))
         };
         let limit = 6.0 * variance(&samples[..501]);
-        for (i, told) in out.iter().enumerate() {
+        for (i, decide) in out.iter().enumerate() {
             let t = samples[i].0;
             let window: Vec<_> = samples.iter().filter(|s| (s.0 - t).abs() <= 0.5).cloned().collect();
             let rest = variance(&window) <= limit;
@@ -232,7 +232,7 @@ mod tests {
                 t if t < 14.0 => None,
                 _ => rest.then_some(1),
             };
-            assert_eq!(told.interval, expected, "{t}");
+            assert_eq!(decide.interval, expected, "{t}");
         }
         let of = |k: usize| out.iter().filter(|o| o.interval == Some(k)).count();
         assert!((940..=1000).contains(&of(0)) && (440..=500).contains(&of(1)), "{} {}", of(0), of(1));

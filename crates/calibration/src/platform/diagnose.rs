@@ -37,7 +37,7 @@ const LOST: f64 = 1e3;
 
 /// Measurement with its residual.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Left {
+pub(crate) struct MeasurementResidual {
     pub run: usize,
     pub key: Key,
     /// Measurement minus estimate.
@@ -50,7 +50,7 @@ pub(crate) struct Left {
     pub normalised: f64,
 }
 
-impl Left {
+impl MeasurementResidual {
     /// Square of the residual in units of sigma.
     fn square(&self) -> f64 {
         self.residual * self.residual / self.r
@@ -59,7 +59,7 @@ impl Left {
 
 /// Residuals of all measurements, and the second path.
 pub(crate) struct Diagnosed {
-    pub all: Vec<Left>,
+    pub all: Vec<MeasurementResidual>,
     pub second: SecondPath,
     /// Residual sums of squares by run, each run alone, by least squares with the wide prior.
     alone: Vec<f64>,
@@ -108,7 +108,7 @@ impl Diagnosed {
             let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
             let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
             for ((left, r_of), key) in smoothed.left_out.iter().zip(variances).zip(keys) {
-                out.all.push(Left {
+                out.all.push(MeasurementResidual {
                     run: r,
                     key: *key,
                     residual: r_of * left.u,
@@ -148,7 +148,7 @@ impl Diagnosed {
     }
 
     /// Sum of squares and degrees of freedom of the measurements that `of` selects.
-    fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
+    fn sums(&self, of: impl Fn(&MeasurementResidual) -> bool) -> (f64, f64) {
         let some = self.all.iter().filter(|l| of(l));
         some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
     }

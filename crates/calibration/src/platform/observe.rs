@@ -17,7 +17,7 @@ use crate::Going;
 use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
-use crate::still::{Detector, Told};
+use crate::still::{DecidedSample, Detector};
 
 /// Units of forces, with their values in g (`None`: a metre per second squared, which depends on gravity).
 const FORCES: [(&str, Option<f64>); 4] =
@@ -395,7 +395,7 @@ fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
 type Kept = (u64, Vec<Option<f64>>, Option<f64>);
 
 /// State of the assignment of samples to positions and bins.
-struct Taking<'a> {
+struct SampleAssignment<'a> {
     layout: &'a Layout,
     plan: &'a Plan,
     /// Bins of the components of Z, in the order of the channels.
@@ -415,7 +415,7 @@ struct Taking<'a> {
     intervals: Intervals,
     /// Detector of intervals at rest, if the file requests it.
     detector: Option<Detector<Kept>>,
-    told: Vec<Told<Kept>>,
+    decided: Vec<DecidedSample<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
     /// Line, time and values of the samples of the bin; `rows` has the input of the robust pass, by position.
@@ -431,7 +431,7 @@ struct Taking<'a> {
     gimbals: Option<(usize, f64, u64)>,
 }
 
-impl Taking<'_> {
+impl SampleAssignment<'_> {
     fn names(&self) -> String {
         let names: Vec<&str> =
             self.plan.platform.scheme().positions.iter().map(|p| p.name.as_str()).collect();
@@ -494,10 +494,10 @@ impl Taking<'_> {
         if let Some(mut detector) = self.detector.take() {
             // a row without forces shows no rest
             if let [Some(x), Some(y), Some(z)] = numbers[1..4] {
-                let mut told = std::mem::take(&mut self.told);
-                detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut told);
-                told.drain(..).try_for_each(|one| self.at_rest(&one))?;
-                self.told = told;
+                let mut decided = std::mem::take(&mut self.decided);
+                detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut decided);
+                decided.drain(..).try_for_each(|one| self.at_rest(&one))?;
+                self.decided = decided;
             } else {
                 self.out.unused += 1;
             }
@@ -526,18 +526,18 @@ impl Taking<'_> {
     }
 
     /// Assigns a sample that the detector has decided.
-    fn at_rest(&mut self, told: &Told<Kept>) -> Result<(), CalibrationError> {
-        let Some(time) = told.sample.1[0] else { return Ok(()) };
-        if let Some(k) = told.interval {
+    fn at_rest(&mut self, decided: &DecidedSample<Kept>) -> Result<(), CalibrationError> {
+        let Some(time) = decided.sample.1[0] else { return Ok(()) };
+        if let Some(k) = decided.interval {
             if k == self.rests.len() {
                 self.rests.push((time, time));
             }
             self.rests[k].1 = time;
         }
         let positions = self.plan.attitudes.len();
-        let found = told.interval.filter(|k| *k < positions);
-        self.intervals.push(time, told.sample.0, found);
-        let (line, numbers, dt) = &told.sample;
+        let found = decided.interval.filter(|k| *k < positions);
+        self.intervals.push(time, decided.sample.0, found);
+        let (line, numbers, dt) = &decided.sample;
         self.put((*line, numbers, *dt), time, found)
     }
 
@@ -818,7 +818,7 @@ pub(crate) fn observe(
     let of_force = plan.components.iter().zip(&sigmas).find(|(k, _)| **k != AZIMUTH);
     let noise = of_force.map_or(0.0, |(_, sigma)| *sigma);
     let binner = Binner::new(bin_s, sigmas);
-    let mut taking = Taking {
+    let mut assignment = SampleAssignment {
         layout: &layout,
         plan,
         binner,
@@ -831,7 +831,7 @@ pub(crate) fn observe(
         before: None,
         intervals: Intervals::default(),
         detector: still.map(Detector::new),
-        told: Vec::new(),
+        decided: Vec::new(),
         rests: Vec::new(),
         samples: Vec::new(),
         over: 0,
@@ -847,63 +847,63 @@ pub(crate) fn observe(
         if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
             return Err(CalibrationError::Interrupted);
         }
-        taking.take(&row)
+        assignment.take(&row)
     })?;
-    if let Some(mut detector) = taking.detector.take() {
-        let mut told = Vec::new();
-        detector.end(&mut told);
-        told.iter().try_for_each(|one| taking.at_rest(one))?;
-        if taking.rests.len() != positions {
-            let spans: Vec<String> = taking.rests.iter().map(|(a, b)| format!("{a} to {b}")).collect();
+    if let Some(mut detector) = assignment.detector.take() {
+        let mut decided = Vec::new();
+        detector.end(&mut decided);
+        decided.iter().try_for_each(|one| assignment.at_rest(one))?;
+        if assignment.rests.len() != positions {
+            let spans: Vec<String> = assignment.rests.iter().map(|(a, b)| format!("{a} to {b}")).collect();
             return Err(CalibrationError::Rests {
-                record: taking.out.name,
+                record: assignment.out.name,
                 found: spans.len(),
                 expected: positions,
                 spans: if spans.is_empty() { String::new() } else { format!(": {} s", spans.join(", ")) },
             });
         }
     }
-    taking.end();
-    taking.forces.end();
-    taking.out.missing = layout.missing(&record_columns, &taking.empty);
+    assignment.end();
+    assignment.forces.end();
+    assignment.out.missing = layout.missing(&record_columns, &assignment.empty);
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
     // forces that are increments of velocity by the header, or the other way round
-    let (between, gaps) = std::mem::take(&mut taking.intervals).finish(plan);
-    (taking.out.interval, taking.out.gaps) = (between, gaps);
+    let (between, gaps) = std::mem::take(&mut assignment.intervals).finish(plan);
+    (assignment.out.interval, assignment.out.gaps) = (between, gaps);
     let per =
         |(u, size): (&'static str, f64)| (u, size * between.powi(if layout.increments { 1 } else { -1 }));
     let others = units_of_force(!layout.increments, gravity).map(per);
-    taking.forces.check_units(
-        &taking.out.name,
+    assignment.forces.check_units(
+        &assignment.out.name,
         &names,
         &plan.attitudes,
         layout.forces.as_ref(),
         &units_of_force(layout.increments, gravity),
         &others,
     )?;
-    taking.leave_out_gross();
+    assignment.leave_out_gross();
     let inertial = plan.platform.scheme().carry == Carry::Inertial;
-    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes, inertial)?;
+    assignment.forces.check_attitudes(&assignment.out.name, &names, &plan.attitudes, inertial)?;
     if matches!(by, By::Label | By::Static) {
-        check_times(&taking.out, plan, &layout.time)?;
+        check_times(&assignment.out, plan, &layout.time)?;
     }
     let timeline = (by == By::Timeline).then(|| bounds(plan));
-    taking.forces.check_ends(&taking.out.name, &names, &plan.attitudes, timeline.as_deref())?;
-    if let Some((p, off, line)) = taking.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
+    assignment.forces.check_ends(&assignment.out.name, &names, &plan.attitudes, timeline.as_deref())?;
+    if let Some((p, off, line)) = assignment.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
         return Err(CalibrationError::Gimbals {
-            record: taking.out.name.clone(),
+            record: assignment.out.name.clone(),
             line,
             position: plan.platform.scheme().positions[p].name.clone(),
             off_deg: format!("{off:.1}"),
         });
     }
-    let (length, count) = taking.length;
+    let (length, count) = assignment.length;
     let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
-    let begin = taking.begin;
-    let gimbals = taking.gimbals.map(|(_, off, _)| off);
-    let lengths = force.map(|_| taking.forces.lengths());
-    let mut out = taking.out;
+    let begin = assignment.begin;
+    let gimbals = assignment.gimbals.map(|(_, off, _)| off);
+    let lengths = force.map(|_| assignment.forces.lengths());
+    let mut out = assignment.out;
     out.lengths = lengths.unwrap_or(out.lengths);
     (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
     out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };

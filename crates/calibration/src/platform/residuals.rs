@@ -4,7 +4,7 @@ use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail, ljung_box};
 
-use super::diagnose::{Left, Parts};
+use super::diagnose::{MeasurementResidual, Parts};
 use super::observe::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
@@ -56,7 +56,7 @@ impl Parts<'_> {
                 run.bins.iter().flatten().map(of).collect()
             })
             .collect();
-        let of = |l: &Left| Residual {
+        let of = |l: &MeasurementResidual| Residual {
             record: l.run,
             position: l.key.position,
             channel: l.key.channel,

@@ -19,7 +19,7 @@ const SAME: f64 = 1e-9;
 const FLAT: f64 = 1e-4;
 
 /// Residuals and derivatives of the constraints.
-struct Left {
+struct ConstraintResiduals {
     /// Relative residuals, by the terms of the constraints.
     over: DVector<f64>,
     /// Residuals as distances along `rows`.
@@ -32,7 +32,7 @@ struct Left {
 }
 
 impl Problem<'_> {
-    fn left(&self, base: &DVector<f64>, x: &DVector<f64>, fixed: Option<usize>) -> Left {
+    fn left(&self, base: &DVector<f64>, x: &DVector<f64>, fixed: Option<usize>) -> ConstraintResiduals {
         let all = self.all(base, x);
         let (over, by_all) = self.numeric.constraints(&all);
         let by = |i: usize, j: usize| match fixed == Some(j) {
@@ -48,7 +48,7 @@ impl Problem<'_> {
             row.iter_mut().for_each(|c| *c = part(*c, *length));
         }
         let distance = |i: usize, _| if lengths[i] == 0.0 { 0.0 } else { over[i] / lengths[i] };
-        Left {
+        ConstraintResiduals {
             over: DVector::from_fn(over.len(), |i, _| part(over[i], terms[i])),
             far: DVector::from_fn(over.len(), distance),
             rows,
@@ -68,7 +68,7 @@ impl Problem<'_> {
         fixed: Option<usize>,
     ) -> Result<DVector<f64>, usize> {
         for _ in 0..BACK {
-            let Left { over, far, rows, .. } = self.left(base, &x, fixed);
+            let ConstraintResiduals { over, far, rows, .. } = self.left(base, &x, fixed);
             let finite = far.iter().chain(rows.iter()).all(|c| c.is_finite());
             if !finite || over.iter().all(|c| c.abs() <= HOLDS) {
                 break;

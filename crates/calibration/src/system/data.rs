@@ -288,13 +288,13 @@ fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
 
 /// Intervals at rest by the inputs `by`, as ranges of rows.
 fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
-    let (mut detector, mut told) = (Detector::new(still), Vec::new());
+    let (mut detector, mut decided) = (Detector::new(still), Vec::new());
     for (i, row) in rows.iter().enumerate() {
-        detector.push(row.t, by.iter().map(|&k| row.inputs[k].0).collect(), i, &mut told);
+        detector.push(row.t, by.iter().map(|&k| row.inputs[k].0).collect(), i, &mut decided);
     }
-    detector.end(&mut told);
+    detector.end(&mut decided);
     let mut out: Vec<Range<usize>> = Vec::with_capacity(detector.found());
-    for one in told {
+    for one in decided {
         match one.interval {
             Some(k) if k + 1 == out.len() => out[k].end = one.sample + 1,
             Some(_) => out.push(one.sample..one.sample + 1),
