@@ -11,8 +11,8 @@
 //! covariance describes the errors, and all estimates are left open. Nothing is wrong with such a record:
 //! with the priors it is not informative enough at these drifts. Attempts to keep some of the estimates
 //! failed. They used the change of each estimate from the linear model, and the scatter of repeated
-//! estimates. Of 20 records of p1 p2 at three times the paper's drifts, one had 14 estimates that moved by
-//! less than a quarter of a sigma and were wrong by 160 together.
+//! estimates. In a test with 20 records of p1 p2 at three times the paper's drifts, one record had 14
+//! estimates that moved by less than a quarter of a sigma. Together they were off by 160.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::Manifold;

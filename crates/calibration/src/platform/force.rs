@@ -12,8 +12,8 @@ use super::mistaken::Mistaken;
 /// Largest angle of the specific force of a position, in deg, from the vertical or, if psi continues in n,
 /// from its direction at the end of the position before.
 const TILT_DEG: f64 = 20.0;
-/// Largest tilt, as a multiple of the summed moves of the vertical from half to half of the positions so far,
-/// if psi does not continue in n and the vertical moves by more than `TILT_DEG`. Twice that sum is the move
+/// Largest tilt if psi does not continue in n and the vertical moves by more than `TILT_DEG`: a multiple of
+/// the summed moves of the vertical from half to half of the positions so far. Twice that sum is the move
 /// over whole positions; azimuth may become tilt too. The limit holds even if another position is nearer.
 const REACH: f64 = 4.0;
 /// Largest move of the vertical by drift from one position to the next: this angle, in deg, plus `MOVES`

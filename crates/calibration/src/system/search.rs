@@ -94,8 +94,8 @@ impl Calibrating<'_> {
         (ends, tried, first_error)
     }
 
-    /// Solutions other than the best that fit nearly as well, the number of starts that led to the best, and
-    /// the outcomes of the other starts, without those that failed.
+    /// Solutions other than the best that fit nearly as well, and the number of starts that led to the best.
+    /// The last value counts the outcomes of the other starts, without those that failed.
     pub(super) fn others(
         &mut self,
         ends: &[Settled],

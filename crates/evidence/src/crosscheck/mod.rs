@@ -342,8 +342,8 @@ fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f
     }
 }
 
-/// Evidence f: filters with another carry, at another latitude, without a position, against the truth of the
-/// linear model, since errors of a linear filter at large drifts would hide the others. Repositioning is
+/// Evidence f: filters with another carry, at another latitude, or without a position, against the truth of
+/// the linear model. An exact truth with large drifts would add errors that hide these. Repositioning is
 /// instantaneous: a filter that does not know a position does not know its slew either.
 fn controls(
     scheme: &Scheme,

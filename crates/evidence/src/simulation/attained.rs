@@ -2,7 +2,7 @@
 //!
 //! All samples count, with the stated noise, random drift and biases. The only prior knowledge is that of the
 //! stated priors. Coefficients are constants. psi is that of the end of the scheme, with which the platform
-//! is used (under reset carry that of the end of each position, since each has a psi of its own).
+//! is used. Under reset carry each position has a psi of its own, that of its end.
 
 use nalgebra::{DMatrix, RowDVector};
 use obsdeg_core::model::{OmittedModel, Scheme};

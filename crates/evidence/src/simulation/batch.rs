@@ -87,9 +87,9 @@ pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     Ok(wider(plan, &information, WIDER_PSI, WIDER_DRIFT))
 }
 
-/// Standard deviations `drift` times wider than the sigma of the best known drift by `information`, and `psi`
-/// times wider than that of the best known other unknown (psi, and others that are no rates); all other
-/// unknowns count as known.
+/// Standard deviations of a wide prior. For drifts they are `drift` times the sigma of the best known drift
+/// by `information`. For psi, and all other unknowns that are no rates, they are `psi` times that of the best
+/// known one. Each of these sigmas takes all other unknowns as known.
 pub(crate) fn wider(plan: &Plan, information: &SquareRootInformation, psi: f64, drift: f64) -> Vec<f64> {
     let units = plan.platform.units();
     let sigma = |psi: bool, wider: f64| {

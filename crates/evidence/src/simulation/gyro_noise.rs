@@ -29,9 +29,10 @@ impl Plan {
         !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
     }
 
-    /// Transition and noise covariance `(Phi, Q)` of psi (in the axes of the unknowns) and the biases over a
-    /// step of a segment (3 + m states), by the noise of the gyros. They are exact at a position. While the
-    /// platform turns, the step is divided into parts of at most 0.02 rad with the attitude of their middle.
+    /// Transition and noise covariance `(Phi, Q)` over a step of a segment, by the noise of the gyros. Their
+    /// states are psi (in the axes of the unknowns) and the m biases, 3 + m in all. The matrices are exact at
+    /// a position. While the platform turns, the step is divided into parts of at most 0.02 rad with the
+    /// attitude of their middle.
     pub(super) fn bias_step(&self, segment: usize) -> Result<Step, SimulationError> {
         let s = &self.segments[segment];
         let n = 3 + self.biases.len();

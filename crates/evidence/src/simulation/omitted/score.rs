@@ -1,8 +1,8 @@
 //! Score test: omitted errors that explain the residuals of a fit.
 //!
-//! With `r` the residuals and `w_j` the part of column j orthogonal to all changes of the unknowns (both
-//! whitened), `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom if the error is zero. It
-//! equals the fall of chi-square with the error among the unknowns. The estimate of the error is
+//! Let `r` be the whitened residuals, and `w_j` the part of the whitened column j orthogonal to all changes
+//! of the unknowns. Then `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom if the error
+//! is zero. It equals the fall of chi-square with the error among the unknowns. The estimate of the error is
 //! `(w_j r) / (w_j w_j)` (Rao 1948, doi:10.1017/S0305004100023987). Residuals may exceed their sigmas even
 //! with the error among the unknowns. The fall is then divided by the remaining chi-square per degree of
 //! freedom, since noise beyond the stated one is no error of the bench. Bonferroni's bound accounts for the
