@@ -15,7 +15,7 @@ const AWAY: [f64; 4] = [3.0, -3.0, 10.0, -10.0];
 /// Number of first estimates that are drawn from the priors, and the seed of these draws.
 const DRAWS: usize = 12;
 const SEED: u64 = 1;
-/// Most bins times squared unknowns of records whose minima are sought where nothing bends.
+/// Most bins times squared unknowns of records whose minima are sought without curvature.
 const SEARCHED: usize = 1_000_000;
 /// Least difference by which a sum of squares is lower than another.
 const LOWER: f64 = 1e-2;

@@ -218,8 +218,8 @@ impl DwellLimit {
     }
 }
 
-/// Check of an order against a slope; it is not resolvable if the slope bends or cannot be separated from
-/// rounding.
+/// Check of an order against a slope; it is not resolvable if the slope is not settled or cannot be separated
+/// from rounding.
 fn slope(order: Option<usize>, modelled: bool, dwell_slope: Option<DwellSlope>) -> Check {
     let measured = match dwell_slope {
         Some(DwellSlope::Slope(s)) => Some(s),
