@@ -47,8 +47,8 @@ pub struct RecordRead {
     /// Time of the record, in s, at time 0 of the timeline: the start of the scheme, or the first row at a
     /// position if only rows show when positions begin.
     pub origin_s: f64,
-    /// Earliest and latest time 0 of the timeline, in s, if the labels leave it open; `calibrate` estimates it.
-    /// Null if they do not.
+    /// Earliest and latest time 0 of the timeline, in s, if the labels leave it open; `calibrate` estimates
+    /// it. Null if they do not.
     pub origin_open_s: Option<(f64, f64)>,
     /// Positions of the scheme.
     pub positions: Vec<PositionRead>,

@@ -90,7 +90,7 @@ pub(super) fn samples(scheme: &Scheme) -> Samples<'_> {
     Samples::new(scheme, DWELLS.iter().map(|&k| 2f64.powi(k)).collect(), BITS)
 }
 
-/// Slopes of `questions`; `None` where no precision separates observable directions from rounding.
+/// Slopes of `requests`; `None` where no precision separates observable directions from rounding.
 pub(super) fn asymptotics(
     samples: &Samples<'_>,
     between: Between,
