@@ -27,7 +27,8 @@ Examples:
   obsdeg analyze --angles NUE --angles NDW --figures pictures
   obsdeg analyze scheme.toml --certificate c.json       the proof, for obsdeg verify and other checkers
 
-Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in rad/s and Z in g.
+Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in \
+rad/s and Z in g.
 
 Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 

@@ -97,7 +97,8 @@ impl RequireMet {
         let none = all.peek().is_none() || all.any(|r| r.stated == 0);
         match self.require_met && none {
             true => Err(Failure::input(
-                "--require-met: no requirement is stated (of some scheme); expected --requirement NAME=SIGMA or [requirements] in the scheme file".into(),
+                "--require-met: no requirement is stated (of some scheme); expected --requirement NAME=SIGMA \
+                 or [requirements] in the scheme file".into(),
             )),
             false => Ok(()),
         }

@@ -23,15 +23,21 @@ Examples:
   obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
   gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate examples/handheld/accelerometers.toml -
 
-A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well; increments of velocity since the row before, as pulses are, in m/s, cm/s, mm/s, um/s), \
-`Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the \
-scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of \
-its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts \
-instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. Columns are separated by commas, semicolons or tabs (then with decimal commas too); a column `t` without a unit may hold dates. With -o it writes calibration.json, coefficients.csv, \
-covariance.csv, residuals.csv and figures.
+A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the \
+accelerometers in platform axes; m/s^2, mg, ug as well; increments of velocity since the row before, as \
+pulses are, in m/s, cm/s, mm/s, um/s), `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` \
+where the azimuth is measured, and `position` with the names of the scheme (empty while the platform turns); \
+without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a \
+mean with a sigma of its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the \
+scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts instead \
+of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema \
+scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. Columns \
+are separated by commas, semicolons or tabs (then with decimal commas too); a column `t` without a unit may \
+hold dates. With -o it writes calibration.json, coefficients.csv, covariance.csv, residuals.csv and figures.
 
-Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
-read).";
+Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is \
+missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, \
+once the records are read).";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -151,7 +157,8 @@ impl Arguments {
                 "{name} is {kind}; expected a scheme or model file, then records: `obsdeg calibrate scheme.toml {name}`"
             ))),
             (Some(kind @ Kind::Calibration), _) => Err(Failure::input(format!(
-                "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior {name}` takes it for what was known before)"
+                "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior \
+                 {name}` takes it for what was known before)"
             ))),
             _ => {
                 let wrong = |path: &&PathBuf| Kind::of(path).is_some_and(|kind| kind != Kind::Record);

@@ -75,16 +75,20 @@ impl EngineArguments {
 pub(crate) fn say_busy(worker: &Worker) {
     let why = match worker.failure() {
         Some(WorkerError::Busy { seconds: 0 }) => {
-            "another obsdeg process holds it, and --engine-wait 0 does not wait. Run the command again, or wait (--engine-wait)".into()
+            "another obsdeg process holds it, and --engine-wait 0 does not wait. Run the command again, or \
+             wait (--engine-wait)"
+                .into()
         }
         Some(WorkerError::Busy { seconds }) => format!(
-            "another obsdeg process held it for more than {seconds} s. Run the command again, or wait longer (--engine-wait)"
+            "another obsdeg process held it for more than {seconds} s. Run the command again, or wait longer \
+             (--engine-wait)"
         ),
         Some(WorkerError::OverLimit { limit: 0 }) => "--symbolic-limit 0 switches it off".into(),
         _ => return,
     };
     say(&format!(
-        "what needs the symbolic engine is missing or in decimals (the notes of a table and the JSON answer say what): {why}"
+        "what needs the symbolic engine is missing or in decimals (the notes of a table and the JSON answer \
+         say what): {why}"
     ));
 }
 
@@ -94,8 +98,8 @@ pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 /// Says that the engine is waited for, at most how many seconds, and the verdicts, which need none.
 fn say_waiting(wait: u64, meanwhile: &[String]) {
     eprintln!(
-        "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once per user, and --solutions off \
-         does without it; Ctrl-C ends this command"
+        "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once \
+         per user, and --solutions off does without it; Ctrl-C ends this command"
     );
     if !meanwhile.is_empty() {
         eprintln!("verdicts, which do not wait for it:");

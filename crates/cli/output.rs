@@ -73,9 +73,10 @@ fn ending(path: &Path) -> Option<String> {
 pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     let arg = match arg.get_id().as_str() {
         "format" => arg.help("The format on stdout (default: table)"),
-        "output" => arg
-            .value_name("DIR")
-            .help("Write summary, series and figures to a folder; a name that ends in .json, .md, .csv or .tex: the answer alone"),
+        "output" => arg.value_name("DIR").help(
+            "Write summary, series and figures to a folder; a name that ends in .json, .md, .csv or .tex: \
+             the answer alone",
+        ),
         "force" => arg.help("Replace files in an existing folder"),
         "quiet" => arg,
         _ => return arg,
@@ -121,7 +122,8 @@ impl Output {
                 let pages = ["html", "htm", "pdf"].contains(&other);
                 let pages = if pages { " (pages are written by `obsdeg report`)" } else { "" };
                 return Err(Failure::input(format!(
-                    "no format for .{other} here; expected a file that ends in .json, .md, .csv, .tex or .txt (a table), or --format{pages}"
+                    "no format for .{other} here; expected a file that ends in .json, .md, .csv, .tex or \
+                     .txt (a table), or --format{pages}"
                 )));
             }
             _ if self.table.is_some() => Format::Csv,

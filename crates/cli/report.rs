@@ -23,8 +23,9 @@ Examples:
   obsdeg report examples/two-compartment/model.toml -o review.md
   obsdeg report scheme.toml --calibration calibration -o review.html
 
-The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their pictures in a \
-folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
+The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have \
+their pictures in a folder of their own beside it, review_figures for review.md. The same command writes the \
+same bytes.
 
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 

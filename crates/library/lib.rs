@@ -44,7 +44,9 @@
 //! ```
 //! use obsdeg::{Conditions, CrossCheckOptions, crosscheck, read_scheme, simulate};
 //!
-//! let scheme = read_scheme("carry = 'inertial'\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]")?;
+//! let scheme = read_scheme(
+//!     "carry = 'inertial'\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]",
+//! )?;
 //! let (run, _record) = simulate(&scheme, &Conditions::default(), 1)?;
 //! assert!(run.quantities.iter().filter(|e| e.name == "D_FX").all(|e| e.error.abs() < 4.0 * e.sigma));
 //!

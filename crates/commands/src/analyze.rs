@@ -48,7 +48,10 @@ pub struct Analyze {
     pub relation_limit: Option<u64>,
 
     /// Solving expressions and numbers of solutions
-    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
+    #[arg(
+        long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on",
+        action = ArgAction::Set, value_parser = one_of(SOLUTIONS)
+    )]
     pub solutions: bool,
 
     /// Axes of Z in solutions
@@ -60,7 +63,10 @@ pub struct Analyze {
     pub formulas: bool,
 
     /// Exact classes of the errors that a scheme does not estimate
-    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
+    #[arg(
+        long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on",
+        action = ArgAction::Set, value_parser = one_of(OMITTED)
+    )]
     pub omitted: bool,
 
     /// Changes of the estimates per unit of each error that a scheme does not estimate, in deg/h per ug and

@@ -222,7 +222,8 @@ impl TermOptions {
         if let (None, Some(axes)) = (&self.terms, self.axes) {
             let word = AXES.iter().find(|(.., a)| *a == axes).map_or("", |(word, ..)| word);
             return Err(Problem::input(format!(
-                "--axes {word} does nothing here: expected --terms with it, as in --terms all (a scheme file says frame = \"{word}\")"
+                "--axes {word} does nothing here: expected --terms with it, as in --terms all (a scheme file \
+                 says frame = \"{word}\")"
             )));
         }
         let of = |text: &String| Unknowns::of(text, self.axes).map_err(|e| Problem::input(e.to_string()));

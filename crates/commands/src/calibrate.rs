@@ -49,7 +49,10 @@ pub struct Calibrate {
 
     /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution
     /// is to be expected
-    #[arg(long, value_name = "N", help_heading = "Models", default_value_t = STARTS, value_parser = whole::<u32>(SOME_STARTS))]
+    #[arg(
+        long, value_name = "N", help_heading = "Models", default_value_t = STARTS,
+        value_parser = whole::<u32>(SOME_STARTS)
+    )]
     pub starts: u32,
 
     /// The profile of an unknown, what the data say of it when all others follow; may be given several times

@@ -53,7 +53,8 @@ pub fn compare(options: &Compare, read: Vec<Named>) -> Result<Comparison, Proble
     for (name, input) in read {
         let Input::Scheme(mut scheme) = input else {
             return Err(Problem::input(format!(
-                "{name} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"
+                "{name} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge \
+                 models side by side)"
             )));
         };
         options.assumptions.apply(&mut scheme);

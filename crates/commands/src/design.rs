@@ -135,7 +135,10 @@ pub struct Search {
 
     /// With --merge: search N blocks of the parts again, chosen at random, and refuse a part whose block
     /// gives something else (default: 0; a block is at most 16 of the starts)
-    #[arg(long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED), conflicts_with_all = ["minimum", "part"])]
+    #[arg(
+        long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED),
+        conflicts_with_all = ["minimum", "part"]
+    )]
     pub check: Option<u64>,
 
     /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names
@@ -627,7 +630,8 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
         let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
         if let Some(option) = given.chain(a.measurement.given()).next() {
             return Err(Problem::input(format!(
-                "{option} does nothing with --minimum, which asks what positions determine at all, by any degree and with any noise; it is for --positions"
+                "{option} does nothing with --minimum, which asks what positions determine at all, by any \
+                 degree and with any noise; it is for --positions"
             )));
         }
     }
@@ -724,7 +728,8 @@ fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates),
         return Ok((Scheme::default(), Candidates::grid(step)?));
     }
     Err(Problem::input(format!(
-        "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a scheme file that exists"
+        "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a \
+         scheme file that exists"
     )))
 }
 

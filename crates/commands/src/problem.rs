@@ -121,7 +121,8 @@ impl From<SimulationError> for Problem {
             // accuracy orders beyond the series
             SimulationError::Prediction(PredictionError::Accuracy(_)) => Self::input(e.to_string()),
             SimulationError::Filter(e) if e.is_numeric() => Self::input(format!(
-                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
+                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps \
+                 and rates that are closer together"
             )),
             SimulationError::Filter(_) => Self::internal(e.to_string()),
             _ => Self::input(e.to_string()),

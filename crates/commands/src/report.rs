@@ -31,7 +31,10 @@ pub struct Report {
     pub assumptions: Assumptions,
 
     /// Monte Carlo runs of the evidence
-    #[arg(id = "monte_carlo", long = "runs", value_name = "N", default_value_t = DEFAULT_RUNS, value_parser = whole::<u32>(RUNS))]
+    #[arg(
+        id = "monte_carlo", long = "runs", value_name = "N", default_value_t = DEFAULT_RUNS,
+        value_parser = whole::<u32>(RUNS)
+    )]
     pub runs: u32,
 
     /// A run's conditions.

@@ -140,8 +140,8 @@ impl Source {
         let plain = |c: char| c.is_alphanumeric() || "/._- +~@:".contains(c);
         let name = if self.name.chars().all(plain) && !self.name.is_empty() { &self.name } else { "FILE" };
         Err(Problem::input(format!(
-            "{} seems to be {kind}; expected a scheme (TOML) or a model (TOML, JSON). The Python package imports it: python -c 'import obsdeg; \
-             print(obsdeg.analyze(obsdeg.load(\"{name}\")))'",
+            "{} seems to be {kind}; expected a scheme (TOML) or a model (TOML, JSON). The Python package \
+             imports it: python -c 'import obsdeg; print(obsdeg.analyze(obsdeg.load(\"{name}\")))'",
             self.name
         )))
     }

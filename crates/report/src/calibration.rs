@@ -87,7 +87,8 @@ fn rates(c: &Clock) -> String {
             number(100.0 * e.sigma)
         ),
         Some(e) => format!(
-            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much or more{held}",
+            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong \
+             by as much or more{held}",
             300.0 * e.sigma
         ),
         None => format!(
@@ -99,14 +100,20 @@ fn rates(c: &Clock) -> String {
 pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up. Check the times and attitudes of the scheme against the run (--dry-run shows how the record is read); state priors of the drifts under [simulation]; add positions".into(),
+        Finding::NotSettled => {
+            "the iteration did NOT settle: the estimates are where it was given up. Check the times and \
+             attitudes of the scheme against the run (--dry-run shows how the record is read); state priors \
+             of the drifts under [simulation]; add positions"
+                .into()
+        }
         Finding::Force { record, length_g, alike, least, most, causes } => {
             let of = of(record, records);
             if *alike {
                 let or =
                     causes.iter().map(|c| format!(" (or of {} alone: these positions do not tell)", c.axis));
                 return format!(
-                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
+                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of \
+                     {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
                     number(length_g - 1.0),
                     or.collect::<String>()
                 );
@@ -117,7 +124,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             );
             if causes.is_empty() {
                 return format!(
-                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the positions), and no unknown of the scheme explains them (K0 and K1 would)"
+                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the \
+                     positions), and no unknown of the scheme explains them (K0 and K1 would)"
                 );
             }
             let each: Vec<String> = causes.iter().map(cause).collect();
@@ -129,10 +137,13 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             let place = format!("column `{column}`{}, lines {} to {}", of(record, records), lines.0, lines.1);
             match kind_of_cells {
                 CellKind::Code => format!(
-                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and were left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and \
+                     were left out; if that is a code of missing values, state `missing = [{value}]` under \
+                     [record]"
                 ),
                 CellKind::Stuck => format!(
-                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, and were left out; check whether the output is stuck"
+                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, \
+                     and were left out; check whether the output is stuck"
                 ),
             }
         }
@@ -144,14 +155,20 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                 by_earth.as_ref().map(|e| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma)));
             match (held, rates) {
                 (Some(held), Some(rates)) if is_clock(*by_durations, by_earth.as_ref()) => format!(
-                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are off by that part, those that the earth rate tells by more"
+                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
+                     off by that part, those that the earth rate tells by more"
                 ),
                 (held, Some(rates)) => format!(
-                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as by a clock that is {rates}{}; another latitude or rate of turns, or an error that no unknown explains, look the same, and are likelier where positions last as in the scheme",
+                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as \
+                     by a clock that is {rates}{}; another latitude or rate of turns, or an error that no \
+                     unknown explains, look the same, and are likelier where positions last as in the \
+                     scheme",
                     held.map_or_else(String::new, |held| format!(", while {held}"))
                 ),
                 (held, None) => format!(
-                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from positions that were held so much longer or shorter: by a clock drifts are off by that part or more, else the scheme has other times than its run",
+                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from \
+                     positions that were held so much longer or shorter: by a clock drifts are off by that \
+                     part or more, else the scheme has other times than its run",
                     held.unwrap_or_default()
                 ),
             }
@@ -175,12 +192,14 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             )
         }
         Finding::Correlated { record, channel, probability } => format!(
-            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too small by what that hides",
+            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too \
+             small by what that hides",
             of(record, records),
             number(*probability)
         ),
         Finding::Temperature { record, channel, correlation, probability } => format!(
-            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, probability {}), which no unknown of the scheme explains",
+            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, \
+             probability {}), which no unknown of the scheme explains",
             of(record, records),
             number(*probability)
         ),
@@ -190,7 +209,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             )
         }
         Finding::Repeatability { chi_square } => format!(
-            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they changed between the runs, or sigmas are too small",
+            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they \
+             changed between the runs, or sigmas are too small",
             number(*chi_square)
         ),
         Finding::SecondPath { difference } => format!(
@@ -228,7 +248,9 @@ fn left_open(c: &Calibration) -> Option<String> {
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };
     Some(format!(
-        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma describes the errors then, so no estimate is given. State priors of the drifts as small as is true (`priors` under [simulation]), or add positions"
+        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma \
+         describes the errors then, so no estimate is given. State priors of the drifts as small as is true \
+         (`priors` under [simulation]), or add positions"
     ))
 }
 
@@ -335,7 +357,8 @@ pub(crate) fn by_what(by: PositionsBy) -> &'static str {
             "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end"
         }
         PositionsBy::Static => {
-            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two"
+            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what \
+             is between two"
         }
     }
 }
@@ -431,7 +454,8 @@ fn next_run(n: &NextRun) -> String {
     );
     if n.required_sigma == 0.0 {
         return format!(
-            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of the bench too, or make them smaller."
+            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of \
+             the bench too, or make them smaller."
         );
     }
     let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
@@ -447,7 +471,8 @@ fn next_run(n: &NextRun) -> String {
         )
     } else {
         format!(
-            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then} only."
+            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes \
+             it {then} only."
         )
     }
 }
@@ -471,7 +496,8 @@ fn mode(c: &Calibration) -> Vec<String> {
     }];
     if !c.assumed.held.is_empty() {
         out.push(format!(
-            "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 times as much into the others).",
+            "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 \
+             times as much into the others).",
             listed(&c.assumed.held)
         ));
         let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
@@ -486,14 +512,16 @@ fn mode(c: &Calibration) -> Vec<String> {
             format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (HELD - 1.0))
         } else {
             format!(
-                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors under [simulation] or more positions make it smaller.",
+                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors \
+                 under [simulation] or more positions make it smaller.",
                 all.join(", ")
             )
         });
     }
     out.push(match c.curvature.kappa {
         Some(k) if c.curvature.from_refits => format!(
-            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from data and priors with errors drawn anew.",
+            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from \
+             data and priors with errors drawn anew.",
             number(k),
             c.curvature.refits - c.curvature.failed
         ),
@@ -522,7 +550,8 @@ fn fit(c: &Calibration) -> Vec<String> {
     let per = f.factor * f.factor;
     let mut out = vec![
         format!(
-            "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}{}",
+            "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled \
+             sigmas are times {:.3}{}",
             number(f.chi_square),
             tenths(f.degrees_of_freedom),
             if is_whole(f.degrees_of_freedom) {
@@ -538,7 +567,8 @@ fn fit(c: &Calibration) -> Vec<String> {
         ),
         format!("{} linearisations along the whole run", f.passes),
         format!(
-            "second path, a filter with the same wide prior: at the end of a record within {} sigma, its sigmas within {} of themselves",
+            "second path, a filter with the same wide prior: at the end of a record within {} sigma, its \
+             sigmas within {} of themselves",
             rounding(c.second_path.difference),
             rounding(c.second_path.sigma_difference)
         ),
@@ -601,8 +631,9 @@ impl Answer for Calibration {
         columns.extend([right("predicted"), right("prior"), left("status")]);
         let total = if totals { "total: with the bench and what a suspected error changes; " } else { "" };
         let heading = format!(
-            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and with the noise of the record; \
-             prior: what that of the program would do, in sigma and to sigma, where none is stated)"
+            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and \
+             with the noise of the record; prior: what that of the program would do, in sigma and to sigma, \
+             where none is stated)"
         );
         let mut blocks =
             vec![Block::table(heading, columns.clone(), self.quantities.iter().map(|e| row(e, totals)))];
@@ -665,7 +696,9 @@ impl Answer for Calibration {
             ]
         });
         blocks.push(Block::table(
-            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: probability of correlations like these; temperature: correlation with it, and the probability of that)",
+            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: \
+             probability of correlations like these; temperature: correlation with it, and the probability \
+             of that)",
             columns,
             rows,
         ));

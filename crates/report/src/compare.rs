@@ -163,8 +163,9 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
             number(v.largest_psi_deg)
         ))
     };
-    let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised along the run of \
-                 the drifts that are stated; an unknown that is not determined at small angles may be seen by large ones";
+    let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised \
+                 along the run of the drifts that are stated; an unknown that is not determined at small \
+                 angles may be seen by large ones";
     vec![
         Block::table("Sigma at the drifts that are stated", columns, rows),
         Block::list(
@@ -315,8 +316,9 @@ impl Answer for Comparison {
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
             .into(),
-        "observable without, met without: positions you can drop (one at a time) so that what is observable stays so, and so \
-         that every requirement is met; only by: positions without which the unknown is not observable"
+        "observable without, met without: positions you can drop (one at a time) so that what is observable \
+         stays so, and so that every requirement is met; only by: positions without which the unknown is not \
+         observable"
             .into(),
         format!("seed {}", self.seed),
     ]);

@@ -57,7 +57,8 @@ fn by_derivatives(c: &CrossCheck) -> Block {
         ]
     };
     Block::table(
-        "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was at the start of each",
+        "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was \
+         at the start of each",
         [
             left("unknown"),
             left("status"),
@@ -88,8 +89,8 @@ fn by_unknown(c: &CrossCheck) -> Block {
         ]
     };
     Block::table(
-        "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) against log dwell; b. factor on sigma \
-         (psi: of the end) for a prior variance times 100",
+        "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) \
+         against log dwell; b. factor on sigma (psi: of the end) for a prior variance times 100",
         [
             left("unknown"),
             right("accuracy order"),
@@ -203,13 +204,14 @@ fn lead(c: &CrossCheck) -> Vec<String> {
     let mut out: Vec<String> = warning(&c.conditions).into_iter().collect();
     let Counts { agree, disagree, not_resolvable, not_tested } = c.counts;
     out.push(format!(
-        "checks: {agree} agree, {disagree} disagree, {not_resolvable} not resolvable, {not_tested} not tested; {} of {} accuracy orders measured",
+        "checks: {agree} agree, {disagree} disagree, {not_resolvable} not resolvable, {not_tested} not \
+         tested; {} of {} accuracy orders measured",
         c.orders.measured, c.orders.of
     ));
     if c.timeline.iter().any(|t| t.slew) {
         out.push(
-            "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \
-             drifts of its own; d knows of the slews"
+            "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of \
+             finite duration moves psi by drifts of its own; d knows of the slews"
                 .into(),
         );
     }

@@ -17,13 +17,15 @@ fn criterion(name: &str) -> &'static str {
             "A: root of the mean variance of the coefficients (psi is estimated with them and does not count)"
         }
         "D" => {
-            "D: geometric mean of the principal sigmas of the coefficients (psi is estimated with them and does not count)"
+            "D: geometric mean of the principal sigmas of the coefficients (psi is estimated with them and \
+             does not count)"
         }
         "E" => {
             "E: largest principal sigma of the coefficients (psi is estimated with them and does not count)"
         }
         "margin" => {
-            "margin: largest sigma over what is required, of psi too where every coefficient is asked for; up to 1 all requirements are met"
+            "margin: largest sigma over what is required, of psi too where every coefficient is asked for; \
+             up to 1 all requirements are met"
         }
         _ => "worst: largest sigma of a coefficient (psi is estimated with them and does not count)",
     }
@@ -79,8 +81,9 @@ fn lead(d: &Design) -> Vec<String> {
         out.extend(d.omitted.as_ref().and_then(|o| omitted::lead(o, first.requirements.with_bench, met)));
         out.extend(s.ranked.map(|n| {
             format!(
-                "The search does not count what is not estimated under these conditions: the {n} schemes of least sigma were ranked by their total \
-                 uncertainty. No bound and no proof counts, and a scheme with a larger sigma may have a smaller total."
+                "The search does not count what is not estimated under these conditions: the {n} schemes of \
+                 least sigma were ranked by their total uncertainty. No bound and no proof counts, and a \
+                 scheme with a larger sigma may have a smaller total."
             )
         }));
         if first.requirements.any_missed() {
@@ -121,7 +124,8 @@ fn parts(p: &PartsReport) -> String {
         ),
     };
     format!(
-        "put together from {} parts, searched by version {}: what they list was evaluated again, their starts and counts add up; {again}",
+        "put together from {} parts, searched by version {}: what they list was evaluated again, their \
+         starts and counts add up; {again}",
         p.parts,
         p.versions.join(", ")
     )
@@ -212,8 +216,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         let unrefined = searched(d);
         let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
         format!(
-            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all sequences of {} of them within the constraints none has a \
-             smaller worst degree, or the same and a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left open",
+            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all \
+             sequences of {} of them within the constraints none has a smaller worst degree, or the same and \
+             a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left \
+             open",
             d.candidates.len(),
             if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
             s.positions
@@ -224,7 +230,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         )
     } else if s.ties.is_some() {
         format!(
-            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of up to {}",
+            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a \
+             probability of up to {}",
             words::at_most(d.error_bound)
         )
     } else if s.interrupted {
@@ -236,7 +243,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
         let by = match rounded {
             true => {
-                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on the grid of rounded angles"
+                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on \
+                 the grid of rounded angles"
             }
             false => "coordinate exchange from random starts",
         };
@@ -247,7 +255,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     out.extend(s.parts.as_ref().map(parts));
     if d.found.iter().any(|f| f.image_of.is_some()) {
         out.push(
-            "images of a scheme listed before them are that scheme in other platform axes (coefficients renamed): what is true of one is true of all"
+            "images of a scheme listed before them are that scheme in other platform axes (coefficients \
+             renamed): what is true of one is true of all"
                 .into(),
         );
     }
@@ -256,24 +265,31 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     }
     if s.lost > 0 {
         out.push(format!(
-            "{} of them are observable by the exact verdict (of repositioning at once), but their samples{} do not determine what is required, as \
-             far as double precision tells: they count as worse than all others",
+            "{} of them are observable by the exact verdict (of repositioning at once), but their samples{} \
+             do not determine what is required, as far as double precision tells: they count as worse than \
+             all others",
             s.lost,
             if s.conditions.slew_rate_deg_s.is_some() { " with the slews" } else { "" }
         ));
     }
     out.extend(s.ties.map(|t| match t.sequences {
-        1 => format!("no other sequence is as good (worst degree equal, criterion within {:e} of it)", t.within),
+        1 => format!(
+            "no other sequence is as good (worst degree equal, criterion within {:e} of it)",
+            t.within
+        ),
         n => format!(
-            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within {:e} of it)",
+            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within \
+             {:e} of it)",
             t.within
         ),
     }));
     out.push(
         if s.order_matters && d.carry == Carry::Reset {
-            "orders of the same positions are different schemes: the noise of Z is correlated from one to the next; a position may be repeated"
+            "orders of the same positions are different schemes: the noise of Z is correlated from one to \
+             the next; a position may be repeated"
         } else if s.order_matters {
-            "orders of the same positions are different schemes: the dwell lets psi move in between; a position may be repeated"
+            "orders of the same positions are different schemes: the dwell lets psi move in between; a \
+             position may be repeated"
         } else {
             "the order of positions does not matter under reset carry; a position may be repeated"
         }
@@ -283,19 +299,21 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         out.push(
             match s.degree_floor {
                 Some(_) => {
-                    "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at once; only what is observable so \
-                     is listed, and its samples determine it with the slews; what slews alone would determine is not sought"
+                    "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at \
+                     once; only what is observable so is listed, and its samples determine it with the \
+                     slews; what slews alone would determine is not sought"
                 }
                 None => {
-                    "degrees, accuracy orders and ranks are those of turns fast against the earth rate, in which torquer errors act; only what \
-                     is observable so is listed, and its samples determine it with the slews"
+                    "degrees, accuracy orders and ranks are those of turns fast against the earth rate, in \
+                     which torquer errors act; only what is observable so is listed, and its samples \
+                     determine it with the slews"
                 }
             }
             .into(),
         );
         out.push(
-            "half turns are tried in both directions, which are different schemes: the axis about which they are right-handed stands \
-             before the position"
+            "half turns are tried in both directions, which are different schemes: the axis about which they \
+             are right-handed stands before the position"
                 .into(),
         );
     }
@@ -305,11 +323,12 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     };
     out.push(match s.degree_floor {
         Some(floor) => format!(
-            "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the criterion, {by}"
+            "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the \
+             criterion, {by}"
         ),
         None => format!(
-            "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered by the criterion alone, {by}; what is \
-             listed is observable by the exact verdict"
+            "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered \
+             by the criterion alone, {by}; what is listed is observable by the exact verdict"
         ),
     });
     out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
@@ -334,12 +353,13 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     let Some(c) = &s.certificate else {
         let why = match s.order_matters {
             _ if s.conditions.accelerometer_bias.is_some() => {
-                "not known: the noise of Z is correlated from position to position, so the information of a scheme is no sum over its positions, and \
-                 no bound is computed"
+                "not known: the noise of Z is correlated from position to position, so the information of a \
+                 scheme is no sum over its positions, and no bound is computed"
                     .into()
             }
             true => format!(
-                "not known: under {} carry the information of a scheme is no sum over its positions, and no bound is computed",
+                "not known: under {} carry the information of a scheme is no sum over its positions, and no \
+                 bound is computed",
                 d.carry
             ),
             false if s.interrupted => "not known: interrupted".into(),
@@ -355,15 +375,16 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     };
     let mut out = vec![
         format!(
-            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of whatever degrees, has a criterion below {bound}; \
-             {first}, of {value}, is {beyond} ({} {:.6} at least)",
+            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of \
+             whatever degrees, has a criterion below {bound}; {first}, of {value}, is {beyond} ({} {:.6} at \
+             least)",
             s.positions,
             if s.criterion == "D" { "D-efficiency" } else { "efficiency, the square of the ratio," },
             (c.efficiency * 1e6).floor() / 1e6
         ),
         format!(
-            "the bound is by optimal weights of the candidates (approximate design theory), as if positions could be divided: those listed would \
-             reach {}, and this way of bounding gives no more",
+            "the bound is by optimal weights of the candidates (approximate design theory), as if positions \
+             could be divided: those listed would reach {}, and this way of bounding gives no more",
             number(c.attained)
         ),
     ];
@@ -373,9 +394,11 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         return out;
     };
     out.push(format!(
-        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}; {first}, of {}, is {} above that, \
-         and what lies between is left open: so few positions may not reach the bound (attitudes that add most are sought on a net; between \
-         its points what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for rounding)",
+        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a \
+         criterion below {}{}; {first}, of {}, is {} above that, and what lies between is left open: so few \
+         positions may not reach the bound (attitudes that add most are sought on a net; between its points \
+         what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for \
+         rounding)",
         s.positions,
         above.bound,
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
@@ -396,27 +419,32 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     match &every.rounded {
         Some(rounded) => {
             out.push(format!(
-                "the candidates are the cardinal attitudes, and those of weights and of schemes near them with angles rounded to {} deg; every \
-                 criterion listed is that of the angles as they are listed",
+                "the candidates are the cardinal attitudes, and those of weights and of schemes near them \
+                 with angles rounded to {} deg; every criterion listed is that of the angles as they are \
+                 listed",
                 rounded.step_deg
             ));
             out.push(match &rounded.finer {
                 Some(finer) => {
                     let cost = Excess::new(first_value(d), finer.value, 0.0);
                     format!(
-                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was found, and here {}, at {}",
+                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was \
+                         found, and here {}, at {}",
                         cost.percent,
                         cost.bound,
                         cost.value,
                         finer.angles.join(" ")
                     )
                 }
-                None => "rounding costs nothing that was found: no better scheme with angles in hundredths of a degree".into(),
+                None => "rounding costs nothing that was found: no better scheme with angles in hundredths \
+                         of a degree"
+                    .into(),
             });
         }
         None if ratio > FAR => out.push(format!(
-            "these candidates cost: weights on other attitudes, as if positions could be divided, would reach a criterion {ratio:.2} times smaller than any scheme of these has \
-             (--candidates free or --refine look for them; so few positions may not come near it)"
+            "these candidates cost: weights on other attitudes, as if positions could be divided, would \
+             reach a criterion {ratio:.2} times smaller than any scheme of these has (--candidates free or \
+             --refine look for them; so few positions may not come near it)"
         )),
         None => {}
     }
@@ -474,7 +502,8 @@ fn minimum(d: &Design) -> Vec<String> {
     out.extend((m.positions.is_some() && !m.proven).then_some(chance));
     if m.counting_bound > 1 {
         out.push(format!(
-            "fewer than {} cannot do: a position adds at most {} independent derivative rows{}, and {} coefficients are required",
+            "fewer than {} cannot do: a position adds at most {} independent derivative rows{}, and {} \
+             coefficients are required",
             m.counting_bound,
             m.rows_per_position,
             if d.carry == Carry::Reset { " besides those that its own psi takes" } else { "" },
@@ -510,7 +539,10 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
             none(&s.drift_noise),
             s.prior.as_ref().map_or_else(
                 || "none".into(),
-                |p| format!("{p} (deg, deg/h, ... as stated; counted in sigmas and the bound, not in what is observable)")
+                |p| format!(
+                    "{p} (deg, deg/h, ... as stated; counted in sigmas and the bound, not in what is \
+                     observable)"
+                )
             )
         ),
         format!(

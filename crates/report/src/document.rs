@@ -351,8 +351,10 @@ mod tests {
         );
         assert_eq!(
             crate::latex::document(&d),
-            "% needs the packages amsmath, booktabs and longtable\n\\paragraph{T}\n\\begin{itemize}\n\\item so\n\\end{itemize}\n\\begin{longtable}{lr}\n\\toprule\nwhat & how many \\\\\n\\midrule\n\\endhead\n\
-             $D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
+            "% needs the packages amsmath, booktabs and longtable\n\\paragraph{T}\n\\begin{itemize}\n\\item \
+             so\n\\end{itemize}\n\\begin{longtable}{lr}\n\\toprule\nwhat & how many \\\\\n\\midrule\n\
+             \\endhead\n$D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\
+             \\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
         );
         let table = crate::table::document(&d, crate::Layout::default());
         let lines: Vec<&str> = table.lines().collect();

@@ -62,8 +62,8 @@ fn turn(t: &GimbalTurn) -> Option<String> {
             deg(*after_deg)
         ),
         (Some(GimbalStop { gimbal: None, at_deg, after_deg }), _) => format!(
-            "cannot be made: after {} deg of it, at beta = {} deg, alpha and gamma would have to turn more than 100 times as fast as the \
-             platform{instead}",
+            "cannot be made: after {} deg of it, at beta = {} deg, alpha and gamma would have to turn more \
+             than 100 times as fast as the platform{instead}",
             deg(*after_deg),
             deg(*at_deg)
         ),
@@ -104,9 +104,11 @@ pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     lines.extend(listed);
     lines.extend(instead.then(|| {
         match report.beyond.is_empty() {
-            true => "Write `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, gamma one after another".into(),
-            false => "Write the angles within the limits (first lines) and `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, \
-                      gamma one after another"
+            true => "Write `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, \
+                     gamma one after another"
+                .into(),
+            false => "Write the angles within the limits (first lines) and `path = \"gimbals\"` in the \
+                      scheme file to turn gimbal by gimbal: alpha, beta, gamma one after another"
                 .into(),
         }
     }));

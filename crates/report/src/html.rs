@@ -120,7 +120,10 @@ fn block(i: usize, part: &Part<'_>) -> Json {
         // in groups, and in parts
         Block::Picture(_) | Block::Fold { .. } => Json::Null,
         Block::Status(boxes) => {
-            let row = |f: &Finding| json!({ "what": f.what, "grade": f.grade.name(), "mark": f.grade.mark(), "text": f.text });
+            let row = |f: &Finding| {
+                let (grade, mark) = (f.grade.name(), f.grade.mark());
+                json!({ "what": f.what, "grade": grade, "mark": mark, "text": f.text })
+            };
             let of = |s: &Status| {
                 let rows: Vec<Json> = s.rows.iter().map(row).collect();
                 json!({ "title": s.title, "rows": rows, "actions": s.actions })
@@ -270,7 +273,8 @@ fn curves(f: &Figure) -> Json {
         add(&l.label, l.color, dash(l), 1.6, &mut l.points.iter().copied());
     }
     json!({
-        "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label), "log_x": f.log, "log_y": f.log || f.log_y,
+        "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label),
+        "log_x": f.log, "log_y": f.log || f.log_y,
         "orders": f.orders, "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })

@@ -31,8 +31,9 @@ pub(crate) fn escape(text: &str) -> String {
 /// A document to be compiled by itself.
 pub(crate) fn alone(d: &Document) -> String {
     format!(
-        "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\\usepackage[margin=15mm]{{geometry}}\n\
-         \\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\\footnotesize\n{}\\end{{document}}\n",
+        "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\
+         \\usepackage[margin=15mm]{{geometry}}\n\\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\
+         \\footnotesize\n{}\\end{{document}}\n",
         escape(&d.title),
         body(d)
     )
@@ -119,7 +120,8 @@ fn body(d: &Document) -> String {
                 out.push_str(&items(lines.iter().map(|l| format!("${}$", l.latex))));
             }
             Block::Picture(p) => out.push_str(&format!(
-                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
+                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,\
+                 keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
                 p.name,
                 escape(&p.caption)
             )),

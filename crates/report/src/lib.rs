@@ -171,7 +171,8 @@ pub enum ReportError {
     Figure(#[from] FigureError),
     /// No typesetter in this build.
     #[error(
-        "this program was built without PDF; build it with `--features pdf`, or write HTML (-o review.html) and print it from a browser"
+        "this program was built without PDF; build it with `--features pdf`, or write HTML (-o review.html) \
+         and print it from a browser"
     )]
     NoPdf,
     /// The typesetter refused.

@@ -253,12 +253,12 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
             .into(),
         match of.attitudes {
             true => {
-                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each position by itself, \
-                 about each platform axis"
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each \
+                 position by itself, about each platform axis"
             }
             false => {
-                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitudes are not computed for rotating \
-                 positions, nor for more than 64"
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitudes are not \
+                 computed for rotating positions, nor for more than 64"
             }
         }
         .into(),
@@ -273,8 +273,8 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
     }
     out.extend(of.correlated_noise.as_ref().map(|c| {
         format!(
-            "the correlated noise of the accelerometers makes the sigmas of drift coefficients {} to {} times as large as the white noise \
-             alone ({}, the most); it is counted in them",
+            "the correlated noise of the accelerometers makes the sigmas of drift coefficients {} to {} \
+             times as large as the white noise alone ({}, the most); it is counted in them",
             number(c.smallest),
             number(c.largest),
             c.unknown
@@ -294,7 +294,8 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
     out.extend(first_lines(silent.collect()));
     if of.priors {
         out.push(
-            "exact changes by silent errors are those by the samples alone: the stated priors hold part of them back, as the figures per unit say"
+            "exact changes by silent errors are those by the samples alone: the stated priors hold part of \
+             them back, as the figures per unit say"
                 .into(),
         );
     }
@@ -379,8 +380,8 @@ pub(crate) fn silent(of: &Omitted) -> String {
 /// What a calibration says of errors that it does not estimate.
 pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     let mut out = vec![format!(
-        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a chance of at most 1 % \
-         where nothing is wrong",
+        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has \
+         a chance of at most 1 % where nothing is wrong",
         of.tried
     )];
     let Some(s) = &of.suspicion else {
@@ -475,7 +476,8 @@ fn change(c: &SuspectedChange, others: usize, with: &str) -> String {
             format!("with any of these, {unknown} is {lowest} {unit}, not {estimate}")
         }
         _ => format!(
-            "with one of these, {unknown} is between {lowest} and {highest} {unit}, by which of them it is, not {estimate}"
+            "with one of these, {unknown} is between {lowest} and {highest} {unit}, by which of them it is, \
+             not {estimate}"
         ),
     }
 }

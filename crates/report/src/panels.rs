@@ -30,7 +30,8 @@ impl Panels {
         let height = self.height;
         self.panels.iter().map(move |p| {
             format!(
-                "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{WIDTH}\" \
+                 height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
                  font-family=\"{FONT}\"><title>{}</title>{}</svg>",
                 escaped(&p.title),
                 p.body
@@ -45,8 +46,9 @@ impl Panels {
         let across = |n: usize, size: f64| n as f64 * (size + GAP) - GAP;
         let (width, height) = (across(columns, WIDTH), across(rows, self.height));
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             font-family=\"{FONT}\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 \
+             {width} {height}\" font-family=\"{FONT}\"><rect width=\"100%\" height=\"100%\" fill=\"white\" \
+             />"
         );
         for (i, p) in self.panels.iter().enumerate() {
             let (x, y) = ((i % columns) as f64 * (WIDTH + GAP), (i / columns) as f64 * (self.height + GAP));

@@ -63,7 +63,8 @@ fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
     if length < 8.0 {
         let _ = write!(
             out,
-            "<circle class=\"tip\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{w}\"{opacity} />"
+            "<circle class=\"tip\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"none\" stroke=\"{color}\" \
+             stroke-width=\"{w}\"{opacity} />"
         );
     } else {
         let [a, b] = [x / length, y / length];
@@ -71,8 +72,9 @@ fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
         let dash = if towards < -1e-9 && !wide { " stroke-dasharray=\"4 3\"" } else { "" };
         let _ = write!(
             out,
-            "<line x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{color}\" stroke-width=\"{w}\"{dash}{opacity} />\
-             <path class=\"tip\" d=\"M{:.2} {:.2}L{:.2} {:.2}L{:.2} {:.2}Z\" fill=\"{color}\"{opacity} />",
+            "<line x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{color}\" \
+             stroke-width=\"{w}\"{dash}{opacity} /><path class=\"tip\" d=\"M{:.2} {:.2}L{:.2} {:.2}L{:.2} \
+             {:.2}Z\" fill=\"{color}\"{opacity} />",
             a * base,
             b * base,
             a * tip,
@@ -108,7 +110,8 @@ fn geographic(out: &mut String) {
         let [a, b] = [x / length, y / length];
         let _ = write!(
             out,
-            "<line data-geographic=\"{name}\" x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{GREY}\" stroke-width=\"1\" />",
+            "<line data-geographic=\"{name}\" x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{GREY}\" \
+             stroke-width=\"1\" />",
             a * (length + 26.0),
             b * (length + 26.0)
         );
@@ -225,8 +228,9 @@ pub(crate) fn caption(poses: &[Pose], latitude_deg: f64, by_default: bool) -> St
     let guessed =
         if guessed { "; how a position is reached is not stated, so the shortest turn is given" } else { "" };
     format!(
-        "The platform at every position{turning}: X_p, Y_p, Z_p in North, Up, East, with a plate across Y_p; wide: g, which is down (the \
-         specific force is up), and \u{3c9}, the earth rate at latitude {latitude_deg} deg{default}; dashed: away from the reader{guessed}"
+        "The platform at every position{turning}: X_p, Y_p, Z_p in North, Up, East, with a plate across Y_p; \
+         wide: g, which is down (the specific force is up), and \u{3c9}, the earth rate at latitude \
+         {latitude_deg} deg{default}; dashed: away from the reader{guessed}"
     )
 }
 

@@ -23,8 +23,10 @@ use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
 /// What a calibration changes of the review of its scheme.
-const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
-    values that the scheme states (of several calibrations those of the last); what is not determined has the values of the scheme.";
+const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
+                          model holds, are of a platform with these estimates in place of the values that \
+                          the scheme states (of several calibrations those of the last); what is not \
+                          determined has the values of the scheme.";
 
 /// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections;
 /// of several the comparison first, and every part folded below it.
@@ -123,12 +125,15 @@ fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
     }
     blocks.push(section(1, "How to check this without obsdeg"));
     let steps = [
-        "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a certificate: a JSON file that proves them.",
-        "obsdeg analyze SCHEME.toml --certificate c.json writes it. The same verdicts give the same bytes, whatever the seed.",
+        "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a \
+         certificate: a JSON file that proves them.",
+        "obsdeg analyze SCHEME.toml --certificate c.json writes it. The same verdicts give the same bytes, \
+         whatever the seed.",
         "The digest below identifies the file: sha256sum c.json.",
-        "python3 tools/verify_certificate.py c.json SCHEME.toml checks it with the standard library of Python alone; obsdeg verify c.json \
-         SCHEME.toml with a crate that shares no code with the engine.",
-        "The chapter Certificates of the book specifies the file and the check, so that you can write a checker of your own.",
+        "python3 tools/verify_certificate.py c.json SCHEME.toml checks it with the standard library of \
+         Python alone; obsdeg verify c.json SCHEME.toml with a crate that shares no code with the engine.",
+        "The chapter Certificates of the book specifies the file and the check, so that you can write a \
+         checker of your own.",
         "Predicted sigmas, the run and the evidence by a filter are not part of a certificate.",
     ];
     blocks.push(Block::list("", steps.map(String::from).to_vec()));
@@ -161,9 +166,9 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
             "are exact and of repositioning at once"
         };
         let text = format!(
-            "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be told apart, formulas and the fewest \
-             positions {exact}; predicted sigmas, requirements and the run are with the slews, by which psi moves and which may determine \
-             more, or less."
+            "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be \
+             told apart, formulas and the fewest positions {exact}; predicted sigmas, requirements and the \
+             run are with the slews, by which psi moves and which may determine more, or less."
         );
         blocks.push(Block::Text(text));
     }
@@ -413,7 +418,12 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
-    blocks.push(Block::table("Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)", [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")], review.sensitivity.iter().map(row)));
+    blocks.push(Block::table(
+        "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where \
+         one is not observable)",
+        [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
+        review.sensitivity.iter().map(row),
+    ));
     blocks.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
     blocks.extend(pictures::latitudes(s, &format!("{id}_latitude")));
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
@@ -424,7 +434,8 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
     let all = s.alternatives.all.as_ref()?;
     Some(match (all.positions, all.never.is_empty()) {
         (Some(k), _) => format!(
-            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
+            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry \
+             (exhaustive search), for instance {}",
             review.carry,
             all.witness.join(", ")
         ),
@@ -446,7 +457,8 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
                 format!("all {k} positions are needed to observe {}", alternatives.required.join(", "))
             }
             Some(k) => format!(
-                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is another question",
+                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
+                 another question",
                 s.positions.len(),
                 kept.witness.join(", "),
                 alternatives.required.join(", ")
@@ -461,8 +473,8 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
     ) {
         let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
         lines.push(format!(
-            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} (optimal weights); the best found has {value}, \
-             at most {percent} above",
+            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} \
+             (optimal weights); the best found has {value}, at most {percent} above",
             alternatives.front_positions,
             number(best.dwell_s),
             alternatives.required.join(", "),

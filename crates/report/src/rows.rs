@@ -106,8 +106,8 @@ impl Chart {
             left + AXIS * ((share - low) / (high - low)).clamp(0.0, 1.0)
         };
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" font-family=\"{FONT}\" font-size=\"11\">\
-             <rect width=\"100%\" height=\"100%\" fill=\"white\" />",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" \
+             font-family=\"{FONT}\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />",
             bottom + 6.0
         );
         for (i, name) in self.series.iter().enumerate() {
@@ -123,7 +123,8 @@ impl Chart {
             let x = at(if self.orders { tick } else { 10f64.powf(tick) });
             let _ = write!(
                 out,
-                "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" stroke-width=\"0.5\" />",
+                "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" \
+                 stroke-width=\"0.5\" />",
                 top - 4.0
             );
             text(&mut out, x, top - 10.0, "middle", &power(tick, self.orders));
@@ -136,7 +137,8 @@ impl Chart {
             if let Some(limit) = row.limit {
                 let _ = write!(
                     out,
-                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" stroke-width=\"2\" />",
+                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" \
+                     stroke-width=\"2\" />",
                     at(limit),
                     y - height / 2.0 + 2.0,
                     y + height / 2.0 - 2.0
@@ -147,7 +149,8 @@ impl Chart {
                 if let Some(threshold) = self.threshold {
                     let _ = write!(
                         out,
-                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" stroke-width=\"2\" />",
+                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" \
+                         stroke-width=\"2\" />",
                         at(threshold),
                         at(x)
                     );
@@ -158,7 +161,8 @@ impl Chart {
         if let Some(threshold) = self.threshold {
             let _ = write!(
                 out,
-                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" stroke-width=\"1.5\" />",
+                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" \
+                 stroke-width=\"1.5\" />",
                 at(threshold),
                 top - 4.0
             );

@@ -137,7 +137,8 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
     match shown.is_empty() {
         true => format!("{}: nothing is cheaper", price(s, f)),
         false => format!(
-            "{}: every set {goal} holds a candidate of {}{more}, since all candidates outside one of these groups fail together{judged}",
+            "{}: every set {goal} holds a candidate of {}{more}, since all candidates outside one of these \
+             groups fail together{judged}",
             price(s, f),
             shown.join(", of ")
         ),
@@ -162,7 +163,8 @@ fn validity(s: &Sensors) -> Vec<String> {
     });
     if !s.closed {
         out.push(format!(
-            "derivatives of some outputs are looked at up to order {} without a proven end: what is not observable is so up to there",
+            "derivatives of some outputs are looked at up to order {} without a proven end: what is not \
+             observable is so up to there",
             s.last_order
         ));
     }

@@ -77,8 +77,8 @@ fn drift_noise(c: &ConditionsReport) -> String {
 pub(crate) fn warning(c: &ConditionsReport) -> Option<String> {
     let step = c.drift_noise_step_s.filter(|_| c.drift_noise_differs)?;
     Some(format!(
-        "warning: the random drift, {} held for one step, was given for steps of {step} s; with the steps here its density is another, {}: \
-         a density in deg/sqrt(h) does not depend on them",
+        "warning: the random drift, {} held for one step, was given for steps of {step} s; with the steps \
+         here its density is another, {}: a density in deg/sqrt(h) does not depend on them",
         c.drift_noise,
         density(c)
     ))
@@ -136,7 +136,11 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
     };
     let mut out = vec![format!("{what}{passes}; {why}")];
     if f.kind != FilterKind::Linear {
-        out.push("verdicts and degrees are those of small angles; what a filter learns beyond them comes of the attitudes that drift reached".into());
+        out.push(
+            "verdicts and degrees are those of small angles; what a filter learns beyond them comes of the \
+             attitudes that drift reached"
+                .into(),
+        );
     }
     if !f.trusted {
         let why = match f.kind {
@@ -144,9 +148,9 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
             _ => "it is linearised before the drifts are known",
         };
         out.push(format!(
-            "do not trust the sigmas of this filter where the small-angle model does not hold, at the truth or within the prior of psi: {why}; \
-             one run that is consistent does not show that they are right; the iterated filter (--filter iterated) is linearised along the \
-             whole run"
+            "do not trust the sigmas of this filter where the small-angle model does not hold, at the truth \
+             or within the prior of psi: {why}; one run that is consistent does not show that they are \
+             right; the iterated filter (--filter iterated) is linearised along the whole run"
         ));
     }
     out
@@ -203,15 +207,18 @@ fn priors(quantities: &[Estimate], filter: FilterKind) -> Vec<String> {
     };
     let mut out: Vec<String> = groups.into_iter().map(line).collect();
     if filter != FilterKind::Linear && !out.is_empty() {
-        let text = "this is said of small angles: with the full attitudes of this filter other priors may bear on these estimates too";
+        let text = "this is said of small angles: with the full attitudes of this filter other priors may \
+                    bear on these estimates too";
         out.push(text.into());
     }
     out
 }
 
 /// Advice where one run is consistent and says little.
-pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the small-angle model does not hold, at the truth or within the prior of psi, and the \
-     filter is not linearised along the whole run. Use the iterated filter (--filter iterated)";
+pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the \
+                                      small-angle model does not hold, at the truth or within the prior of \
+                                      psi, and the filter is not linearised along the whole run. Use the \
+                                      iterated filter (--filter iterated)";
 
 /// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody
 /// states.
@@ -221,7 +228,8 @@ fn lead(s: &Simulation) -> Vec<String> {
     let mut out = vec![format!("{predicted}."), format!("{run}.")];
     if !s.consistency.consistent {
         let whose = if stated::drifts_by_default(&s.conditions) && s.conditions.states_priors() {
-            ", which is the paper's, against the priors that are stated: state the drifts (--value) or leave this run out of account"
+            ", which is the paper's, against the priors that are stated: state the drifts (--value) or leave \
+             this run out of account"
         } else {
             ""
         };
@@ -288,8 +296,8 @@ impl Answer for Simulation {
         }
         let mut consistency = words::consistency(&self.consistency);
         if self.consistency.consistent && !self.filter.trusted {
-            consistency[0] = "this run is consistent with its truth, which says little of this filter (see Filter): the errors of many runs \
-                              decide (obsdeg crosscheck)"
+            consistency[0] = "this run is consistent with its truth, which says little of this filter (see \
+                              Filter): the errors of many runs decide (obsdeg crosscheck)"
                 .into();
         }
         blocks.push(Block::list("Consistency", consistency));

@@ -120,14 +120,16 @@ fn reason(why: RunDiffers, c: &ConditionsReport) -> String {
 pub(crate) fn carry(c: Carry) -> &'static str {
     match c {
         Carry::Platform => {
-            "platform carry: psi goes on unchanged in platform axes from position to position, as in the paper; a platform that is torqued from \
-             one to the next has inertial carry"
+            "platform carry: psi goes on unchanged in platform axes from position to position, as in the \
+             paper; a platform that is torqued from one to the next has inertial carry"
         }
         Carry::Inertial => {
-            "inertial carry: psi goes on in geographic axes from position to position, as on a platform that is torqued from one to the next"
+            "inertial carry: psi goes on in geographic axes from position to position, as on a platform that \
+             is torqued from one to the next"
         }
         Carry::Reset => {
-            "reset carry: the platform is levelled and aligned anew at every position, so that each has a psi of its own"
+            "reset carry: the platform is levelled and aligned anew at every position, so that each has a \
+             psi of its own"
         }
     }
 }
@@ -194,8 +196,14 @@ pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementRepo
     said.dedup();
     match said.len() {
         1 => said.remove(0),
-        _ if all.iter().any(|m| m.bench.is_some()) => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end; worst sigma: of schemes with a bench the total uncertainty".into(),
-        _ => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end".into(),
+        _ if all.iter().any(|m| m.bench.is_some()) => "sigma: information of all samples, with the priors \
+                                                       and the random drift that each scheme states; psi at \
+                                                       the end; worst sigma: of schemes with a bench the \
+                                                       total uncertainty"
+            .into(),
+        _ => "sigma: information of all samples, with the priors and the random drift that each scheme \
+              states; psi at the end"
+            .into(),
     }
 }
 
@@ -283,9 +291,9 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         || "repositioning at once unless a position says otherwise".into(),
         |r| {
             format!(
-                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, accuracy orders and ranks: of \
-                 repositioning at once, with torquer errors of turns fast against the earth rate; what has a sigma: with the slews, in \
-                 floating point)"
+                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, \
+                 accuracy orders and ranks: of repositioning at once, with torquer errors of turns fast \
+                 against the earth rate; what has a sigma: with the slews, in floating point)"
             )
         },
     );

@@ -14,14 +14,17 @@ const LISTED: usize = 20;
 fn finding(f: &SystemFinding) -> String {
     match f {
         SystemFinding::Interrupted => {
-            "interrupted: the estimates are where the best iteration was then, from the starts that were tried so far".into()
+            "interrupted: the estimates are where the best iteration was then, from the starts that were \
+             tried so far"
+                .into()
         }
         SystemFinding::NotSettled => {
             "no start settled: the estimates are where the iteration was given up".into()
         }
         SystemFinding::Noise { chi_square, factor } if *factor >= 1.0 => {
             format!(
-                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small, or the model leaves something out",
+                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small, or the \
+                 model leaves something out",
                 number(*chi_square)
             )
         }
@@ -31,7 +34,8 @@ fn finding(f: &SystemFinding) -> String {
             1.0 / factor
         ),
         SystemFinding::Correlated { output, probability } => format!(
-            "the residuals of {output} are not independent of each other (probability {}): the model leaves something out, or sigmas are too small",
+            "the residuals of {output} are not independent of each other (probability {}): the model leaves \
+             something out, or sigmas are too small",
             number(*probability)
         ),
         SystemFinding::Outlier { output, line, sigmas } => {
@@ -125,7 +129,8 @@ impl Answer for SystemCalibration {
         )];
         if self.starts.0 < self.starts_at_most {
             fit.push(format!(
-                "{} of {} starts were made: no other solution was to be expected by then (Boender and Rinnooy Kan 1987)",
+                "{} of {} starts were made: no other solution was to be expected by then (Boender and \
+                 Rinnooy Kan 1987)",
                 self.starts.0, self.starts_at_most
             ));
         }
@@ -166,7 +171,8 @@ impl Answer for SystemCalibration {
             ]
         });
         blocks.push(Block::table(
-            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as all others have it)",
+            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as \
+             all others have it)",
             columns,
             rows,
         ));
@@ -189,22 +195,32 @@ impl Answer for SystemCalibration {
         }
         let mut read: Vec<String> = Vec::new();
         read.extend(self.intervals.map(|n| {
-            format!("{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of its samples", self.samples)
+            format!(
+                "{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of \
+                 its samples",
+                self.samples
+            )
         }));
         read.push(format!(
-            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} times the usual steps of integration; seed {}",
+            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} \
+             times the usual steps of integration; seed {}",
             self.rows, self.substeps, self.seed
         ));
         if let Some(t) = self.begins {
             read.push(format!(
-                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with its first row"
+                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with \
+                 its first row"
             ));
         }
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
         }
         if self.shared {
-            read.push("the calibration before rests on the same record, by another model: what both models take of it counts twice".into());
+            read.push(
+                "the calibration before rests on the same record, by another model: what both models take of \
+                 it counts twice"
+                    .into(),
+            );
         }
         blocks.push(Block::list("Read", read));
         Document { title: format!("Calibration: {}", self.name), lead, blocks }

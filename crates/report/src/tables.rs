@@ -189,7 +189,10 @@ mod tests {
             "rank": [1, 2],
             "at": { "latitude_deg": 28.2, "by": null },
             "schemes": [
-                { "name": "a", "worst": null, "missed": [], "quantities": [{ "name": "x", "sigma": 1.5e-300 }, { "name": "y", "degree": 2 }] },
+                {
+                    "name": "a", "worst": null, "missed": [],
+                    "quantities": [{ "name": "x", "sigma": 1.5e-300 }, { "name": "y", "degree": 2 }],
+                },
                 { "name": "b", "worst": { "name": "x" }, "quantities": [{ "name": "x", "sigma": null }] },
             ],
             "null_space": [[{ "name": "x" }], [{ "name": "y" }]],

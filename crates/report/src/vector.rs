@@ -182,8 +182,9 @@ mod tests {
 
     #[test]
     fn a_picture_is_one_page_of_outlines() {
-        let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='40' height='20'><rect x='0' y='0' width='40' height='20' fill='#fff' opacity='0.5'/>\
-                   <text x='2' y='12' font-family='DejaVu Sans' font-size='10'>so</text></svg>";
+        let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='40' height='20'><rect x='0' y='0' \
+                   width='40' height='20' fill='#fff' opacity='0.5'/><text x='2' y='12' font-family='DejaVu \
+                   Sans' font-size='10'>so</text></svg>";
         let bytes = pdf(svg).expect("an SVG");
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.starts_with("%PDF-1.7") && text.contains("/MediaBox [0 0 30 15]"), "{text}");

@@ -173,8 +173,9 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
     let mut out: Vec<String> = a.carries.iter().map(line).collect();
     if a.carries.iter().flat_map(|c| &c.differs).any(|d| d.name.contains('@')) {
         out.push(
-            "psi of one position (psi_x@2) is an unknown of reset carry alone: under the other carry the same quantity, psi in the axes of c \
-             where that position begins, is judged as a combination of its unknowns"
+            "psi of one position (psi_x@2) is an unknown of reset carry alone: under the other carry the \
+             same quantity, psi in the axes of c where that position begins, is judged as a combination of \
+             its unknowns"
                 .into(),
         );
     }
@@ -221,7 +222,8 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
             "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
         }
         (Frame::N, true) => {
-            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; primes are time derivatives"
+            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; \
+             primes are time derivatives"
         }
         (Frame::Platform, false) => {
             "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives"
@@ -248,35 +250,38 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         let inputs = ["X", "Y", "Z"].iter().zip(a.geometry.accelerometers.inputs());
         let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
         out.push(format!(
-            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific force f = -g",
+            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific \
+             force f = -g",
             inputs.join(", ")
         ));
     }
     if has(Source::Rate) {
         out.push(
-            "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, GM_XY that of gyro X times the \
-             torqued rate along the input axis of gyro Y; at a position that is the earth rate, in a rotation that of the turn besides"
+            "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, \
+             GM_XY that of gyro X times the torqued rate along the input axis of gyro Y; at a position that \
+             is the earth rate, in a rotation that of the turn besides"
                 .into(),
         );
     }
     if a.positions.iter().any(|p| !p.turns.is_empty()) {
         out.push(
-            "on the way to a position the torqued rate is that of the slew, fast against the earth rate: the listed turns leave torquer errors \
-             in psi^n, with pi as a number of its own"
+            "on the way to a position the torqued rate is that of the slew, fast against the earth rate: the \
+             listed turns leave torquer errors in psi^n, with pi as a number of its own"
                 .into(),
         );
     }
     let turns = a.positions.iter().any(|p| p.rotation.is_some());
     if turns && has_others {
         out.push(
-            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these errors share: at almost any rate; psi in n \
-             moves in it, by drift and by what torquer errors leave"
+            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these \
+             errors share: at almost any rate; psi in n moves in it, by drift and by what torquer errors \
+             leave"
                 .into(),
         );
     } else if turns {
         out.push(
-            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
-             goes on through it"
+            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric \
+             polynomials of degree m); psi in n goes on through it"
                 .into(),
         );
     }
@@ -286,8 +291,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
         let rate = s.rate.as_deref().unwrap_or_default();
         out.push(format!(
-            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: derivatives of Z there are those of the \
-             turning platform, and {rate} is the rate of that angle in rad/s",
+            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: \
+             derivatives of Z there are those of the turning platform, and {rate} is the rate of that angle \
+             in rad/s",
             s.label, s.position
         ));
     }
@@ -301,7 +307,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     }
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
         out.push(
-            "solutions take psi as it is carried from station to station: what the dwells change in it is not in them".into(),
+            "solutions take psi as it is carried from station to station: what the dwells change in it is \
+             not in them"
+                .into(),
         );
     }
     if a.measured_azimuth {
@@ -441,8 +449,8 @@ pub(crate) fn loci(loci: &[obsdeg_core::solution::Locus]) -> String {
         false => "a determinant vanishes there, and",
     };
     format!(
-        "({held} at a random point of each, in two prime fields, ranks or verdicts differ from those above; what needs two equations at \
-         once is not sought; degrees that are not whole are rounded)"
+        "({held} at a random point of each, in two prime fields, ranks or verdicts differ from those above; \
+         what needs two equations at once is not sought; degrees that are not whole are rounded)"
     )
 }
 
@@ -530,7 +538,8 @@ fn left_out(c: &Consistency) -> String {
     match c.unresolved_directions {
         0 => held,
         k => format!(
-            "{held}; without {} that are not resolvable: the filter claims to know them more than a million times better than any unknown",
+            "{held}; without {} that are not resolvable: the filter claims to know them more than a million \
+             times better than any unknown",
             directions(k)
         ),
     }
@@ -584,7 +593,8 @@ pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
     let states = if g.rate_random_walk_dph_sqrt_h.is_none() && g.bias_instability_dph.is_none() {
         ""
     } else {
-        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the start of the run"
+        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the \
+         start of the run"
     };
     format!("gyros (X, Y, Z where they differ): {}{markov}{states}", parts.join(", "))
 }
@@ -604,11 +614,13 @@ pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
 
 /// What a noise floor is.
 pub(crate) const FLOOR_MEANS: [&str; 3] = [
-    "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and random drift: now, and the least over all dwells \
-     in proportion to these",
-    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the least; the shortest: of those \
-     looked at, so that shorter ones may do as well or better; still falls: not before a quarter of the longest",
-    "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes its bias away from there",
+    "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and \
+     random drift: now, and the least over all dwells in proportion to these",
+    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the \
+     least; the shortest: of those looked at, so that shorter ones may do as well or better; still falls: \
+     not before a quarter of the longest",
+    "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes \
+     its bias away from there",
 ];
 
 /// Of which dwells and of what noise.

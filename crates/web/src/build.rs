@@ -38,7 +38,8 @@ pub(crate) enum BuildError {
     File { path: String, reason: std::io::Error },
     /// The compiler, which has said more.
     #[error(
-        "the engine was not compiled; expected the target wasm32-unknown-unknown (rustup target add wasm32-unknown-unknown)"
+        "the engine was not compiled; expected the target wasm32-unknown-unknown (rustup target add \
+         wasm32-unknown-unknown)"
     )]
     Compiler,
     /// The glue between script and engine.

@@ -468,7 +468,8 @@ mod tests {
     #[test]
     fn terms_of_one_coefficient_share_a_bracket() {
         let terms = [["-wU/2", "Z1", "p1"], ["wU/2", "Z1", "p2"], ["-1", "Z3''", "p1"], ["1", "Z3'", "p2"]];
-        let math = "-\\frac{\\omega_U}{2}\\,(Z_{1}(\\text{p1}) - Z_{1}(\\text{p2})) - \\ddot{Z}_{3}(\\text{p1}) + \\dot{Z}_{3}(\\text{p2})";
+        let math = "-\\frac{\\omega_U}{2}\\,(Z_{1}(\\text{p1}) - Z_{1}(\\text{p2})) - \
+                    \\ddot{Z}_{3}(\\text{p1}) + \\dot{Z}_{3}(\\text{p2})";
         assert_eq!(solution_of(&terms), math);
         assert_eq!(solution_of(&[["a - b", "Z1", "p1"]]), "(a - b)\\,Z_{1}(\\text{p1})");
         assert_eq!(solution_of(&[]), "0");

@@ -21,7 +21,11 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
         Block::Picture(Picture {
             name: format!("{id}_estimates_{}", i + 1),
-            caption: format!("Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a requirement is stated", figure.title),
+            caption: format!(
+                "Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a \
+                 requirement is stated",
+                figure.title
+            ),
             drawing: Drawing::Still(figure.svg()),
         })
     }));
@@ -36,7 +40,8 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
         ));
         if s.allan.len() > 1 {
             let caption = format!(
-                "Allan deviation of the residuals of {what}{of}: white noise falls with the root of the cluster time; a rise is an error outside the model"
+                "Allan deviation of the residuals of {what}{of}: white noise falls with the root of the \
+                 cluster time; a rise is an error outside the model"
             );
             out.push(curves(name("allan"), caption, allan_figure(s)));
         }

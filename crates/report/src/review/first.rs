@@ -71,7 +71,9 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
         series: Vec::new(),
         rows: s.analysis.quantities.iter().take(ROWS).map(row).collect(),
     };
-    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met by prediction, and a ring is missed".to_string();
+    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met \
+                   by prediction, and a ring is missed"
+        .to_string();
     chart(&format!("{id}_margins"), caption, picture, s.analysis.quantities.len())
 }
 
@@ -158,7 +160,8 @@ fn choice(r: &DesignReview) -> (Grade, String) {
                 seconds(s.total_s)
             ),
             (n, k) => format!(
-                "of {n} that meet every requirement by prediction, {k} of them equally short, the one with the largest worst margin"
+                "of {n} that meet every requirement by prediction, {k} of them equally short, the one with \
+                 the largest worst margin"
             ),
         };
         let doubts = doubts(&r.schemes[best]);

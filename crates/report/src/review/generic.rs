@@ -22,8 +22,9 @@ fn verdict(g: &GenericReview) -> String {
         format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
     });
     format!(
-        "{} of {} unknowns are observable for {}{how}, but for angles on which verdicts change: those that were found are below. Without numbers for \
-         the angles there are no predicted sigmas, no requirements and no evidence by a filter.",
+        "{} of {} unknowns are observable for {}{how}, but for angles on which verdicts change: those that \
+         were found are below. Without numbers for the angles there are no predicted sigmas, no requirements \
+         and no evidence by a filter.",
         seen.len(),
         a.quantities.len(),
         any(g)

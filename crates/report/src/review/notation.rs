@@ -18,7 +18,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ],
     [
         "psi",
-        "misalignment of the computed platform from the true one; psi_x, psi_y, psi_z along the axes that the carry names",
+        "misalignment of the computed platform from the true one; psi_x, psi_y, psi_z along the axes that \
+         the carry names",
         "rad; deg in tables",
         "(1), (2)",
     ],
@@ -33,13 +34,15 @@ const SCHEMES: [[&str; 4]; 15] = [
     ["wN, wU", "earth rate to the North and up: w_ie cos and w_ie sin of the latitude", "rad/s", "(2)"],
     [
         "Z, Z', Z''",
-        "observation -[g^c x] psi and its derivatives by time; Z1, Z2, Z3 along x, y, z of n unless it is said otherwise; Z@p2: at position p2",
+        "observation -[g^c x] psi and its derivatives by time; Z1, Z2, Z3 along x, y, z of n unless it is \
+         said otherwise; Z@p2: at position p2",
         "g",
         "(6), (12)",
     ],
     [
         "degree",
-        "observable degree: the highest derivative of Z that a solution needs; 0 is best, every derivative amplifies noise",
+        "observable degree: the highest derivative of Z that a solution needs; 0 is best, every derivative \
+         amplifies noise",
         "-",
         "(13) to (18)",
     ],
@@ -64,7 +67,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ["not excited", "no derivative of Z changes with it at any of the positions", "-", "-"],
     [
         "sigma",
-        "standard deviation; predicted: by the information of all samples of Z, with the priors and the random drift that are stated",
+        "standard deviation; predicted: by the information of all samples of Z, with the priors and the \
+         random drift that are stated",
         "as the unknown",
         "-",
     ],
@@ -76,7 +80,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ],
     [
         "NEES, NIS",
-        "squares of errors and of innovations over what the filter believes of them: about their number where it is right",
+        "squares of errors and of innovations over what the filter believes of them: about their number \
+         where it is right",
         "-",
         "-",
     ],

@@ -133,7 +133,8 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
     let svg = heat("Excitation", &rows, positions, values, 0.0);
     map(
         name,
-        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 blank, 1 blue; a torquer by the earth rate)",
+        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 blank, 1 blue; a \
+         torquer by the earth rate)",
         svg,
     )
 }
@@ -173,7 +174,8 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
         ..Figure::default()
     };
     let caption = format!(
-        "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is not observable"
+        "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is \
+         not observable"
     );
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
@@ -248,9 +250,11 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         log: true,
         ..Figure::default()
     };
-    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
-                   dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most (twelve under reset carry), for \
-                   the same coefficients; under reset carry with the bound that no scheme of as many cardinal attitudes in equal dwells crosses";
+    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme \
+                   determines: the scheme at other dwells, and the Pareto front (at six dwells) of schemes \
+                   of as many cardinal attitudes, five at most (twelve under reset carry), for the same \
+                   coefficients; under reset carry with the bound that no scheme of as many cardinal \
+                   attitudes in equal dwells crosses";
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 

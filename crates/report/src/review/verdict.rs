@@ -23,8 +23,8 @@ fn small_angles(s: &SchemeReview) -> Option<String> {
     let v = &s.simulation.validity;
     (!v.holds).then(|| {
         format!(
-            "the small-angle model does NOT hold for {}: |psi| reaches {} deg, which leaves out {} times the noise of Z and {} deg/h of \
-             drift",
+            "the small-angle model does NOT hold for {}: |psi| reaches {} deg, which leaves out {} times the \
+             noise of Z and {} deg/h of drift",
             stated::drifts(&s.simulation.conditions),
             number(v.largest_psi_deg),
             number(v.neglected_g / v.accelerometer_noise_g),
@@ -134,7 +134,8 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         (n, true) if n == all => format!("The scheme determines every one of the {all} {what}"),
         (n, true) => format!("The scheme determines {n} of the {all} {what}"),
         (n, false) => format!(
-            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with {}, during which psi moves",
+            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with {}, during \
+             which psi moves",
             with_dwell.len(),
             dwell_or_slews(s)
         ),
@@ -248,7 +249,9 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
                 match (consistency.consistent, s.simulation.filter.trusted) {
                     (true, true) => "consistent with its truth".into(),
                     (true, false) => {
-                        "consistent with its truth, which says little: its sigmas are not to be trusted at these drifts".into()
+                        "consistent with its truth, which says little: its sigmas are not to be trusted at \
+                         these drifts"
+                            .into()
                     }
                     (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
                 },
