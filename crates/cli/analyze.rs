@@ -76,7 +76,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
         [(_, Input::Model(_))] => "judging the model",
         _ => "solving symbolically (--solutions off leaves it out)",
     };
-    // what has no certificate says so before anything is solved or written
+    // fails for a scheme or model without a certificate before anything is solved or written
     let certificate =
         a.certificate.as_ref().map(|path| Ok::<_, Failure>((path, certificate(&a.asked, &read)?)));
     let certificate = certificate.transpose()?;
@@ -106,7 +106,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The verdicts without solutions, a line each: what is said while the engine is waited for.
+/// Verdicts without solutions, one line each; printed while another process uses the symbolic engine.
 fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> Meanwhile {
     let asked = Analyze { solutions: false, formulas: false, ..asked.clone() };
     let read = Arc::clone(read);

@@ -1,4 +1,4 @@
-//! `obsdeg calibrate`: what a scheme determines, from the record of its run.
+//! `obsdeg calibrate`: estimates of what a scheme or model determines, from records of its runs.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -70,7 +70,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say here.
+/// Help of shared options for `calibrate`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.help("Write calibration, coefficients, residuals and figures to a folder"),
@@ -107,7 +107,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The scheme or the model, with its file, and the records of its runs.
+    /// Scheme or model file, and the paths of the records of its runs.
     fn read(&self) -> Result<(Source, &[PathBuf]), Failure> {
         self.check_kinds()?;
         let (source, records) = if let Some(path) = &self.model {
@@ -129,7 +129,8 @@ impl Arguments {
         }
     }
 
-    /// Refuses files in the place of others, with the command in the right order where it can be told.
+    /// Refuses a file of the wrong kind; if the order of the files is wrong, the message shows the right
+    /// command.
     fn check_kinds(&self) -> Result<(), Failure> {
         let given = self.model.as_ref().or(self.scheme.as_ref());
         let (first, records) = match (given, &self.files[..]) {

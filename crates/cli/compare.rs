@@ -36,11 +36,11 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say here.
+/// Help of shared options for `compare`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "files" => arg.help("Scheme files (TOML); - is stdin"),
-        // one is refused, with where it can be judged
+        // `--model` is refused; the message names the command that judges models
         "model" => arg.hide(true),
         "carry" => arg.help("What is carried between positions, for all schemes"),
         "latitude" => arg.help("Latitude in degrees, for all schemes (default: that of the file, or 28.2)"),

@@ -82,7 +82,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say and need here.
+/// Help and conflicts of shared options for `design`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "latitude" => arg.help("Latitude in degrees (default: 28.2)"),
@@ -122,7 +122,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     match designed? {
         Designed::Schemes(mut found) => {
             if let (Some(path), Some(file)) = (&a.certificate, found.take_certificate()) {
-                // its question, its best sequences and its cover; blocks are for those who doubt
+                // checks the question, the best sequences and the cover, but searches no block again
                 let replay = Replay { blocks: Some(0), seed: Some(0) };
                 if let Err(refused) = verify_with(&file.bytes, None, &replay) {
                     return Err(Failure::input(format!("no certificate: its check refuses it ({refused})")));
@@ -145,7 +145,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Writes a part to its file, whole or interrupted, and says which; and which options act later.
+/// Writes a complete or interrupted part to its file; says so, and names the options that act at the merge
+/// only.
 fn write_part(part: &Part, Arguments { asked, output, .. }: &Arguments) -> Result<(), Failure> {
     let text = serde_json::to_string(part).map_err(|e| Failure::internal(e.to_string()))?;
     output.target.replace(format!("{text}\n").as_bytes())?;

@@ -1,4 +1,4 @@
-//! The symbolic engine as the commands use it.
+//! The symbolic engine for the commands: limits, messages while waiting, licence notice.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use obsdeg_symbolic::{Waiting, Worker, WorkerConfig, WorkerError};
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
 
-/// How much the engine may do.
+/// Limits of the symbolic engine: work, and waiting time.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Solutions")]
 pub(crate) struct EngineArguments {
@@ -28,8 +28,8 @@ pub(crate) struct EngineArguments {
 }
 
 impl EngineArguments {
-    /// The symbolic engine in a process of its own, if this build has one; nothing starts yet. `meanwhile`
-    /// gives what can be said while others hold it.
+    /// The symbolic engine in a process of its own, `None` if this build has none; nothing starts yet.
+    /// `meanwhile` gives the verdicts to print while another process holds the engine.
     pub(crate) fn worker(&self, quiet: bool, meanwhile: Meanwhile) -> Result<Option<Worker>, Failure> {
         if !cfg!(feature = "symbolica") {
             return Ok(None);
@@ -49,8 +49,8 @@ impl EngineArguments {
         })))
     }
 
-    /// What `work` finds with the engine, with a sign of life, and what the engine says of itself; then the
-    /// next process may have it.
+    /// Result of `work` with the engine, which is then free for the next process. Shows a spinner, then the
+    /// notice of the engine.
     pub(crate) fn lend<T>(
         &self,
         message: &'static str,
@@ -70,8 +70,8 @@ impl EngineArguments {
     }
 }
 
-/// Names on stderr the parts of the answer that are missing without the engine, and how to get them; quiet or
-/// not.
+/// Names on stderr the parts of the answer that are missing without the engine, and how to get them;
+/// `--quiet` does not suppress this.
 pub(crate) fn say_busy(worker: &Worker) {
     let why = match worker.failure() {
         Some(WorkerError::Busy { seconds: 0 }) => {
@@ -92,10 +92,10 @@ pub(crate) fn say_busy(worker: &Worker) {
     ));
 }
 
-/// Verdicts that need no engine, line by line: asked for once, when the wait for it has lasted a second.
+/// Verdicts that need no engine, one per line; called once, after the wait for the engine has lasted 1 s.
 pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 
-/// Says that the engine is waited for, at most how many seconds, and the verdicts, which need none.
+/// Says on stderr that the command waits for the engine, at most `wait` s, and prints the verdicts.
 fn say_waiting(wait: u64, meanwhile: &[String]) {
     eprintln!(
         "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once \
@@ -109,7 +109,7 @@ fn say_waiting(wait: u64, meanwhile: &[String]) {
     }
 }
 
-/// The banner of the engine is its licence notice: whole, and after the answer.
+/// Prints the banner of the engine, its licence notice, unabridged and after the answer.
 pub(crate) fn notice(banner: &[String], quiet: bool) {
     for line in banner.iter().filter(|_| !quiet) {
         say(line);

@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     engine: EngineArguments,
 }
 
-/// What shared options say here.
+/// Help of shared options for `report`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.required(true).help("The file to be written"),
@@ -110,7 +110,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.met.decide(reviewed.requirements())
 }
 
-/// A calibration, and what it is called: its folder.
+/// Reads a calibration; its name is that of its folder.
 fn calibration(path: &Path) -> Result<CalibrationFile, Failure> {
     let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
     let named = if path.is_dir() { Some(path) } else { path.parent() };
@@ -118,7 +118,7 @@ fn calibration(path: &Path) -> Result<CalibrationFile, Failure> {
     Ok(CalibrationFile { name, source: read(&file, "calibration")? })
 }
 
-/// The format that is asked for, or that of the file's ending.
+/// The requested format, or the format of the file's ending.
 fn format(asked: Option<ReviewFormat>, path: &Path) -> Result<ReviewFormat, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let by_ending = match ending.as_deref() {

@@ -98,14 +98,14 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     };
     let name = a.kind.to_possible_value();
     let name = name.as_ref().map_or("", |v| v.get_name());
-    // layouts of which keys have changed since the first
+    // version 2: layouts whose keys have changed since version 1
     let version = if ["comparison", "design", "part", "simulation"].contains(&name) { 2 } else { 1 };
     schema.insert("$id".into(), format!("urn:obsdeg:{name}:{version}").into());
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
     output::print((text + "\n").as_bytes())
 }
 
-/// The schema of what is written: what is left out there may be missing.
+/// Schema of written JSON: keys that the program may leave out are not required.
 fn written<T: JsonSchema>() -> Schema {
     SchemaSettings::default().for_serialize().into_generator().into_root_schema_for::<T>()
 }
