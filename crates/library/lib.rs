@@ -1,9 +1,8 @@
 //! Which unknowns of a system can be solved from its output, and how many derivatives does each need?
 //!
-//! The front door of obsdeg: a scheme or a model goes in, an answer comes out. An answer is plain data, the
-//! same that the program writes as JSON. What stands behind it (the crates `obsdeg-core`, `obsdeg-evidence`,
-//! `obsdeg-design`, `obsdeg-calibration`) may change its modules from version to version; the names here
-//! stay.
+//! Every function takes a scheme or a model and returns an answer. An answer is plain data, with the same
+//! content as the program's JSON. The crates behind it (`obsdeg-core`, `obsdeg-evidence`, `obsdeg-design`,
+//! `obsdeg-calibration`) may change their modules from version to version; the names here stay.
 //!
 //! | question | function | answer |
 //! | --- | --- | --- |
@@ -105,7 +104,7 @@ pub use obsdeg_evidence::compare::{Comparison, Entry as Compared, compare};
 pub use obsdeg_evidence::crosscheck::{CrossCheck, CrossCheckOptions, crosscheck};
 pub use obsdeg_evidence::simulation::{Conditions, Simulation, simulate};
 
-/// Errors of the functions of this crate; each names the place, what was expected and what was found.
+/// Errors of this crate's functions; each names the place, the expected and the found.
 pub mod error {
     pub use obsdeg_calibration::{CalibrationError, SystemCalibrationError as ModelCalibrationError};
     pub use obsdeg_core::analysis::AnalysisError;
