@@ -1,4 +1,4 @@
-//! A calibration from recorded data.
+//! Documents, tables and CSV of a calibration from recorded data.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
@@ -9,10 +9,10 @@ use obsdeg_calibration::answer::{
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::{Answer, ReportError, Table, omitted, stated, words};
 
-/// How many outliers are listed.
+/// Largest number of listed outliers.
 const LISTED: usize = 20;
 
-/// A factor of sigma in words.
+/// Sentence part on sigmas that are wrong by a factor.
 fn sigmas(factor: f64) -> String {
     if factor >= 1.0 {
         format!("sigmas are {factor:.2} times too small")
@@ -21,12 +21,12 @@ fn sigmas(factor: f64) -> String {
     }
 }
 
-/// ` of FILE`, where there are several records.
+/// ` of FILE` if there are several records, else empty.
 fn of(record: &str, records: &[RecordReport]) -> String {
     if records.len() > 1 { format!(" of {record}") } else { String::new() }
 }
 
-/// What one axis is off by.
+/// Error of one axis that explains the lengths of the specific force.
 fn cause(c: &ForceCause) -> String {
     let besides = c.besides.map_or_else(String::new, |b| {
         format!(", beside {} too long at all positions alike (scale or gravity)", number(b))
@@ -46,22 +46,22 @@ fn cause(c: &ForceCause) -> String {
     }
 }
 
-/// A part by which a clock is fast.
+/// Relative rate error of a clock in percent, with `fast` or `slow`.
 fn part(fast: f64) -> String {
     format!("{:.2} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
 }
 
-/// From this part on an error of the clock is large.
+/// Relative rate error from which a clock error is large.
 const CLOCK: f64 = 0.1;
 
-/// True if durations and rates tell of the same clock: a quarter of its error is what drifts that follow take
-/// of it.
+/// True if durations and rates show the same clock. Drifts that follow the clock take up a quarter of its
+/// error, so the two may differ by that.
 pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
     let both = by_durations.zip(by_earth);
     both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
 }
 
-/// What is known of the clock of a record.
+/// Sentence on the offset and the rate of a record's clock.
 fn clock(c: &Clock) -> String {
     let begins = match (c.offset_s, c.offset_sigma_s) {
         (Some(at), Some(sigma)) => format!(
@@ -75,7 +75,7 @@ fn clock(c: &Clock) -> String {
     format!("{begins}{}", rates(c))
 }
 
-/// What is known of the rate of the clock of a record.
+/// Sentence on the rate of a record's clock.
 fn rates(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
@@ -229,8 +229,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// Sentence that no estimate stands at the drifts of the record, with which nothing is wrong then; `None` if
-/// estimates stand.
+/// Sentence that the record leaves all unknowns open at its drifts, so that no estimate is given; `None` if
+/// estimates are given. Nothing else is wrong with such a record.
 fn left_open(c: &Calibration) -> Option<String> {
     if !c.quantities.iter().chain(&c.combinations).any(|e| e.left_open) {
         return None;
@@ -254,10 +254,10 @@ fn left_open(c: &Calibration) -> Option<String> {
     ))
 }
 
-/// From this factor of sigma on, what is left open shows.
+/// Factor of sigma from which the effect of unknowns that are left open is printed.
 const HELD: f64 = 1.05;
 
-/// Why there is no estimate, or what is to be said of it.
+/// Verdict on an unknown: the source of its estimate, or the reason why there is none.
 fn verdict(e: &Estimated) -> String {
     let bent = e.open_sigma.filter(|_| e.determined && e.held_factor.is_some_and(|f| f > HELD));
     match (e.determined, e.degree) {
@@ -297,7 +297,7 @@ fn row(e: &Estimated, totals: bool) -> Vec<String> {
     out
 }
 
-/// The column of the force among those of a position.
+/// Index of the specific force among the columns of a position.
 const FORCE: usize = 4;
 
 fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> {
@@ -317,10 +317,10 @@ fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> 
     out
 }
 
-/// Most gaps that are listed.
+/// Largest number of listed gaps.
 const GAPS: usize = 5;
 
-/// Where rows are missing, the longest first, in the order of time.
+/// The longest gaps between rows, in the order of time; `None` without gaps.
 pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
     let mut all: Vec<&Gap> = of.iter().collect();
     let length = |g: &Gap| g.to_s - g.from_s;
@@ -346,7 +346,7 @@ pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
     (!each.is_empty()).then(|| format!("rows are missing for {}{more}", each.join(", ")))
 }
 
-/// What says where samples were taken.
+/// Source of the times at which positions begin and end.
 pub(crate) fn by_what(by: PositionsBy) -> &'static str {
     match by {
         PositionsBy::Labels => {
@@ -363,7 +363,7 @@ pub(crate) fn by_what(by: PositionsBy) -> &'static str {
     }
 }
 
-/// What was read, a sentence for each record.
+/// Sentence on each record: its rows, times and positions.
 fn records(c: &Calibration) -> Vec<String> {
     let of = |r: &RecordReport| {
         let mut out = format!(
@@ -434,7 +434,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// The moment whose psi is estimated.
+/// Time at which the estimated psi holds.
 fn moment(records: &[RecordReport]) -> String {
     let by_rows = |r: &RecordReport| matches!(r.positions_by, PositionsBy::Labels | PositionsBy::Static);
     let start = "the start of the scheme's first position";
@@ -477,7 +477,7 @@ fn next_run(n: &NextRun) -> String {
     }
 }
 
-/// The mode of the estimates: data alone or priors as stated, the box of what is left open and its effect,
+/// Mode of the estimates: data alone or with stated priors, the unknowns that are left open and their effect,
 /// the curvature.
 fn mode(c: &Calibration) -> Vec<String> {
     let listed = |of: &[(String, f64, String)]| {
@@ -531,7 +531,7 @@ fn mode(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// A difference that is rounding alone has no digits.
+/// Number, at least 1e-9: smaller differences are rounding.
 fn rounding(x: f64) -> String {
     if x < 1e-9 { "1e-9".into() } else { number(x) }
 }
@@ -540,7 +540,7 @@ fn is_whole(x: f64) -> bool {
     (x - x.round()).abs() < 0.05
 }
 
-/// With a tenth where there is one.
+/// Number with one decimal, or without if that is zero.
 pub(crate) fn tenths(x: f64) -> String {
     if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
 }
@@ -585,7 +585,7 @@ fn fit(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// The conditions that nobody states, which sigmas and requirements rest on; `None` where all are stated.
+/// Conditions that are not stated but affect sigmas and requirements; `None` if all are stated.
 fn by_default(a: &Assumed) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", a.latitude_deg),
@@ -732,25 +732,24 @@ impl Answer for Calibration {
         }
     }
 
-    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
+    /// Lists of the JSON, then coefficients and covariance of all estimates.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Unknowns and combinations.
+    /// Table of unknowns and combinations.
     fn main_table(&self) -> &'static str {
         COEFFICIENTS
     }
 }
 
-/// The table of unknowns and combinations.
+/// Name of the table of unknowns and combinations.
 pub(crate) const COEFFICIENTS: &str = "coefficients";
 
-/// The tables of a calibration with two more: unknowns and combinations one below the other, and the
-/// covariance.
+/// Adds two tables to those of a calibration: unknowns with combinations below them, and the covariance.
 pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceTable) -> Vec<Table> {
     let of = |name: &str| tables.iter().find(|t| t.name == name);
-    // both are lists of the same objects
+    // `quantities` and `combinations` are lists of the same objects
     let both: Vec<&Table> = ["quantities", "combinations"].into_iter().filter_map(of).collect();
     let columns = both.first().map(|t| t.columns.clone()).unwrap_or_default();
     let rows = both.iter().flat_map(|t| t.rows.clone()).collect();
@@ -769,7 +768,7 @@ pub fn covariance_csv(t: &CovarianceTable) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(columns).chain(rows))
 }
 
-/// Estimates and sigmas with the covariance of all.
+/// Table of estimates, sigmas and their covariance.
 fn covariance_table(t: &CovarianceTable) -> Table {
     let head = ["name", "unit", "estimate", "sigma"].map(String::from).into_iter();
     let columns = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
@@ -781,7 +780,7 @@ fn covariance_table(t: &CovarianceTable) -> Table {
     Table { name: "covariance".into(), columns, rows: (0..t.names.len()).map(row).collect() }
 }
 
-/// The residuals of all measurements, as CSV.
+/// Residuals of all measurements as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].

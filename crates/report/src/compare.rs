@@ -1,4 +1,4 @@
-//! Schemes side by side.
+//! Comparison of schemes.
 
 use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity};
 use obsdeg_evidence::requirements::{Requirements, Worst};
@@ -15,7 +15,7 @@ fn list(items: &[String]) -> String {
     if items.is_empty() { "-".into() } else { items.join(" ") }
 }
 
-/// `15 of 15`; how it is counted where accuracy orders are not computed.
+/// `15 of 15`; with the words `by derivatives` if accuracy orders are not computed.
 pub(crate) fn rank([rank, unknowns]: [usize; 2], with_dwell: bool) -> String {
     format!("{rank} of {unknowns}{}", if with_dwell { "" } else { " by derivatives" })
 }
@@ -31,7 +31,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
     }
 }
 
-/// Columns that say nothing where no requirement is stated.
+/// Columns that are empty if no requirement is stated.
 pub(crate) const REQUIREMENTS: [&str; 4] =
     ["requirements; worst margin", "met without", "required", "margin"];
 
@@ -138,7 +138,7 @@ fn excitation(q: &Quantity) -> String {
     q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
 }
 
-/// Predicted sigmas beside those of full attitudes, where the small-angle model does not hold at the scheme's
+/// Predicted sigmas beside those of full attitudes, if the small-angle model does not hold at the scheme's
 /// own drifts.
 pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     let large = || schemes.iter().filter(|r| r.validity.as_ref().is_some_and(|v| !v.holds));
@@ -175,7 +175,7 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     ]
 }
 
-/// The answer on every scheme; then the carry, and what nobody states.
+/// Answer on every scheme, then the carry and the conditions that are not stated.
 fn lead(c: &Comparison) -> Vec<String> {
     let of = |text: String, r: &ComparedScheme| match c.schemes.len() {
         1 => stated::capital(&text),
@@ -219,7 +219,7 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
-        // where nothing is required there is nothing to be met
+        // without requirements their columns would be empty
         let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
         let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
         let mut blocks =

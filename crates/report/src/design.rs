@@ -1,4 +1,4 @@
-//! Schemes that were found.
+//! Documents and figures of found schemes.
 
 use obsdeg_core::model::Carry;
 use obsdeg_design::design::{BiasPoint, Certificate, Design, Found, PartsReport, SearchReport, Weight};
@@ -51,7 +51,7 @@ fn route(f: &Found) -> String {
     out.join(" ")
 }
 
-/// `0.5 (psi_y)`, and what has none.
+/// `0.5 (psi_y)`, and the unknowns without a margin.
 fn margin(r: &Requirements) -> String {
     let unseen: Vec<&str> =
         r.missed.iter().filter(|m| m.why != Miss::TooLarge).map(|m| m.name.as_str()).collect();
@@ -59,8 +59,7 @@ fn margin(r: &Requirements) -> String {
     none.or_else(|| stated::worst_margin(r)).unwrap_or_else(|| "-".into())
 }
 
-/// The answer: the first scheme with what becomes of the requirements; then the carry, and what nobody
-/// states.
+/// First lines: the first scheme and its requirements, then the carry and the conditions that are not stated.
 fn lead(d: &Design) -> Vec<String> {
     let mut out = Vec::new();
     if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
@@ -108,12 +107,12 @@ fn lead(d: &Design) -> Vec<String> {
     out
 }
 
-/// The parts of a search, unless every block of them was searched again.
+/// The parts of a search; `None` if every block of them was searched again.
 fn by_parts(s: &SearchReport) -> Option<&PartsReport> {
     s.parts.as_ref().filter(|parts| !parts.is_repeated())
 }
 
-/// The parts that an answer was put together from, and what was checked of them.
+/// Sentence on the merged parts and on the blocks of them that were searched again.
 fn parts(p: &PartsReport) -> String {
     let again = match (p.searched_again, p.is_repeated()) {
         (_, true) => format!("all {} blocks of starts were searched again with the same result", p.blocks),
@@ -137,7 +136,7 @@ fn dwells(f: &Found) -> String {
     if listed.is_empty() { String::new() } else { format!(" ({} s)", listed.join(", ")) }
 }
 
-/// The first scheme of those that were searched, in words.
+/// Name of the scheme that a refined or divided one started from: the first of the search.
 fn searched(d: &Design) -> &'static str {
     match (d.found.iter().any(|f| f.refined), d.found.iter().any(|f| !f.dwells_s.is_empty())) {
         (false, false) => "the first",
@@ -335,20 +334,20 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     out
 }
 
-/// The criterion of the first scheme of those that were searched; not a number where there is none.
+/// Criterion of the first scheme of the search; not a number if there is none.
 fn first_value(d: &Design) -> f64 {
     d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value)
 }
 
-/// The criterion of the first scheme that was searched, how far it is above the bound for the candidates, and
-/// above that for all attitudes.
+/// Criterion of the first scheme of the search: its excess over the bound for the candidates, and over that
+/// for all attitudes.
 fn first_above(d: &Design, c: &Certificate) -> (Excess, Option<Excess>) {
     let first = first_value(d);
     let every = c.everywhere.as_ref().map(|e| Excess::new(first, e.best_possible, e.within_percent));
     (Excess::new(first, c.best_possible, c.within_percent), every)
 }
 
-/// How good the best can be.
+/// Sentences on the bound of the criterion, and on how close to it the found schemes are.
 fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     let Some(c) = &s.certificate else {
         let why = match s.order_matters {
@@ -463,7 +462,7 @@ fn weights(list: &[Weight]) -> String {
     groups.map(group).collect::<Vec<_>>().join("; ")
 }
 
-/// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
+/// Factor of the criterion from which the candidates are said to be worse than other attitudes.
 const FAR: f64 = 1.1;
 
 /// The answer of `design --minimum` in a sentence.
@@ -517,7 +516,7 @@ fn minimum(d: &Design) -> Vec<String> {
     out
 }
 
-/// What the sigmas rest on.
+/// Conditions of the sigmas, one sentence each.
 fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     let c = &s.conditions;
     let slews = c.slew_rate_deg_s.map_or_else(
@@ -553,7 +552,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     ]
 }
 
-/// The front of sigma against bias; nothing where the search counts no bench.
+/// Front of sigma against bias; `None` if the search counts no bench.
 fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
     let row = |p: &BiasPoint| vec![p.positions.join(" "), number(p.sigma), number(p.bias), number(p.total)];
     let unit = s.unit.as_ref().map_or_else(|| "over what is required".into(), |u| format!("in {u}"));
@@ -561,7 +560,7 @@ fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
         true => "of all sequences",
         false => "by exchange with other sizes of the bench, not proven",
     };
-    // the largest sigma and the largest bias of the best may be those of different coefficients
+    // the largest sigma and the largest bias of the best scheme may belong to different coefficients
     let best = d.found.first().filter(|f| !d.bias_front.iter().any(|p| p.positions == f.positions));
     let best = best.map_or("", |_| "; the best by the total is not on it");
     let heading = format!(
@@ -635,7 +634,7 @@ fn candidates(names: &[String]) -> String {
     format!("{} candidates: {}", names.len(), shortened(names))
 }
 
-/// At most thirty names.
+/// Names, at most thirty of them.
 fn shortened(names: &[String]) -> String {
     const SHOWN: usize = 30;
     let more =
@@ -643,7 +642,7 @@ fn shortened(names: &[String]) -> String {
     format!("{}{more}", names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(" "))
 }
 
-/// What no scheme is below, by total time.
+/// Lower bound of the criterion over total time.
 pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
     Line {
         label: "no scheme of the candidates in equal dwells is below".into(),
@@ -653,13 +652,13 @@ pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
     }
 }
 
-/// Between two times the bound is that of the longer: more time is never worse.
+/// Steps of a bound: between two times the bound of the longer holds, since more time is never worse.
 pub(crate) fn bound_steps(bound: &[[f64; 2]]) -> Vec<(f64, f64)> {
     let steps = bound.windows(2).flat_map(|w| [(w[0][0], w[0][1]), (w[0][0], w[1][1])]);
     steps.chain(bound.last().map(|p| (p[0], p[1]))).collect()
 }
 
-/// The front of total time against the criterion; none when there is no search.
+/// Front of total time against the criterion; empty without a search.
 pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
     let Some(search) = d.search.as_ref().filter(|_| !d.front.is_empty()) else { return Ok(Vec::new()) };
     // lines per number of positions, and the front itself as steps

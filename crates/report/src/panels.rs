@@ -1,17 +1,17 @@
-//! Pictures that stand side by side: a panel each, of one height.
+//! Pictures side by side: panels of one height.
 
 use std::fmt::Write;
 
 use crate::figure::FONT;
 use crate::visible;
 
-/// Width of a panel, and of the space that it leaves to the next.
+/// Width of a panel, and of the space between two panels, in pixels.
 pub(crate) const WIDTH: f64 = 220.0;
 pub(crate) const GAP: f64 = 8.0;
-/// Panels in a row of a picture that holds several.
+/// Number of panels in a row of a picture with several rows.
 const COLUMNS: usize = 4;
 
-/// A panel for each position, of one height, and what they show.
+/// Panels, one per position, of one height in pixels.
 pub(crate) struct Panels {
     pub(crate) panels: Vec<Panel>,
     pub(crate) height: f64,
@@ -19,13 +19,13 @@ pub(crate) struct Panels {
 
 /// The picture of one position.
 pub(crate) struct Panel {
-    /// What it shows, in words.
+    /// Description of the picture.
     pub(crate) title: String,
     pub(crate) body: String,
 }
 
 impl Panels {
-    /// Every panel as an SVG of its own.
+    /// SVG of each panel.
     pub(crate) fn each(&self) -> impl Iterator<Item = String> {
         let height = self.height;
         self.panels.iter().map(move |p| {
@@ -39,7 +39,7 @@ impl Panels {
         })
     }
 
-    /// All panels in rows of one SVG.
+    /// One SVG of all panels, in rows.
     pub(crate) fn svg(&self) -> String {
         let columns = self.panels.len().clamp(1, COLUMNS);
         let rows = self.panels.len().div_ceil(columns);

@@ -22,13 +22,13 @@ use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
 
-/// Fonts for text and formulas (Libertinus, New Computer Modern), and for pictures (DejaVu).
+/// Fonts of texts and formulas (Libertinus, New Computer Modern), and of pictures (DejaVu).
 static FONTS: LazyLock<Vec<Font>> = LazyLock::new(|| {
     let own = [dejavu::sans::regular(), dejavu::sans::bold()];
     typst_assets::fonts().chain(own).flat_map(|data| Font::iter(Bytes::new(data))).collect()
 });
 
-/// One document and its pictures.
+/// Input of the typesetter: one document, its pictures and the fonts.
 struct Desk {
     library: LazyHash<Library>,
     book: LazyHash<FontBook>,
@@ -75,7 +75,7 @@ fn file_id(name: &str) -> Result<FileId, ReportError> {
     Ok(RootedPath::new(VirtualRoot::Project, path).intern())
 }
 
-/// The document as PDF.
+/// PDF of the document.
 pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
     let mut files = HashMap::new();
     for p in d.pictures() {
@@ -96,7 +96,7 @@ pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
     typst_pdf::pdf(&pages, &options).map_err(|e| refused(&e))
 }
 
-/// A string of the typesetter's language: nothing in it is markup.
+/// Text as a string of the typesetter's language, without markup.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", visible(text).replace('\\', "\\\\").replace('"', "\\\""))
 }
@@ -133,7 +133,7 @@ fn part(part: Part<'_>) -> Json {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        // pictures are in groups, a status is a table by now, and nothing is folded
+        // pictures come in groups, a status is a table here, and folds are taken apart
         Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => Json::Null,
     }
 }

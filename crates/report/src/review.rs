@@ -1,4 +1,4 @@
-//! The design review: its sections in the order in which a review asks for them.
+//! Design review: its sections in the order of a review.
 
 mod actions;
 mod calibrated;
@@ -22,14 +22,14 @@ use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
-/// What a calibration changes of the review of its scheme.
+/// Note on the effect of a calibration on the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
                           model holds, are of a platform with these estimates in place of the values that \
                           the scheme states (of several calibrations those of the last); what is not \
                           determined has the values of the scheme.";
 
-/// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections;
-/// of several the comparison first, and every part folded below it.
+/// Review as one document. A single scheme or model has its status, a picture of the unknowns and its
+/// sections. Several have the comparison first and every part folded below it.
 pub(crate) fn document(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],
@@ -195,7 +195,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
-    // carry, latitude and observation are said above
+    // carry, latitude and observation are stated above
     assumed
         .extend(stated::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
@@ -207,7 +207,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.push(Block::list("", assumed));
 }
 
-/// `with derivatives up to order 2 (D_FY, D_IY)`: names where only some need as many.
+/// `with derivatives up to order 2 (D_FY, D_IY)`: names if only some unknowns need that order.
 fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usize>)>) -> String {
     let all: Vec<_> = all.collect();
     let names: Vec<&str> = all.iter().filter(|q| q.1 == Some(worst)).map(|q| q.0).collect();
@@ -218,7 +218,7 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
     }
 }
 
-/// Effects of errors that the scheme does not estimate, and the budgets with a bench.
+/// Effects of errors that the scheme does not estimate; with a bench also the budgets.
 fn not_estimated(blocks: &mut Vec<Block>, review: &ComparedScheme, id: &str) {
     let (effects, budgets) = omitted::in_full(&review.omitted);
     blocks.extend(effects);
@@ -274,10 +274,10 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
     .without(&left_out(review))
 }
 
-/// Column of total uncertainties.
+/// Title of the column of total uncertainties.
 const TOTAL: &str = "total with the bench";
 
-/// Columns that say nothing where no requirement, or no bench, is stated.
+/// Columns that are empty without requirements or without a bench.
 fn left_out(review: &ComparedScheme) -> Vec<&'static str> {
     let required: &[&str] = if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS };
     let bench = review.conditions.bench.is_none().then_some(TOTAL);
@@ -429,7 +429,7 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
 }
 
-/// How few cardinal attitudes observe every coefficient.
+/// Sentence on the smallest number of cardinal attitudes that make every coefficient observable.
 fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
     let all = s.alternatives.all.as_ref()?;
     Some(match (all.positions, all.never.is_empty()) {
@@ -440,7 +440,7 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
             all.witness.join(", ")
         ),
         (None, false) => format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", ")),
-        // of larger sets nothing is known
+        // larger sets were not searched
         (None, true) => format!(
             "no set of {} of the 24 cardinal attitudes determines every coefficient",
             all.none_of.last()?[0]
@@ -535,7 +535,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             && !is_list(b, "Assumed")
             && !is_list(b, "Validity of the small-angle model")
     };
-    // predicted sigmas stand among the unknowns, and a sheet has room for so many columns
+    // the unknowns' table has the predicted sigmas, and a page has no room for more columns
     blocks.extend(run.blocks.into_iter().filter(kept).map(|b| b.without(&["predicted"])));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
         .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)

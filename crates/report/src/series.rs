@@ -22,7 +22,7 @@ fn suffix(unit: &str) -> String {
     if plain.is_empty() { plain } else { format!("_{plain}") }
 }
 
-/// A column after the position.
+/// Column of a time series.
 struct Column {
     name: String,
     unit: String,
@@ -45,7 +45,7 @@ fn columns(record: &Traces) -> Vec<Column> {
     out
 }
 
-/// A run as CSV: one row per sample, the position by its number from 1.
+/// Run as CSV: one row per sample, with the number of the position from 1.
 ///
 /// # Errors
 /// [`ReportError::Csv`].
@@ -60,9 +60,9 @@ pub fn series_csv(record: &Traces) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(header).chain(rows))
 }
 
-/// The same as Parquet (snappy). Its metadata say what it belongs to: `obsdeg.version`, `obsdeg.seed`,
-/// `obsdeg.units` (JSON, unit by column) and `obsdeg.summary_sha256`, the digest of the summary of the run as
-/// JSON, which holds all its conditions.
+/// Run as Parquet (snappy). Its metadata are `obsdeg.version`, `obsdeg.seed`, `obsdeg.units` (JSON, unit by
+/// column) and `obsdeg.summary_sha256`: the digest of the run's summary as JSON, which has all its
+/// conditions.
 ///
 /// # Errors
 /// [`ReportError::Parquet`], [`ReportError::Json`].

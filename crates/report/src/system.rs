@@ -1,4 +1,4 @@
-//! Any system.
+//! Verdicts, runs and evidence on any system.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
@@ -11,7 +11,7 @@ use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvid
 use crate::document::{Block, Document, Typeset, left, number, right};
 use crate::{Answer, latex, resolve, words};
 
-/// Longest solving expression that a reader is shown.
+/// Length in bytes up to which a solving expression is printed.
 const READABLE: usize = 240;
 
 fn explanation(q: &SystemQuantity, constrained: bool) -> String {
@@ -27,8 +27,8 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
     }
 }
 
-/// What verdicts rest on, in a sentence. Real numbers give no probability: a number that is not zero is
-/// proven to be so, one that holds zero is taken to be.
+/// Certainty of verdicts in a sentence. Real numbers give no probability: a number that differs from zero is
+/// proven to do so, one whose ball contains zero is assumed to be zero.
 fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
         (Some(bound), _) => {
@@ -39,7 +39,7 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
                 || "what counts as zero is so exactly".into(),
                 |x| format!("what counts as zero is less than 10^{x:.0} of its row; a judgement by this gap"),
             );
-            // no "-0"
+            // + 0.0 avoids "-0"
             let least = d.nonzero_log10.round() + 0.0;
             format!(
                 "functions by their true values at two random real points, with {} and {} digits, that \
@@ -52,7 +52,7 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     }
 }
 
-/// Number of solutions of an observable unknown, and the place of its expression.
+/// Number of solutions of an observable unknown, and a reference to its expression.
 fn solutions(q: &SystemQuantity) -> String {
     let words = q.identifiability_words();
     match (&q.number_of_solutions, &q.solution) {
@@ -62,7 +62,7 @@ fn solutions(q: &SystemQuantity) -> String {
     }
 }
 
-/// What the numbers of solutions rest on, and why some are missing.
+/// Conditions of the numbers of solutions, and reasons why some are missing.
 fn counting(a: &SystemAnalysis) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(order) = a.counting_order {
@@ -100,7 +100,7 @@ fn values_of(c: &SystemCombination) -> String {
     }
 }
 
-/// Combinations with their verdicts; `unproven` is the order up to which was looked, where no end is proven.
+/// Combinations with their verdicts. `unproven` is the largest order of derivatives if the end is not proven.
 fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> Block {
     let row = |c: &SystemCombination| {
         let verdict = match (c.degree, unproven) {
@@ -150,7 +150,7 @@ impl Answer for SystemAnalysis {
     fn document(&self) -> Document {
         let units = self.quantities.iter().any(|q| !q.unit.is_empty());
         let mut order: Vec<_> = self.quantities.iter().collect();
-        // best first, what has no degree last
+        // best first, unknowns without a degree last
         order.sort_by_key(|q| (q.status, q.degree));
         let rows = order.iter().map(|q| {
             let mut row = vec![q.name.clone(), q.kind.clone()];
@@ -202,7 +202,7 @@ impl Answer for SystemAnalysis {
                 moved.join(", ")
             )
         }));
-            // beyond the bound a derivative may change
+            // derivatives of higher order than the bound may change
             let heading = match self.rests_on_bound {
                 true => {
                     format!("No derivative up to order {} changes at the start when you", self.last_order)
@@ -240,7 +240,7 @@ impl Answer for SystemAnalysis {
             )
         }));
         if !self.constraints.is_empty() {
-            // linear ones hold in one way, products in that of the factor taken
+            // a linear constraint holds in one way, a product by the factor that was chosen
             let left = |c: &String| {
                 let factor = self.constraint_factors.iter().find(|w| w.constraint == *c);
                 factor.map_or(c.clone(), |w| w.factor.clone())
@@ -342,7 +342,7 @@ impl Answer for SystemAnalysis {
     }
 }
 
-/// When the run of a model that holds the time begins.
+/// Sentence on the start of a run of a model that depends on time.
 fn begins_at(time: f64) -> String {
     format!(
         "the equations or known inputs depend on the time: the run begins at t = {time} (1 where the file \

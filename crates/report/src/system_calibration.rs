@@ -8,7 +8,7 @@ use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, Table, words};
 
-/// How many of many are listed.
+/// Largest number of listed items.
 const LISTED: usize = 20;
 
 fn finding(f: &SystemFinding) -> String {
@@ -64,7 +64,7 @@ fn row(e: &SystemEstimated) -> Vec<String> {
     ]
 }
 
-/// Sentence on the starts that did not lead to the solution.
+/// Sentence on the starts that did not lead to the solution; `None` if all did.
 fn other_starts(of: &OtherStarts) -> Option<String> {
     let mut out = Vec::new();
     let mut say = |count: usize, what: String| {
@@ -226,18 +226,18 @@ impl Answer for SystemCalibration {
         Document { title: format!("Calibration: {}", self.name), lead, blocks }
     }
 
-    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
+    /// Lists of the JSON, then coefficients and covariance of all estimates.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Unknowns and combinations.
+    /// Table of unknowns and combinations.
     fn main_table(&self) -> &'static str {
         COEFFICIENTS
     }
 }
 
-/// The residuals of all measurements, as CSV.
+/// Residuals of all measurements as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].

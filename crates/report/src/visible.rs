@@ -1,11 +1,10 @@
-//! What a reader would not see, written out.
+//! Texts with invisible characters written out.
 
 use std::borrow::Cow;
 
-/// The text on one line, with everything in it that is not text written out, as in `\u{1b}`: control
-/// characters, which move the cursor of a terminal, colour it or ring its bell, and are not allowed in
-/// pictures and pages; marks that turn the direction of writing, so that a text reads otherwise than it is;
-/// what is no character. Line breaks and tabs become blanks.
+/// Text on one line, with characters that a reader cannot see written out, as `\u{1b}`. These are control
+/// characters, which may act on a terminal and are not allowed in pictures and pages; marks that change the
+/// direction of writing; and code points that are no characters. Line breaks and tabs become blanks.
 ///
 /// ```
 /// use obsdeg_report::visible;
@@ -33,7 +32,7 @@ fn hidden(c: char) -> bool {
         || matches!(c, '\u{fff9}'..='\u{fffb}' | '\u{fffe}' | '\u{ffff}')
 }
 
-/// JSON with the same characters as `\u001b`, which reads as what it was.
+/// JSON with the same characters as `\u001b`, which parses to the original text.
 pub(crate) fn json(answer: &impl serde::Serialize) -> Result<String, serde_json::Error> {
     let text = serde_json::to_string_pretty(answer)?;
     let is_hidden = |c: char| c != '\n' && hidden(c);

@@ -20,7 +20,7 @@ pub(crate) fn degree(d: Option<usize>) -> String {
     d.map_or_else(|| "-".into(), |k| k.to_string())
 }
 
-/// An accuracy order in a table: why there is none beside a degree is said there.
+/// Accuracy order in a table, with the reason if there is none beside a degree.
 pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, computed: bool) -> String {
     match (degree, order) {
         (_, Some(k)) => k.to_string(),
@@ -30,8 +30,7 @@ pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, comput
     }
 }
 
-/// What the dwell makes of a degree, where it is something else; empty where the accuracy order is the
-/// degree.
+/// Remark on the effect of the dwell on a degree; empty if the accuracy order equals the degree.
 pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usize>) -> String {
     match (degree, order) {
         _ if !a.has_accuracy_orders => String::new(),
@@ -41,7 +40,7 @@ pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usiz
     }
 }
 
-/// True if a row of the answer has something to say of the dwell.
+/// True if the dwell changes a row of the answer.
 pub(crate) fn dwell_matters(a: &Analysis) -> bool {
     let unknowns = a.quantities.iter().map(|q| (q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (c.degree, c.accuracy_order));
@@ -72,7 +71,7 @@ pub(crate) fn rank(a: &Analysis) -> String {
     )
 }
 
-/// `not told from D_FZ, D_OY`; a long list is cut, and says so (JSON and CSV hold all of it).
+/// `not told from D_FZ, D_OY`; a long list is cut and says so (JSON and CSV have all of it).
 pub(crate) fn not_told_from(partners: &[String]) -> String {
     const SHOWN: usize = 8;
     let more = partners.len().saturating_sub(SHOWN);
@@ -80,7 +79,7 @@ pub(crate) fn not_told_from(partners: &[String]) -> String {
     format!("not told from {}{tail}", partners[..partners.len() - more].join(", "))
 }
 
-/// What stands beside the verdict on an unknown: its solution, its partners, or why there is neither.
+/// Remark beside the verdict on an unknown: its solution, its partners, or the reason why there is neither.
 pub(crate) fn explanation(q: &Quantity) -> String {
     let mut out = match (&q.solution, q.status) {
         (Some(s), _) => s.text.clone(),
@@ -113,14 +112,14 @@ pub(crate) fn difference(d: &Difference) -> String {
     format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
 }
 
-/// Unknowns that change alike, with the positions that their names hold.
+/// Unknowns that change alike, with the positions in their names.
 struct Change<'a> {
     of: &'a Difference,
     names: Vec<(&'a str, Vec<&'a str>)>,
 }
 
-/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike
-/// together.
+/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: unknowns with the same change
+/// are grouped.
 fn differences(all: &[Difference]) -> String {
     let mut groups: Vec<Change<'_>> = Vec::new();
     for d in all {
@@ -149,17 +148,17 @@ fn differences(all: &[Difference]) -> String {
     groups.iter().map(group).collect::<Vec<_>>().join("; ")
 }
 
-/// True if numbers in words follow each other.
+/// True if numbers, given as texts, follow each other.
 fn consecutive(positions: &[&str]) -> bool {
     let numbers: Option<Vec<usize>> = positions.iter().map(|p| p.parse().ok()).collect();
     numbers.is_some_and(|n| n.windows(2).all(|pair| pair[1] == pair[0] + 1))
 }
 
-/// Why candidates leave coefficients unobservable, where the terms themselves say so.
+/// Reasons why candidates leave coefficients unobservable, if the terms give them.
 pub(crate) fn reasons(terms: &str, candidates: &[String]) -> Vec<String> {
     let attitudes: Result<Vec<_>, _> = candidates.iter().map(|c| parse_attitude(c)).collect();
     let (Ok(unknowns), Ok(attitudes)) = (terms.parse(), attitudes) else { return Vec::new() };
-    // what a carry means is no reason
+    // inertial carry has no notes of its own, which would be no reasons
     term_notes(&Scheme { carry: Carry::Inertial, unknowns, ..Scheme::of_angles(attitudes) })
 }
 
@@ -194,7 +193,7 @@ pub(crate) fn gyros(geometry: &Geometry) -> String {
     format!("gyros {}", parts.join(", "))
 }
 
-/// What was assumed, a sentence each.
+/// Assumptions, one sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let carry = match a.carry {
         Carry::Platform => {
@@ -327,7 +326,7 @@ pub(crate) fn angles(p: &PositionReport) -> String {
     }
 }
 
-/// The accuracy orders that differ from the degrees, a sentence for each pair of them.
+/// Accuracy orders that differ from the degrees, one sentence for each pair of order and degree.
 pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
     let unknowns = a.quantities.iter().map(|q| (&q.name, q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (&c.expression, c.degree, c.accuracy_order));
@@ -370,7 +369,7 @@ pub(crate) fn at_most(bound: f64) -> String {
     }
 }
 
-/// How certain the verdicts and solutions are.
+/// Sentence on the certainty of verdicts and solutions.
 pub(crate) fn certainty(a: &Analysis) -> String {
     let c = &a.certainty;
     let mut out = format!(
@@ -423,8 +422,8 @@ pub(crate) fn null_vector(v: &[Component]) -> String {
     format!("{}{turned}", v.iter().map(part).collect::<Vec<_>>().join(", "))
 }
 
-/// True if a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd
-/// part: what a rotation of the platform axes does to them.
+/// True if a direction is a rotation of the platform axes: only psi and misalignments of gyros and
+/// accelerometers change, these by antisymmetric parts.
 fn rotates_the_axes(v: &[Component]) -> bool {
     let number = |name: &str| {
         let found = v.iter().find(|c| c.name == name);
@@ -442,7 +441,7 @@ fn rotates_the_axes(v: &[Component]) -> bool {
     only && of("psi_") && of("GM_") && of("M_") && odd("GM") && odd("M")
 }
 
-/// What the list of degenerate angles holds.
+/// Note on the list of degenerate angles.
 pub(crate) fn loci(loci: &[obsdeg_core::solution::Locus]) -> String {
     let held = match loci.is_empty() {
         true => "none was found: a determinant would vanish there, and",
@@ -461,7 +460,7 @@ pub(crate) fn locus(l: &obsdeg_core::solution::Locus) -> String {
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
 }
 
-/// At most a dozen names.
+/// Names, at most a dozen of them.
 pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     const SHOWN: usize = 12;
     let all: Vec<&str> = names.into_iter().collect();
@@ -471,7 +470,7 @@ pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     format!("{}{tail}", all[..shown].join(", "))
 }
 
-/// What a run makes of an unknown.
+/// Outcome of an unknown in a run.
 pub(crate) fn outcome(o: Outcome) -> &'static str {
     match o {
         Outcome::Reached => "reached",
@@ -488,14 +487,13 @@ pub(crate) fn outcome(o: Outcome) -> &'static str {
 /// The columns of [`estimate`].
 pub(crate) const ESTIMATE: [&str; 6] = ["degree", "truth", "estimate", "error", "sigma", "in sigma"];
 
-/// The degree of an unknown, its true value, its estimate, the error and sigma of that, and the error in
-/// sigma.
+/// Degree, true value, estimate, error and sigma of an unknown, and the error in sigma.
 pub(crate) fn estimate(d: Option<usize>, values: [f64; 4], in_sigma: f64) -> [String; 6] {
     let [truth, estimate, error, sigma] = values.map(number);
     [degree(d), truth, estimate, error, sigma, format!("{in_sigma:.2}")]
 }
 
-/// Why a review has no evidence by a filter.
+/// Reason why a review has no evidence by a filter.
 pub(crate) fn no_evidence(e: &SimulationError) -> String {
     match e {
         SimulationError::CrosscheckRotation => {
@@ -505,7 +503,7 @@ pub(crate) fn no_evidence(e: &SimulationError) -> String {
     }
 }
 
-/// What speaks against a run.
+/// Findings against the consistency of a run.
 pub(crate) fn doubts(c: &Consistency) -> String {
     let of = |d: &Doubt| match d {
         Doubt::NoNumber => "a figure of the run is no number".into(),
@@ -523,7 +521,7 @@ pub(crate) fn doubts(c: &Consistency) -> String {
     c.doubts.iter().map(of).collect::<Vec<String>>().join("; ")
 }
 
-/// `1.7..2.3`.
+/// Band such as `1.7..2.3`.
 pub(crate) fn band((low, high): (f64, f64)) -> String {
     format!("{}..{}", number(low), number(high))
 }
@@ -545,7 +543,7 @@ fn left_out(c: &Consistency) -> String {
     }
 }
 
-/// Whether a run is credible, and its figures.
+/// Sentences on the consistency of a run, with its figures.
 pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
     vec![
         if c.consistent {
@@ -573,7 +571,7 @@ pub(crate) fn accelerometer_bias(b: &AccelerometerBias) -> String {
     )
 }
 
-/// What the datasheet of the gyros adds.
+/// Noise of the gyros by their datasheet.
 pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
     let listed = [
         (g.angle_random_walk_deg_sqrt_h, "angle random walk", "deg/sqrt(h)"),
@@ -599,10 +597,10 @@ pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
     format!("gyros (X, Y, Z where they differ): {}{markov}{states}", parts.join(", "))
 }
 
-/// The cells of a noise floor: sigma with the scheme's dwells, the least, and where it is reached.
+/// Columns of a noise floor: sigma with the scheme's dwells, the least sigma, and the dwell that reaches it.
 pub(crate) const FLOOR: [&str; 3] = ["sigma now", "least sigma", "no better beyond [s]"];
 
-/// Those of one coefficient.
+/// Cells of the noise floor of one coefficient.
 pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
     let dwell = match c.reached {
         Some(Reached::StillFalls) => "still falls".into(),
@@ -612,7 +610,7 @@ pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
     [optional(c.sigma), optional(c.least_sigma), dwell]
 }
 
-/// What a noise floor is.
+/// Notes on the meaning of a noise floor.
 pub(crate) const FLOOR_MEANS: [&str; 3] = [
     "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and \
      random drift: now, and the least over all dwells in proportion to these",
@@ -623,7 +621,7 @@ pub(crate) const FLOOR_MEANS: [&str; 3] = [
      its bias away from there",
 ];
 
-/// Of which dwells and of what noise.
+/// Dwells and noise of a noise floor.
 pub(crate) fn floor_of(f: &NoiseFloor) -> [String; 2] {
     let [low, high] = f.dwells_s.map(number);
     let drift = if f.drift_noise_deg_sqrt_h > 0.0 {
@@ -660,7 +658,7 @@ pub(crate) fn turn(t: &Turn) -> String {
 mod tests {
     use super::*;
 
-    /// What is printed is no smaller than the bound, and at most a digit above.
+    /// The printed bound is no smaller than the bound, and at most a digit above.
     #[test]
     fn bounds_are_rounded_up() {
         let cases = [(8.4e-23, "9e-23"), (8e-23, "8e-23"), (9.5e-5, "1e-4"), (9.001e-1, "1e0"), (0.0, "0e0")];

@@ -1,4 +1,4 @@
-//! What to do, by what was found: of a scheme, of a model, of a calibration.
+//! Recommended actions by the findings on a scheme, a model or a calibration.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, Finding, PositionFit};
@@ -14,12 +14,12 @@ use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
 use crate::{omitted, resolve, stated, words};
 
-/// Advice where a run is not consistent.
+/// Advice for a run that is not consistent.
 const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsistent with the truth.";
-/// Advice where checks of the filter fail.
+/// Advice if checks of the filter fail.
 const FAILING: &str = "First explain the filter checks that fail (section Evidence by a filter).";
 
-/// What follows from what was found of a scheme, the gravest first.
+/// Actions for a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
     let mut out = Vec::new();
     let missed = |why: Miss| -> Vec<&str> {
@@ -84,13 +84,13 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     out
 }
 
-/// True if the sigma of an unknown meets its requirement, whatever the bench adds.
+/// True if the sigma of an unknown alone meets its requirement.
 fn sigma_meets(review: &ComparedScheme, name: &str) -> bool {
     let own = review.quantities.iter().find(|q| q.name == name);
     own.and_then(|q| q.sigma.zip(q.requirement)).is_some_and(|(sigma, required)| sigma <= required)
 }
 
-/// Whether longer dwells meet what is too large.
+/// Advice on longer dwells for requirements that sigmas miss.
 fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
     let meets = |row: &[Option<f64>], name: &str| {
@@ -132,7 +132,7 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     }
 }
 
-/// What follows from what was found of a model, the gravest first.
+/// Actions for a model, the gravest first.
 pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let a = &m.analysis;
     let named = |of: &dyn Fn(&&SystemQuantity) -> bool| -> Vec<&str> {
@@ -181,12 +181,12 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     out
 }
 
-/// What follows from what was found of a calibration, the gravest first.
+/// Actions for a calibration, the gravest first.
 pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for f in &c.findings {
         let line = of_finding(c, f);
-        // of several positions or components the same
+        // several positions or components may give the same line
         if !out.contains(&line) {
             out.push(line);
         }
@@ -222,7 +222,7 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// What to do about positions that do not fit.
+/// Action for positions whose residuals do not fit.
 fn at_positions(c: &Calibration) -> String {
     let unfit: Vec<&PositionFit> = (c.findings.iter())
         .filter_map(|f| match f {
@@ -249,7 +249,7 @@ fn at_positions(c: &Calibration) -> String {
     format!("Look at the record at {names}: attitudes, labels, rest{without}.")
 }
 
-/// What to do about what speaks against a calibration.
+/// Action for one finding of a calibration.
 fn of_finding(c: &Calibration, f: &Finding) -> String {
     match f {
         Finding::Interrupted => "Run the same command again, to its end.".into(),

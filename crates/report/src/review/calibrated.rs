@@ -1,4 +1,4 @@
-//! The part of a calibration in a review.
+//! Calibration as part of a review.
 
 use obsdeg_calibration::Calibration;
 
@@ -10,7 +10,7 @@ use crate::calibration_figures::{
 use crate::document::{Block, Document, Drawing, Finding, Grade, Picture, Status};
 use crate::figure::Figure;
 
-/// What a review has of a calibration: its answer, and its pictures; `id` begins their names.
+/// Section of a calibration: its answer and its pictures, whose names begin with `id`.
 pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     let Document { lead, blocks, .. } = c.document();
     let mut out: Vec<Block> = lead.into_iter().map(Block::Text).collect();
@@ -57,7 +57,7 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out
 }
 
-/// The answers that a review begins with.
+/// Status of a calibration.
 pub(super) fn status(c: &Calibration, title: String) -> Status {
     let row = |what, grade, text| Finding { what, grade, text };
     let all = c.quantities.len();

@@ -1,5 +1,4 @@
-//! The part of a scheme with generic angles: what holds for almost all of them, and nothing that needs
-//! numbers.
+//! Part of a scheme with generic angles: verdicts that hold at almost all angles, without numbers.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::GenericReview;
@@ -31,7 +30,7 @@ fn verdict(g: &GenericReview) -> String {
     )
 }
 
-/// The box of such a scheme.
+/// Status of a scheme with generic angles.
 pub(super) fn status(g: &GenericReview) -> Status {
     let a = &g.analysis;
     let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
@@ -51,7 +50,7 @@ pub(super) fn status(g: &GenericReview) -> Status {
     }
 }
 
-/// Verdict, unknowns, positions.
+/// Part with verdict, unknowns and positions.
 pub(super) fn part(blocks: &mut Vec<Block>, g: &GenericReview, level: usize, id: &str) {
     let document = g.analysis.document();
     blocks.push(section(level, "Verdict"));

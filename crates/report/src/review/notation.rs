@@ -1,4 +1,4 @@
-//! What the symbols of a review mean, with the equations of the paper that have them.
+//! Symbols of a review, with the equations of the paper in which they occur.
 
 use std::collections::BTreeSet;
 
@@ -7,8 +7,8 @@ use obsdeg_design::review::DesignReview;
 
 use crate::document::{Block, left};
 
-/// The symbols of schemes: what stands for what, in which unit, and where the paper (J. NUDT 39(1), 2017,
-/// 1001-2486(2017)01-040-06) has it.
+/// Symbols of schemes: symbol, meaning, unit, and place in the paper (J. NUDT 39(1), 2017,
+/// 1001-2486(2017)01-040-06).
 const SCHEMES: [[&str; 4]; 15] = [
     [
         "n, c, p",
@@ -118,7 +118,7 @@ fn carry(carry: Carry) -> [String; 4] {
     [name, means, "-", "-"].map(String::from)
 }
 
-/// Every symbol that the review may use.
+/// Table of the symbols that the review may use.
 pub(super) fn notation(r: &DesignReview) -> Block {
     let analyses = || r.schemes.iter().map(|s| &s.analysis).chain(r.generic.iter().map(|g| &g.analysis));
     let any_scheme = analyses().next().is_some();
