@@ -1,4 +1,5 @@
-//! Which unknowns of a system can be solved from its output, and how many derivatives does each need?
+//! Exact observable degrees: the unknowns that the output of a system determines, and the number of
+//! derivatives that each needs.
 //!
 //! Every function takes a scheme or a model and returns an answer. An answer is plain data, with the same
 //! content as the program's JSON. The crates behind it (`obsdeg-core`, `obsdeg-evidence`, `obsdeg-design`,
@@ -23,7 +24,8 @@
 //! let positions = [[0, 0, 0], [180, 0, 0]].map(|angles| angles.map(Angle::from_degrees));
 //! let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
 //! let degree = |name| answer.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
-//! assert_eq!((degree("psi_x"), degree("D_FX"), degree("D_FY"), degree("D_FZ")), (Some(0), Some(1), Some(2), None));
+//! let degrees = ["psi_x", "D_FX", "D_FY", "D_FZ"].map(degree);
+//! assert_eq!(degrees, [Some(0), Some(1), Some(2), None]);
 //! # Ok::<(), obsdeg::error::AnalysisError>(())
 //! ```
 //!
@@ -32,7 +34,9 @@
 //! ```
 //! use obsdeg::{ModelOptions, analyze_model, read_model};
 //!
-//! let model = read_model("name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }")?;
+//! let model = read_model(
+//!     "name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }",
+//! )?;
 //! let answer = analyze_model(&model, ModelOptions::default())?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
 //! # Ok::<(), obsdeg::error::ModelError>(())

@@ -140,7 +140,7 @@ pub struct InputOptions {
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(WORK))]
     pub work_limit: Option<u64>,
 
-    /// Which options were given
+    /// Given options that concern one kind of file only.
     #[arg(skip)]
     #[serde(skip)]
     pub given: Given,

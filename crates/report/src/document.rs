@@ -145,7 +145,7 @@ pub(crate) struct Finding {
 /// Grade of an answer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Grade {
-    /// As it should be.
+    /// Requirements are met and checks pass.
     Good,
     /// Limits the validity of other answers.
     Limited,
