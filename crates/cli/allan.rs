@@ -56,7 +56,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.check_folder()?;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let found = allan(&a.asked, open_record(&a.record)?, &Host { worker: None, going: &going })?;

@@ -8,7 +8,7 @@ use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, 
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
-use crate::engine::{EngineArguments, Meanwhile, notice};
+use crate::engine::{EarlyVerdicts, EngineArguments, notice};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Output, write_file, write_files};
@@ -107,7 +107,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 }
 
 /// Verdicts without solutions, one line each; printed while another process uses the symbolic engine.
-fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> Meanwhile {
+fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> EarlyVerdicts {
     let asked = Analyze { solutions: false, formulas: false, ..asked.clone() };
     let read = Arc::clone(read);
     Box::new(move || {

@@ -8,7 +8,7 @@ use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
 
 use crate::arguments::RequireMet;
 use crate::failure::Failure;
-use crate::input::{Kind, is_stdin, open_record, read, read_as};
+use crate::input::{FileKind, is_stdin, open_record, read, read_as};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
@@ -86,7 +86,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.asked.given = given;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let (source, records) = a.read()?;
@@ -138,37 +138,37 @@ impl Arguments {
             (None, [first, records @ ..]) => (first, records),
             (None, []) => return Ok(()),
         };
-        let runs_of = |kind| matches!(kind, Some(Kind::Scheme | Kind::Model));
-        let other = records.iter().find(|path| runs_of(Kind::of(path)));
+        let runs_of = |kind| matches!(kind, Some(FileKind::Scheme | FileKind::Model));
+        let other = records.iter().find(|path| runs_of(FileKind::of(path)));
         let name = first.display();
-        match (Kind::of(first), other) {
-            (Some(Kind::Record), Some(file)) => {
+        match (FileKind::of(first), other) {
+            (Some(FileKind::Record), Some(file)) => {
                 let records: Vec<String> = std::iter::once(first)
                     .chain(records.iter().filter(|path| *path != file))
                     .map(|path| path.display().to_string())
                     .collect();
-                let kind = Kind::of(file).map_or_else(String::new, |k| k.to_string());
+                let kind = FileKind::of(file).map_or_else(String::new, |k| k.to_string());
                 Err(Failure::input(format!(
                     "{name} is a record and {file} {kind}; expected `obsdeg calibrate {file} {}`",
                     records.join(" "),
                     file = file.display()
                 )))
             }
-            (Some(kind @ Kind::Record), None) => Err(Failure::input(format!(
+            (Some(kind @ FileKind::Record), None) => Err(Failure::input(format!(
                 "{name} is {kind}; expected a scheme or model file, then records: `obsdeg calibrate scheme.toml {name}`"
             ))),
-            (Some(kind @ Kind::Calibration), _) => Err(Failure::input(format!(
+            (Some(kind @ FileKind::Calibration), _) => Err(Failure::input(format!(
                 "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior \
                  {name}` takes it for what was known before)"
             ))),
             _ => {
-                let wrong = |path: &&PathBuf| Kind::of(path).is_some_and(|kind| kind != Kind::Record);
-                let Some((path, kind)) = records.iter().find(wrong).and_then(|p| Some((p, Kind::of(p)?)))
+                let wrong = |path: &&PathBuf| FileKind::of(path).is_some_and(|kind| kind != FileKind::Record);
+                let Some((path, kind)) = records.iter().find(wrong).and_then(|p| Some((p, FileKind::of(p)?)))
                 else {
                     return Ok(());
                 };
                 let hint = match kind {
-                    Kind::Calibration => {
+                    FileKind::Calibration => {
                         format!("`--prior {}` takes it for what was known before", path.display())
                     }
                     _ => format!("one scheme or model, which is {name}"),

@@ -46,7 +46,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let input = a.asked.input.read_one(a.files.read()?)?;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         true
     };
     let evidence = crosscheck(&a.asked, &input, &Host { worker: None, going: &going });

@@ -113,7 +113,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let bar = Bar::start(a.output.target.quiet);
     let interrupted = interrupt::flag()?;
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let asked = Search { certificate: a.certificate.is_some(), ..a.asked.clone() };

@@ -30,7 +30,7 @@ pub(crate) struct EngineArguments {
 impl EngineArguments {
     /// The symbolic engine in a process of its own, `None` if this build has none; nothing starts yet.
     /// `meanwhile` gives the verdicts to print while another process holds the engine.
-    pub(crate) fn worker(&self, quiet: bool, meanwhile: Meanwhile) -> Result<Option<Worker>, Failure> {
+    pub(crate) fn worker(&self, quiet: bool, meanwhile: EarlyVerdicts) -> Result<Option<Worker>, Failure> {
         if !cfg!(feature = "symbolica") {
             return Ok(None);
         }
@@ -55,7 +55,7 @@ impl EngineArguments {
         &self,
         message: &'static str,
         quiet: bool,
-        meanwhile: Meanwhile,
+        meanwhile: EarlyVerdicts,
         work: impl FnOnce(Option<&mut Worker>) -> Result<T, Failure>,
     ) -> Result<(T, Vec<String>), Failure> {
         let mut worker = self.worker(quiet, meanwhile)?;
@@ -93,7 +93,7 @@ pub(crate) fn say_busy(worker: &Worker) {
 }
 
 /// Verdicts that need no engine, one per line; called once, after the wait for the engine has lasted 1 s.
-pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
+pub(crate) type EarlyVerdicts = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 
 /// Says on stderr that the command waits for the engine, at most `wait` s, and prints the verdicts.
 fn say_waiting(wait: u64, meanwhile: &[String]) {

@@ -15,14 +15,14 @@ const MAX_FILE: u64 = 50_000_000;
 
 /// Kind of file that a text is meant to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     Scheme,
     Model,
     Calibration,
     Record,
 }
 
-impl Kind {
+impl FileKind {
     /// Kind of the file at `path`, judged by its beginning. `None` for stdin, pipes and files that cannot be
     /// read.
     pub(crate) fn of(path: &Path) -> Option<Self> {
@@ -51,7 +51,7 @@ impl Kind {
     }
 }
 
-impl std::fmt::Display for Kind {
+impl std::fmt::Display for FileKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Scheme => "a scheme",

@@ -69,7 +69,7 @@ impl Bar {
     }
 
     /// Shows how far the work is; for a search also its rate per second and the best criterion so far.
-    pub(crate) fn shows(&self, now: &Now) {
+    pub(crate) fn show(&self, now: &Now) {
         let mut what = visible(&now.what).into_owned();
         if let Some(examined) = now.examined {
             let rate = examined as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
@@ -86,16 +86,16 @@ impl Bar {
         if let Some(total) = now.total {
             self.bar.set_length(total);
         }
-        self.at(now.done);
+        self.set_position(now.done);
     }
 
     /// Shows the name of the current work.
-    pub(crate) fn says(&self, what: &str) {
+    pub(crate) fn set_message(&self, what: &str) {
         self.bar.set_message(visible(what).into_owned());
     }
 
     /// Sets the position of the bar, and shows the bar after one second.
-    fn at(&self, done: u64) {
+    fn set_position(&self, done: u64) {
         if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }

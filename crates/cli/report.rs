@@ -95,13 +95,13 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let mut worker = a.engine.worker(a.target.quiet, Box::new(Vec::new))?;
     let bar = Bar::start(a.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         true
     };
     let mut host = Host { worker: worker.as_mut(), going: &going };
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     a.met.check(reviewed.requirements())?;
-    bar.says("writing");
+    bar.set_message("writing");
     let written = reviewed.files(&origin, format, &folder)?;
     drop(bar);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;

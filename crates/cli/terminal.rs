@@ -11,7 +11,7 @@ pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: 
 pub(crate) fn layout(ascii: bool) -> Layout {
     let stdout = std::io::stdout();
     let terminal = stdout.is_terminal();
-    let ascii = ascii || plain(terminal, said);
+    let ascii = ascii || plain(terminal, variable);
     if !terminal {
         return Layout { ascii, ..PIPE };
     }
@@ -23,23 +23,23 @@ pub(crate) fn layout(ascii: bool) -> Layout {
 }
 
 /// Value of an environment variable; `None` if it is unset or empty.
-fn said(name: &str) -> Option<String> {
+fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|v| !v.is_empty())
 }
 
 /// True if a stream takes ASCII only. Without a locale variable the locale is C, whose characters are ASCII.
 /// That is assumed of a terminal only: pipes are read as UTF-8, as files are, and Windows has no such
 /// variables.
-fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
+fn plain(terminal: bool, variable: impl Fn(&str) -> Option<String>) -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&variable);
     let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));
-    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && said("TERM").is_some_and(|t| t == "dumb")
+    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && variable("TERM").is_some_and(|t| t == "dumb")
 }
 
 /// True if messages are ASCII: by `--ascii` (even on a command line that is otherwise wrong), or by the
 /// character set of stderr.
 pub(crate) fn plain_messages() -> bool {
-    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), said)
+    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), variable)
 }
 
 #[cfg(test)]

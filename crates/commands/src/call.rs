@@ -76,12 +76,12 @@ impl Answered {
 }
 
 /// Answer with the function that makes its files.
-struct Whole<A, F> {
+struct AnswerWithFiles<A, F> {
     answer: A,
     files: F,
 }
 
-impl<A, F> Rendered for Whole<A, F>
+impl<A, F> Rendered for AnswerWithFiles<A, F>
 where
     A: Answer + Send + Sync,
     F: Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync,
@@ -108,9 +108,9 @@ where
 }
 
 /// Answer that is a text in every format: the page of a report, a part of a search.
-struct Text(String);
+struct PlainText(String);
 
-impl Rendered for Text {
+impl Rendered for PlainText {
     fn layout(&self) -> Option<&str> {
         None
     }
@@ -138,7 +138,7 @@ fn none<A>(_: &A) -> Result<Vec<File>, Problem> {
 }
 
 /// Form in which an answer is returned.
-trait Wanted {
+trait OutputForm {
     type Out;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -151,9 +151,9 @@ trait Wanted {
 }
 
 /// Answers that can be written in every format, with their files.
-struct All;
+struct AllFormats;
 
-impl Wanted for All {
+impl OutputForm for AllFormats {
     type Out = Answered;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -161,11 +161,11 @@ impl Wanted for All {
         passed: bool,
         files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Answered, Problem> {
-        Ok(Answered { answer: Box::new(Whole { answer, files }), passed })
+        Ok(Answered { answer: Box::new(AnswerWithFiles { answer, files }), passed })
     }
 
     fn text(text: String, passed: bool) -> Result<Answered, Problem> {
-        Ok(Answered { answer: Box::new(Text(text)), passed })
+        Ok(Answered { answer: Box::new(PlainText(text)), passed })
     }
 }
 
@@ -182,7 +182,7 @@ pub struct InJson {
 /// Answers as JSON only: a program that needs nothing else links no other writer.
 struct JsonOnly;
 
-impl Wanted for JsonOnly {
+impl OutputForm for JsonOnly {
     type Out = InJson;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -214,10 +214,10 @@ pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<In
 /// # Errors
 /// Defect of the request; options are named in snake case.
 pub fn call(command: &str, request: &str, host: &mut Host<'_>) -> Result<Answered, Problem> {
-    object(request).and_then(|request| answered::<All>(command, request, host)).map_err(in_snake_case)
+    object(request).and_then(|request| answered::<AllFormats>(command, request, host)).map_err(in_snake_case)
 }
 
-fn answered<W: Wanted>(
+fn answered<W: OutputForm>(
     command: &str,
     request: Map<String, Value>,
     host: &mut Host<'_>,
@@ -430,7 +430,7 @@ pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) 
         let mut asked: Request<Calibrate, Records> = Request::read(object(request)?)?;
         asked.options.given = asked.given;
         let source = one(asked.files.sources)?;
-        calibrated::<All>(&asked.options, source, records, asked.files.before.as_ref(), host)
+        calibrated::<AllFormats>(&asked.options, source, records, asked.files.before.as_ref(), host)
     };
     answer().map_err(in_snake_case)
 }
@@ -442,12 +442,16 @@ pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) 
 pub fn call_allan(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
         let asked: Request<Allan, StaticRecords> = Request::read(object(request)?)?;
-        noise_of::<All>(&asked.options, records, host)
+        noise_of::<AllFormats>(&asked.options, records, host)
     };
     answer().map_err(in_snake_case)
 }
 
-fn noise_of<W: Wanted>(options: &Allan, records: Vec<Record>, host: &Host<'_>) -> Result<W::Out, Problem> {
+fn noise_of<W: OutputForm>(
+    options: &Allan,
+    records: Vec<Record>,
+    host: &Host<'_>,
+) -> Result<W::Out, Problem> {
     let found = records.len();
     let [record] = <[Record; 1]>::try_from(records)
         .map_err(|_| Problem::input(format!("found {found} records; expected one of sensors at rest")))?;
@@ -456,7 +460,7 @@ fn noise_of<W: Wanted>(options: &Allan, records: Vec<Record>, host: &Host<'_>) -
     W::whole(found, passed, |found| Ok(allan_files(found)?))
 }
 
-fn calibrated<W: Wanted>(
+fn calibrated<W: OutputForm>(
     options: &Calibrate,
     source: Source,
     records: Vec<Record>,

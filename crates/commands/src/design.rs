@@ -24,7 +24,7 @@ use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
-use crate::measure::{MeasureOptions, Wanted, measured};
+use crate::measure::{MeasureOptions, SetRequirements, measured};
 use crate::problem::Problem;
 use crate::source::Source;
 use crate::text;
@@ -516,7 +516,7 @@ fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<S
         )));
     }
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
-    let wanted = Wanted {
+    let wanted = SetRequirements {
         required: &a.wanted.observable,
         max_degree: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
         keep: a.keep.unwrap_or(10).into(),

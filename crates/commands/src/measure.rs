@@ -53,7 +53,7 @@ fn cost(text: &str) -> Result<Assignment, String> {
 }
 
 /// Requirements on a set of outputs, number of listed sets, and seed.
-pub(crate) struct Wanted<'a> {
+pub(crate) struct SetRequirements<'a> {
     /// Unknowns that must be observable; empty: all.
     pub(crate) required: &'a [String],
     /// Largest degree of one unknown; without a name, of all.
@@ -65,7 +65,7 @@ pub(crate) struct Wanted<'a> {
 /// Finds sets of outputs of a model that make the required unknowns observable.
 pub(crate) fn measured(
     a: &MeasureOptions,
-    wanted: &Wanted<'_>,
+    wanted: &SetRequirements<'_>,
     file: &Source,
     host: &Host<'_>,
 ) -> Result<Sensors, Problem> {

@@ -80,7 +80,7 @@ impl Answer {
 #[pyfunction]
 #[pyo3(signature = (command, request, progress=None))]
 fn answer(py: Python<'_>, command: &str, request: &str, progress: Option<Py<PyAny>>) -> PyResult<Answer> {
-    heard(py, command, progress, |host| call(command, request, host))
+    with_progress(py, command, progress, |host| call(command, request, host))
 }
 
 /// Calibrates from records. Each is a name with the path of a file (CSV or Parquet), or with its bytes.
@@ -92,7 +92,7 @@ fn calibrate(
     records: Vec<(String, Option<Vec<u8>>)>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
-    heard(py, "calibrate", progress, move |host| {
+    with_progress(py, "calibrate", progress, move |host| {
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_calibrate(request, records, host)
     })
@@ -117,7 +117,7 @@ fn allan(
     records: Vec<(String, Option<Vec<u8>>)>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
-    heard(py, "allan", progress, move |host| {
+    with_progress(py, "allan", progress, move |host| {
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_allan(request, records, host)
     })
@@ -180,7 +180,7 @@ fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
 
 /// Works without the interpreter's lock. Ten times a second Python receives the progress and is asked for a
 /// keyboard interrupt and for the return value of `progress`.
-fn heard(
+fn with_progress(
     py: Python<'_>,
     command: &str,
     progress: Option<Py<PyAny>>,

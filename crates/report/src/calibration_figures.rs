@@ -137,7 +137,7 @@ pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
 }
 
 /// Label, colour and stroke of bars, their shift along x, and the sigma that they show.
-type Kind = (&'static str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>);
+type BarSeries = (&'static str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>);
 
 /// A bar from `low` to `high` at `at`, with ends.
 fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [f64; 2]) -> Line {
@@ -157,7 +157,7 @@ fn named(e: &Estimated) -> String {
 fn family_figure(family: &str, own: &[&Estimated]) -> Figure {
     let last = own.len() as f64 + 0.5;
     let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.5, 0.0), (last, 0.0)])];
-    let kinds: [Kind; 3] = [
+    let kinds: [BarSeries; 3] = [
         ("+-3 sigma of the estimate (rescaled)", BLUE, Stroke::Solid, 0.0, |e| e.sigma_rescaled),
         ("+-3 predicted sigma", ORANGE, Stroke::Dashed, 0.2, |e| e.predicted_sigma),
         ("+-3 required sigma", GREEN, Stroke::DashDot, -0.2, |e| e.required_sigma),

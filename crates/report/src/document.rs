@@ -130,13 +130,13 @@ pub(crate) struct Status {
     /// Name of the scheme, model or calibration.
     pub(crate) title: String,
     /// Answers, one per question.
-    pub(crate) rows: Vec<Finding>,
+    pub(crate) rows: Vec<StatusRow>,
     /// Recommended actions.
     pub(crate) actions: Vec<String>,
 }
 
 /// Answer to one question of a status.
-pub(crate) struct Finding {
+pub(crate) struct StatusRow {
     pub(crate) what: &'static str,
     pub(crate) grade: Grade,
     pub(crate) text: String,
@@ -179,7 +179,7 @@ impl Grade {
 impl Status {
     /// Status as a table, for formats without boxes.
     fn table(&self) -> Block {
-        let row = |f: &Finding| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
+        let row = |f: &StatusRow| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
         let action = |text: &String| ["Recommended action", "", text].map(String::from).to_vec();
         let columns = [left("question"), left("status"), left("finding")];
         let rows = self.rows.iter().map(row).chain(self.actions.iter().map(action));
@@ -274,21 +274,21 @@ pub(crate) fn optional(x: Option<f64>) -> String {
 }
 
 /// A block, or pictures that follow each other.
-pub(crate) enum Part<'a> {
+pub(crate) enum BlockGroup<'a> {
     Block(&'a Block),
     Pictures(Vec<&'a Picture>),
 }
 
 /// Blocks, with successive pictures grouped unless they are wide.
-pub(crate) fn parts(blocks: &[Block]) -> Vec<Part<'_>> {
-    let mut out: Vec<Part<'_>> = Vec::new();
+pub(crate) fn parts(blocks: &[Block]) -> Vec<BlockGroup<'_>> {
+    let mut out: Vec<BlockGroup<'_>> = Vec::new();
     for block in blocks {
         match (block, out.last_mut()) {
-            (Block::Picture(p), Some(Part::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
+            (Block::Picture(p), Some(BlockGroup::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
                 list.push(p)
             }
-            (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
-            (block, _) => out.push(Part::Block(block)),
+            (Block::Picture(p), _) => out.push(BlockGroup::Pictures(vec![p])),
+            (block, _) => out.push(BlockGroup::Block(block)),
         }
     }
     out

@@ -9,7 +9,7 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::document::{
-    Block, Document, Drawing, Finding, Part, Picture, Status, Typeset, parts, table_of_page,
+    Block, BlockGroup, Document, Drawing, Picture, Status, StatusRow, Typeset, parts, table_of_page,
 };
 use crate::figure::{CLIP, Figure, Line, Stroke};
 use crate::{ReportError, visible};
@@ -84,7 +84,7 @@ fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
     let mut out = Vec::new();
     for part in parts(blocks) {
         *ids += 1;
-        if let Part::Block(Block::Fold { title, blocks }) = &part {
+        if let BlockGroup::Block(Block::Fold { title, blocks }) = &part {
             out.push(json!({ "kind": "fold", "level": 1, "title": title, "id": format!("section-{ids}") }));
             out.extend(listed(blocks, ids));
             out.push(json!({ "kind": "end" }));
@@ -96,13 +96,13 @@ fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
 }
 
 /// One block as data for the template.
-fn block(i: usize, part: &Part<'_>) -> Json {
+fn block(i: usize, part: &BlockGroup<'_>) -> Json {
     let b = match part {
-        Part::Pictures(pictures) => {
+        BlockGroup::Pictures(pictures) => {
             let pictures: Vec<Json> = pictures.iter().map(|p| picture(p)).collect();
             return json!({ "kind": "pictures", "pictures": pictures });
         }
-        Part::Block(b) => b,
+        BlockGroup::Block(b) => b,
     };
     match b {
         Block::Section { level, title } => {
@@ -118,7 +118,7 @@ fn block(i: usize, part: &Part<'_>) -> Json {
         // pictures come in groups, folds are taken apart by `listed`
         Block::Picture(_) | Block::Fold { .. } => Json::Null,
         Block::Status(boxes) => {
-            let row = |f: &Finding| {
+            let row = |f: &StatusRow| {
                 let (grade, mark) = (f.grade.name(), f.grade.mark());
                 json!({ "what": f.what, "grade": grade, "mark": mark, "text": f.text })
             };

@@ -17,7 +17,7 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::document::{Block, Document, Part, parts, table_of_page};
+use crate::document::{Block, BlockGroup, Document, parts, table_of_page};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
@@ -29,14 +29,14 @@ static FONTS: LazyLock<Vec<Font>> = LazyLock::new(|| {
 });
 
 /// Input of the typesetter: one document, its pictures and the fonts.
-struct Desk {
+struct TypstInput {
     library: LazyHash<Library>,
     book: LazyHash<FontBook>,
     source: Source,
     files: HashMap<FileId, Bytes>,
 }
 
-impl World for Desk {
+impl World for TypstInput {
     fn library(&self) -> &LazyHash<Library> {
         &self.library
     }
@@ -81,7 +81,7 @@ pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
     for p in d.pictures() {
         files.insert(file_id(&format!("{}.svg", p.name))?, Bytes::from_string(p.svg()));
     }
-    let desk = Desk {
+    let desk = TypstInput {
         library: LazyHash::new(Library::default()),
         book: LazyHash::new(FontBook::from_fonts(FONTS.iter())),
         source: Source::new(file_id("review.typ")?, source(d)?),
@@ -114,15 +114,15 @@ fn source(d: &Document) -> Result<String, ReportError> {
     })?)
 }
 
-fn part(part: Part<'_>) -> Json {
+fn part(part: BlockGroup<'_>) -> Json {
     let block = match part {
-        Part::Pictures(pictures) => {
+        BlockGroup::Pictures(pictures) => {
             let of = |p: &&crate::document::Picture| json!({ "name": p.name, "caption": p.caption });
             let width = if pictures.iter().any(|p| p.is_wide()) { "100%" } else { "11cm" };
             let pictures: Vec<Json> = pictures.iter().map(of).collect();
             return json!({ "kind": "pictures", "pictures": pictures, "width": width });
         }
-        Part::Block(block) => block,
+        BlockGroup::Block(block) => block,
     };
     match block {
         Block::Section { level, title } => json!({ "kind": "section", "level": level, "title": title }),

@@ -175,7 +175,7 @@ fn whole(remedies: &Remedies, open: &[&str]) -> Option<String> {
         let given = single(r).and_then(Change::known);
         open.iter().all(|name| given == Some(name) || resolves(r, name))
     };
-    let mut group = Group { names: open.to_vec(), ..Group::default() };
+    let mut group = RemedyGroup { names: open.to_vec(), ..RemedyGroup::default() };
     for r in remedies.remedies.iter().filter(settles) {
         match single(r) {
             Some(Change::Known { name }) => group.known.push(name),
@@ -201,7 +201,7 @@ fn either(parts: &[String]) -> String {
 
 /// Unknowns that the same changes resolve, with these changes.
 #[derive(Default)]
-struct Group<'a> {
+struct RemedyGroup<'a> {
     names: Vec<&'a str>,
     known: Vec<&'a str>,
     outputs: Vec<&'a str>,
@@ -212,7 +212,7 @@ struct Group<'a> {
     themselves: bool,
 }
 
-impl<'a> Group<'a> {
+impl<'a> RemedyGroup<'a> {
     /// The remedies of one unknown.
     fn of(remedies: &'a Remedies, name: &'a str) -> Self {
         let mut group = Self { names: vec![name], ..Self::default() };
@@ -349,15 +349,15 @@ fn lines<'a>(
     two: &str,
     unknowns: impl Iterator<Item = &'a str>,
 ) -> Vec<String> {
-    let mut groups: Vec<Group<'a>> = Vec::new();
+    let mut groups: Vec<RemedyGroup<'a>> = Vec::new();
     let resolved = |name: &str| remedies.remedies.iter().any(|r| resolves(r, name));
     for name in unknowns.filter(|name| resolved(name)) {
-        let group = Group::of(remedies, name);
+        let group = RemedyGroup::of(remedies, name);
         if !groups.iter_mut().any(|g| g.join(&group)) {
             groups.push(group);
         }
     }
-    let line = |g: &Group<'_>| {
+    let line = |g: &RemedyGroup<'_>| {
         let degree = match g.degrees(remedies) {
             Some((k, true)) => format!("; degree {k}"),
             Some((k, false)) => format!("; degree at most {k}"),

@@ -12,7 +12,7 @@ use crate::figure::{FigureError, tree};
 const POINTS: f32 = 0.75;
 
 /// Content of the page, and its opacities in thousandths.
-struct Sheet {
+struct PdfPage {
     content: Content,
     opacities: Vec<[u16; 2]>,
 }
@@ -24,7 +24,7 @@ struct Sheet {
 pub(crate) fn pdf(svg: &str) -> Result<Vec<u8>, FigureError> {
     let tree: Tree = tree(svg)?;
     let (width, height) = (tree.size().width() * POINTS, tree.size().height() * POINTS);
-    let mut sheet = Sheet { content: Content::new(), opacities: Vec::new() };
+    let mut sheet = PdfPage { content: Content::new(), opacities: Vec::new() };
     // y is upwards in PDF
     sheet.content.transform([POINTS, 0.0, 0.0, -POINTS, 0.0, height]);
     sheet.group(tree.root(), 1.0);
@@ -71,7 +71,7 @@ fn color(paint: &Paint) -> [f32; 3] {
     found.map_or([0.5; 3], |c| [c.red, c.green, c.blue].map(|x| f32::from(x) / 255.0))
 }
 
-impl Sheet {
+impl PdfPage {
     /// Draws a group; overlapping parts are drawn one by one, each with the opacity.
     fn group(&mut self, group: &Group, opacity: f32) {
         self.content.save_state();

@@ -56,9 +56,9 @@ mod tests {
         for text in ["D_FX", "µ ω ½ 惯性平台 é", "a\\u{1b}", "𝛼 \u{1f600}"] {
             assert_eq!(visible(text), text);
         }
-        let hidden = "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\
+        let characters = "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\
                       \u{2066}\u{2069}\u{ffff}";
-        for c in hidden.chars() {
+        for c in characters.chars() {
             assert_eq!(visible(&format!("a{c}b")), format!("a\\u{{{:x}}}b", u32::from(c)));
         }
     }

@@ -113,7 +113,7 @@ pub(crate) fn difference(d: &Difference) -> String {
 }
 
 /// Unknowns that change alike, with the positions in their names.
-struct Change<'a> {
+struct DifferenceGroup<'a> {
     of: &'a Difference,
     names: Vec<(&'a str, Vec<&'a str>)>,
 }
@@ -121,11 +121,11 @@ struct Change<'a> {
 /// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: unknowns with the same change
 /// are grouped.
 fn differences(all: &[Difference]) -> String {
-    let mut groups: Vec<Change<'_>> = Vec::new();
+    let mut groups: Vec<DifferenceGroup<'_>> = Vec::new();
     for d in all {
         let place = groups.iter().position(|g| (g.of.here, g.of.there) == (d.here, d.there));
         let place = place.unwrap_or_else(|| {
-            groups.push(Change { of: d, names: Vec::new() });
+            groups.push(DifferenceGroup { of: d, names: Vec::new() });
             groups.len() - 1
         });
         let (name, position) = d.name.split_once('@').unwrap_or((&d.name, ""));
@@ -141,7 +141,7 @@ fn differences(all: &[Difference]) -> String {
         [first, .., last] if consecutive(positions) => format!("{name}@{first} to @{last}"),
         _ => format!("{name}@{}", positions.join(", @")),
     };
-    let group = |g: &Change<'_>| {
+    let group = |g: &DifferenceGroup<'_>| {
         let names: Vec<String> = g.names.iter().map(named).collect();
         format!("{} {} -> {}", names.join(", "), verdict(&g.of.here), verdict(&g.of.there))
     };

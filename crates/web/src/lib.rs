@@ -20,13 +20,13 @@ pub fn call(command: &str, request: &str) -> String {
     let mut host = Host { worker: None, going: &hears };
     match obsdeg_commands::call_json(command, request, &mut host) {
         Ok(a) => json!({ "text": a.text, "sentences": a.sentences, "passed": a.passed }),
-        Err(problem) => json!({ "problem": said(&problem) }),
+        Err(problem) => json!({ "problem": problem_json(&problem) }),
     }
     .to_string()
 }
 
 /// A problem as JSON, with line and column of its place.
-fn said(problem: &Problem) -> Value {
+fn problem_json(problem: &Problem) -> Value {
     let place = problem.place.as_ref().map(|p| {
         let (line, column) = p.line_and_column();
         let count = |end: usize| p.text.get(..end).map_or(0, |t| t.encode_utf16().count());
@@ -44,7 +44,7 @@ pub fn toml_as_json(text: &str) -> String {
         Ok(value) => json!({ "value": value }),
         Err(e) => {
             let problem = Problem::at(e.message(), "", text, e.span().unwrap_or(0..0));
-            json!({ "problem": said(&problem) })
+            json!({ "problem": problem_json(&problem) })
         }
     }
     .to_string()

@@ -7,7 +7,7 @@ use crate::calibration::finding;
 use crate::calibration_figures::{
     allan_figure, estimate_figures, file_name, residual_figure, whiteness_figure,
 };
-use crate::document::{Block, Document, Drawing, Finding, Grade, Picture, Status};
+use crate::document::{Block, Document, Drawing, Grade, Picture, Status, StatusRow};
 use crate::figure::Figure;
 
 /// Section of a calibration: its answer and its pictures, whose names begin with `id`.
@@ -59,7 +59,7 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
 
 /// Status of a calibration.
 pub(super) fn status(c: &Calibration, title: String) -> Status {
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     let all = c.quantities.len();
     let determined = c.quantities.iter().filter(|u| u.determined).count();
     let first = c.findings.first().map(|f| finding(f, &c.records));

@@ -9,7 +9,7 @@ use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
 use super::{joined, seconds};
-use crate::document::{Block, Cell, Finding, Grade, Status, left, number};
+use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
 use crate::rows::{Chart, Row};
 use crate::{compare, words};
 
@@ -110,7 +110,7 @@ pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> Block {
 }
 
 /// Answer to the question whether the compared schemes have the same conditions.
-fn like_with_like(r: &DesignReview) -> Finding {
+fn like_with_like(r: &DesignReview) -> StatusRow {
     let totals = || r.comparison.schemes.iter().map(|s| s.total_s);
     let (least, most) = totals().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
     let time = match least == most {
@@ -123,13 +123,13 @@ fn like_with_like(r: &DesignReview) -> Finding {
             (Grade::Limited, format!("the schemes differ in {}; {time}", r.comparison.differ.join(", ")))
         }
     };
-    Finding { what: "Like with like", grade, text }
+    StatusRow { what: "Like with like", grade, text }
 }
 
 /// Recommended scheme, and the reason.
-fn recommended(r: &DesignReview) -> Finding {
+fn recommended(r: &DesignReview) -> StatusRow {
     let (grade, text) = choice(r);
-    Finding { what: "Recommended", grade, text }
+    StatusRow { what: "Recommended", grade, text }
 }
 
 fn choice(r: &DesignReview) -> (Grade, String) {

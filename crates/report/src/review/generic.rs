@@ -4,7 +4,7 @@ use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::GenericReview;
 
 use super::{derivatives, pictures, section};
-use crate::document::{Block, Finding, Grade, Status};
+use crate::document::{Block, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
 /// `any alpha and gamma`.
@@ -35,7 +35,7 @@ pub(super) fn status(g: &GenericReview) -> Status {
     let a = &g.analysis;
     let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
     let grade = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     Status {
         title: g.name.clone(),
         rows: vec![

@@ -7,7 +7,7 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::{derivatives, is_list, pictures, section};
-use crate::document::{Block, Finding, Grade, Status};
+use crate::document::{Block, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
 /// Verdict on a model: its limits, and the determined unknowns.
@@ -122,7 +122,7 @@ fn limits(m: &ModelReview) -> Vec<String> {
 pub(super) fn status(m: &ModelReview) -> Status {
     let a = &m.analysis;
     let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
-    let row = |what, (grade, text)| Finding { what, grade, text };
+    let row = |what, (grade, text)| StatusRow { what, grade, text };
     let every = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
     let mut rows = vec![
         row("Observable", (every, format!("{seen} of {} unknowns: {}", a.quantities.len(), solutions(a)))),

@@ -6,7 +6,7 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
-use crate::document::{Finding, Grade, Status, number};
+use crate::document::{Grade, Status, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
 /// Name for the unknowns besides psi.
@@ -228,7 +228,7 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
     let open = open.filter(|_| review.requirements.stated > 0);
     let requirements = open.map_or(requirements.clone(), |open| format!("{requirements}. {open}"));
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     Status {
         title: s.name.clone(),
         rows: vec![
