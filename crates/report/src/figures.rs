@@ -247,7 +247,7 @@ pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> 
         lines.push(line(format!("{}, {what}", c.name), color, stroke, c.points.clone()));
         let ends = curves.get(i + 1).is_none_or(|next| next.accuracy_order != c.accuracy_order);
         let Some(d) = c.accuracy_order.filter(|_| ends) else { continue };
-        // through the middle of the first curve of this order, shifted
+        // twice as high as the middle of the first curve of this order
         let Some(of) = curves.iter().find(|of| of.accuracy_order == c.accuracy_order) else { continue };
         let (t0, s0) = of.points[of.points.len() / 2];
         let slope = -(d as f64 + 0.5);

@@ -230,7 +230,7 @@ fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
 
-/// Curves for the interactive plots: a table for each, x strictly increasing.
+/// Curves as data of the interactive plots: tables with strictly increasing x, one per run of equal x.
 fn curves(f: &Figure) -> Json {
     let all = || f.lines.iter().flat_map(|l| l.points.iter().map(|p| p.0));
     let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));

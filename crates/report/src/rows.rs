@@ -94,7 +94,7 @@ impl Chart {
     pub(crate) fn svg(&self) -> String {
         let count = self.series.len().max(1);
         let height = ROW.max(APART * (count as f64 + 1.0));
-        // the last names of the axis need room even if no row has a text
+        // without any text its column is left out, but for a margin
         let texts = if self.rows.iter().all(|r| r.text.is_empty()) { 16.0 } else { TEXTS };
         let left = NAMES + REMARKS;
         let legend = self.series.iter().filter(|s| !s.is_empty()).count() as f64 * 16.0;

@@ -60,7 +60,7 @@ fn matrix(t: Transform) -> [f32; 6] {
     [t.sx, t.ky, t.kx, t.sy, t.tx, t.ty]
 }
 
-/// Colour of a paint; for a gradient, which pictures do not have, that of its first stop.
+/// Colour of a paint. Pictures have no gradients (their first stop counts) and no patterns (grey).
 fn color(paint: &Paint) -> [f32; 3] {
     let found = match paint {
         Paint::Color(c) => Some(*c),

@@ -57,7 +57,7 @@ mod tests {
             assert_eq!(visible(text), text);
         }
         let characters = "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\
-                      \u{2066}\u{2069}\u{ffff}";
+                          \u{2066}\u{2069}\u{ffff}";
         for c in characters.chars() {
             assert_eq!(visible(&format!("a{c}b")), format!("a\\u{{{:x}}}b", u32::from(c)));
         }

@@ -79,7 +79,7 @@ pub(crate) fn not_told_from(partners: &[String]) -> String {
     format!("not told from {}{tail}", partners[..partners.len() - more].join(", "))
 }
 
-/// Remark beside the verdict on an unknown: its solution, its partners, or the reason why there is neither.
+/// Remark beside the verdict on an unknown: its solution or its partners, then its degree elsewhere.
 pub(crate) fn explanation(q: &Quantity) -> String {
     let mut out = match (&q.solution, q.status) {
         (Some(s), _) => s.text.clone(),
@@ -158,7 +158,7 @@ fn consecutive(positions: &[&str]) -> bool {
 pub(crate) fn reasons(terms: &str, candidates: &[String]) -> Vec<String> {
     let attitudes: Result<Vec<_>, _> = candidates.iter().map(|c| parse_attitude(c)).collect();
     let (Ok(unknowns), Ok(attitudes)) = (terms.parse(), attitudes) else { return Vec::new() };
-    // inertial carry has no notes of its own, which would be no reasons
+    // inertial: notes on the meaning of another carry would be no reasons
     term_notes(&Scheme { carry: Carry::Inertial, unknowns, ..Scheme::of_angles(attitudes) })
 }
 

@@ -225,7 +225,7 @@ fn kept(r: &Requirements) -> String {
     }
 }
 
-/// Schemes as columns: time and number of positions, and the margin of every unknown.
+/// Schemes as columns: carry, positions, total time, rank, requirements, and the margin of every unknown.
 fn matrix(schemes: &[ComparedScheme]) -> Block {
     let mut columns = vec![left("")];
     columns.extend(schemes.iter().map(|s| left(s.name.clone())));
