@@ -31,7 +31,7 @@ pub(crate) fn abandon() {
     std::mem::forget(held);
 }
 
-/// Refuses a file larger than the limit of the system (`ulimit -f`): a write beyond it sends a signal that
+/// Refuses a file larger than the limit of the system (`ulimit -f`). A write beyond it sends a signal that
 /// ends the program and leaves the folder behind.
 fn within_limit(bytes: &[u8]) -> Result<()> {
     #[cfg(unix)]

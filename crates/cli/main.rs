@@ -96,8 +96,8 @@ enum Command {
     Schema(schema::Arguments),
 }
 
-/// The command line with its rules for negative numbers: after an option with a value, a negative number is
-/// that value, so that the error can say what the option expects. After a numeric option any exponent counts
+/// The command line with its rules for negative numbers. After an option with a value, a negative number is
+/// that value, so that the error can name what is expected. After a numeric option any exponent counts
 /// (`-1e-5`); after others only text that cannot be an option.
 fn command() -> clap::Command {
     let takes =
@@ -118,8 +118,8 @@ fn command() -> clap::Command {
     })
 }
 
-/// Hint for an argument that a command does not know: the commands that have such an option, or the command
-/// for a file that stands in place of a command.
+/// Hint for an argument that a command does not know. It names the commands that have such an option, or the
+/// command for a file in place of a command.
 fn hint(e: &clap::Error) -> Option<String> {
     let is_file =
         |text: &str| std::path::Path::new(text).extension().is_some_and(|x| x == "toml" || x == "json");

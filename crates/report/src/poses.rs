@@ -1,10 +1,10 @@
 //! Pictures of positions: the platform's axes, g and the earth rate at each, in an axonometric view of North,
 //! Up, East.
 //!
-//! Of right-handed axes North, Up, East the picture shows North to the right, Up upwards and East towards the
-//! reader, turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above:
-//! `right = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the
-//! reader `u sin h + near cos h`.
+//! The axes North, Up, East are right-handed. The picture shows North to the right, Up upwards and East
+//! towards the reader. It is turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above: `right
+//! = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the reader `u
+//! sin h + near cos h`.
 
 use std::fmt::Write;
 
