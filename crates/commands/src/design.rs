@@ -493,7 +493,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
 }
 
-/// Options that concern models; all others concern schemes.
+/// Options that a search for outputs of a model takes.
 const OF_MODELS: [&str; 9] =
     ["seed", "keep", "observable", "max_degree", "measure", "own_outputs", "cost", "order", "work_limit"];
 

@@ -2,9 +2,9 @@
 //! Up, East.
 //!
 //! The axes North, Up, East are right-handed. The picture shows North to the right, Up upwards and East
-//! towards the reader. It is turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above: `right
-//! = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the reader `u
-//! sin h + near cos h`.
+//! towards the reader. It is turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above:
+//! `right = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the
+//! reader `u sin h + near cos h`.
 
 use std::fmt::Write;
 

@@ -11,9 +11,9 @@ extern "C" {
     fn going(now: &str) -> bool;
 }
 
-/// Answers a command by its name, with options and files as JSON. The answer is `{"text", "sentences",
-/// "passed"}`: `text` is that of the command line with `--format json`, `sentences` are its first lines. A
-/// failure is `{"problem": {"kind", "message", "place"}}`.
+/// Answers a command by its name, with options and files as JSON. The answer is
+/// `{"text", "sentences", "passed"}`: `text` is that of the command line with `--format json`, `sentences`
+/// are its first lines. A failure is `{"problem": {"kind", "message", "place"}}`.
 #[wasm_bindgen]
 pub fn call(command: &str, request: &str) -> String {
     let hears = |now: Now| going(&serde_json::to_string(&now).unwrap_or_default());
