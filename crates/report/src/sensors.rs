@@ -7,15 +7,15 @@ use crate::document::{Block, Document, left, right};
 use crate::stated::capital;
 use crate::words;
 
-/// Most members of the groups of a proof that are shown.
+/// Largest number of candidates in the groups of a printed proof.
 const MEMBERS: usize = 24;
 
-/// A number, and what it counts: `1 output`, `2 outputs`.
+/// Number with the word that it counts: `1 output`, `2 outputs`.
 fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-/// Members of a set.
+/// Outputs of a set.
 fn set(outputs: &[String]) -> String {
     match outputs.is_empty() {
         true => "none".into(),
@@ -23,18 +23,18 @@ fn set(outputs: &[String]) -> String {
     }
 }
 
-/// A cost without zeros at its end.
+/// Cost without trailing zeros.
 fn cost(cost: f64) -> String {
     let text = format!("{cost:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// True if some cost is not one.
+/// True if a cost differs from one.
 fn has_costs(s: &Sensors) -> bool {
     s.candidates.iter().any(|c| c.cost != 1.0)
 }
 
-/// What a set costs, in words: `2 outputs`, `cost 2.5`.
+/// Cost of a set in words: `2 outputs`, `cost 2.5`.
 fn price(s: &Sensors, f: &FrontSet) -> String {
     match has_costs(s) {
         true => format!("cost {}", cost(f.cost)),
@@ -42,7 +42,7 @@ fn price(s: &Sensors, f: &FrontSet) -> String {
     }
 }
 
-/// The unknowns that the sets are about: `all 34 unknowns`, `k1, k2`.
+/// Unknowns that the sets make observable: `all 34 unknowns`, `k1, k2`.
 fn about(s: &Sensors) -> String {
     let (required, all) = (s.required.len(), s.quantities.len());
     match required {
@@ -52,7 +52,7 @@ fn about(s: &Sensors) -> String {
     }
 }
 
-/// The answer in sentences, the first one being the answer.
+/// Sentences, the answer first.
 fn sentences(s: &Sensors) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(first) = s.front.first() {
@@ -102,7 +102,7 @@ fn sentences(s: &Sensors) -> Vec<String> {
     out
 }
 
-/// What proves that a set of the front is the cheapest.
+/// Proof that a set of the front is the cheapest.
 fn proof(s: &Sensors, f: &FrontSet) -> String {
     let asked = match s.max_degree.is_empty() {
         true => String::new(),
@@ -140,7 +140,7 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
     }
 }
 
-/// What the answer rests on.
+/// Conditions and limits of the answer.
 fn validity(s: &Sensors) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(s.stopped.as_ref().map(|reason| format!("the search ended early: {reason}")));
