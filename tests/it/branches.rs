@@ -25,7 +25,8 @@ fn value(text: &str, t: f64) -> f64 {
 fn verdicts_hold_on_the_side_that_is_said() {
     let model = |input: &str, time: &str| {
         format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\n\
+             x='a + b*u'\n[outputs]\ny='x'"
         )
     };
     let times = [-9.3, -4.0, -1.7, 0.4, 2.2, 5.1, 8.3, 9.9];
@@ -86,7 +87,8 @@ fn sides_of_all_arguments_are_said() {
     let text = printed(&a);
     assert!(text.contains("of one branch, where x > 0, a - 9 < 0 (chosen by unknowns near one"), "{text}");
     let a = judged(
-        "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\ne=0\n[[segment]]\n\
+        "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\n\
+         e=0\n[[segment]]\n\
          [[segment]]\nconstants={e='1'}",
     );
     let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
@@ -108,7 +110,8 @@ fn later_segments_begin_later() {
         for (time, rank) in [("5", 1), ("0", 2)] {
             let a = judged_with(
                 &format!(
-                    "name='m'\ntime={time}\nparameters=['b']\n[states]\nv='b*(abs(t - 4) - t + 4)'\n[outputs]\ny='v'\n{segments}"
+                    "name='m'\ntime={time}\nparameters=['b']\n[states]\nv='b*(abs(t - 4) - t + 4)'\n[outputs]\ny='v'\n\
+                     {segments}"
                 ),
                 seed,
             );
@@ -117,7 +120,8 @@ fn later_segments_begin_later() {
         for shift in ["1", "2", "3/2"] {
             let a = judged_with(
                 &format!(
-                    "name='m'\ntime='generic'\nparameters=['a', 'b']\n[states]\nx='a + b*sign(t - {shift})'\n[outputs]\ny='x'\n{segments}"
+                    "name='m'\ntime='generic'\nparameters=['a', 'b']\n[states]\nx='a + b*sign(t - {shift})'\n\
+                     [outputs]\ny='x'\n{segments}"
                 ),
                 seed,
             );
@@ -179,7 +183,8 @@ fn a_time_that_can_not_be_is_named() {
         ("log(-1 - t^2)", "time = 'generic'", false),
     ] {
         let text = format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\n\
+             x='a + b*u'\n[outputs]\ny='x'"
         );
         let model = model_file::read(&text).expect("a model");
         let said = analyze_system(&model, SystemOptions::default()).expect_err(input).to_string();
@@ -197,7 +202,8 @@ fn a_time_that_can_not_be_is_named() {
 #[test]
 fn solutions_rest_on_what_is_printed() {
     let a = judged(
-        "name='m'\nparameters=['a', 'b']\ntime=2\nknown_inputs={u={function='t^2'}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'",
+        "name='m'\nparameters=['a', 'b']\ntime=2\nknown_inputs={u={function='t^2'}}\n[states]\nx='a + b*u'\n\
+         [outputs]\ny='x'",
     );
     assert!(a.equations.contains(&"u = t^2".to_string()), "{:?}", a.equations);
     assert!(printed(&a).contains("The system u = t^2"), "{}", printed(&a));
@@ -219,7 +225,8 @@ fn solutions_rest_on_what_is_printed() {
     let found = evaluate_f64(&parse_with(&text, Names::Plain).expect("an expression"), &known);
     assert!((found - 1.3).abs() < 1e-12, "{solution}: {found}");
     let a = judged(
-        "name='m'\nparameters=['a']\nknown_inputs={u={function='t'}}\n[states]\nx='a*u'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\n\
+        "name='m'\nparameters=['a']\nknown_inputs={u={function='t'}}\n[states]\nx='a*u'\n[outputs]\ny='x'\n\
+         [[experiment]]\n[[experiment]]\n\
          known_inputs={u={function='t^3'}}",
     );
     for line in ["u in experiment 1 = t", "u in experiment 2 = t^3"] {

@@ -191,9 +191,11 @@ fn what_design_says_every_command_repeats_in_200_tasks() {
 /// for every step's drift: no filter.
 #[test]
 fn predicted_sigmas_are_those_of_least_squares() {
-    let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\naccelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
+    let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\n\
+                  accelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
                   priors = { D_F = 20, D_I = 10, D_O = 10, D_S = 10, psi = 0.2 }\n[requirements]\npsi = 0.1\nD_F = 19\n\
-                  [[position]]\nangles_deg = [10, 25, 40]\n[[position]]\nangles_deg = [130, -50, 70]\n[[position]]\nangles_deg = [-95, 33, -160]\n";
+                  [[position]]\nangles_deg = [10, 25, 40]\n[[position]]\nangles_deg = [130, -50, 70]\n[[position]]\n\
+                  angles_deg = [-95, 33, -160]\n";
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scheme.toml");
     std::fs::write(&file, scheme).expect("a file");

@@ -114,7 +114,10 @@ fn options_are_the_same() {
         json!({ "solutions": false, "measured_azimuth": true }),
         &["--solutions", "off", "--measured-azimuth"],
     );
-    let run = json!({ "requirement": { "D": 0.05 }, "prior": ["D_F=30"], "step": 20, "rate_random_walk": "0.001,0.002,0.003", "drift_noise": "0.001 deg/sqrt(h)" });
+    let run = json!({
+        "requirement": { "D": 0.05 }, "prior": ["D_F=30"], "step": 20, "rate_random_walk": "0.001,0.002,0.003",
+        "drift_noise": "0.001 deg/sqrt(h)"
+    });
     ask(
         "simulate",
         run,
@@ -139,7 +142,10 @@ fn options_are_the_same() {
     ask("crosscheck", json!({ "filter_drop": "p9" }), &["--filter-drop", "p9"]);
     same(
         "design",
-        &json!({ "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "immune": { "K0": 500 }, "keep": 3, "restarts": 5 }),
+        &json!({
+            "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "immune": { "K0": 500 }, "keep": 3,
+            "restarts": 5
+        }),
         &[
             "design",
             "--positions",
@@ -234,7 +240,9 @@ fn wrong_requests_are_named() {
 /// The documented way to read an option set back: what is written is read as the same.
 #[test]
 fn options_are_read_back() {
-    let asked = json!({ "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"] });
+    let asked = json!({
+        "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"]
+    });
     let options: obsdeg_commands::Simulate = serde_json::from_value(asked).expect("options");
     let written = serde_json::to_string(&options).expect("text");
     let again: obsdeg_commands::Simulate = serde_json::from_str(&written).expect("options");

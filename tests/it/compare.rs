@@ -320,7 +320,8 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     };
     let slow = sigmas(
         "slow.toml",
-        "carry = \"inertial\"\nlatitude_deg = 89.9\n[simulation]\nslew_rate_deg_s = 0.01\n[[position]]\nattitude = \"EDN\"\n\
+        "carry = \"inertial\"\nlatitude_deg = 89.9\n[simulation]\nslew_rate_deg_s = 0.01\n[[position]]\n\
+         attitude = \"EDN\"\n\
          [[position]]\nangles_deg = [-177.94, 102.12, 115.37]\n[[position]]\nangles_deg = [-177.94, 102.12, -176.94]\n",
     );
     for (name, sigma) in

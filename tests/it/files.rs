@@ -8,7 +8,8 @@ use std::process::{Command, Output, Stdio};
 
 use crate::program::{obsdeg, run, stderr};
 
-const SCHEME: &str = "[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n";
+const SCHEME: &str = "[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\n\
+                      dwell_s = 100\n";
 
 /// A shell command with `$0` for the program.
 fn shell(script: &str) -> Output {

@@ -99,13 +99,15 @@ fn definite_values_are_what_they_are() {
 fn starts_are_the_given_ones() {
     let pendulum = |rate: &str| {
         verdicts(&format!(
-            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial=0}}\nw={{equation='-k*sin(th)', initial={rate}}}\n[outputs]\ny='th'"
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial=0}}\n\
+             w={{equation='-k*sin(th)', initial={rate}}}\n[outputs]\ny='th'"
         ))
     };
     // at rest nothing moves; pushed, th''' = -k w
     assert_eq!(pendulum("0"), "k -");
     assert_eq!(pendulum("1"), "k 3");
-    let upside_down = "name='m'\nparameters=['k']\n[states]\nth={equation='w', initial='pi'}\nw={equation='-k*sin(th)', initial=0}\n[outputs]\ny='th'";
+    let upside_down = "name='m'\nparameters=['k']\n[states]\nth={equation='w', initial='pi'}\n\
+                       w={equation='-k*sin(th)', initial=0}\n[outputs]\ny='th'";
     assert_eq!(verdicts(upside_down), "k -");
     // from anywhere: y'' = -k sin y
     let free = "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'";
@@ -118,7 +120,8 @@ fn starts_are_the_given_ones() {
     assert_eq!(verdicts(&power(80)), "p ?");
     let timed = "name='m'\nparameters=['p']\n[states]\nx='0'\n[outputs]\ny='p*t^3 + x'";
     assert_eq!(verdicts(timed), "x 0, p 3");
-    let input = "name='m'\nparameters=['p']\nknown_inputs={u={function='1 - cos(t)'}}\n[states]\nx='0'\n[outputs]\ny='p*u + x'";
+    let input = "name='m'\nparameters=['p']\nknown_inputs={u={function='1 - cos(t)'}}\n[states]\nx='0'\n[outputs]\n\
+                 y='p*u + x'";
     assert_eq!(verdicts(input), "x 0, p 2");
     // the end is proven where the rank is that of a generic point
     let never = judged(
@@ -136,7 +139,8 @@ fn jumps_to_special_values_are_special() {
     // the output of the first segment says nothing; after the jump x' = 1 + a x^2 starts at 0
     let jump = |to: &str| {
         format!(
-            "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={{c='1'}}\ncarry={{x='{to}'}}"
+            "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n\
+             [[segment]]\nconstants={{c='1'}}\ncarry={{x='{to}'}}"
         )
     };
     assert_eq!(verdicts(&jump("0")), "x -, a 3");
@@ -433,7 +437,8 @@ fn only_independent_functions_are_judged_in_prime_fields() {
 fn exponents_may_be_constants() {
     let power = |start: &str, exponent: &str, rest: &str| {
         format!(
-            "name='m'\nparameters=['p']\n{rest}\n[states]\nx={{equation='1', initial='{start}'}}\n[outputs]\ny='p*x^{exponent}'"
+            "name='m'\nparameters=['p']\n{rest}\n[states]\nx={{equation='1', initial='{start}'}}\n[outputs]\n\
+             y='p*x^{exponent}'"
         )
     };
     let constant = |start: &str, exponent: &str, n: &str| {
@@ -464,11 +469,13 @@ fn exponents_may_be_constants() {
     assert_eq!(by_name.findings.degrees, by_hand.findings.degrees);
     assert!(by_name.fields.is_some() && free("n", "[constants]\nn='generic'").fields.is_none());
     // each experiment has its own; what a segment changes has none
-    let own = "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nn=2\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^n'\n[[experiment]]\n[[experiment]]\nconstants={n=4}\n";
+    let own = "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nn=2\n[states]\nx={equation='1', initial=0}\n\
+               [outputs]\ny='p*x^n'\n[[experiment]]\n[[experiment]]\nconstants={n=4}\n";
     assert_eq!(verdicts(own), "p 2");
     let later = own.replace("[constants]\nn=2", "[constants]\nn=5");
     assert_eq!(verdicts(&later), "p 4");
-    let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n[[segment]]\nconstants={n=2}\n";
+    let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n\
+                   [[segment]]\nconstants={n=2}\n";
     assert_eq!(verdicts(segment), "x 0, z 0");
 }
 
@@ -483,7 +490,8 @@ fn with_numbers(text: &str, duration: f64) -> String {
     }
     let noise: String = model.outputs.iter().map(|o| format!("{}=0.01\n", o.0.name)).collect();
     format!(
-        "{text}\n[simulation]\nduration={duration}\nstep=0.01\n[simulation.values]\n{values}\n[simulation.noise]\n{noise}"
+        "{text}\n[simulation]\nduration={duration}\nstep=0.01\n[simulation.values]\n{values}\n[simulation.noise]\n\
+         {noise}"
     )
 }
 
@@ -495,7 +503,8 @@ fn the_information_agrees_on_every_named_case() {
     let constant = |output: &str, c: &str| still("z x", output, &format!("[constants]\nc={c}\n"));
     let pendulum = |th: &str, w: &str| {
         format!(
-            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial='{th}'}}\nw={{equation='-k*sin(th)', initial='{w}'}}\n[outputs]\ny='th'"
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial='{th}'}}\n\
+             w={{equation='-k*sin(th)', initial='{w}'}}\n[outputs]\ny='th'"
         )
     };
     let beacons: String =
@@ -519,7 +528,8 @@ fn the_information_agrees_on_every_named_case() {
         pendulum("0", "1"),
         pendulum("pi", "0"),
         "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'".into(),
-        "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={c='1'}\ncarry={x='0'}".into(),
+        "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n\
+         [[segment]]\nconstants={c='1'}\ncarry={x='0'}".into(),
         "name='m'\nparameters=['p']\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^20'".into(),
         still("x", "sqrt(2)*x", ""),
         format!("name='m'\n[states]\nx='vx'\ny='vy'\nvx='0'\nvy='0'\n[outputs]\n{beacons}"),
@@ -567,7 +577,8 @@ fn held_out_models() {
             &format!("{{equation='-9.81/l*sin(th) - d*w', initial={w}}}"),
         )
     };
-    let arrhenius = "name='m'\nexperiments=2\nparameters=['A', 'E']\n[constants]\nT=300\n[states]\nx='-A*exp(-E/T)*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\nconstants={T=350}\n";
+    let arrhenius = "name='m'\nexperiments=2\nparameters=['A', 'E']\n[constants]\nT=300\n[states]\n\
+                     x='-A*exp(-E/T)*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\nconstants={T=350}\n";
     let cases: Vec<(String, &str)> = vec![
         // given values
         (c("z*tan(c) + x", "0"), "z -, x 0"),
@@ -595,9 +606,17 @@ fn held_out_models() {
         (still("a w phi", "a*sin(w*t + phi)", ""), "a 2, w 2, phi 2"),
         (still("a w", "a*sin(w*t)", ""), "a 3, w 3"),
         (still("a w", "a*cos(w*t)", ""), "a 0, w 2"),
-        (model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='sin(t)'}}\n"), "p 2"),
         (
-            model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='exp(t) - 1 - t'}}\n"),
+            model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='sin(t)'}}\n"),
+            "p 2",
+        ),
+        (
+            model(
+                "'p'",
+                "x={equation='p*u', initial=0}",
+                "y='x'",
+                "known_inputs={u={function='exp(t) - 1 - t'}}\n",
+            ),
             "p 3",
         ),
         // related values
@@ -628,7 +647,9 @@ fn held_out_models() {
         (arrhenius.into(), "x@1 0, x@2 0, A 1, E 1"),
         (arrhenius.replace("350", "300"), "x@1 0, x@2 0, A ~, E ~"),
         (
-            "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nc=0\n[states]\nx='0'\n[outputs]\ny='p*sin(c) + x'\n[[experiment]]\n[[experiment]]\nconstants={c='pi/2'}\n".into(),
+            "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nc=0\n[states]\nx='0'\n[outputs]\n\
+             y='p*sin(c) + x'\n[[experiment]]\n[[experiment]]\nconstants={c='pi/2'}\n"
+                .into(),
             "x@1 0, x@2 ~, p ~",
         ),
     ];

@@ -14,11 +14,15 @@ use crate::program::{obsdeg, run, stdout};
 /// Command lines of each command.
 const DRAWN: usize = 16;
 
-const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
-    [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";
-const TURNING: &str = "name = 't'\nlatitude_deg = 45\n[[position]]\nangles_deg = [10, 20, 30]\nrotation = { about = 'X_p', angle_deg = 90 }\n\
+const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n\
+                      [requirements]\nD_F = 0.1\n\
+    [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\n\
+    angles_deg = [180, 0, 90]\n";
+const TURNING: &str = "name = 't'\nlatitude_deg = 45\n[[position]]\nangles_deg = [10, 20, 30]\n\
+                       rotation = { about = 'X_p', angle_deg = 90 }\n\
     [[position]]\nangles_deg = [0, 40, 0]\n";
-const MODEL: &str = "name = 'm'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n[simulation]\nduration = 10\nstep = 0.5\n\
+const MODEL: &str = "name = 'm'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n[simulation]\n\
+                     duration = 10\nstep = 0.5\n\
     values = { x = 1, k = 0.5 }\npriors = { x = 0.1, k = 0.1 }\nnoise = { y = 0.01 }\n";
 
 /// What may stand behind an option: fair values, extremes, what is none.

@@ -12,7 +12,8 @@ use crate::program::obsdeg;
 
 /// Colour, bell, backspace, end of text, window title, C1, the other direction of writing; what markup and
 /// spreadsheets act on.
-const NASTY: &str = "\u{1b}[31m\u{7}\u{8}\u{0}\u{1b}]0;t\u{7}\u{9b}2J\u{85}\u{202e}\u{2066}\u{200f}\u{2028}\u{7f}\u{ffff}`<b>|$^{}\\\"'&%#_*[x](y)";
+const NASTY: &str = "\u{1b}[31m\u{7}\u{8}\u{0}\u{1b}]0;\
+                     t\u{7}\u{9b}2J\u{85}\u{202e}\u{2066}\u{200f}\u{2028}\u{7f}\u{ffff}`<b>|$^{}\\\"'&%#_*[x](y)";
 
 /// The same in a string of TOML or JSON.
 fn escaped() -> String {
@@ -42,12 +43,16 @@ impl Files {
         let folder = tempfile::tempdir().expect("a folder");
         let text = escaped();
         let scheme = format!(
-            "name = \"={text}\"\ndescription = \"{text}\"\n[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n"
+            "name = \"={text}\"\ndescription = \"{text}\"\n[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n\
+             [[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n"
         );
         let model = format!(
-            "name = \"={text}\"\ndescription = \"{text}\"\n[states]\nx = {{ equation = \"-k*x\", unit = \"=cmd|' /C calc'!A0\", description = \"{text}\" }}\n\
-             [parameters]\nk = {{ unit = \"{text}\" }}\n[outputs]\ny = {{ expression = \"x\", unit = \"@SUM(1)\", description = \"-{text}\" }}\n\
-             [simulation]\nduration = 10\nstep = 0.1\nvalues = {{ x = 1, k = 0.5 }}\npriors = {{ x = 0.1, k = 0.1 }}\nnoise = {{ y = 0.01 }}\n"
+            "name = \"={text}\"\ndescription = \"{text}\"\n[states]\nx = {{ equation = \"-k*x\", unit = \"=cmd|' /C \
+             calc'!A0\", description = \"{text}\" }}\n\
+             [parameters]\nk = {{ unit = \"{text}\" }}\n[outputs]\ny = {{ expression = \"x\", unit = \"@SUM(1)\", \
+             description = \"-{text}\" }}\n\
+             [simulation]\nduration = 10\nstep = 0.1\nvalues = {{ x = 1, k = 0.5 }}\npriors = {{ x = 0.1, k = 0.1 }}\n\
+             noise = {{ y = 0.01 }}\n"
         );
         let files = Self { folder };
         fs::write(files.path("scheme.toml"), scheme).expect("written");

@@ -81,7 +81,8 @@ fn several_solutions_where_points_are_special() {
     let cases: [Case<'_>; 11] = [
         // q and -q are one attitude
         (
-            "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\ny='R(q)'",
+            "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\n\
+             y='R(q)'",
             &[("q[1]", 2), ("q[2]", 2), ("q[3]", 2), ("q[4]", 2)],
             &["negate q[1], q[2], q[3], q[4]"],
         ),
@@ -91,13 +92,15 @@ fn several_solutions_where_points_are_special() {
             &["negate v[3]"],
         ),
         (
-            "constraints=['m1^2 + m2^2 + m3^2 = 4']\n[known_inputs]\nw='generic'\n[states]\nm1='w*m2'\nm2='-w*m1'\nm3=0\n[outputs]\ny1='m1'\ny2='m2'",
+            "constraints=['m1^2 + m2^2 + m3^2 = 4']\n[known_inputs]\nw='generic'\n[states]\nm1='w*m2'\nm2='-w*m1'\n\
+             m3=0\n[outputs]\ny1='m1'\ny2='m2'",
             &[("m1", 1), ("m2", 1), ("m3", 2)],
             &["negate m3"],
         ),
         // a heading as cosine and sine, and the speed along it
         (
-            "parameters=['v']\nconstraints=['c^2 + s^2 = 1']\n[known_inputs]\nw='generic'\n[states]\nx='v*c'\nc='-w*s'\ns='w*c'\n[outputs]\ny='x'",
+            "parameters=['v']\nconstraints=['c^2 + s^2 = 1']\n[known_inputs]\nw='generic'\n[states]\nx='v*c'\n\
+             c='-w*s'\ns='w*c'\n[outputs]\ny='x'",
             &[("c", 2), ("s", 2), ("v", 2), ("x", 1)],
             &["negate c, s, v"],
         ),
@@ -107,35 +110,41 @@ fn several_solutions_where_points_are_special() {
             &["negate a"],
         ),
         (
-            "parameters=['a']\n[states]\nx={equation='a^2*x', initial=1}\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + 1'}",
+            "parameters=['a']\n[states]\nx={equation='a^2*x', initial=1}\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\n\
+             carry={x='x + 1'}",
             &[("a", 2)],
             &["negate a"],
         ),
         (
-            "parameters=['b']\n[constants]\nc=1\n[states]\nx={equation='c*b*z', initial=0}\nz={equation='b*x', initial=1}\n[outputs]\ny='z'\n[[segment]]\n[[segment]]\nconstants={c=-1}",
+            "parameters=['b']\n[constants]\nc=1\n[states]\nx={equation='c*b*z', initial=0}\n\
+             z={equation='b*x', initial=1}\n[outputs]\ny='z'\n[[segment]]\n[[segment]]\nconstants={c=-1}",
             &[("b", 2)],
             &["negate x, b"],
         ),
         // absorption and elimination change places, and the volume with them: y = D ka/(V (ka - ke)) (e^(-ke
         // t) - e^(-ka t))
         (
-            "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\nx2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
+            "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\n\
+             x2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
             &[("V", 2), ("ka", 2), ("ke", 2)],
             &["replace ka by ke, ke by ka, V by V*ke/ka"],
         ),
         (
-            "parameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\n[outputs]\ny='x1 + x2'",
+            "parameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\n\
+             [outputs]\ny='x1 + x2'",
             &[("k1", 2), ("k2", 2)],
             &["swap x1 and x2, k1 and k2"],
         ),
         // the rates of three decays in any order: each is one of three
         (
-            "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
+            "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
+             x2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
             &[("k1", 3), ("k2", 3), ("k3", 3)],
             &["swap x1 and x2, k1 and k2", "swap x1 and x3, k1 and k3", "swap x2 and x3, k2 and k3"],
         ),
         (
-            "parameters=['r1', 'r2']\n[states]\nx1={equation='r1*x1*(1 - x1 - x2)', initial='0.25'}\nx2={equation='r2*x2*(1 - x1 - x2)', initial='0.25'}\n[outputs]\ny='x1 + x2'",
+            "parameters=['r1', 'r2']\n[states]\nx1={equation='r1*x1*(1 - x1 - x2)', initial='0.25'}\n\
+             x2={equation='r2*x2*(1 - x1 - x2)', initial='0.25'}\n[outputs]\ny='x1 + x2'",
             &[("r1", 2), ("r2", 2)],
             &["swap x1 and x2, r1 and r2"],
         ),
@@ -146,7 +155,8 @@ fn several_solutions_where_points_are_special() {
         assert_eq!(a.solution_maps, maps, "{text}");
     }
     // by different starts the decays are told from each other
-    let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
+    let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
+               x2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
     assert_eq!(numbers(&analyzed(one)), BTreeMap::from([("k1", 1), ("k2", 1)]));
 }
 
@@ -156,7 +166,9 @@ fn several_solutions_where_points_are_special() {
 fn known_starts_are_not_mapped() {
     let cases: [(&str, &[&str]); 5] = [
         (
-            "parameters=['p']\n[states]\nw={equation='p^2 + w^2', initial=0}\nx={equation='x^3', initial='known'}\nz1={equation='z2', initial=0}\nz2={equation='z3', initial=0}\nz3={equation='z4', initial=0}\nz4={equation='z5', initial=0}\nz5={equation='p*x', initial=0}\n[outputs]\ny='w + z1'",
+            "parameters=['p']\n[states]\nw={equation='p^2 + w^2', initial=0}\nx={equation='x^3', initial='known'}\n\
+             z1={equation='z2', initial=0}\nz2={equation='z3', initial=0}\nz3={equation='z4', initial=0}\n\
+             z4={equation='z5', initial=0}\nz5={equation='p*x', initial=0}\n[outputs]\ny='w + z1'",
             &[],
         ),
         (
@@ -164,7 +176,8 @@ fn known_starts_are_not_mapped() {
             &["negate b"],
         ),
         (
-            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='b^3*x', initial=0}\n[outputs]\ny='z'",
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='b^3*x', initial=0}\n\
+             [outputs]\ny='z'",
             &[],
         ),
         (
@@ -172,7 +185,8 @@ fn known_starts_are_not_mapped() {
             &["negate k"],
         ),
         (
-            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='-b*z', initial='known'}\n[outputs]\ny='x + z'",
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\n\
+             z={equation='-b*z', initial='known'}\n[outputs]\ny='x + z'",
             &[],
         ),
     ];
@@ -187,7 +201,8 @@ fn known_starts_are_not_mapped() {
 #[test]
 fn words_of_identifiability() {
     let a = analyzed(
-        "name='m'\nparameters=['a', 'b', 'c', 'd']\n[states]\nx='a^2 + b*c'\n[outputs]\ny='x + 0*d'\nz='b^3*c^3'\nw='a^2'",
+        "name='m'\nparameters=['a', 'b', 'c', 'd']\n[states]\nx='a^2 + b*c'\n[outputs]\ny='x + 0*d'\nz='b^3*c^3'\n\
+         w='a^2'",
     );
     let of = |name: &str| {
         let q = a.quantities.iter().find(|q| q.name == name).expect("an unknown");

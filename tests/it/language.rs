@@ -76,7 +76,10 @@ proptest! {
         ] {
             let found = values(text, &numbers);
             prop_assert_eq!(found.shape(), expected.shape(), "{}", text);
-            prop_assert!((&found - &expected).amax() < 1e-12 * (1.0 + expected.amax()), "{} {} {}", text, found, expected);
+            prop_assert!(
+                (&found - &expected).amax() < 1e-12 * (1.0 + expected.amax()),
+                "{} {} {}", text, found, expected
+            );
         }
     }
 }
@@ -125,7 +128,8 @@ z = "h"
     };
     let (f, g) = (["f1", "f2", "f3"], ["0", "0", "(-9.81)"]);
     let scalars = format!(
-        "name='s'\nparameters=['b1','b2','b3']\nknown_inputs={{{}}}\ncombinations=['q1^2+q2^2+q3^2+q4^2','2*b1','2*b2','2*b3']\n\
+        "name='s'\nparameters=['b1','b2','b3']\nknown_inputs={{{}}}\n\
+         combinations=['q1^2+q2^2+q3^2+q4^2','2*b1','2*b2','2*b3']\n\
          [constants]\n{}\n[states]\n\
          q1='(-q2*(w1-b1) - q3*(w2-b2) - q4*(w3-b3))/2'\nq2='(q1*(w1-b1) + q3*(w3-b3) - q4*(w2-b2))/2'\n\
          q3='(q1*(w2-b2) + q4*(w1-b1) - q2*(w3-b3))/2'\nq4='(q1*(w3-b3) + q2*(w2-b2) - q3*(w1-b1))/2'\n\
@@ -162,8 +166,10 @@ fn other_words_for_the_same_model() {
     let first =
         model("parameters=['k']\n[states]\n'x[2]'='v'\n'v[2]'='-k*x'\n'c[2]'=0\n[outputs]\ny='x + c'");
     for other in [
-        "[parameters]\nk={}\n[states]\n'x[2]'={equation='v'}\n'v[2]'=['-k*x[1]', '-k*x[2]']\n'c[2]'=[0, 0]\n[outputs]\n'y[2]'='x + c'",
-        "[parameters]\nk={}\n[definitions]\nz='x + w'\nw='c'\n[states]\n'x[2]'='v'\n'v[2]'='-K*x'\n'c[2]'='[0, 0]'\n[outputs]\ny={expression='z'}\n[constants]\nE=[[1, 0], [0, 1]]\n[definitions.K]\n",
+        "[parameters]\nk={}\n[states]\n'x[2]'={equation='v'}\n'v[2]'=['-k*x[1]', '-k*x[2]']\n'c[2]'=[0, 0]\n\
+         [outputs]\n'y[2]'='x + c'",
+        "[parameters]\nk={}\n[definitions]\nz='x + w'\nw='c'\n[states]\n'x[2]'='v'\n'v[2]'='-K*x'\n'c[2]'='[0, 0]'\n\
+         [outputs]\ny={expression='z'}\n[constants]\nE=[[1, 0], [0, 1]]\n[definitions.K]\n",
     ] {
         let other = match other.strip_suffix("[definitions.K]\n") {
             Some(rest) => rest.replace("w='c'", "w='c'\nK='k*E'"),
@@ -175,8 +181,10 @@ fn other_words_for_the_same_model() {
     // starts, jumps and constants of a segment
     let known = model("[states]\n'x[2]'={equation='s*x', initial='known'}\ns=0\n[outputs]\ny='x[2]'");
     assert_eq!(known.0, ["s"]);
-    let jump = "[constants]\ng=[0, 0, 1]\n[states]\n'x[3]'='cross(g, x)'\n[outputs]\ny='x[1]'\n[[segment]]\n[[segment]]\nconstants={g=[1, 0, 0]}\ncarry={x='2*x'}";
-    let by_hand = "[constants]\na=0\nb=1\n[states]\nx1='-b*x2'\nx2='b*x1 - a*x3'\nx3='a*x2'\n[outputs]\ny='x1'\n[[segment]]\n[[segment]]\nconstants={a=1, b=0}\ncarry={x1='2*x1', x2='2*x2', x3='2*x3'}";
+    let jump = "[constants]\ng=[0, 0, 1]\n[states]\n'x[3]'='cross(g, x)'\n[outputs]\ny='x[1]'\n[[segment]]\n\
+                [[segment]]\nconstants={g=[1, 0, 0]}\ncarry={x='2*x'}";
+    let by_hand = "[constants]\na=0\nb=1\n[states]\nx1='-b*x2'\nx2='b*x1 - a*x3'\nx3='a*x2'\n[outputs]\ny='x1'\n\
+                   [[segment]]\n[[segment]]\nconstants={a=1, b=0}\ncarry={x1='2*x1', x2='2*x2', x3='2*x3'}";
     assert_eq!(model(jump).1, model(by_hand).1);
 }
 
@@ -184,7 +192,8 @@ fn other_words_for_the_same_model() {
 #[test]
 fn names_of_functions_of_vectors_are_free() {
     let j = judged(
-        "name='r'\nparameters=['dot']\n[states]\nR='-dot*R'\n'q[4]'=0\n[definitions]\nskew='R*R'\n[outputs]\ny='skew + R'\nz='R(q)*[1, 0, 0]'",
+        "name='r'\nparameters=['dot']\n[states]\nR='-dot*R'\n'q[4]'=0\n[definitions]\nskew='R*R'\n[outputs]\n\
+         y='skew + R'\nz='R(q)*[1, 0, 0]'",
     );
     assert_eq!(j.findings.degrees.degree[0], Some(0));
     // `R = "R(q)"` is no circle
@@ -384,7 +393,8 @@ fn degrees(j: &Judgement) -> Vec<(String, Option<usize>)> {
 fn constraints_against_coordinates_of_their_own() {
     // a rotation by two numbers on a circle, and by the tangent of its half: rank 2 of 3 and 1 of 2
     let circle = judged(
-        "name='c'\nconstraints=['c^2 + s^2 = 1']\nparameters=['k']\n[states]\nc='-s*k'\ns='c*k'\nz='c'\n[outputs]\ny='z'",
+        "name='c'\nconstraints=['c^2 + s^2 = 1']\nparameters=['k']\n[states]\nc='-s*k'\ns='c*k'\nz='c'\n[outputs]\n\
+         y='z'",
     );
     let half = judged(
         "name='h'\nparameters=['k']\n[states]\nt='(1 + t^2)*k/2'\nz='(1-t^2)/(1+t^2)'\n[outputs]\ny='z'",
@@ -416,7 +426,8 @@ fn constraints_against_coordinates_of_their_own() {
 fn attitudes_on_their_constraint() {
     let attitude = |constraints: &str, state: &str, turned: &str, b: &str| {
         judged(&format!(
-            "name='a'\nparameters=['b[3]']\nconstraints={constraints}\nknown_inputs={{'w[3]'='generic'}}\n[definitions]\nr='w - b'\n\
+            "name='a'\nparameters=['b[3]']\nconstraints={constraints}\nknown_inputs={{'w[3]'='generic'}}\n\
+             [definitions]\nr='w - b'\n\
              [states]\n{state}\n[outputs]\ny='{turned}*{b}'"
         ))
     };
@@ -474,7 +485,8 @@ fn constraints_that_cannot_hold_are_named() {
         ("['x = 1', 'x^2 = 2']", "no real point was found at which it holds"),
     ] {
         let text = format!(
-            "name='c'\nconstraints={constraints}\nknown_inputs={{u='generic'}}\n[constants]\nk='generic'\n[states]\nx='u*k'\nz={{equation=0, initial=1}}\n'p[2]'=0\n[outputs]\ny='x + z'"
+            "name='c'\nconstraints={constraints}\nknown_inputs={{u='generic'}}\n[constants]\nk='generic'\n[states]\n\
+             x='u*k'\nz={{equation=0, initial=1}}\n'p[2]'=0\n[outputs]\ny='x + z'"
         );
         let e = model_file::read(&text).and_then(|m| judge(&m, 1, None)).expect_err(constraints);
         assert!(e.message.contains(message) && e.what.starts_with("the constraint"), "{constraints}: {e}");
@@ -486,13 +498,18 @@ fn constraints_that_cannot_hold_are_named() {
 #[test]
 fn experiments_of_their_own() {
     let several = judged(
-        "name='s'\nparameters=['k', 'b']\nknown_inputs={u='generic', 'z[2]'='generic'}\n[constants]\nm='2*d'\nd=1\n[definitions]\nforce='b*u*m'\n\
-         [states]\nx='-k*x + force + z[1]*z[2]'\n[outputs]\ny='d*x'\n[[experiment]]\nconstants={d=3}\nknown_inputs={u={function='t + d'}, z='constant'}\n\
-         [[experiment]]\nknown_inputs={u='constant'}\n[[experiment]]\nconstants={d='1/2'}\nknown_inputs={z={function=['t', 'd']}}\n",
+        "name='s'\nparameters=['k', 'b']\nknown_inputs={u='generic', 'z[2]'='generic'}\n[constants]\nm='2*d'\nd=1\n\
+         [definitions]\nforce='b*u*m'\n\
+         [states]\nx='-k*x + force + z[1]*z[2]'\n[outputs]\ny='d*x'\n[[experiment]]\nconstants={d=3}\n\
+         known_inputs={u={function='t + d'}, z='constant'}\n\
+         [[experiment]]\nknown_inputs={u='constant'}\n[[experiment]]\nconstants={d='1/2'}\n\
+         known_inputs={z={function=['t', 'd']}}\n",
     );
     let one = judged(
-        "name='o'\nparameters=['k', 'b']\nknown_inputs={u2='constant', u3='generic', z1='constant', z2='generic', z3='generic'}\n\
-         [states]\nx1='-k*x1 + b*(t + 3)*6 + z1'\nx2='-k*x2 + b*u2*2 + z2'\nx3='-k*x3 + b*u3 + t/2'\n[outputs]\ny1='3*x1'\ny2='x2'\ny3='x3/2'\n",
+        "name='o'\nparameters=['k', 'b']\nknown_inputs={u2='constant', u3='generic', z1='constant', z2='generic', \
+         z3='generic'}\n\
+         [states]\nx1='-k*x1 + b*(t + 3)*6 + z1'\nx2='-k*x2 + b*u2*2 + z2'\nx3='-k*x3 + b*u3 + t/2'\n[outputs]\n\
+         y1='3*x1'\ny2='x2'\ny3='x3/2'\n",
     );
     let names: Vec<String> = degrees(&several).into_iter().map(|d| d.0).collect();
     assert_eq!(names, ["x@1", "x@2", "x@3", "k", "b"]);
@@ -517,7 +534,8 @@ fn experiments_that_are_wrong_are_named() {
         let text = format!("name='d'\n{own}");
         model_file::read(&text).and_then(|m| judge(&m, 1, None)).expect_err(own).to_string()
     };
-    let rest = "parameters=['a']\nknown_inputs={u='generic'}\n[constants]\nd=1\ne='2*d'\n[states]\nx='a + u*d'\n[outputs]\ny='x'\n";
+    let rest = "parameters=['a']\nknown_inputs={u='generic'}\n[constants]\nd=1\ne='2*d'\n[states]\nx='a + u*d'\n\
+                [outputs]\ny='x'\n";
     for (own, message) in [
         ("[[experiment]]\nconstants={c=1}", "the constant c of experiment 1: `c` is no known constant"),
         (
@@ -554,8 +572,10 @@ fn experiments_that_are_wrong_are_named() {
 fn evidence_of_several_experiments() {
     let text = |second: &str| {
         format!(
-            "name='e'\nparameters=['a', 'b']\nknown_inputs={{u='constant'}}\n[states]\nx='-a*x + b*u'\nc='-c'\n[outputs]\ny='x'\nz='c'\n[[experiment]]\n[[experiment]]\n\
-             [simulation]\nduration=2\nstep=0.05\nnoise={{y=0.01, z=0.01}}\nvalues={{x=1, 'x@2'=0.3, c=0.1, 'c@2'=-0.2, a=0.7, b=1.5}}\ninputs={{u='1', 'u@2'='{second}'}}\n"
+            "name='e'\nparameters=['a', 'b']\nknown_inputs={{u='constant'}}\n[states]\nx='-a*x + b*u'\nc='-c'\n\
+             [outputs]\ny='x'\nz='c'\n[[experiment]]\n[[experiment]]\n\
+             [simulation]\nduration=2\nstep=0.05\nnoise={{y=0.01, z=0.01}}\n\
+             values={{x=1, 'x@2'=0.3, c=0.1, 'c@2'=-0.2, a=0.7, b=1.5}}\ninputs={{u='1', 'u@2'='{second}'}}\n"
         )
     };
     let model = |second: &str| read(&text(second));

@@ -279,7 +279,8 @@ fn inputs_constants_and_experiments() {
     assert_eq!(degree_of(&twice, "x@2"), Some(0));
     // a jump of the state that is known
     let jump = judged(
-        "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + a*z'}",
+        "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\n\
+         carry={x='x + a*z'}",
     );
     assert_eq!((degree_of(&jump, "a"), jump.findings.degrees.rank()), (None, 2));
 }
@@ -287,7 +288,8 @@ fn inputs_constants_and_experiments() {
 /// The same system from JSON and from TOML.
 #[test]
 fn both_layouts_say_the_same() {
-    let toml = "name='s'\nparameters=['p1', 'p2']\nknown_inputs={u='generic'}\n[states]\nx1='-p1*x1 + u'\nx2='p2*x1 - x2'\n[outputs]\ny='x2'";
+    let toml = "name='s'\nparameters=['p1', 'p2']\nknown_inputs={u='generic'}\n[states]\nx1='-p1*x1 + u'\n\
+                x2='p2*x1 - x2'\n[outputs]\ny='x2'";
     let json = r#"{"name": "s", "states": ["x1", "x2"], "params": ["p1", "p2"], "known_inputs": ["u"],
         "equations": {"x1": "-p1*x1 + u", "x2": "p2*x1 - x2"}, "outputs": {"y": "x2"}}"#;
     let of_json = judge(&json::read(json).expect("a model"), 7, None).expect("judged");
@@ -329,7 +331,8 @@ fn monsters_do_no_harm() {
         .and_then(|m| judge(&m, 1, None))
         .expect_err("too many");
     assert!(error.to_string().contains("200000 states"), "{error}");
-    let experiments = r#"{"name": "e", "experiments": 1000000000, "states": ["x"], "equations": {"x": "x"}, "outputs": {"y": "x"}}"#;
+    let experiments = "{\"name\": \"e\", \"experiments\": 1000000000, \"states\": [\"x\"], \
+                       \"equations\": {\"x\": \"x\"}, \"outputs\": {\"y\": \"x\"}}";
     assert!(json::read(experiments).expect_err("too many").to_string().contains("1 to 20"));
     for nested in ["sin(x + ", "exp(2*", "log(x + ", "sqrt(1 + "] {
         let text = model(&format!("{}x{}", nested.repeat(150), ")".repeat(150)));
@@ -488,9 +491,12 @@ fn what_is_not_measured_is_no_agreement() {
 fn slopes_that_do_not_settle_are_not_measured() {
     for (theta, input) in [("0.5", "sin(t)"), ("1", "0.5*cos(3*t)")] {
         let text = format!(
-            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\ntheta='omega'\n\
-             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\nstep=0.01\n\
-             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, o=0.1}}"
+            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\n\
+             theta='omega'\n\
+             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\n\
+             step=0.01\n\
+             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, \
+             o=0.1}}"
         );
         let e = crosscheck_system(&model_file::read(&text).expect("a model"), 1).expect("evidence");
         assert!(e.passed && (e.orders.measured, e.orders.of) == (0, 7), "{e:?}");
@@ -563,7 +569,8 @@ fn solving_expressions() {
     // an input: y' = -(p/V) y + u/V, so that y'' and u' solve for both
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("m.toml");
-    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"x\"\n";
+    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\n\
+                u = \"generic\"\n[outputs]\ny = \"x\"\n";
     std::fs::write(&file, text).expect("written");
     let (clearance, _) = solved(&file.display().to_string());
     let (x, p, v, u, u1) = (0.7, 0.4, 2.5, 1.3, -0.6);
@@ -625,7 +632,8 @@ fn the_input_chooses_the_primes() {
         let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
         model.random(1, "verdicts").next_u64()
     };
-    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n[constants]\nc=2\n\
+    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n\
+                 [constants]\nc=2\n\
                  [states]\nx='-a*x + u'\ny={equation='c*x + w', initial=1}\n[outputs]\nz='b*y'\n";
     let words = plain.replace("name='m'", "name='another'\ndescription='words'");
     assert_eq!(first(plain), first(&words));

@@ -212,7 +212,13 @@ fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
     ] {
         let (_, without) = calibrated(of, 0.0, 0.0);
         let (table, estimate) = calibrated(of, d_iy, k0_z);
-        assert!(table.contains("consistent: the model and its sigmas explain the record, as far as it can tell; silent here: "), "{table}");
+        assert!(
+            table.contains(
+                "consistent: the model and its sigmas explain the record, as far as it can tell; \
+                                silent here: "
+            ),
+            "{table}"
+        );
         let said = format!("{name} (changes {of} by ");
         let behind = table.split(&said).nth(1).unwrap_or_else(|| panic!("no {said}: {table}"));
         let (per_unit, rest) = behind.split_once(' ').expect("a number");

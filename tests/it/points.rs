@@ -371,7 +371,8 @@ fn factors_are_taken_that_can_be() {
             "{constraints}"
         );
     }
-    let runs = "constraints=['x*(y - 1) = 0']\nexperiments=2\n[states]\nx='0'\ny='0'\n[outputs]\ns='x + y'\n[simulation.values]\n";
+    let runs = "constraints=['x*(y - 1) = 0']\nexperiments=2\n[states]\nx='0'\ny='0'\n[outputs]\ns='x + y'\n\
+                [simulation.values]\n";
     for (values, factors) in
         [("'x@1'=0\n'y@1'=2\n'x@2'=3\n'y@2'=1", &[][..]), ("'x@1'=0\n'y@1'=2\n'x@2'=0\n'y@2'=5", &["x"])]
     {
@@ -393,7 +394,8 @@ fn given_values_choose_the_way() {
     ] {
         for seed in 1..=6 {
             let text = format!(
-                "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\ns='{output}'\n[simulation]\nvalues={{{values}}}"
+                "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\ns='{output}'\n\
+                 [simulation]\nvalues={{{values}}}"
             );
             let model = model_file::read(&text).expect("a model");
             let options = SystemOptions { seed, solutions: false, ..SystemOptions::default() };

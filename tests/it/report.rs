@@ -341,7 +341,8 @@ fn a_verdict_leads_with_what_limits_it() {
     assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
     // at a pole the dwell gives what no derivative sees
     let (page, verdict) = page_of("dwell.html", &[five, "--latitude", "90"]);
-    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, during which psi moves. \
+    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, \
+                during which psi moves. \
                 The largest predicted sigma of those is ";
     assert!(
         verdict.contains(said) && !verdict.contains("None of them") && !verdict.contains("cannot tell"),

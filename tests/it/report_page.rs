@@ -26,7 +26,8 @@ fn several_schemes_are_compared_first() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, dwell: u32, attitudes: &[&str], more: &str| -> String {
         let mut text = format!(
-            "name = '{name}'\nterms = ['F', 'S']\ncarry = 'inertial'\nlatitude_deg = 48\n{more}\n[simulation]\ndwell_s = {dwell}\n\
+            "name = '{name}'\nterms = ['F', 'S']\ncarry = 'inertial'\nlatitude_deg = 48\n{more}\n[simulation]\n\
+             dwell_s = {dwell}\n\
              drift_scale = 1e-4\npriors = {{ D = 1e5, psi = 10 }}\n[requirements]\nD = 0.05\npsi = 1\n"
         );
         attitudes.iter().for_each(|a| text.push_str(&format!("[[position]]\nattitude = '{a}'\n")));
@@ -126,7 +127,8 @@ fn a_browser_shows_it() {
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
     browser.settle();
     let cut = browser.value(
-        "(() => { const all = [...document.querySelectorAll('.formulas math')], w = document.documentElement.clientWidth; \
+        "(() => { const all = [...document.querySelectorAll('.formulas math')], \
+         w = document.documentElement.clientWidth; \
          return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
     );
     assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
@@ -137,7 +139,8 @@ fn a_browser_shows_it() {
         browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
         browser.settle();
         let cut = browser.value(
-            "(() => { const w = document.documentElement.clientWidth; return [...document.querySelectorAll('.wide > table')] \
+            "(() => { const w = document.documentElement.clientWidth; return [...document.querySelectorAll('.wide > \
+             table')] \
              .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.innerText.slice(0, 80)); })()",
         );
         assert_eq!(cut, json!([]), "cut at the edge of a sheet");
@@ -147,7 +150,8 @@ fn a_browser_shows_it() {
     // what is folded is on paper all the same
     let (several, _) = report(folder.path(), "several.html", &[PAPER, MODEL]);
     browser.open(&several, 1280, 900);
-    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ contentVisibilityAuto: true }))";
+    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ \
+                   contentVisibilityAuto: true }))";
     let seen = |browser: &mut Browser, all: bool| {
         let shown = browser.value(visible);
         let shown = shown.as_array().expect("a list");
@@ -169,7 +173,8 @@ fn a_browser_shows_it() {
             browser.value("document.querySelectorAll('details').forEach(d => { d.open = true; })");
             browser.value(&format!("{axe};1"));
             let found = browser.value(
-                "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+                "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + \
+                 v.nodes[0].html.slice(0, 200))])",
             );
             assert!(found[0].as_u64() > Some(15) && found[1] == json!([]), "{scheme}: {found}");
         }
@@ -181,7 +186,8 @@ fn a_browser_shows_it() {
         browser.open(file, 1280, 900);
         // every figure with curves has a drawing of its own, and the still one is out of the way
         let counts = browser.value(
-            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves canvas').length, \
+            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves \
+             canvas').length, \
              [...document.querySelectorAll('figure.curves > .still')].filter(e => e.checkVisibility()).length]",
         );
         assert!(counts[0].as_u64() > Some(10) && counts[0] == counts[1] && counts[2] == json!(0), "{counts}");
@@ -190,7 +196,8 @@ fn a_browser_shows_it() {
             browser.settle();
             let beyond = browser.value(
                 "(() => { const w = document.documentElement.clientWidth; \
-                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || e.classList.contains('wide')) \
+                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || \
+                 e.classList.contains('wide')) \
                  .filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('svg, .u-wrap')) \
                  .map(e => e.tagName + '.' + e.className); \
                  return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
@@ -212,7 +219,8 @@ fn a_browser_shows_it() {
             .value(&format!("document.querySelector({series:?}).querySelector('.u-value').textContent"));
         assert!(shown.as_str().is_some_and(|v| v.parse::<f64>().is_ok()), "{shown}");
         let degree = browser.value(
-            "[...document.querySelectorAll('td')].find(c => c.textContent == 'D_FY').parentElement.children[3].textContent",
+            "[...document.querySelectorAll('td')].find(c => c.textContent == \
+             'D_FY').parentElement.children[3].textContent",
         );
         assert_eq!(degree, json!(degree_of_d_fy));
         // dark
@@ -308,7 +316,8 @@ fn a_model_says_what_to_know_beforehand() {
     let three = "name='three'\nparameters=['a','b','c']\n[states]\nx='-a*b*c*x'\n[outputs]\ny='x'\n";
     let all = page(&written("three.toml", three));
     assert_eq!(all[0], "To resolve a: know b and c; degree 1", "{all:?}");
-    let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\nstep=0.1\n\
+    let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\n\
+               step=0.1\n\
                values={x=1,k=0.5}\npriors={x=0.01,k=0.01}\nnoise={y=0.001}\n";
     let all = page(&written("one.toml", one));
     assert!(all.len() == 1 && all[0].starts_with("No action: every unknown is observable"), "{all:?}");

@@ -200,8 +200,10 @@ fn read(text: &str) -> SystemModel {
 }
 
 /// From t = 0 on y = (a + b) t + a t^71/71: no derivative up to the bound shows a and b, a run does.
-const BEYOND: &str = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n[outputs]\ny='x'\n\
-                      [simulation]\nduration=1.5\nstep=0.1\nnoise={y=0.01}\nvalues={a=0.5, b=1.0, x=0.0}\npriors={a=1.0, b=1.0, x=1.0}";
+const BEYOND: &str = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n\
+                      [outputs]\ny='x'\n\
+                      [simulation]\nduration=1.5\nstep=0.1\nnoise={y=0.01}\nvalues={a=0.5, b=1.0, x=0.0}\n\
+                      priors={a=1.0, b=1.0, x=1.0}";
 
 /// What a run shows beyond the bound contradicts nothing, and is not called unseen by the run.
 #[test]

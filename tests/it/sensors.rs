@@ -236,27 +236,33 @@ fn sets_of_all_reference_models_are_those_of_exhaustion() {
 /// functions, vectors, and candidates with costs that are expressions.
 const SPECIAL: [(&str, &str); 8] = [
     (
-        "name='input'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw={polynomial=1}\n[outputs]\ny='b'",
+        "name='input'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw={polynomial=1}\n\
+         [outputs]\ny='b'",
         "states, inputs, a + b, k",
     ),
     (
-        "name='arbitrary'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw='arbitrary'\n[outputs]\ny='b'",
+        "name='arbitrary'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw='arbitrary'\n\
+         [outputs]\ny='b'",
         "states, inputs, parameters",
     ),
     (
-        "name='segments'\nparameters=['k','m']\n[states]\na='-c*k*a'\nb='c*k*a-m*b'\n[constants]\nc='generic'\n[[segment]]\n[[segment]]\nconstants={c='-1'}\ncarry={b='a-b'}\n[outputs]\ny='b'",
+        "name='segments'\nparameters=['k','m']\n[states]\na='-c*k*a'\nb='c*k*a-m*b'\n[constants]\nc='generic'\n\
+         [[segment]]\n[[segment]]\nconstants={c='-1'}\ncarry={b='a-b'}\n[outputs]\ny='b'",
         "states, a*b, m*a",
     ),
     (
-        "name='experiments'\nparameters=['k','m']\n[states]\na='-k*a*b'\nb='k*a-m*b'\n[known_inputs]\nu='generic'\n[outputs]\ny='b'\n[[experiment]]\n[[experiment]]\nknown_inputs={u='constant'}",
+        "name='experiments'\nparameters=['k','m']\n[states]\na='-k*a*b'\nb='k*a-m*b'\n[known_inputs]\nu='generic'\n\
+         [outputs]\ny='b'\n[[experiment]]\n[[experiment]]\nknown_inputs={u='constant'}",
         "states, a*u, m*a + b",
     ),
     (
-        "name='known'\nparameters=['k','m']\n[states]\na={equation='-k*a*b', initial='2'}\nb={equation='k*a-m*b', initial='known'}\nc='m*a*c'\n[outputs]\ny='b'",
+        "name='known'\nparameters=['k','m']\n[states]\na={equation='-k*a*b', initial='2'}\n\
+         b={equation='k*a-m*b', initial='known'}\nc='m*a*c'\n[outputs]\ny='b'",
         "states, a*b",
     ),
     (
-        "name='constraint'\nconstraints=['x^2+y^2=1']\nparameters=['k']\n[states]\nx='-k*y'\ny='k*x'\nz='x*z'\n[outputs]\no='x'",
+        "name='constraint'\nconstraints=['x^2+y^2=1']\nparameters=['k']\n[states]\nx='-k*y'\ny='k*x'\nz='x*z'\n\
+         [outputs]\no='x'",
         "x, y, z, x + y",
     ),
     (
@@ -264,7 +270,9 @@ const SPECIAL: [(&str, &str); 8] = [
         "q, v, cos(q), exp(m*v)",
     ),
     (
-        "name='vector'\nparameters=['k']\n[states]\n'p[2]'='[p[2], -k*p[1]]'\nb='-b+p[1]*t'\n[outputs]\no='b'\n[candidates]\nplace={expression='p', cost=1.5}\nsum={expression='p[1]+b', cost=0.25}\nlate={expression='b*t', cost=2}",
+        "name='vector'\nparameters=['k']\n[states]\n'p[2]'='[p[2], -k*p[1]]'\nb='-b+p[1]*t'\n[outputs]\no='b'\n\
+         [candidates]\nplace={expression='p', cost=1.5}\nsum={expression='p[1]+b', cost=0.25}\n\
+         late={expression='b*t', cost=2}",
         "candidates, p[2]",
     ),
 ];

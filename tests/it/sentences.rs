@@ -218,7 +218,8 @@ fn point(model: &SystemModel) -> Point {
     out
 }
 
-const SIR: &str = "name='sir'\nparameters=['beta', 'gamma', 'k']\nconstraints=['S + I + R = 1']\n[states]\nS='-beta*S*I'\n\
+const SIR: &str = "name='sir'\nparameters=['beta', 'gamma', 'k']\nconstraints=['S + I + R = 1']\n[states]\n\
+                   S='-beta*S*I'\n\
                    I='beta*S*I - gamma*I'\nR='gamma*I'\n[outputs]\ny='k*I'";
 
 /// Every printed symmetry, at several c: outputs and constraints stay as they are, and c = 1 (0 where nothing
@@ -343,7 +344,8 @@ fn constraints_are_named_beside_the_outputs() {
 /// Beyond the bound on the order outputs may change: from t = 0 on, y = (a + b) t + a t^71/71 does.
 #[test]
 fn beyond_the_bound_no_output_is_said_to_stay() {
-    let text = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n[outputs]\ny='x'";
+    let text = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n\
+                [outputs]\ny='x'";
     let said = table(text);
     assert!(said.contains("add c to a; subtract c from b"), "{said}");
     let y = |a: f64, b: f64| (a + b) * 1.2 + a * 1.2f64.powi(71) / 71.0;
@@ -380,7 +382,8 @@ fn models_are_checked_without_a_filter() {
 fn verdicts_are_those_of_the_time_that_is_said() {
     let model = |time: &str| {
         format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n\
+             [outputs]\ny='x'"
         )
     };
     for (time, said, degrees) in [
@@ -433,7 +436,8 @@ fn runs_say_when_they_begin() {
     let file = place.path().join("model.toml");
     for (time, begins) in [("", 0.0), ("time = 2", 2.0), ("time = 'generic'", 1.0)] {
         let text = format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n[outputs]\n\
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n\
+             [outputs]\n\
              y='x'\n[simulation]\nduration=1.0\nstep=0.01\nnoise={{y=0.01}}\nvalues={{a=2.0, b=3.0, x=0.0}}"
         );
         std::fs::write(&file, text).expect("written");
@@ -463,7 +467,8 @@ fn runs_say_when_they_begin() {
 fn known_starts_are_not_called_unobservable() {
     use obsdeg_core::degree::Status;
     let model = read(
-        "name='m'\nparameters=['a', 'b']\n[states]\nx={equation='a + b', initial='0'}\n[outputs]\ny='x'\n[simulation]\nduration=1.0\n\
+        "name='m'\nparameters=['a', 'b']\n[states]\nx={equation='a + b', initial='0'}\n[outputs]\ny='x'\n\
+         [simulation]\nduration=1.0\n\
          step=0.1\nnoise={y=0.01}\nvalues={a=2.0, b=3.0}",
     );
     let (run, _) = obsdeg_evidence::system::simulate_system(&model, 1).expect("a run");
@@ -500,7 +505,8 @@ fn no_verdict_without_certainty() {
 fn constraints_have_real_points() {
     let judged = |constraint: &str, values: &str| {
         let text = format!(
-            "name='m'\nconstraints=['{constraint}']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'\n[simulation]\nvalues={{{values}}}"
+            "name='m'\nconstraints=['{constraint}']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'\n[simulation]\n\
+             values={{{values}}}"
         );
         model_file::read(&text).and_then(|m| without_solutions(&m))
     };

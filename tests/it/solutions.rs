@@ -90,7 +90,8 @@ fn numbers_by_hand() {
 /// Two compartments that may be swapped, and a third that may not; with states known or not.
 #[test]
 fn numbers_of_systems() {
-    let twins = "name = \"twins\"\nparameters = [\"a\", \"b\"]\n[states]\nu = \"-a*u\"\nv = \"-b*v\"\n[outputs]\ny = \"u + v\"\n";
+    let twins = "name = \"twins\"\nparameters = [\"a\", \"b\"]\n[states]\nu = \"-a*u\"\nv = \"-b*v\"\n[outputs]\n\
+                 y = \"u + v\"\n";
     let two = counted(twins);
     assert_eq!(numbers(&two), BTreeMap::from([("u", 2), ("v", 2), ("a", 2), ("b", 2)]));
     let three = twins.replace("[outputs]\ny = \"u + v\"", "w = \"-(a + b)*w\"\n[outputs]\ny = \"u + v + w\"");
@@ -110,7 +111,8 @@ fn numbers_of_systems() {
     assert_eq!(numbers(&constrained("u - 2*v = 1")).values().copied().collect::<Vec<_>>(), [1; 4]);
     assert_eq!(numbers(&constrained("u + v = 1")), numbers(&two));
     // an unknown input that is constant, one that is a ramp
-    let pushed = "name = \"pushed\"\nparameters = [\"a\"]\nunknown_inputs = {w = \"constant\"}\n[states]\nx = \"-a*x + w^2\"\n[outputs]\ny = \"x\"\n";
+    let pushed = "name = \"pushed\"\nparameters = [\"a\"]\nunknown_inputs = {w = \"constant\"}\n[states]\n\
+                  x = \"-a*x + w^2\"\n[outputs]\ny = \"x\"\n";
     assert_eq!(numbers(&counted(pushed)), BTreeMap::from([("a", 1), ("w", 2), ("x", 1)]));
 }
 
@@ -119,7 +121,8 @@ fn numbers_of_systems() {
 fn special_starts_leave_it_open() {
     let text = |start: &str| {
         format!(
-            "name = \"s\"\nparameters = [\"a\", \"b\"]\n[states]\nx = {{equation = \"a^2 + b*x\"{start}}}\n[outputs]\ny = \"x\"\n"
+            "name = \"s\"\nparameters = [\"a\", \"b\"]\n[states]\nx = {{equation = \"a^2 + b*x\"{start}}}\n[outputs]\n\
+             y = \"x\"\n"
         )
     };
     assert_eq!(numbers(&counted(&text(""))), BTreeMap::from([("a", 2), ("b", 1), ("x", 1)]));

@@ -252,7 +252,8 @@ fn errors_that_are_not_estimated_are_shown() {
     wait(
         b,
         "classes of the new scheme",
-        "[...document.querySelectorAll('#omitted tbody tr')].some(r => r.cells[0].textContent == 'K0 (3)' && r.cells[1].textContent == '1 no effect, 2 silent')",
+        "[...document.querySelectorAll('#omitted tbody tr')].some(r => r.cells[0].textContent == 'K0 (3)' && \
+         r.cells[1].textContent == '1 no effect, 2 silent')",
     );
     b.value("document.getElementById('not-estimated').open = false, 1");
     assert_eq!(shown(b, "reset"), "1 no effect, 2 silent");
@@ -274,7 +275,8 @@ fn requirements_are_judged_by_the_total() {
     let head = b.value("[...document.querySelectorAll('#omitted th')].at(-1).textContent");
     assert_eq!(head, json!("uses up a margin at"));
     let k0 = b.value(
-        "[...document.querySelectorAll('#omitted tbody tr')].find(r => r.cells[0].textContent == 'K0 (3)').cells[6].textContent",
+        "[...document.querySelectorAll('#omitted tbody tr')].find(r => r.cells[0].textContent == 'K0 \
+         (3)').cells[6].textContent",
     );
     let pair =
         ["--angles", "0,0,0", "--angles", "180,0,0", "--requirement", "D_IY=0.2", "--format", "json", "-q"];
@@ -371,7 +373,8 @@ fn the_tour_shows_what_it_says() {
     wait(
         b,
         "marks",
-        "document.getElementById('alpha').title.startsWith('Other verdicts at -180, 0, 180 deg (tried: multiples of 5)')",
+        "document.getElementById('alpha').title.startsWith('Other verdicts at -180, 0, 180 deg (tried: multiples of \
+         5)')",
     );
     click(b, "#tour-next");
     says(b, "psi_y", 3, "not excited");
@@ -417,7 +420,8 @@ fn it_is_for_everyone() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && \
+         document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     b.value("document.getElementById('not-estimated').open = true, 1");
     b.value(&format!("{axe};1"));
@@ -432,7 +436,8 @@ fn it_is_for_everyone() {
                 b.settle();
                 let beyond = b.value(
                     "(() => { const w = document.documentElement.clientWidth; \
-                     const out = [...document.body.querySelectorAll('*')].filter(e => e.checkVisibility() && (!e.closest('.wide') || e.classList.contains('wide'))) \
+                     const out = [...document.body.querySelectorAll('*')].filter(e => e.checkVisibility() && \
+                     (!e.closest('.wide') || e.classList.contains('wide'))) \
                      .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.tagName + '#' + e.id); \
                      return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
                 );
@@ -441,7 +446,8 @@ fn it_is_for_everyone() {
                     continue;
                 }
                 let found = b.value(
-                    "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+                    "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + \
+                     v.nodes[0].html.slice(0, 200))])",
                 );
                 assert!(
                     found[0].as_u64() > Some(10) && found[1] == json!([]),

@@ -81,7 +81,8 @@ fn links_of_others_put_nothing_into_the_page() {
     let b = &mut browser;
     // as the page packs a text
     b.value(
-        "window.packedText = (text) => btoa(Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b)).join(''))\
+        "window.packedText = (text) => btoa(Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b))\
+         .join(''))\
          .replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', ''), 1",
     );
     for (text, said) in hostile() {

@@ -73,7 +73,8 @@ pub(crate) fn ready(browser: &mut Browser) {
     wait(browser, "start", "document.querySelector('#verdicts tbody tr')");
 }
 
-const CELL: &str = "(name, column) => document.querySelector(`#verdicts tr[data-name=\"${name}\"]`)?.children[column]?.textContent";
+const CELL: &str = "(name, column) => document.querySelector(`#verdicts tr[data-name=\"${name}\"]`)\
+                    ?.children[column]?.textContent";
 
 /// Waits until a cell of the table of verdicts says so.
 pub(crate) fn says(browser: &mut Browser, name: &str, column: usize, text: &str) {
@@ -97,13 +98,16 @@ pub(crate) fn write(browser: &mut Browser, selector: &str, text: &str) {
 
 pub(crate) fn choose(browser: &mut Browser, selector: &str, value: &str) {
     browser.value(&format!(
-        "(() => {{ const e = document.querySelector({selector:?}); e.value = {value:?}; e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+        "(() => {{ const e = document.querySelector({selector:?}); e.value = {value:?}; e.dispatchEvent(new \
+         Event('change', {{ bubbles: true }})); }})()"
     ));
 }
 
 pub(crate) fn key(browser: &mut Browser, key: &str, code: u32, modifiers: u32) {
     for kind in ["rawKeyDown", "keyUp"] {
-        let event = json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": modifiers });
+        let event = json!({
+            "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": modifiers
+        });
         browser.call("Input.dispatchKeyEvent", event);
     }
     browser.settle();

@@ -23,7 +23,8 @@ fn positions_are_edited() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && \
+         document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     // a slider: psi_y becomes observable, the row says what it was
     click(b, "#positions li:nth-child(2) .name");
@@ -267,7 +268,8 @@ fn it_keeps_up() {
     let open = |b: &mut Browser, text: &str| {
         b.value(&format!(
             "(() => {{ const held = new DataTransfer(); held.items.add(new File([{}], 'many.toml')); \
-             document.dispatchEvent(new DragEvent('drop', {{ dataTransfer: held, bubbles: true, cancelable: true }})); }})()",
+             document.dispatchEvent(new DragEvent('drop', {{ dataTransfer: held, bubbles: true, cancelable: true \
+             }})); }})()",
             json!(text)
         ));
     };
@@ -279,7 +281,8 @@ fn it_keeps_up() {
     // what the engine alone takes, by the same question: other tests run beside this one, and slow both
     let alone = format!(
         "(async () => {{ const times = []; for (let i = 0; i < 21; i++) {{ const from = performance.now(); \
-         await obsdeg.ask('verdicts', [{{ sources: [{{ name: 'six.toml', text: {} }}], solutions: false, omitted: false }}]); \
+         await obsdeg.ask('verdicts', [{{ sources: [{{ name: 'six.toml', text: {} }}], solutions: false, omitted: \
+         false }}]); \
          times.push(performance.now() - from); }} return times.sort((a, b) => a - b)[10]; }})()",
         json!(six)
     );

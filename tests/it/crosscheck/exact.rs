@@ -104,7 +104,8 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     };
     assert_eq!(
         title(&c),
-        "Cross-check: filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter (platform carry)"
+        "Cross-check: filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter (platform \
+         carry)"
     );
     let wrong = FilterChange { carry: Some(Carry::Inertial), ..FilterChange::default() };
     let c = check(&paper(Carry::Platform), &Conditions::default(), wrong);

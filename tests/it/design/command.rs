@@ -25,7 +25,8 @@ fn an_answer_says_what_it_rests_on() {
         "half turns are tried in both directions",
         "NUE (-N) NDW (-N) NUE",
         "Best schemes (sigma: information of all samples, no prior, no random drift; psi at the end)",
-        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
+        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst \
+         sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
         "inertial carry: psi goes on in geographic axes from position to position",
         "under the other carries, platform (repositioning at once): not every coefficient is determined",
         "not stated, chosen by the program: latitude 28.2 deg\n",
@@ -36,8 +37,10 @@ fn an_answer_says_what_it_rests_on() {
     let json: serde_json::Value = serde_json::from_str(&run(&["--format", "json"])).expect("JSON");
     let search = &json["search"];
     let conditions = serde_json::json!({
-        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0, "accelerometer_noise_g": 2e-5,
-        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5, "drift_noise": null, "prior": null, "by_default": ["latitude_deg"]
+        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0,
+        "accelerometer_noise_g": 2e-5,
+        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5, "drift_noise": null, "prior": null,
+        "by_default": ["latitude_deg"]
     });
     assert_eq!(search["conditions"], conditions);
     assert!(search["drift_noise"].is_null() && search["prior"].is_null());

@@ -27,8 +27,10 @@ fn task(rng: &mut SplitMix64) -> (Vec<String>, Search) {
     let candidates = ["cardinal", "cardinal", "grid:90", "grid:45", "grid:45", "free"][kind as usize];
     let carry = if candidates == "free" { "reset" } else { ["inertial", "platform"][rng.below(2) as usize] };
     let mut asked = serde_json::json!({
-        "positions": if candidates == "grid:45" { 2 } else { 2 + rng.below(2) }, "candidates": candidates, "carry": carry, "latitude": "45", "gimbal": limits,
-        "observable": ["D_FX", "D_SX"], "restarts": 2, "keep": 3, "refine": candidates != "free" && rng.below(2) == 0, "step": 100.0,
+        "positions": if candidates == "grid:45" { 2 } else { 2 + rng.below(2) }, "candidates": candidates,
+        "carry": carry, "latitude": "45", "gimbal": limits,
+        "observable": ["D_FX", "D_SX"], "restarts": 2, "keep": 3,
+        "refine": candidates != "free" && rng.below(2) == 0, "step": 100.0,
     });
     if candidates == "free" {
         asked["round"] = ["5", "7", "12.5"][rng.below(3) as usize].into();
@@ -181,7 +183,8 @@ fn angles_of_a_file_beyond_its_limits_are_pointed_out() {
         positions.concat()
     );
     std::fs::write(&file, &text).expect("written");
-    let said = "angles beyond the gimbal limits (alpha from -90 to 90 deg): p2 (135,20,0): the same attitude within them is -45,160,180";
+    let said = "angles beyond the gimbal limits (alpha from -90 to 90 deg): p2 (135,20,0): the same attitude within \
+                them is -45,160,180";
     for command in [
         &["analyze", &file, "--solutions", "off"][..],
         &["simulate", &file],

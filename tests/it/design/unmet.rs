@@ -100,7 +100,8 @@ fn conditions_are_those_of_a_file() {
     std::fs::write(
         &file,
         format!(
-            "carry = \"inertial\"\nlatitude_deg = 45\nterms = \"F,S\"\n[simulation]\ndwell_s = 700\n[requirements]\nD = 0.5\npsi = 5\n[gimbals]\nbeta_deg = [-60, 60]\n{positions}"
+            "carry = \"inertial\"\nlatitude_deg = 45\nterms = \"F,S\"\n[simulation]\ndwell_s = 700\n[requirements]\n\
+             D = 0.5\npsi = 5\n[gimbals]\nbeta_deg = [-60, 60]\n{positions}"
         ),
     )
     .expect("written");

@@ -51,7 +51,9 @@ fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
 fn the_papers_run_word_by_word() {
     let output = run(&P1P2);
     assert!(output.status.success() && output.stderr.is_empty());
-    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false, snapshot_path => "../snapshots" }, {
+    insta::with_settings!({
+        omit_expression => true, prepend_module_to_snapshot => false, snapshot_path => "../snapshots"
+    }, {
         insta::assert_snapshot!("simulate_p1p2_table", stdout(&output));
     });
 }
