@@ -11,7 +11,7 @@ use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::simulation::{Conditions, Plan, batch};
 use obsdeg_exact::SplitMix64;
 
-use super::brute::{Brute, Way};
+use super::brute::{Brute, SlewPath};
 use super::*;
 
 #[test]
@@ -341,17 +341,17 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
             set.dedup();
             let degrees: Option<Vec<usize>> = rows.degrees(&set).into_iter().collect();
             if let Some(degree) = degrees.and_then(|d| d.into_iter().max()) {
-                let two: Vec<usize> = sequence.windows(2).map(|w| brute.ways[w[0]][w[1]].len()).collect();
-                let mut ways = vec![0; k - 1];
-                'ways: loop {
-                    let sigmas = brute.sigmas(&sequence, &ways);
+                let two: Vec<usize> = sequence.windows(2).map(|w| brute.paths[w[0]][w[1]].len()).collect();
+                let mut paths = vec![0; k - 1];
+                'paths: loop {
+                    let sigmas = brute.sigmas(&sequence, &paths);
                     all.push((degree, wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max)));
-                    for (way, two) in ways.iter_mut().zip(&two) {
-                        *way += 1;
-                        if *way < *two {
-                            continue 'ways;
+                    for (path, two) in paths.iter_mut().zip(&two) {
+                        *path += 1;
+                        if *path < *two {
+                            continue 'paths;
                         }
-                        *way = 0;
+                        *path = 0;
                     }
                     break;
                 }
@@ -385,18 +385,19 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
         for f in &found.found {
             let sequence = sequence_of(&candidates, &f.positions);
             let leg = |i: usize| {
-                let all = &brute.ways[sequence[i]][sequence[i + 1]];
+                let all = &brute.paths[sequence[i]][sequence[i + 1]];
                 let about = f.half_turns.iter().find(|t| t.to == i + 2).map(|t| t.about);
-                let same =
-                    |w: &Way| about.is_none_or(|a| w.about.iter().zip(a).all(|(x, y)| (x - y).abs() < 1e-9));
+                let same = |w: &SlewPath| {
+                    about.is_none_or(|a| w.about.iter().zip(a).all(|(x, y)| (x - y).abs() < 1e-9))
+                };
                 assert_eq!(all.len(), 1 + usize::from(about.is_some()), "{f:?}");
                 all.iter().position(same).expect("a way")
             };
-            let ways: Vec<usize> = (0..k - 1).map(leg).collect();
-            let sigmas = brute.sigmas(&sequence, &ways);
+            let paths: Vec<usize> = (0..k - 1).map(leg).collect();
+            let sigmas = brute.sigmas(&sequence, &paths);
             let largest = wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max);
             assert!((largest / worst(f) - 1.0).abs() < 1e-7, "{largest} {f:?}");
-            let slews = (0..k - 1).map(|i| brute.ways[sequence[i]][sequence[i + 1]][ways[i]].seconds);
+            let slews = (0..k - 1).map(|i| brute.paths[sequence[i]][sequence[i + 1]][paths[i]].seconds);
             assert!((slews.sum::<f64>() + k as f64 * 1000.0 - f.total_s).abs() < 1e-6, "{f:?}");
         }
         let ties = found.search.and_then(|s| s.ties.filter(|_| s.proven)).expect("proven");
