@@ -23,14 +23,15 @@ fn number(n: Option<&NumberOfSolutions>) -> Option<usize> {
     }
 }
 
-/// The number of solutions by name, of those that are decided.
+/// Number of solutions of each decided unknown, by name.
 fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
     let of = |q| number(Option::as_ref(q));
     a.quantities.iter().filter_map(|q| Some((q.name.as_str(), of(&q.number_of_solutions)?))).collect()
 }
 
-/// Systems with numbers that Groebner bases of another program gave (`tests/data/identifiability/oracle.py`):
-/// how many unknowns are decided, and how many are not. What is decided must agree.
+/// Compares numbers of solutions with Groebner bases of another program
+/// (`tests/data/identifiability/oracle.py`). Returns the numbers of decided and undecided unknowns. All
+/// decided numbers must agree.
 fn held_against_groebner_bases(chosen: impl Fn(usize) -> bool) -> (usize, usize) {
     let text = include_str!("../data/identifiability/counts.json");
     let systems: Value = serde_json::from_str(text).expect("JSON");
@@ -72,14 +73,14 @@ fn numbers_are_those_of_groebner_bases_of_all_systems() {
     assert!(decided > 380 && open * 20 <= decided, "{decided}, {open}");
 }
 
-/// A system, the numbers of solutions of its unknowns, and the maps between these.
+/// System, numbers of solutions of its unknowns, and maps between the solutions.
 type Case<'a> = (&'a str, &'a [(&'a str, usize)], &'a [&'a str]);
 
-/// Several solutions where starts are known, constraints hold, or states jump; numbers and maps by hand.
+/// Several solutions with known starts, constraints or jumps; numbers and maps by hand.
 #[test]
 fn several_solutions_where_points_are_special() {
     let cases: [Case<'_>; 11] = [
-        // q and -q are one attitude
+        // q and -q are the same attitude
         (
             "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\n\
              y='R(q)'",
@@ -121,8 +122,8 @@ fn several_solutions_where_points_are_special() {
             &[("b", 2)],
             &["negate x, b"],
         ),
-        // absorption and elimination change places, and the volume with them: y = D ka/(V (ka - ke)) (e^(-ke
-        // t) - e^(-ka t))
+        // absorption and elimination are exchangeable, with another volume: y = D ka/(V (ka - ke)) (e^(-ke t)
+        // - e^(-ka t))
         (
             "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\n\
              x2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
@@ -135,7 +136,7 @@ fn several_solutions_where_points_are_special() {
             &[("k1", 2), ("k2", 2)],
             &["swap x1 and x2, k1 and k2"],
         ),
-        // the rates of three decays in any order: each is one of three
+        // the rates of three decays are exchangeable: each has three values
         (
             "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
              x2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
@@ -154,14 +155,14 @@ fn several_solutions_where_points_are_special() {
         assert_eq!(numbers(&a), expected.iter().copied().collect(), "{text}");
         assert_eq!(a.solution_maps, maps, "{text}");
     }
-    // by different starts the decays are told from each other
+    // different starts distinguish the decays
     let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
                x2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
     assert_eq!(numbers(&analyzed(one)), BTreeMap::from([("k1", 1), ("k2", 1)]));
 }
 
-/// A known start is a number that no map changes: the sign of its state stays, and no number of solutions
-/// rests on a change of it. By hand: the fifth derivative of the first shows p x(0), lower ones p^2 alone.
+/// Maps do not change a known start: the sign of its state stays, and no number of solutions rests on
+/// changing it. By hand: the fifth derivative of the first model contains p x(0), lower ones only p^2.
 #[test]
 fn known_starts_are_not_mapped() {
     let cases: [(&str, &[&str]); 5] = [
@@ -197,7 +198,7 @@ fn known_starts_are_not_mapped() {
     }
 }
 
-/// The words of each unknown follow from verdict and number.
+/// The identifiability of each unknown follows from its verdict and its number of solutions.
 #[test]
 fn words_of_identifiability() {
     let a = analyzed(
@@ -213,19 +214,19 @@ fn words_of_identifiability() {
     assert_eq!(of("b"), (Identifiability::NotIdentifiable, "not identifiable".into()));
     assert_eq!(of("d"), (Identifiability::NotIdentifiable, "not identifiable".into()));
     let function = |text: &str| a.invariants.iter().find(|c| c.expression == text).expect("a function");
-    // x' - a^2 is b c itself: one value
+    // x' - a^2 equals b c: one value
     assert_eq!(number(function("b*c").number_of_solutions.as_ref()), Some(1));
 }
 
-/// By hand: functions beyond those of scalings, with the number of their values.
+/// Functions beyond scalings, with their numbers of values, by hand.
 #[test]
 fn functions_by_hand() {
-    // only a/b and its square are seen through y' and z: f = a*b has two values, with its square once seen
+    // only the square of f = a*b is observed: f has two values
     let a = analyzed("name='m'\nparameters=['a', 'b']\n[states]\nx='-x'\n[outputs]\ny='x'\nz='(a*b)^2 + 1'");
     let [f] = &a.invariants[..] else { panic!("{:?}", a.invariants) };
     assert_eq!((f.expression.as_str(), f.degree), ("a*b", Some(0)));
     assert_eq!(number(f.number_of_solutions.as_ref()), Some(2));
-    // S, E, U, I of an epidemic with unknown transmission, whose confirmation is asking for them
+    // combinations of S, E, U, I in an epidemic with unknown transmission
     let (_, _, text) = models().into_iter().find(|m| m.0 == "seuir").expect("the model");
     let model = json::read(&text).expect("a model");
     let found = analyze_system(&model, SystemOptions::default()).expect("judged");
@@ -238,8 +239,9 @@ fn functions_by_hand() {
     assert_eq!(listed, [six("N*w/beta"), six("S*w"), six("E*w"), six("w*(U + I)")]);
 }
 
-/// Of all reference models: as many functions as the rank is more than the number of observable unknowns, or
-/// the answer says how many are missing; and each is observable with the same degree where it is asked for.
+/// All reference models: the rank equals the number of observable unknowns and functions, or the answer
+/// states the number of missing functions. Each function is observable with the same degree when requested as
+/// a combination.
 #[test]
 fn functions_are_complete_or_said_to_be_missing() {
     let (mut incomplete, mut missing, mut asked) = (Vec::new(), 0, 0);
@@ -254,7 +256,7 @@ fn functions_are_complete_or_said_to_be_missing() {
             let observable = a.quantities.iter().filter(|q| q.degree.is_some()).count();
             assert_eq!(observable + a.invariants.len(), a.rank, "{name}");
         }
-        // asking for those that are short and whose names may stand in a formula
+        // models with few functions, whose names are valid in a formula
         if a.invariants.is_empty() || a.invariants.len() > 8 {
             continue;
         }
@@ -271,8 +273,8 @@ fn functions_are_complete_or_said_to_be_missing() {
     assert!(asked > 100, "{asked}");
 }
 
-/// Reduced models of all reference models that have one: judged again they are fully observable, with the
-/// rank.
+/// Reduced versions of all reference models that are not fully observable: judged again they are fully
+/// observable, with the same rank.
 #[test]
 fn reduced_models_are_fully_observable() {
     let (mut made, mut refused) = (0, 0);
