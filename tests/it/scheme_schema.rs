@@ -1,11 +1,12 @@
-//! The JSON Schema of scheme files against the files that are shipped: the schema says no to none of them,
-//! and to those on purpose wrong that a schema can express.
+//! The JSON Schema of scheme files against the shipped files: it accepts all of them, and refuses
+//! deliberately wrong files if a schema can express the error.
 
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-/// What of a value breaks a schema, by its place; the keywords are those that the schema of scheme files has.
+/// Violations of a schema by a value, each with its place; supports the keywords of the schema of scheme
+/// files.
 fn violations(root: &Value, schema: &Value, value: &Value, at: &str, out: &mut Vec<String>) {
     let Some(keys) = schema.as_object() else { return };
     for (key, rule) in keys {
@@ -108,7 +109,7 @@ fn violations(root: &Value, schema: &Value, value: &Value, at: &str, out: &mut V
     }
 }
 
-/// TOML as JSON.
+/// Converts TOML to JSON.
 fn converted(value: toml::Value) -> Value {
     match value {
         toml::Value::String(s) => s.into(),
@@ -146,14 +147,14 @@ fn the_schema_accepts_every_shipped_scheme() {
     assert!(files.len() > 15, "{}", files.len());
     for file in files {
         let found = broken(&std::fs::read_to_string(&file).expect("readable"));
-        // what a schema can say of those that are wrong: a unit is missing
+        // the schema can express one of the errors: a missing unit
         let wrong = file.to_string_lossy().contains("wrong-noise");
         assert_eq!(found.is_empty(), !wrong, "{}: {found:?}", file.display());
     }
 }
 
-/// What the reader refuses for its kind, its range or its key, the schema refuses too; and every key that the
-/// schema has is read.
+/// The schema refuses what the reader refuses because of kind, range or key, and the reader accepts every key
+/// of the schema.
 #[test]
 fn schema_and_reader_agree() {
     use obsdeg_core::model::scheme_file::read;
@@ -217,7 +218,7 @@ alpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
     let all = all.replace("[0, 1]", "[-180, 180]");
     // misalignments are judged at positions
     read(&all.replace("rotation = { about = \"N\", rate_deg_s = 1 }\n", "")).expect("a scheme");
-    // no key of the schema is missing above
+    // the texts above contain every key of the schema
     let schema = schema();
     let mut keys: Vec<&String> = Vec::new();
     for object in schema["$defs"].as_object().expect("definitions").values().chain([&schema]) {
