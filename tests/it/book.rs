@@ -126,11 +126,11 @@ fn what_is_left_out_is_any_lines_and_nothing_else() {
 }
 
 /// Folder in which the commands of one text run.
-struct Desk {
+struct CommandFolder {
     folder: tempfile::TempDir,
 }
 
-impl Desk {
+impl CommandFolder {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         symlink(root().join("examples"), folder.path().join("examples")).expect("a link");
@@ -174,7 +174,7 @@ fn as_run(command: &str) -> Option<String> {
 
 /// Runs the commands of a text. Returns the mismatches and the text with the printed output in place.
 fn held(name: &str, text: &str) -> (Vec<String>, String) {
-    let desk = Desk::new();
+    let desk = CommandFolder::new();
     let mut wrong = Vec::new();
     let mut lines: Vec<String> = text.lines().map(String::from).collect();
     // applied from the last to the first, so that line numbers stay valid
@@ -284,7 +284,7 @@ fn a_text_that_is_wrong_is_told() {
 /// The picture on the first page is identical to the one that its command draws.
 #[test]
 fn the_picture_is_the_one_that_is_drawn() {
-    let desk = Desk::new();
+    let desk = CommandFolder::new();
     desk.run("obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 -o drawn", 0).expect("drawn");
     let drawn = fs::read_to_string(desk.folder.path().join("drawn/slopes.svg")).expect("readable");
     let shown = root().join("book/src/slopes.svg");

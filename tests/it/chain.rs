@@ -10,9 +10,9 @@ use serde_json::{Value, json as object};
 use crate::program::{json, run, stdout};
 
 /// A linear congruential generator (Knuth's MMIX constants).
-struct Draw(u64);
+struct Random(u64);
 
-impl Draw {
+impl Random {
     /// Random number below `n`.
     fn below(&mut self, n: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -31,7 +31,7 @@ impl Draw {
 }
 
 /// Random design task, as options of a command line.
-fn task(draw: &mut Draw) -> Vec<String> {
+fn task(draw: &mut Random) -> Vec<String> {
     let carry = draw.of(&["platform", "inertial", "reset"]);
     let positions = if carry == "reset" { 6 + draw.below(2) } else { 5 + draw.below(2) };
     let mut out: Vec<String> =
@@ -105,7 +105,7 @@ fn agree(task: &str, of: &str, found: &Value, other: &Value) {
 
 /// Checks one task with every command.
 fn holds(seed: u64, with_report: bool) {
-    let options = task(&mut Draw(seed));
+    let options = task(&mut Random(seed));
     let name = options.join(" ");
     let folder = tempfile::tempdir().expect("a folder");
     let written = folder.path().join("w").display().to_string();

@@ -58,12 +58,12 @@ fn hold(model: &SystemModel, text: &str, order: Option<usize>, count: &mut Count
 
 /// Generator of models: polynomials and quotients in states, parameters, inputs and constants of given value;
 /// some with known starts, segments, jumps and experiments.
-struct Draw {
+struct ModelGenerator {
     rng: SplitMix64,
     functions: bool,
 }
 
-impl Draw {
+impl ModelGenerator {
     fn below(&mut self, n: u64) -> u64 {
         self.rng.below(n)
     }
@@ -148,7 +148,7 @@ impl Draw {
 fn random_models(functions: bool, seeds: std::ops::Range<u64>) -> Count {
     let mut count = Count::default();
     for seed in seeds {
-        let text = Draw { rng: SplitMix64::of(seed, "random models", &[""; 0]), functions }.model();
+        let text = ModelGenerator { rng: SplitMix64::of(seed, "random models", &[""; 0]), functions }.model();
         let model = model_file::read(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
         hold(&model, &text, Some(12), &mut count);
     }

@@ -267,7 +267,7 @@ fn table() -> ThirdParty {
     }
     out.texts = order.iter().map(|&i| written[i].clone()).collect();
     out.packages.sort_by_key(|p| (p.name.to_lowercase(), p.version.clone()));
-    // builds and platforms are the same one by one and combined
+    // the table reproduces the crates of every build on every platform
     for (build, platform, expected) in cells {
         let parts = if build == "symbolica" || build == "pdf" { vec!["program", build] } else { vec![build] };
         let expected: BTreeSet<Crate> = expected.into_iter().filter(|id| !is_ours(id)).collect();

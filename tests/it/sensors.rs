@@ -56,13 +56,13 @@ fn every_set(model: &SystemModel, candidates: &[Candidate], own: bool) -> Vec<De
 }
 
 /// Reference answers, derived from the verdicts on every set.
-struct Oracle<'a> {
+struct SetOracle<'a> {
     candidates: &'a [Candidate],
     every: &'a [Degrees],
     required: Vec<usize>,
 }
 
-impl Oracle<'_> {
+impl SetOracle<'_> {
     fn cost(&self, set: usize) -> f64 {
         members(set).map(|c| self.candidates[c].cost).sum()
     }
@@ -142,7 +142,7 @@ fn compared(found: &Sensors, candidates: &[Candidate], every: &[Degrees]) -> Vec
     let whole = every.last().expect("a set");
     let name = |u: usize| whole[u].0.clone();
     let required: Vec<usize> = (0..whole.len()).filter(|&u| whole[u].1.is_some()).collect();
-    let oracle = Oracle { candidates, every, required: required.clone() };
+    let oracle = SetOracle { candidates, every, required: required.clone() };
     // one more output never raises a degree
     for s in 0..every.len() {
         for c in (0..candidates.len()).filter(|c| s >> c & 1 == 0) {

@@ -157,7 +157,7 @@ fn special_starts_leave_it_open() {
 type Terms = Vec<(i64, Vec<u32>)>;
 
 /// System over the field of `Q` elements; the first unknowns are states.
-struct Tiny {
+struct SmallFieldSystem {
     rates: Vec<Terms>,
     outputs: Vec<Terms>,
     unknowns: usize,
@@ -166,7 +166,7 @@ struct Tiny {
 /// Order of the field, above any order of derivatives, so that orders have inverses.
 const Q: i64 = 37;
 
-impl Tiny {
+impl SmallFieldSystem {
     fn draw(rng: &mut SplitMix64) -> Self {
         let unknowns = 2 + rng.below(2) as usize;
         let states = 1 + rng.below(2) as usize;
@@ -268,7 +268,7 @@ fn counts_are_those_of_all_points_of_a_small_field() {
     let mut rng = SplitMix64::new(20);
     let mut seen = BTreeMap::new();
     for _ in 0..60 {
-        let tiny = Tiny::draw(&mut rng);
+        let tiny = SmallFieldSystem::draw(&mut rng);
         let a = counted(&tiny.text());
         let numbers = numbers(&a);
         if numbers.is_empty() {

@@ -101,29 +101,29 @@ fn crates() -> Imports {
 
 /// Circular import: a path from a place back to it.
 fn circle(imports: &Imports) -> Option<Vec<String>> {
-    fn climb(imports: &Imports, way: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
-        let here = way.last().cloned().unwrap_or_default();
+    fn climb(imports: &Imports, path: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
+        let here = path.last().cloned().unwrap_or_default();
         for next in imports.get(&here).into_iter().flatten() {
-            if way.contains(next) {
-                way.push(next.clone());
+            if path.contains(next) {
+                path.push(next.clone());
                 return true;
             }
             if done.contains(next) {
                 continue;
             }
-            way.push(next.clone());
-            if climb(imports, way, done) {
+            path.push(next.clone());
+            if climb(imports, path, done) {
                 return true;
             }
-            way.pop();
+            path.pop();
         }
         done.insert(here);
         false
     }
     let mut done = BTreeSet::new();
     imports.keys().find_map(|start| {
-        let mut way = vec![start.clone()];
-        climb(imports, &mut way, &mut done).then_some(way)
+        let mut path = vec![start.clone()];
+        climb(imports, &mut path, &mut done).then_some(path)
     })
 }
 

@@ -21,7 +21,7 @@ fn degrees(text: &str) -> [f64; 3] {
 
 /// Designs of one task with free and with cardinal attitudes, and the data for an evaluation from the
 /// equations.
-struct Both {
+struct DesignPair {
     terms: &'static str,
     criterion: Criterion,
     conditions: Conditions,
@@ -33,7 +33,13 @@ struct Both {
 }
 
 /// Random task with `k` positions.
-fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng: &mut SplitMix64) -> Both {
+fn both(
+    criterion: CriterionName,
+    terms: &'static str,
+    k: usize,
+    step: i64,
+    rng: &mut SplitMix64,
+) -> DesignPair {
     let mut between =
         |low: f64, high: f64| low + (high - low) * (rng.below(1 << 30) as f64 / f64::from(1 << 30));
     let m = 3 * terms.len();
@@ -75,10 +81,10 @@ fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng:
     let all: Vec<usize> = (0..m).collect();
     let evaluator = Evaluator::new(&base, &grid.attitudes, &all, &conditions).expect("an evaluator");
     let every = evaluator.everywhere(&without_psi(&criterion), k, &|| true).expect("a bound");
-    Both { terms, criterion, conditions, latitude, cardinal, free, every }
+    DesignPair { terms, criterion, conditions, latitude, cardinal, free, every }
 }
 
-impl Both {
+impl DesignPair {
     /// Criterion of printed attitudes with the given weights; `None` if it cannot be evaluated.
     fn value(&self, angles: &[String], times: &[f64]) -> Option<f64> {
         let c = &self.conditions;
@@ -125,7 +131,7 @@ impl Both {
             reaches(self.value(&f.angles, &once(f.angles.len())), f.value, 1e-4)
         });
         // weights are relative to their sum, and psi of the positions does not count in their criterion
-        let of_coefficients = Both { criterion: without_psi(&self.criterion), ..self.shallow() };
+        let of_coefficients = DesignPair { criterion: without_psi(&self.criterion), ..self.shallow() };
         // the answer lists at most ten
         assert!(every.weights.len() == 10 || every.lighter == 0 && every.weights.len() < 10, "{task}");
         let all = &self.every.support;
@@ -232,21 +238,21 @@ fn images_are_turns_of_the_axes() {
         let options = DesignOptions { required: vec!["D_F".into()], ..options.clone() };
         let found = designed(carry, &options).found;
         // attitude as a matrix of whole numbers
-        type Whole = [[i64; 3]; 3];
-        let matrices = |f: &Found| -> Vec<Whole> {
+        type IntegerMatrix = [[i64; 3]; 3];
+        let matrices = |f: &Found| -> Vec<IntegerMatrix> {
             let of = |a: &String| c_n_f64(&obsdeg_core::model::parse_attitude(a).expect("angles"));
             f.angles.iter().map(|a| of(a).map(|row| row.map(|x| x.round() as i64))).collect()
         };
-        let arranged = |mut list: Vec<Whole>| {
+        let arranged = |mut list: Vec<IntegerMatrix>| {
             if carry == Carry::Reset {
                 list.sort_unstable();
             }
             list
         };
-        let product = |c: &Whole, p: &Whole| -> Whole {
+        let product = |c: &IntegerMatrix, p: &IntegerMatrix| -> IntegerMatrix {
             std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| c[i][k] * p[k][j]).sum()))
         };
-        let turns: Vec<Whole> = Candidates::cardinals()
+        let turns: Vec<IntegerMatrix> = Candidates::cardinals()
             .attitudes
             .iter()
             .map(|e| c_n_f64(e).map(|row| row.map(|x| x.round() as i64)))

@@ -122,7 +122,7 @@ fn limits_of(coefficients: &[f64]) -> Limits {
 }
 
 /// Sequence that meets every constraint.
-struct Kept {
+struct SequenceScore {
     degree: usize,
     value: f64,
     seconds: f64,
@@ -130,19 +130,19 @@ struct Kept {
 }
 
 /// Task with all its sequences evaluated.
-struct Judged {
+struct EvaluatedTask {
     candidates: Candidates,
     rows: Rows,
     evaluator: Evaluator,
     criterion: Criterion,
     constraints: Constraints,
     floor: usize,
-    kept: Vec<Kept>,
+    kept: Vec<SequenceScore>,
     /// True if all candidates together leave a required coefficient unobservable.
     never: bool,
 }
 
-fn judged(t: &Task) -> Judged {
+fn judged(t: &Task) -> EvaluatedTask {
     let (mut out, caps, limits) = prepared(t);
     out.kept = out.all(t, &caps, &limits);
     out
@@ -150,7 +150,7 @@ fn judged(t: &Task) -> Judged {
 
 /// The task before any sequence is evaluated, with the caps on degrees and the limits of required
 /// coefficients.
-fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
+fn prepared(t: &Task) -> (EvaluatedTask, Vec<usize>, Vec<f64>) {
     let (reached, _) = t.options.candidates.clone().within(&t.base.gimbals);
     let mut candidates = Candidates::default();
     for (name, attitude) in reached.names.iter().zip(&reached.attitudes) {
@@ -202,13 +202,14 @@ fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
     let best = rows.degrees(&every);
     let never = best.iter().any(Option::is_none);
     let floor = best.into_iter().flatten().max().unwrap_or(0);
-    let out = Judged { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
+    let out =
+        EvaluatedTask { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
     (out, caps, limits)
 }
 
-impl Judged {
+impl EvaluatedTask {
     /// Evaluates all sequences, built position by position without any shortcut of a search.
-    fn all(&self, t: &Task, caps: &[usize], limits: &[f64]) -> Vec<Kept> {
+    fn all(&self, t: &Task, caps: &[usize], limits: &[f64]) -> Vec<SequenceScore> {
         let k = t.options.positions.expect("a number");
         let mut sequences: Vec<Vec<Stop>> = vec![Vec::new()];
         for _ in 0..k {
@@ -225,7 +226,7 @@ impl Judged {
         sequences.iter().filter_map(|s| self.one(t, s, caps, limits)).collect()
     }
 
-    fn one(&self, t: &Task, s: &[Stop], caps: &[usize], limits: &[f64]) -> Option<Kept> {
+    fn one(&self, t: &Task, s: &[Stop], caps: &[usize], limits: &[f64]) -> Option<SequenceScore> {
         let mut set: Vec<usize> = s.iter().map(|s| s.candidate).collect();
         let names = set.iter().map(|&c| self.candidates.names[c].clone()).collect();
         let slews: Vec<f64> = set.windows(2).map(|w| self.evaluator.slew_s(w[0], w[1])).collect();
@@ -241,12 +242,14 @@ impl Judged {
             && (!t.options.meet || self.evaluator.of_sequence(s, &margin) <= 1.0)
             && value.is_finite();
         let degree = degrees.into_iter().max()?;
-        kept.then_some(Kept { degree, value, seconds, names })
+        kept.then_some(SequenceScore { degree, value, seconds, names })
     }
 
     /// Worst degree and criterion of the best sequence.
     fn best(&self) -> Option<(usize, f64)> {
-        let order = |a: &&Kept, b: &&Kept| a.degree.cmp(&b.degree).then(a.value.total_cmp(&b.value));
+        let order = |a: &&SequenceScore, b: &&SequenceScore| {
+            a.degree.cmp(&b.degree).then(a.value.total_cmp(&b.value))
+        };
         self.kept.iter().min_by(order).map(|k| (k.degree, k.value))
     }
 }
@@ -255,7 +258,7 @@ fn close(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < 1e-8
 }
 
-impl Judged {
+impl EvaluatedTask {
     /// Candidate names of the positions. Gimbal limits may lead to other angles, and names, for the same
     /// attitude.
     fn named(&self, positions: &[String]) -> Vec<String> {
@@ -271,7 +274,7 @@ impl Judged {
 
 /// Checks that the result of exhaustion is the best of all sequences in the search order, and that its
 /// statements hold.
-fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, DesignError>) {
+fn hold_exhaustion(seed: u64, t: &Task, all: &EvaluatedTask, found: &Result<Design, DesignError>) {
     let Some((degree, value)) = all.best() else {
         let error = found.as_ref().expect_err("nothing is within the constraints").to_string();
         let expected = if all.never { "unobservable" } else { "every sequence was examined" };
@@ -288,19 +291,20 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
         plain[0]
     );
     let ties = search.ties.expect("all were searched");
-    let near = |k: &&Kept| k.degree == degree && k.value <= value * (1.0 + ties.within);
+    let near = |k: &&SequenceScore| k.degree == degree && k.value <= value * (1.0 + ties.within);
     assert_eq!(ties.sequences, all.kept.iter().filter(near).count() as u64, "{seed}");
     for f in &plain {
         let names = all.named(&f.positions);
-        let is = |k: &&Kept| {
+        let is = |k: &&SequenceScore| {
             k.names == names
                 && k.degree == f.worst_degree
                 && close(k.value, f.value)
                 && close(k.seconds, f.total_s)
         };
         // under reset carry the positions are a set, listed in the order of the search
-        let same =
-            |k: &&Kept| t.base.carry == Carry::Reset && k.degree == f.worst_degree && close(k.value, f.value);
+        let same = |k: &&SequenceScore| {
+            t.base.carry == Carry::Reset && k.degree == f.worst_degree && close(k.value, f.value)
+        };
         assert!(all.kept.iter().any(|k| is(&k) || same(&k)), "{seed}: {f:?}");
     }
     if found.symmetry == 1 {
@@ -315,7 +319,7 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
     // no sequence with the same dwell is better than the front
     for f in found.front.iter().filter(|f| f.worst_degree <= degree && f.positions.len() == search.positions)
     {
-        let beats = |k: &Kept| {
+        let beats = |k: &SequenceScore| {
             f.dwell_s == t.conditions.dwell_s
                 && k.degree == degree
                 && k.seconds <= f.total_s + 1e-6
@@ -333,7 +337,7 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
 fn hold_refinement(
     seed: u64,
     t: &Task,
-    all: &Judged,
+    all: &EvaluatedTask,
     f: &obsdeg_design::design::Found,
     (degree, value): (usize, f64),
 ) {

@@ -29,7 +29,7 @@ pub(super) enum Angles {
 
 /// A random scheme.
 #[derive(Debug, Clone)]
-pub(super) struct Draw {
+pub(super) struct RandomScheme {
     pub(super) angles: Vec<[String; 3]>,
     /// Axis and angle (deg) by which each position turns.
     pub(super) turns: Vec<Option<(&'static str, i32)>>,
@@ -54,7 +54,7 @@ fn angle(kind: Angles) -> BoxedStrategy<String> {
     }
 }
 
-fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Value = Draw> {
+fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Value = RandomScheme> {
     let about = prop::sample::select(vec!["X_p", "Y_p", "Z_p", "N", "U", "E"]);
     let turn = move || match turning {
         [] => Just(None).boxed(),
@@ -73,11 +73,11 @@ fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Va
             // the terms `drift` belong to one position at rest
             let single = angles.len() == 1 && turns[0].is_none();
             let terms = if single && values[0] < 0.5 { "drift" } else { terms };
-            Draw { angles, turns, carry, latitude, azimuth, terms, asked: &[], values }
+            RandomScheme { angles, turns, carry, latitude, azimuth, terms, asked: &[], values }
         })
 }
 
-impl Draw {
+impl RandomScheme {
     /// Name of a position; some names need quotation marks.
     fn name(&self, i: usize) -> String {
         if self.turns.iter().any(Option::is_some) && i > 0 {
@@ -172,12 +172,12 @@ impl Draw {
 }
 
 /// Scheme of the given attitudes and requested combinations.
-pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> Draw {
+pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> RandomScheme {
     let of = |a: &&str| -> [String; 3] {
         let parts: Vec<String> = a.split(',').map(String::from).collect();
         parts.try_into().expect("three angles")
     };
-    Draw {
+    RandomScheme {
         angles: angles.iter().map(of).collect(),
         turns: vec![None; angles.len()],
         carry: Carry::Platform,
@@ -190,7 +190,7 @@ pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> Draw {
 }
 
 /// The same `n` random schemes in every run.
-pub(super) fn cases(kind: Angles, most: usize, n: usize, turning: &'static [i32]) -> Vec<Draw> {
+pub(super) fn cases(kind: Angles, most: usize, n: usize, turning: &'static [i32]) -> Vec<RandomScheme> {
     let config =
         Config { rng_seed: RngSeed::Fixed(12), rng_algorithm: RngAlgorithm::ChaCha, ..Config::default() };
     let mut runner = TestRunner::new(config);

@@ -17,7 +17,7 @@ use obsdeg_report::{Format, Layout};
 use obsdeg_symbolic::Worker;
 use serde_json::Value as Json;
 
-use self::draw::{Angles, Draw, cases, fixed};
+use self::draw::{Angles, RandomScheme, cases, fixed};
 use self::platform::Case;
 use self::text::READINGS;
 use self::value::Value;
@@ -32,7 +32,7 @@ const SIX_PLACES: f64 = 1e-4;
 
 /// Number of formulas of each kind that were checked.
 #[derive(Debug, Default)]
-struct Seen {
+struct CheckCounts {
     exact: usize,
     symbolic: usize,
     decimal: usize,
@@ -111,7 +111,7 @@ fn stations(json: &Json) -> Vec<String> {
 }
 
 /// Checks all formulas of one scheme.
-fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen) {
+fn check(draw: &RandomScheme, frame: Frame, worker: Option<&mut Worker>, seen: &mut CheckCounts) {
     let (scheme, case) = (draw.scheme(), draw.case());
     let options =
         AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame, omitted: false };
@@ -203,7 +203,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
 }
 
 /// Directions that are printed as unobservable change no derivative of Z.
-fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+fn null_vectors(json: &Json, latex: &str, draw: &RandomScheme, case: &Case, seen: &mut CheckCounts) {
     let lines = items(latex, "Directions that derivatives of Z do not see");
     let vectors = json["null_space"].as_array().expect("a list");
     assert_eq!(lines.len(), vectors.len());
@@ -236,7 +236,7 @@ fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut S
 }
 
 /// Checks the formulas of Z, and of psi and eps at each position.
-fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+fn position_formulas(json: &Json, latex: &str, draw: &RandomScheme, case: &Case, seen: &mut CheckCounts) {
     let formulas = json["formulas"].as_array().expect("formulas");
     let lines = items(latex, "Z in n, and psi, eps in n at each position");
     assert_eq!(lines.len(), formulas.len());
@@ -298,7 +298,7 @@ fn asked(mut worker: Option<&mut Worker>) {
         ),
     ] {
         let draw = fixed(angles, asked);
-        let mut seen = Seen::default();
+        let mut seen = CheckCounts::default();
         for frame in [Frame::N, Frame::Platform] {
             let generic = angles[0].contains("alpha");
             if generic && worker.is_none() {
@@ -492,7 +492,7 @@ fn formulas_without_the_engine_give_the_truth_at_length() {
 }
 
 fn without_the_engine(times: usize) {
-    let mut seen = Seen::default();
+    let mut seen = CheckCounts::default();
     for (kind, most, n, turning) in [
         (Angles::Cardinal, 5, 10 * times, &[] as &[i32]),
         (Angles::Roots, 4, 10 * times, &[]),
@@ -530,7 +530,7 @@ fn formulas_of_the_engine_give_the_truth() {
         wait: std::time::Duration::from_secs(600),
         waiting: obsdeg_symbolic::Waiting::silent(),
     });
-    let mut seen = Seen::default();
+    let mut seen = CheckCounts::default();
     for (kind, most, n, turning) in [
         (Angles::Cardinal, 3, 4, &[] as &[i32]),
         (Angles::Roots, 3, 4, &[]),
@@ -543,7 +543,7 @@ fn formulas_of_the_engine_give_the_truth() {
             check(draw, [Frame::N, Frame::Platform][i % 2], Some(&mut worker), &mut seen);
         }
     }
-    let turning = Draw { turns: vec![Some(("X_p", 360))], ..fixed(&["alpha,0,0"], &[]) };
+    let turning = RandomScheme { turns: vec![Some(("X_p", 360))], ..fixed(&["alpha,0,0"], &[]) };
     for frame in [Frame::N, Frame::Platform] {
         check(&turning, frame, Some(&mut worker), &mut seen);
     }

@@ -2,26 +2,26 @@
 
 use super::value::{Names, Value};
 
-struct Reader<'a> {
+struct LatexReader<'a> {
     rest: &'a str,
     names: &'a Names<'a>,
 }
 
 /// Value of a formula.
 pub(crate) fn evaluate(latex: &str, names: &Names<'_>) -> Result<Value, String> {
-    let mut reader = Reader { rest: latex, names };
+    let mut reader = LatexReader { rest: latex, names };
     let value = reader.sum().map_err(|e| format!("{e} before `{}` in `{latex}`", reader.rest))?;
     if reader.rest.is_empty() { Ok(value) } else { Err(format!("left over `{}` in `{latex}`", reader.rest)) }
 }
 
 /// Text name of a name in LaTeX.
 pub(crate) fn name(latex: &str) -> Result<String, String> {
-    let mut reader = Reader { rest: latex, names: &|_| None };
+    let mut reader = LatexReader { rest: latex, names: &|_| None };
     let name = reader.name()?;
     if reader.rest.is_empty() { Ok(name) } else { Err(format!("left over `{}`", reader.rest)) }
 }
 
-impl Reader<'_> {
+impl LatexReader<'_> {
     fn take(&mut self, token: &str) -> bool {
         let found = self.rest.strip_prefix(token);
         if let Some(rest) = found {

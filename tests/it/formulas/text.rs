@@ -19,7 +19,7 @@ pub(crate) enum Blank {
 
 pub(crate) const READINGS: [Blank; 3] = [Blank::Weak, Blank::Plain, Blank::Strong];
 
-struct Reader<'a> {
+struct TextReader<'a> {
     rest: &'a str,
     blank: Blank,
     names: &'a Names<'a>,
@@ -27,12 +27,12 @@ struct Reader<'a> {
 
 /// Value of a formula.
 pub(crate) fn evaluate(text: &str, blank: Blank, names: &Names<'_>) -> Result<Value, String> {
-    let mut reader = Reader { rest: text, blank, names };
+    let mut reader = TextReader { rest: text, blank, names };
     let value = reader.sum().map_err(|e| format!("{e} before `{}` in `{text}`", reader.rest))?;
     if reader.rest.is_empty() { Ok(value) } else { Err(format!("left over `{}` in `{text}`", reader.rest)) }
 }
 
-impl Reader<'_> {
+impl TextReader<'_> {
     fn take(&mut self, token: &str) -> bool {
         let found = self.rest.strip_prefix(token);
         if let Some(rest) = found {
