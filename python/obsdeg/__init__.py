@@ -11,11 +11,10 @@ take a :class:`Scheme` or a :class:`Model`. :func:`allan` estimates the noise of
 reads models of other tools. :mod:`obsdeg.campaign` runs searches and sweeps of many tasks.
 
 Options have the names of the command line in snake case. Answers have the attributes of the command line's
-JSON (without the symbolic engine), which they return byte for byte.
-Angles and latitudes are exact: an ``int`` and a ``str`` as they are, a ``float`` by its shortest text. A
-    computed number
-(``0.1 + 0.2``) is rounded to nine decimals, and the answer lists it (``answer.rounded``). An invalid request
-raises a :class:`ProblemError`, which is a ``ValueError`` with ``message``, ``file``, ``line`` and ``column``.
+JSON (without the symbolic engine), which they return byte for byte. Angles and latitudes are exact: an
+``int`` and a ``str`` as they are, a ``float`` by its shortest text. A computed number (``0.1 + 0.2``) is
+rounded to nine decimals, and the answer lists it (``answer.rounded``). An invalid request raises a
+:class:`ProblemError`, which is a ``ValueError`` with ``message``, ``file``, ``line`` and ``column``.
 """
 
 from __future__ import annotations

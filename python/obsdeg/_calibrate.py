@@ -81,22 +81,24 @@ def calibrate(
     ----------
     what : Scheme, Model, positions or path
         The scheme or model.
-    *records : path, text stream, frame or mapping Files (CSV, Parquet), streams of CSV, frames of pandas,
-        polars, pyarrow and others with the C interface of Arrow, or columns by name. Columns have the names
-        of files: ``t [s]``, ``position``, ``fx [g]``, ``fy [g]``, ``fz [g]``; for a model ``t`` in its unit
-        and the outputs. A time index of pandas is used as the time. Dates count from 1970 in UTC.
+    *records : path, text stream, frame or mapping
+        Files (CSV, Parquet), streams of CSV, frames of pandas, polars, pyarrow and others with the C
+        interface of Arrow, or columns by name. Columns have the names of files: ``t [s]``, ``position``, ``fx
+        [g]``, ``fy [g]``, ``fz [g]``; for a model ``t`` in its unit and the outputs. A time index of pandas
+        is used as the time. Dates count from 1970 in UTC.
     t : array, optional
         Times of a record of arrays: numbers in s (for a model in its unit), dates, or time spans.
     f : array of shape (n, 3), frame of three columns, or mapping, optional
         Specific force along X, Y, Z of the platform, in g.
-    position : array, optional Position of every sample: its name, or its number from 1. Samples between
-        positions have 0, None, NaN or an empty text.
+    position : array, optional
+        Position of every sample: its name, or its number from 1. Samples between positions have 0, None, NaN
+        or an empty text.
     outputs : mapping of arrays, optional
         Outputs and known inputs of a model by name, in their units.
     prior : Calibration, SystemCalibration or path
         Previous calibration, or the file that ``obsdeg calibrate -o`` wrote for it.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options
@@ -106,7 +108,7 @@ def calibrate(
     Returns
     -------
     Calibration or SystemCalibration
-        Of a scheme, or of a model.
+        Answer for a scheme, or for a model.
 
     Raises
     ------
@@ -155,10 +157,11 @@ def allan(
 
     Parameters
     ----------
-    record : path, text stream, frame or mapping A record as for :func:`calibrate`, with the column names of
-        files (``t [s]``, ``wx [deg/h]``, ``fx [g]``).
+    record : path, text stream, frame or mapping
+        A record as for :func:`calibrate`, with the column names of files (``t [s]``, ``wx [deg/h]``, ``fx
+        [g]``).
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options

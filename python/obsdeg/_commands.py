@@ -135,11 +135,13 @@ def analyze(*what: Judged, digits: int | None = DIGITS, progress: Progress | boo
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        What is judged: one, or several. None where ``angles`` are given.
-    digits : int or None Decimals, 0 to 9, to which computed angles and latitudes are rounded; None rounds
-        nothing. ``answer.rounded`` lists rounded values.
-    progress : callable or bool Called ten times a second; True shows a bar of tqdm. If it returns False, the
-        analysis ends with a ``KeyboardInterrupt``, as it does where a key is pressed.
+        Systems to judge, one or several; none if ``angles`` are given.
+    digits : int or None
+        Decimals, 0 to 9, to which computed angles and latitudes are rounded; None rounds nothing.
+        ``answer.rounded`` lists rounded values.
+    progress : callable or bool
+        Called ten times a second; True shows a bar of tqdm. If it returns False, the analysis ends with a
+        ``KeyboardInterrupt``, as it does on Ctrl-C.
     **options
         Options of ``obsdeg analyze``, see :class:`obsdeg.options.Analyze` for units: ``carry``, ``latitude``
         [deg], ``terms``, ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``,
@@ -148,12 +150,12 @@ def analyze(*what: Judged, digits: int | None = DIGITS, progress: Progress | boo
     Returns
     -------
     Analysis, SystemAnalysis or Judgements
-        Of a scheme, of a model, or of several.
+        Answer for a scheme, for a model, or for several.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -196,7 +198,7 @@ def simulate(*what: Judged, digits: int | None = DIGITS, progress: Progress | bo
     *what : positions, Scheme, Model or path
         Scheme or model with numbers; none if ``angles`` are given.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called ten times a second; if it returns False, the run ends with a ``KeyboardInterrupt``.
     **options
@@ -212,7 +214,7 @@ def simulate(*what: Judged, digits: int | None = DIGITS, progress: Progress | bo
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -251,7 +253,7 @@ def crosscheck(*what: Judged, digits: int | None = DIGITS, progress: Progress | 
     *what : positions, Scheme, Model or path
         Scheme or model with numbers; none if ``angles`` are given.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options
@@ -261,12 +263,12 @@ def crosscheck(*what: Judged, digits: int | None = DIGITS, progress: Progress | 
     Returns
     -------
     CrossCheck or SystemEvidence
-        Of a scheme, or of a model.
+        Answer for a scheme, or for a model.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -291,7 +293,7 @@ def compare(
     *what : positions, Scheme or path
         Two schemes or more; schemes given as positions are called ``scheme 1``, ``scheme 2``, ...
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called ten times a second; if it returns False, the comparison ends with a ``KeyboardInterrupt``.
     **options
@@ -301,7 +303,7 @@ def compare(
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -378,22 +380,23 @@ def design(
     ----------
     positions : int
         Number of positions.
-    candidates : str, positions, Scheme or path Candidate attitudes: ``"cardinal"``, ``"grid:45"`` [deg],
-        ``"free"``, or a scheme with the positions to choose from.
+    candidates : str, positions, Scheme or path
+        Candidate attitudes: ``"cardinal"``, ``"grid:45"`` [deg], ``"free"``, or a scheme with the positions
+        to choose from.
     part : (int, int)
         (I, N): searches part I of N of all sequences; the answer is a :class:`Part`.
     conditions : Scheme or path
         Scheme whose conditions apply. Its number of positions is the default of ``positions``.
     resume : Part or str
-        That part as far as it came.
+        Unfinished part to continue.
     merge : iterable of Part or str
         Parts to merge into the answer of the whole search; they contain its options. Listed schemes are
         evaluated again. The search itself is repeated only for ``check=N`` blocks.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
         Called with the progress; True shows a bar of tqdm. If it returns False, and on Ctrl-C, the search
-        ends with the best so far.
+        ends with the best scheme so far.
     **options
         Options of ``obsdeg design``, see :class:`obsdeg.options.Design`: ``minimum``, ``observable``,
         ``criterion``, ``dwell`` [s], ``max_time`` [s], ``gimbal`` [deg], ...
@@ -407,7 +410,7 @@ def design(
     Raises
     ------
     ProblemError
-        What is wrong; nothing was found.
+        Invalid request, or no scheme was found.
 
     Examples
     --------
@@ -454,16 +457,17 @@ def measure(
     ----------
     model : Model or path
         The model.
-    candidates : str or iterable of str Candidate quantities: ``"states"``, ``"outputs"``, ``"inputs"``,
-        ``"parameters"``, ``"candidates"`` (those of the file), names and expressions such as ``"x1 + x3"``
-        [default: candidates if the file has any, else states].
+    candidates : str or iterable of str
+        Candidate quantities: ``"states"``, ``"outputs"``, ``"inputs"``, ``"parameters"``, ``"candidates"``
+        (those of the file), names and expressions such as ``"x1 + x3"`` [default: candidates if the file has
+        any, else states].
     own_outputs : bool
         True: candidates are added to the outputs of the model. By default they replace the outputs.
     progress : callable or bool
         Called ten times a second; True shows a bar of tqdm. If it returns False, the search ends.
     **options
-        In :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``, ``order``,
-        ``work_limit``, ``seed``.
+        Options, see :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``,
+        ``order``, ``work_limit``, ``seed``.
 
     Returns
     -------
@@ -474,7 +478,7 @@ def measure(
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -514,13 +518,13 @@ def report(
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        What is reviewed: one, or several.
+        Systems to review, one or several.
     calibrations : mapping
         Calibrations by their names on the page.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far it is; True for a bar of tqdm.
+        Called with the progress; True shows a bar of tqdm.
     **options
         Options of ``obsdeg report``, see :class:`obsdeg.options.Report`: options of :func:`simulate`, and
         ``runs``.
@@ -528,7 +532,7 @@ def report(
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -576,7 +580,7 @@ def load(path: str | os.PathLike[str], **options: Any) -> Scheme | Model:
     Raises
     ------
     obsdeg.importers.ImportProblem
-        What cannot be imported, by construct and place.
+        Unsupported construct; the message gives construct and place.
 
     Examples
     --------

@@ -115,7 +115,7 @@ class Text:
         Raises
         ------
         ProblemError
-            What is wrong with it, with its line and column.
+            Invalid text; the message gives line and column.
         """
         try:
             # the engine reads the text, and then rejects the record because it has no time

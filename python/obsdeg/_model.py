@@ -26,15 +26,17 @@ class Model(Text):
         of an importer.
     name : str
         Name of the system in reports; of a text, what errors call it.
-    states : mapping, or iterable of SymPy equations The derivative of every state by name, as a formula
-        (``{"x": "-k*x"}``), an expression of SymPy, or the keys of a model file (``{"x": {"equation": "-k*x",
-        "unit": "mg"}}``); or equations ``Eq(x(t).diff(t), -k*x(t))``.
+    states : mapping, or iterable of SymPy equations
+        The derivative of every state by name, as a formula (``{"x": "-k*x"}``), an expression of SymPy, or
+        the keys of a model file (``{"x": {"equation": "-k*x", "unit": "mg"}}``); or equations
+        ``Eq(x(t).diff(t), -k*x(t))``.
     parameters : iterable of names or symbols, or mapping of names to units
         Unknown constants; by default all names without another meaning.
     outputs : mapping
         Measured quantities by name.
-    starts : mapping, optional Exact known values at the start by state; ``"known"`` for a known but generic
-        value. Other starts are unknown.
+    starts : mapping, optional
+        Exact known values at the start by state; ``"known"`` for a known but generic value. Other starts are
+        unknown.
     known_inputs, unknown_inputs : iterable of names, or mapping, optional
         Functions of time. A mapping states their kinds as in a model file: ``{"u": "constant"}``.
     constants : mapping, optional
@@ -123,7 +125,7 @@ class Model(Text):
         Raises
         ------
         ProblemError
-            What is wrong with the copy.
+            Invalid copy.
 
         Examples
         --------

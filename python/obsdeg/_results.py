@@ -56,12 +56,12 @@ class Answer:
         Returns
         -------
         Answer
-            Of the class that its layout names, such as :class:`Analysis`.
+            Answer in the class of its layout, such as :class:`Analysis`.
 
         Raises
         ------
         ValueError
-            The text is no JSON, or has no layout of this version.
+            The text is not JSON, or has no layout of this version.
 
         Examples
         --------
@@ -281,8 +281,9 @@ class Run(Drawn):
 
         Parameters
         ----------
-        *names : str Unknowns whose truth, estimate and sigma are drawn over time, one panel each. Without
-            names: sigmas of all unknowns at the start and at the end, with predicted and required sigmas.
+        *names : str
+            Unknowns whose truth, estimate and sigma are drawn over time, one panel each. Without names:
+            sigmas of all unknowns at the start and at the end, with predicted and required sigmas.
         figure : matplotlib Figure or SubFigure, optional
             Figure to draw in; by default a new figure of pyplot.
 
@@ -296,7 +297,7 @@ class Run(Drawn):
         ImportError
             matplotlib is not installed (``pip install 'obsdeg[plots]'``).
         KeyError
-            There is no such unknown.
+            No such unknown.
 
         Examples
         --------

@@ -41,10 +41,10 @@ class Scheme(Text):
         Part of psi that is carried between positions; by default "platform".
     latitude : number, optional
         Latitude in degrees, -90 to 90; generic by default.
-    digits : int or None Decimals, 0 to 9, to which computed angles and latitudes (float, `Decimal`,
-        `Fraction`, rationals of SymPy) are rounded. ``rounded`` and every answer on the scheme list the
-        rounded ones. With None nothing is rounded, and more than nine decimals are an error. An ``int`` and a
-        text are always exact.
+    digits : int or None
+        Decimals, 0 to 9, to which computed angles and latitudes (float, `Decimal`, `Fraction`, rationals of
+        SymPy) are rounded. ``rounded`` and every answer on the scheme list the rounded ones. With None
+        nothing is rounded, and more than nine decimals are an error. An ``int`` and a text are always exact.
     angles : iterable of positions
         Alternative name of `positions`.
     **keys
@@ -119,14 +119,14 @@ class Scheme(Text):
             All positions of the copy, as for :class:`Scheme`. Names, dwells and slews of the scheme
             apply to the position of the copy at the same place.
         digits : int or None
-            As that of :class:`Scheme`.
+            Same as for :class:`Scheme`.
         **changes
             ``carry``, ``latitude`` [deg], ``name``, and other keys of a scheme file; None removes a key.
 
         Raises
         ------
         ValueError
-            As :class:`Scheme`.
+            Same as for :class:`Scheme`.
 
         Examples
         --------

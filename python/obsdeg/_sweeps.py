@@ -41,13 +41,15 @@ def table(
 
     Parameters
     ----------
-    tasks : iterable of mappings Same as for :func:`sweep`: options of :func:`obsdeg.analyze` (and of
-        :func:`obsdeg.simulate` if sigmas are needed), with ``angles``, ``scheme`` or ``model``, and ``tags``:
-        names and values of additional columns.
+    tasks : iterable of mappings
+        Same as for :func:`sweep`: options of :func:`obsdeg.analyze` (and of :func:`obsdeg.simulate` if sigmas
+        are needed), with ``angles``, ``scheme`` or ``model``, and ``tags``: names and values of additional
+        columns.
     executor : callable
         Makes an executor of :mod:`concurrent.futures`; by default threads of this process, one per core.
-    errors : {"record", "raise"} "record": a task that cannot be judged gets one row with the message in the
-        column ``error``. "raise": it ends the sweep.
+    errors : {"record", "raise"}
+        "record": a task that cannot be judged gets one row with the message in the column ``error``. "raise":
+        it ends the sweep.
     heard : callable, optional
         Called with the number of finished tasks.
 
