@@ -3,10 +3,9 @@
 
     verify_certificate.py CERTIFICATE.json [SCHEME.toml]
 
-Certificates of models need verify_model_certificate.py beside this file, those of optima
-verify_optimum_certificate.py.
+Certificates of models need verify_model_certificate.py beside this file, those of optima verify_optimum_certificate.py.
 
-Prints one sentence per unknown. Exit codes: 0 accepted, 1 refused, 2 not readable or bad usage.
+One sentence per unknown. Exit codes: 0 accepted, 1 refused, 2 not readable or bad usage.
 """
 
 import hashlib

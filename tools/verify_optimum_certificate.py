@@ -3,8 +3,8 @@
 
     verify_optimum_certificate.py CERTIFICATE.json [--blocks N] [--seed N]
 
---blocks N searches N random blocks again (default: all if they have at most 20000 sequences, otherwise as
-many as that number fills). Exit codes: 0 accepted, 1 refused, 2 not readable or bad usage.
+--blocks N searches N blocks again, chosen at random (default: all up to 20000 sequences, otherwise as many as these fill).
+Exit codes: 0 accepted, 1 refused, 2 not readable or bad usage.
 """
 
 import argparse
