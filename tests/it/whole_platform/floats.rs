@@ -30,7 +30,7 @@ fn constant(x: f64) -> Jet {
     Jet([x, 0.0, 0.0])
 }
 
-/// Axes of the sensors along x, y and z: gyros mounted as in the paper, accelerometers along the axes.
+/// Axes of the gyros X, Y and Z in c, mounted as in the paper.
 const GYROS: [[[f64; 3]; 3]; 3] = [
     // input, output, spin
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
