@@ -16,7 +16,7 @@ from toml_numbers import Numbers, value
 
 from obsdeg.importers import ImportProblem, load
 
-#: By first author: options, number of unknowns, and the unobservable ones.
+#: Judged problems by first author: options, number of unknowns, and the unobservable ones.
 JUDGED: dict[str, tuple[dict[str, Any], int, set[str]]] = {
     "Armistead": ({}, 10, set()),
     "Bachmann": ({}, 101, {"init_EpoRJAK2"}),
@@ -56,7 +56,7 @@ JUDGED: dict[str, tuple[dict[str, Any], int, set[str]]] = {
     "Zhao": ({}, 21, set()),
     "Zheng": ({}, 60, set()),
 }
-#: By first author: refused construct without options, and its place.
+#: Refused problems by first author: refused construct without options, and its place.
 REFUSED = {
     "Blasi": ("the steady state before a run", "16 equations that must be solved together"),
     "Liu": ("event _E0", "a condition on the state `U`"),

@@ -341,7 +341,7 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     assert_eq!((coupled["D_SY"], coupled["D_IX"]), (None, None));
 }
 
-/// Where the paper's drifts break the small-angle model, sigmas of the filter with full attitudes stand
+/// If the paper's drifts break the small-angle model, sigmas of the filter with full attitudes stand
 /// beside the predicted ones. An independent extended filter found 0.03 deg/h for D_FX, not 0.0003. At a
 /// thousandth of the drifts the column is missing.
 #[test]
