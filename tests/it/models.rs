@@ -661,8 +661,8 @@ fn the_input_chooses_the_primes() {
     assert_eq!(seen.len(), all);
 }
 
-/// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys `(D + c)(D + w2)(D + K) x4 = k2 q2 (D
-/// + K) u + k1 k2 q1 u` with K = k1 + w1 and the known u = b x1 x4. So c, w2 and K are the roots of one
+/// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys
+/// `(D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u` with K = k1 + w1 and the known u = b x1 x4. So c, w2 and K are the roots of one
 /// polynomial, in any order, and the right side is attainable with each order. Numerical integration with all
 /// six orders gives the same outputs.
 #[test]

@@ -73,10 +73,10 @@ pub fn check() {
 
 /// Handle with which the parts of this thread's work on other threads end with it.
 #[derive(Debug, Clone)]
-pub struct Parts(Option<Arc<AtomicBool>>);
+pub(crate) struct Parts(Option<Arc<AtomicBool>>);
 
 /// Handle for the parts of the work of this thread.
-pub fn parts() -> Parts {
+pub(crate) fn parts() -> Parts {
     let hearing = CANCELLATION.take();
     let wanted = match &hearing {
         Some(Cancellation::Flag(wanted)) => Some(wanted.clone()),
@@ -88,7 +88,7 @@ pub fn parts() -> Parts {
 
 impl Parts {
     /// Runs a part on the calling thread. It ends with the whole.
-    pub fn part<T>(&self, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn part<T>(&self, work: impl FnOnce() -> T) -> T {
         match &self.0 {
             None => work(),
             Some(wanted) => match while_wanted(wanted.clone(), work) {

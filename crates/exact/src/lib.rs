@@ -40,6 +40,7 @@ mod gcd;
 pub mod groebner;
 pub mod interrupt;
 pub mod multivariate;
+pub mod parallel;
 pub mod polynomial;
 pub mod prime;
 pub mod radical;

@@ -12,8 +12,8 @@ use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
 use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, latitude_of, simulate};
 use obsdeg_evidence::system::{RunError, crosscheck_system, simulate_system};
+use obsdeg_exact::parallel;
 use obsdeg_symbolic::Worker;
-use rayon::prelude::*;
 
 use crate::design::{Candidates, DesignError, DesignOptions, design};
 
@@ -264,25 +264,27 @@ fn attitudes(plan: &Plan) -> Vec<Attitude> {
 }
 
 fn latitudes(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let at = |k: i32| {
-        let degrees = k * LATITUDE_STEP;
+    let at = |k: usize| {
+        let degrees = k as i32 * LATITUDE_STEP;
         let other = Scheme { latitude: degrees.to_string().parse().ok(), ..scheme.clone() };
-        Ok((f64::from(degrees), predicted(&other, conditions, seed)?))
+        Ok::<_, SimulationError>((f64::from(degrees), predicted(&other, conditions, seed)?))
     };
-    Ok(Sweep::of((0..=90 / LATITUDE_STEP).into_par_iter().map(at).collect::<Result<_, SimulationError>>()?))
+    Ok(Sweep::of(parallel::try_map((90 / LATITUDE_STEP) as usize + 1, at)?))
 }
 
 fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let at = |k: i32| {
-        let factor = 2f64.powf(f64::from(k) / 2.0);
+    let at = |k: usize| {
+        let factor = 2f64.powf(f64::from(k as i32 - 2 * OCTAVES) / 2.0);
         let other = scheme.with_dwells(conditions.dwell_s, factor)?;
         // a step is at most half a dwell
         let shortest = other.positions.iter().filter_map(|p| p.dwell).map(Dwell::seconds);
         let step_s = shortest.fold(conditions.step_s, |step, dwell| step.min(dwell / 2.0));
-        Ok((factor, predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?))
+        Ok::<_, SimulationError>((
+            factor,
+            predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?,
+        ))
     };
-    let factors = (-2 * OCTAVES..=2 * OCTAVES).into_par_iter();
-    Ok(Sweep::of(factors.map(at).collect::<Result<_, SimulationError>>()?))
+    Ok(Sweep::of(parallel::try_map(4 * OCTAVES as usize + 1, at)?))
 }
 
 /// Smallest subset that keeps the same coefficients observable, smallest scheme for all coefficients,

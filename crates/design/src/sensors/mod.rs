@@ -25,8 +25,7 @@ mod search;
 use obsdeg_core::system::{
     Candidate, Gathered, Judgement, ModelError, OutputRows, Role, SystemModel, check_cost, gather,
 };
-
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 pub use answer::{FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable};
 use confirm::Confirmation;
@@ -440,7 +439,7 @@ impl SensorTask<'_> {
         let judged = &self.search.judged;
         let mut sets: Vec<Set> = judged.keys().copied().collect();
         sets.sort_unstable();
-        sets.par_iter().copied().find_first(|set| judged[set] != other.degrees(*set))
+        parallel::find_first(sets.len(), |i| (judged[&sets[i]] != other.degrees(sets[i])).then_some(sets[i]))
     }
 }
 

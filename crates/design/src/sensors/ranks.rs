@@ -114,8 +114,7 @@ where
     <Reals<N> as Scalars>::Element: Sync,
 {
     fn degrees(&self, set: Set) -> Box<[u16]> {
-        let mut space =
-            AnyBasis(<<Reals<N> as Scalars>::Space as RowSpace>::new(Reals::<N>, self.columns));
+        let mut space = AnyBasis(<<Reals<N> as Scalars>::Space as RowSpace>::new(Reals::<N>, self.columns));
         let degrees = self.climb(set, &mut space);
         if let Ok(mut gap) = self.gap.lock() {
             *gap = gap.and(space.0.gap());

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::cuts::{Cheapest, Transversals, cost_of, members, smallest};
 use super::ranks::{NONE, Ranks, Set};
@@ -145,7 +145,7 @@ impl<'a> SetSearch<'a> {
         let ranks = self.ranks;
         let found: Vec<_> = match new.len() {
             1 => vec![ranks.degrees(new[0])],
-            _ => new.par_iter().map(|set| ranks.degrees(*set)).collect(),
+            _ => parallel::map(new.len(), |i| ranks.degrees(new[i])),
         };
         self.judged.extend(new.into_iter().zip(found));
         match (self.going)(self.judged.len() as u64) {

@@ -10,8 +10,7 @@ use std::collections::BTreeMap;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::requirements::{Claim, Miss};
 use crate::simulation::answer::MeasurementReport;
@@ -265,7 +264,6 @@ fn drop_one(
         let unknown = |c: usize| &of.prediction.unknowns[c];
         c.is_some_and(|c| unknown(c).status == Status::Observable || unknown(c).determined)
     };
-    let parts = interrupt::parts();
     let without = |i: usize| {
         let position = scheme.positions[i].name.clone();
         let own = Conditions { bench: Bench::without(&conditions.bench, i), ..conditions.clone() };
@@ -277,7 +275,7 @@ fn drop_one(
         let requirements = judged.requirements(conditions)?;
         Ok(DropOne { position, lost, worst: judged.worst_of(&|_| true), requirements })
     };
-    (0..scheme.positions.len()).into_par_iter().map(|i| parts.part(|| without(i))).collect()
+    parallel::try_map(scheme.positions.len(), without)
 }
 
 /// Worst sigmas at other latitudes, dwells and carries.
@@ -302,16 +300,16 @@ fn sensitivity(
         let other = under(scheme, conditions, carry);
         others.extend(other.map(|(other, still)| (format!("{carry} carry{without}"), other, still)));
     }
-    let of = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
-        let judged = judged(&scheme, &conditions, seed)?;
+    let of = |i: usize| {
+        let (condition, scheme, conditions) = &others[i];
+        let judged = judged(scheme, conditions, seed)?;
         let worst_determined = judged.worst_of(&|name| determined.contains(name));
         Ok(Sensitivity {
-            condition,
+            condition: condition.clone(),
             rank: rank(&judged),
             worst: judged.worst_of(&|_| true),
             worst_determined,
         })
     };
-    let parts = interrupt::parts();
-    others.into_par_iter().map(|other| parts.part(|| of(other))).collect()
+    parallel::try_map(others.len(), of)
 }

@@ -28,7 +28,7 @@ use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, each_row};
@@ -371,7 +371,8 @@ fn controls(
         farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
     ];
     let changes: Vec<(FilterChange, f64)> = changes.into_iter().flatten().collect();
-    let counted = changes.par_iter().map(|(change, _)| -> Result<(usize, usize), SimulationError> {
+    let counted = parallel::map(changes.len(), |i| -> Result<(usize, usize), SimulationError> {
+        let change = &changes[i].0;
         let filter_scheme = change.apply(scheme);
         let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
         // an outcome that the numbers of a wrong filter do not resolve is no check of it
@@ -384,7 +385,6 @@ fn controls(
             Err(e) => Err(e),
         }
     });
-    let counted: Vec<_> = counted.collect();
     let mut out = Vec::new();
     for ((change, off_deg), counts) in changes.iter().zip(counted) {
         let filter_scheme = change.apply(scheme);

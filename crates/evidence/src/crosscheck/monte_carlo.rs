@@ -9,8 +9,7 @@ use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form, Gains, Manifold, Update};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::answer::{HistoryPoint, Statistic};
 use crate::simulation::SimulationError;
@@ -173,12 +172,11 @@ impl<'a> Prepared<'a> {
     /// stop.
     pub fn run(&self, runs: usize, progress: &dyn Fn(usize) -> bool) -> Totals {
         let mut totals = Totals::none(self.checkpoints.len());
-        let parts = interrupt::parts();
         for batch in (0..runs).step_by(CHUNK * BATCH) {
             let end = runs.min(batch + CHUNK * BATCH);
             let starts: Vec<usize> = (batch..end).step_by(CHUNK).collect();
-            let of = |&first: &usize| parts.part(|| self.chunk(first, end.min(first + CHUNK)));
-            let chunks: Vec<Totals> = starts.par_iter().map(of).collect();
+            let of = |i: usize| self.chunk(starts[i], end.min(starts[i] + CHUNK));
+            let chunks: Vec<Totals> = parallel::map(starts.len(), of);
             for chunk in &chunks {
                 totals.add(chunk);
             }

@@ -6,6 +6,7 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
+use obsdeg_exact::parallel;
 
 use super::answer::{
     Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
@@ -187,7 +188,7 @@ impl DwellLimit {
         let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
         let both = || -> Vec<SlopeRequest> { requests(false).chain(requests(true)).collect() };
         let samples = samples(scheme);
-        let (derivatives, dwells) = rayon::join(
+        let (derivatives, dwells) = parallel::join(
             || asymptotics(&samples, Between::Nothing, &is_psi, &start),
             || (!alone).then(|| asymptotics(&samples, Between::Dwell, &is_psi, &both())),
         );

@@ -31,8 +31,7 @@ use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
 use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Form, SquareRootInformation};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -115,9 +114,8 @@ pub fn noise_floor(
     let mean = mean_dwell(scheme, conditions);
     let factors = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0));
     let factors: Vec<f64> = factors.filter(|f| *f == 1.0 || ranges::DWELL_S.admits(f * mean)).collect();
-    let parts = interrupt::parts();
-    let curve = |&f: &f64| parts.part(|| sigmas_without_prior(scheme, conditions, f));
-    let curves: Vec<Vec<f64>> = factors.par_iter().map(curve).collect::<Result<_, _>>()?;
+    let curve = |i: usize| sigmas_without_prior(scheme, conditions, factors[i]);
+    let curves: Vec<Vec<f64>> = parallel::try_map(factors.len(), curve)?;
     let plan = Plan::new(scheme, conditions)?;
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let of = |c: usize| {

@@ -15,7 +15,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, elementary, product};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::bounded::{Bounded, Bounds, rounding};
 use super::weights::{OptimalWeights, listed, weigh};
@@ -100,7 +100,8 @@ impl Evaluator {
         let n = self.degree();
         let g = self.information_of_effects();
         let energy = |e: &Euler| self.energy_bounded(e, &g, &found.dual.x) * scale;
-        let on_net = on_net(FINE, n, &|e| energy(e).value).map(|(_, d)| d).reduce(|| 0.0, f64::max);
+        let largest = |points: Points<'_>| points.map(|p| p.1).fold(0.0, f64::max);
+        let on_net = on_net(FINE, n, &|e| energy(e).value, largest).into_iter().fold(0.0, f64::max);
         let (hidden, moved) = hidden(FINE, n, &energy);
         let part = (1.0 + (n as f64 * h).cos()) / 2.0 * (1.0 - rounding(0));
         let most = (on_net + hidden) / (part - moved) * (1.0 + rounding(0));
@@ -222,25 +223,33 @@ fn betas(step: usize) -> Vec<f64> {
     (0..=180).step_by(step).map(|b| b as f64 - 90.0).collect()
 }
 
+/// Euler angles in degrees, each with the value there.
+type Points<'a> = &'a mut dyn Iterator<Item = ([f64; 3], f64)>;
+
 /// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about
 /// fixed axes, it is a trigonometric polynomial of degree n: 2 n + 1 values of each determine the others (the
-/// interpolation adds a few roundings to them).
-fn on_net(
+/// interpolation adds a few roundings to them). `layer` reduces the points of one beta.
+fn on_net<T: Send>(
     step: usize,
     n: usize,
     energy: &(dyn Fn(&Euler) -> f64 + Sync),
-) -> impl ParallelIterator<Item = ([f64; 3], f64)> {
+    layer: impl Fn(Points<'_>) -> T + Sync,
+) -> Vec<T> {
     let (nodes, weights) = interpolation(step, n);
-    betas(step).into_par_iter().flat_map_iter(move |b| {
+    let betas = betas(step);
+    let along = |k: usize| {
+        let b = betas[k];
         let count = nodes.len();
         let values = DMatrix::from_fn(count, count, |i, j| energy(&at(nodes[i], b, nodes[j])));
         let all = &weights * values * weights.transpose();
         let full = weights.nrows();
-        (0..full * full).map(move |k| {
+        let of = |k: usize| {
             let (i, j) = (k / full, k % full);
             ([(i * step) as f64, b, (j * step) as f64], all[(i, j)])
-        })
-    })
+        };
+        layer(&mut (0..full * full).map(of))
+    };
+    parallel::map(betas.len(), along)
 }
 
 /// Rounding bound of the values of [`on_net`] from those at the nodes, and the relative bound for nodes
@@ -253,7 +262,9 @@ fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) ->
         all.fold((0.0, 0.0), |(size, radius): (f64, f64), x| (size.max(x.value.abs()), radius.max(x.radius)))
     };
     let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
-    let (size, radius) = betas(step).into_par_iter().map(both).reduce(|| (0.0, 0.0), larger);
+    let betas = betas(step);
+    let largest = parallel::map(betas.len(), |k| both(betas[k]));
+    let (size, radius) = largest.into_iter().fold((0.0, 0.0), larger);
     // arguments up to 2 pi k are off by some 26 k u, cosines by u, and their sum by (n + 1) u of its size
     let weight = (14 * n + 16) as f64 * f64::EPSILON;
     let sizes = weights.row_iter().map(|row| row.iter().map(|w| w.abs()).sum::<f64>()).fold(0.0, f64::max);
@@ -311,7 +322,8 @@ fn angles(c: &Matrix3<f64>) -> Euler {
 
 /// Attitudes of largest energy near the best points of the coarse net, largest first.
 fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
-    let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, &|e| energy(&c_n_f64(e))).collect();
+    let mut points: Vec<([f64; 3], f64)> =
+        on_net(COARSE, n, &|e| energy(&c_n_f64(e)), |points| points.collect::<Vec<_>>()).concat();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut taken: Vec<([f64; 3], Matrix3<f64>)> = Vec::new();
     for (e, _) in points {
@@ -327,7 +339,8 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
             break;
         }
     }
-    let polished = taken.into_par_iter().map(|(mut at, c)| {
+    parallel::map(taken.len(), |k| {
+        let (mut at, c) = taken[k];
         let mut best = energy(&c);
         let mut step = COARSE as f64 / 2.0;
         while step > 0.005 {
@@ -343,8 +356,7 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
             }
         }
         euler(at)
-    });
-    polished.collect()
+    })
 }
 
 #[cfg(test)]
@@ -378,7 +390,8 @@ mod tests {
             let x = DMatrix::from_fn(evaluator.n - 3, 3, |_, _| draw());
             let energy = |c: &Matrix3<f64>| evaluator.energy(c, &x);
             let off = |n: usize| {
-                let all: Vec<_> = on_net(20, n, &|e| energy(&c_n_f64(e))).collect();
+                let all: Vec<_> =
+                    on_net(20, n, &|e| energy(&c_n_f64(e)), |points| points.collect::<Vec<_>>()).concat();
                 assert_eq!(all.len(), 18 * 10 * 18);
                 let largest = all.iter().map(|(_, d)| *d).fold(0.0, f64::max);
                 let far = all.iter().map(|(e, d)| (d - energy(&matrix(*e))).abs()).fold(0.0, f64::max);
@@ -414,7 +427,8 @@ mod tests {
                 assert!(off <= radius, "{terms}: {place} {told:e} off by {off:e}, told {radius:e}");
                 largest[kind] = largest[kind].max(if radius > 0.0 { off / radius } else { 0.0 });
             };
-            let net: Vec<_> = on_net(FINE, n, &|e| energy(e).value).collect();
+            let net: Vec<_> =
+                on_net(FINE, n, &|e| energy(e).value, |points| points.collect::<Vec<_>>()).concat();
             let most = net.iter().map(|(_, d)| *d).fold(0.0, f64::max);
             let (hidden, moved) = hidden(FINE, n, &energy);
             assert!(hidden < 1e-8 * most && moved < 1e-8, "{terms}: {hidden:e} {moved:e} {most:e}");

@@ -3,7 +3,7 @@
 
 use obsdeg_core::model::slew::{Slew, Turn};
 use obsdeg_core::model::{Matrix3, SlewTo};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::slew_path::SlewPath;
@@ -24,11 +24,10 @@ impl Evaluator {
             if found > MAX_TURNING {
                 return Err(DesignError::Pairs { found });
             }
-            let slew_paths = (0..found * found).into_par_iter().map(|k| {
+            self.slew_paths = parallel::try_map(found * found, |k| {
                 let shortest_path = || self.shortest_path(&attitudes[k / found], &attitudes[k % found]);
                 going().then(shortest_path).ok_or(DesignError::Interrupted)
-            });
-            self.slew_paths = slew_paths.collect::<Result<_, _>>()?;
+            })?;
         }
         Ok(self)
     }

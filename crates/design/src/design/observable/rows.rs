@@ -11,8 +11,8 @@ use std::collections::HashMap;
 use obsdeg_core::degree::{EnsembleError, local_chain};
 use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme, Source};
 use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field};
-use rayon::prelude::*;
 
 use crate::design::observable::symmetry::Symmetry;
 use crate::design::request::error::DesignError;
@@ -225,7 +225,7 @@ impl Rows {
             });
             out
         };
-        (0..self.candidates()).into_par_iter().flat_map_iter(behind).collect()
+        parallel::map(self.candidates(), behind).concat()
     }
 
     /// First observable set of `size` candidates that begins with one of `firsts`, and true if no enumeration
@@ -238,17 +238,14 @@ impl Rows {
         budget: u64,
         going: &(dyn Fn() -> bool + Sync),
     ) -> (Option<Vec<usize>>, bool) {
-        let found: Vec<(Option<Vec<usize>>, bool)> = firsts
-            .par_iter()
-            .map(|&first| {
-                let (mut out, mut patience) = (None, EnumerationLimits { budget, going });
-                self.each(&[first], size, false, &mut patience, &mut |set| {
-                    out = Some(set.to_vec());
-                    false
-                });
-                (out, patience.budget > 0)
-            })
-            .collect();
+        let found: Vec<(Option<Vec<usize>>, bool)> = parallel::map(firsts.len(), |i| {
+            let (mut out, mut patience) = (None, EnumerationLimits { budget, going });
+            self.each(&[firsts[i]], size, false, &mut patience, &mut |set| {
+                out = Some(set.to_vec());
+                false
+            });
+            (out, patience.budget > 0)
+        });
         let complete = found.iter().all(|f| f.1);
         (found.into_iter().find_map(|f| f.0), complete)
     }

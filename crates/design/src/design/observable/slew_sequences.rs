@@ -17,8 +17,8 @@ use obsdeg_core::model::{
     parse_attitude,
 };
 use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -222,7 +222,8 @@ impl SequenceSearch {
             self.search(&self.fields[0].go(walk, turn, to), length, seen, going)
         };
         if walk.places.len() < 4 {
-            self.neighbours[here].par_iter().find_map_first(next)
+            let neighbours = &self.neighbours[here];
+            parallel::find_first(neighbours.len(), |i| next(&neighbours[i]))
         } else {
             self.neighbours[here].iter().find_map(next)
         }
@@ -286,7 +287,7 @@ impl SequenceSearch {
                 let here = walk.places[walk.places.len() - 1];
                 self.neighbours[here].iter().map(|&(turn, to)| self.fields[0].go(walk, turn, to)).collect()
             };
-            let next: Vec<SlewSequence> = beam.par_iter().flat_map_iter(grown).collect();
+            let next: Vec<SlewSequence> = parallel::map(beam.len(), |i| grown(&beam[i])).concat();
             let mut order: Vec<(usize, u64, usize)> = next
                 .iter()
                 .enumerate()
@@ -407,9 +408,9 @@ pub fn walks(
             stopped.fetch_or(!go, Ordering::Relaxed);
             go
         };
-        let found = (0..space.neighbours.len())
-            .into_par_iter()
-            .find_map_first(|c| space.search(&space.fields[0].start(c), length, &seen, &going));
+        let found = parallel::find_first(space.neighbours.len(), |c| {
+            space.search(&space.fields[0].start(c), length, &seen, &going)
+        });
         if let Some(found) = found {
             best = Some(found);
             break;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Euler, angles_text};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
 use crate::design::certificate::value::{CriterionValue, excess};
@@ -110,6 +110,6 @@ impl Task<'_> {
                 .min_by(f64::total_cmp)
                 .map(|value| [total, value])
         };
-        totals.into_par_iter().filter_map(at).collect()
+        parallel::map(totals.len(), |i| at(totals[i])).into_iter().flatten().collect()
     }
 }

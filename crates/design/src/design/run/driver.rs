@@ -6,6 +6,7 @@ use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Euler, Scheme};
 use obsdeg_evidence::simulation::omitted::omitted_effects;
 use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
 use crate::design::request::error::DesignError;
@@ -137,8 +138,10 @@ pub(crate) fn answered(
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
             let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
             let line = || certificate.is_some().then(|| task.front_bound(evaluator, of, &going));
-            let (front, (found, line)) =
-                rayon::join(|| task.front(evaluator, &search, of, &best), || rayon::join(over_all, line));
+            let (front, (found, line)) = parallel::join(
+                || task.front(evaluator, &search, of, &best),
+                || parallel::join(over_all, line),
+            );
             out.front.extend(front?);
             if let (Some(certificate), Some(line)) = (&mut certificate, line) {
                 let every = free.as_ref().map(|f| &f.every).or(found.as_ref());

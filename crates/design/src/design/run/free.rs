@@ -8,8 +8,7 @@
 
 use obsdeg_core::model::{Carry, Euler, Scheme, c_n_f64, format_decimal};
 use obsdeg_evidence::simulation::Conditions;
-use obsdeg_exact::SplitMix64;
-use rayon::prelude::*;
+use obsdeg_exact::{SplitMix64, parallel};
 
 use crate::design::certificate::Everywhere;
 use crate::design::measure::stop::Stop;
@@ -128,7 +127,7 @@ impl Free {
             criterion: &task.criterion,
             going: &going,
         };
-        let mut moved: Vec<OnGrids> = first.par_iter().map(|start| moves.rounded(start, step)).collect();
+        let mut moved: Vec<OnGrids> = parallel::map(first.len(), |i| moves.rounded(&first[i], step));
         out.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
         let finer = moved.iter().map(|m| &m.finer).min_by(|a, b| a.order(b));
         out.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();

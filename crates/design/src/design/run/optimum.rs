@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use obsdeg_core::model::{Carry, Euler, GyroAxes, Scheme, Term, cardinal_name, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, latitude_of, steps};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -292,7 +292,7 @@ fn blocks(
             bound,
         })
     };
-    starts.par_iter().with_max_len(1).map(block).collect()
+    parallel::try_map(starts.len(), |i| block(&starts[i]))
 }
 
 /// Starts of all blocks, in lexicographic order: two candidates, or more where many sequences follow.

@@ -10,7 +10,7 @@ use obsdeg_core::omitted::OmittedClass;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::omitted::{Bench, OmittedEffect, term_effects};
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Found, HalfTurn, Minimum};
 use crate::design::measure::criterion::{Criterion, Limits};
@@ -333,8 +333,7 @@ impl<'a> Task<'a> {
         evaluator: &Evaluator,
         list: &[Scored],
     ) -> Result<Vec<Found>, DesignError> {
-        let found: Vec<Option<Found>> =
-            list.par_iter().map(|scored| self.found(evaluator, scored)).collect::<Result<_, _>>()?;
+        let found: Vec<Option<Found>> = parallel::try_map(list.len(), |i| self.found(evaluator, &list[i]))?;
         Ok(found.into_iter().flatten().collect())
     }
 

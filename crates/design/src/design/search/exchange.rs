@@ -1,7 +1,6 @@
 //! Coordinate exchange, for spaces too large for exhaustion.
 
-use obsdeg_exact::SplitMix64;
-use rayon::prelude::*;
+use obsdeg_exact::{SplitMix64, parallel};
 
 use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
@@ -112,7 +111,7 @@ impl Search<'_> {
             best.add(self.keep, held);
             best
         };
-        let parts = (0..total as u64).into_par_iter().map(|start| meter.part(|| from(start))).collect();
+        let parts = parallel::map(total, |start| meter.part(|| from(start as u64)));
         meter.gather(self.keep, parts)
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
@@ -24,6 +24,8 @@ const KNOWN_RESTARTS: u64 = 24;
 pub(crate) const MOST_BEHIND: f64 = 2e7;
 /// Largest number of starts of more than two positions.
 const MOST_STARTS: f64 = 1e6;
+/// Number of starts whose results are kept until they are merged.
+const BATCH: usize = 4096;
 
 /// Sequences that an exhaustive search covers at once.
 pub(crate) enum SearchLevel {
@@ -365,14 +367,11 @@ impl Search<'_> {
             }
             SearchLevel::Any => self.exhaust_sets(&meter, start, k, symmetry),
         };
-        let none = || Best { complete: true, ..Best::default() };
-        let together = |mut best: Best, more: Best| {
-            best.merge(self.keep, more);
-            best
-        };
-        // work differs between starts
-        let parts = starts.par_iter().with_max_len(1).map(|start| meter.part(|| from(start)));
-        let best = parts.reduce(none, together);
+        let mut best = Best { complete: true, ..Best::default() };
+        for batch in starts.chunks(BATCH) {
+            let parts = parallel::map(batch.len(), |i| meter.part(|| from(&batch[i])));
+            parts.into_iter().for_each(|part| best.merge(self.keep, part));
+        }
         Best { complete: !meter.is_stopped(), ..best }
     }
 
@@ -448,11 +447,10 @@ impl Search<'_> {
         };
         let behind = |first: usize, size: usize| match size {
             1 => judged(&[first], size),
-            _ => (first + 1..candidates).into_par_iter().all(|second| judged(&[first, second], size)),
+            _ => parallel::all(candidates - first - 1, &|i| judged(&[first, first + 1 + i], size)),
         };
         let sizes = 1..=k.min(candidates);
-        let mut all =
-            sizes.map(|size| (0..candidates).into_par_iter().all(|first| going() && behind(first, size)));
+        let mut all = sizes.map(|size| parallel::all(candidates, &|first| going() && behind(first, size)));
         (all.all(|done| done) && going()).then_some(levels)
     }
 }
