@@ -20,12 +20,13 @@ use super::observe::{By, channel_name};
 use super::offset::{Later, Offset};
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
-use super::{CalibrationError, Options, STRICT};
+use super::{CalibrationError, Options};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Fit, Moved,
     Outlier, PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
+use crate::levels;
 use crate::setup::{self, Setup};
 
 /// How many times wider than the prior that of the filter is.
@@ -436,7 +437,7 @@ impl Parts<'_> {
         Fit {
             chi_square: left,
             degrees_of_freedom,
-            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, STRICT)
+            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, 1.0 - levels::NOISE)
                 .map_both(|x| x / degrees_of_freedom.max(1.0)),
             factor: mean.sqrt(),
             passes: self.estimate.passes,
@@ -562,7 +563,8 @@ impl Parts<'_> {
             Repeatability {
                 chi_square: joined / degrees_of_freedom,
                 degrees_of_freedom,
-                band: chi_square_band(degrees_of_freedom, 1.0, STRICT).map_both(|x| x / degrees_of_freedom),
+                band: chi_square_band(degrees_of_freedom, 1.0, 1.0 - 2.0 * levels::REPEATABILITY)
+                    .map_both(|x| x / degrees_of_freedom),
             }
         })
     }

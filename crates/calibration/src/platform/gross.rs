@@ -24,9 +24,6 @@ const BESIDE: usize = 2;
 const STEPS: f64 = 10.0;
 /// Number of equal rows in succession that are stuck, where values seldom repeat.
 const STUCK: usize = 4;
-/// Expected number of such successions by chance, from how often two neighbours are equal, below which they
-/// are stuck.
-const BY_CHANCE: f64 = 1e-5;
 
 /// Row of a record, or the median of a dense bin of rows.
 #[derive(Debug, Clone)]
@@ -89,8 +86,9 @@ fn beside(values: &[f64], i: usize) -> f64 {
 }
 
 /// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard
-/// deviation of a row.
-fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
+/// deviation of a row; values are stuck where the expected number of such successions by chance, from how often
+/// two neighbours are equal, is below `stuck`.
+fn window(t: &[f64], values: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64, Why)> {
     let n = values.len();
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -116,7 +114,7 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
         let seldom = 2 * steps.len() > n - run.len();
         let equal = equal.saturating_sub(run.len() - 1) as f64 / n as f64;
         let by_chance = n as f64 * equal.powi(run.len() as i32 - 1);
-        let seldom = seldom && by_chance < BY_CHANCE;
+        let seldom = seldom && by_chance < stuck;
         if run.len() >= STUCK && seldom && out.iter().all(|o| !run.contains(&o.0)) {
             out.extend((run.start + 1..run.end).map(|i| (i, 0.0, Why::Stuck)));
         }
@@ -145,16 +143,28 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
     out
 }
 
-/// The gross cells of the rows of a position; `noise` is about the standard deviation of a sample.
-pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
-    let mut out = Vec::new();
-    let mut from = 0;
+/// First and last row (exclusive) of every window of a position.
+fn windows(rows: &[Row]) -> Vec<(usize, usize)> {
+    let (mut out, mut from) = (Vec::new(), 0);
     while from < rows.len() {
         let long = |to: usize| to - from >= FEWEST && rows[to - 1].t - rows[from].t >= WINDOW_S;
         let mut to = (from + 1..=rows.len()).find(|&to| long(to)).unwrap_or(rows.len());
         if rows.len() - to < FEWEST {
             to = rows.len();
         }
+        out.push((from, to));
+        from = to;
+    }
+    out
+}
+
+/// The gross cells of the rows of a position; `noise` is about the standard deviation of a sample, `stuck` the
+/// probability that chance makes an output look stuck.
+pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
+    let mut out = Vec::new();
+    let windows = windows(rows);
+    let stuck = stuck / (3 * windows.len()) as f64;
+    for &(from, to) in &windows {
         let own = &rows[from..to];
         for axis in 0..3 {
             let there: Vec<&Row> = own.iter().filter(|r| r.values[axis].is_finite()).collect();
@@ -162,7 +172,7 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
                 continue;
             }
             let (t, values): (Vec<f64>, Vec<f64>) = there.iter().map(|r| (r.t, r.values[axis])).unzip();
-            out.extend(window(&t, &values, noise).into_iter().map(|(i, sigmas, why)| Cell {
+            out.extend(window(&t, &values, noise, stuck).into_iter().map(|(i, sigmas, why)| Cell {
                 lines: there[i].lines,
                 t: there[i].t,
                 axis,
@@ -171,12 +181,11 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
                 why,
             }));
         }
-        from = to;
     }
     // a run of equal values that a window ends in
-    let stuck: Vec<(usize, f64)> =
+    let held: Vec<(usize, f64)> =
         out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
-    for cell in out.iter_mut().filter(|c| c.why == Why::Far && stuck.contains(&(c.axis, c.value))) {
+    for cell in out.iter_mut().filter(|c| c.why == Why::Far && held.contains(&(c.axis, c.value))) {
         (cell.why, cell.sigmas) = (Why::Stuck, 0.0);
     }
     out.sort_by_key(|c| (c.lines, c.axis));
@@ -228,7 +237,7 @@ mod tests {
     fn what_is_gross_is_found_and_no_more() {
         for seed in 0..20 {
             let right = rows(seed);
-            assert!(cells(&right, 1e-5).is_empty(), "{:?}", cells(&right, 1e-5));
+            assert!(cells(&right, 1e-5, 5e-4).is_empty(), "{:?}", cells(&right, 1e-5, 5e-4));
             let mut spoiled = right.clone();
             spoiled[0].values[0] += 0.1;
             spoiled[60].values[2] -= 2e-4;
@@ -236,7 +245,7 @@ mod tests {
             (160..172).for_each(|i| spoiled[i].values[0] = 0.0);
             let held = spoiled[200].values[2];
             (200..206).for_each(|i| spoiled[i].values[2] = held);
-            let found = cells(&spoiled, 1e-5);
+            let found = cells(&spoiled, 1e-5, 5e-4);
             let mut expected: Vec<(u64, usize, Why)> =
                 vec![(2, 0, Why::Far), (62, 2, Why::Far), (132, 1, Why::Far)];
             expected.extend((162..174).map(|line| (line, 0, Why::Code)));
@@ -252,7 +261,7 @@ mod tests {
         for quantum in [1e-6, 2e-5, 1e-4] {
             let mut all = rows(3);
             all.iter_mut().for_each(|r| r.values = r.values.map(|x| (x / quantum).round() * quantum));
-            assert!(cells(&all, 1e-5).is_empty(), "{quantum}: {:?}", cells(&all, 1e-5));
+            assert!(cells(&all, 1e-5, 5e-4).is_empty(), "{quantum}: {:?}", cells(&all, 1e-5, 5e-4));
         }
     }
 }

@@ -245,7 +245,7 @@ impl Default for Options {
     }
 }
 
-/// The probability with which a right record is in its bands.
+/// Probability with which what a right record leaves is below a bound that asks for a closer look.
 const STRICT: f64 = 0.999;
 /// Rounds in which outliers are looked for, or the noise is estimated.
 const ROUNDS: usize = 6;

@@ -2,14 +2,12 @@
 
 use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
-use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail, ljung_box};
+use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
 use super::diagnose::{Left, Parts};
 use super::observe::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
-/// Fewest residuals of which a correlation is told.
-const FEWEST: usize = 40;
 /// Fewest residuals of a position whose correlation with the temperature is told.
 const FEWEST_WARM: usize = 10;
 /// Most points of a series.
@@ -21,9 +19,7 @@ impl Parts<'_> {
     /// Probability that independent residuals are correlated as these are.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
         let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
-        let series: Vec<f64> = own.map(|l| l.normalised).collect();
-        let lags = LAGS.min(series.len() / 4);
-        (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
+        crate::white::whiteness(&own.map(|l| l.normalised).collect::<Vec<f64>>())
     }
 
     /// How the residuals of a channel go with the temperature, position by position: what is fixed to the

@@ -29,6 +29,7 @@ pub use answer::{
 use crate::Going;
 use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::Solution;
+use crate::levels;
 use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
@@ -39,8 +40,6 @@ use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size,
 const SCHEMA: &str = "obsdeg.system-calibration/1";
 /// A pull ten times as weak leaves the sigma of what is determined.
 const DETERMINED: f64 = 1.05;
-/// The probability with which right data are in their bands.
-const STRICT: f64 = 0.999;
 /// Most steps of integration over all rows, and for each row besides.
 const STEPS: f64 = 50_000.0;
 const STEPS_A_ROW: f64 = 50.0;
@@ -312,7 +311,7 @@ impl<'a> Calibrating<'a> {
         let residuals = self.residuals(&at, &solution);
         let outputs = self.with_gates(self.outputs(&residuals, &at, &solution));
         let all_estimated = self.estimated.iter().all(|e| *e);
-        let band = chi_square_band(degrees_of_freedom as f64, 1.0, STRICT);
+        let band = chi_square_band(degrees_of_freedom as f64, 1.0, 1.0 - levels::NOISE);
         let band = (band.0 / degrees_of_freedom as f64, band.1 / degrees_of_freedom as f64);
         let mut findings = Vec::new();
         if self.problem.stopped {
@@ -325,7 +324,7 @@ impl<'a> Calibrating<'a> {
         }
         for o in &outputs {
             if let Some(probability) =
-                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < 1.0 - STRICT)
+                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < levels::CORRELATED)
             {
                 findings.push(SystemFinding::Correlated { output: o.output.clone(), probability });
             }

@@ -15,7 +15,7 @@ use crate::simulator::{AtOnce, Bench, Random, csv};
 
 /// Attitudes of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Scheme {
+pub(crate) enum Scheme {
     /// Six at odd angles, with slews under inertial carry.
     Six,
     /// The paper's two.
@@ -28,13 +28,13 @@ enum Scheme {
 
 /// Records of one kind.
 #[derive(Debug, Clone, Copy)]
-struct Case {
-    scheme: Scheme,
-    carry: Carry,
+pub(crate) struct Case {
+    pub(crate) scheme: Scheme,
+    pub(crate) carry: Carry,
     /// Standard deviations of the drifts over 12 deg/h and 5 deg/h/g.
-    scale: f64,
+    pub(crate) scale: f64,
     /// True if these are stated as priors.
-    priors: bool,
+    pub(crate) priors: bool,
 }
 
 const SCALES: [f64; 3] = [0.1, 1.0, 3.0];
@@ -70,7 +70,7 @@ impl Case {
     }
 
     /// A platform drawn at random; psi is 0.1 deg (1 sigma) in each axis.
-    fn bench(&self, seed: u64) -> Bench {
+    pub(crate) fn bench(&self, seed: u64) -> Bench {
         let mut random = Random::new(1_000_003 * (seed + 1) + (1e4 * self.scale) as u64);
         let mut three = |sigma: f64| -> [f64; 3] { std::array::from_fn(|_| sigma * random.normal()) };
         let (f, g) = (12.0 * self.scale, 5.0 * self.scale);

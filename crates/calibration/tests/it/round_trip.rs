@@ -110,7 +110,7 @@ fn is_right(c: &Calibration) {
 }
 
 /// Benches as real ones are: turns take time, outputs are quantised, samples are lost, gyros drift at random.
-fn real(seed: u64) -> Bench {
+pub(crate) fn real(seed: u64) -> Bench {
     Bench {
         seed,
         slew_deg_s: Some(1.0),

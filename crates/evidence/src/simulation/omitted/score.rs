@@ -12,8 +12,6 @@ use obsdeg_ekf::consistency::{chi_square_quantile, chi_square_tail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Probability of any suspicion where nothing is wrong.
-pub const LEVEL: f64 = 0.01;
 /// Confidence of the bound on chi-square above which a single error does not explain the residuals.
 const UNEXPLAINED: f64 = 0.999;
 /// Fall of chi-square, of the size found, by which errors of a group differ at most: three sigma.
@@ -185,8 +183,8 @@ impl Score {
     }
 
     /// What explains the residuals best: a single error, or a pair where no single one does; nothing where
-    /// chance is enough.
-    pub fn explanation(&self) -> Option<Explanation> {
+    /// chance is enough. `level` is the probability of an explanation where nothing is wrong.
+    pub fn explanation(&self, level: f64) -> Option<Explanation> {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
         let fall = self.fall(best);
@@ -203,12 +201,12 @@ impl Score {
             explained,
         };
         // a band of all residuals hides a second error that is many sigmas large
-        let pair = if explained && probability >= LEVEL { None } else { self.best_pair(&tried, fall) };
-        pair.or_else(|| (probability < LEVEL).then_some(single))
+        let pair = if explained && probability >= level { None } else { self.best_pair(&tried, fall, level) };
+        pair.or_else(|| (probability < level).then_some(single))
     }
 
     /// The best pair, if it explains more than the best single error by more than chance.
-    fn best_pair(&self, tried: &[usize], single: f64) -> Option<Explanation> {
+    fn best_pair(&self, tried: &[usize], single: f64, level: f64) -> Option<Explanation> {
         let pairs = tried.iter().enumerate().flat_map(|(k, &i)| tried[..k].iter().map(move |&j| [i, j]));
         let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
         let (mut errors, mut estimates, fall) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -216,7 +214,7 @@ impl Score {
         let left_over = self.left_over(fall, 2.0);
         let probability = (chi_square_tail(2.0, fall / left_over) * count).min(1.0);
         let more = chi_square_tail(1.0, (fall - single) / left_over) * tried.len() as f64;
-        if probability >= LEVEL || more >= LEVEL {
+        if probability >= level || more >= level {
             return None;
         }
         // the one that explains more by itself first
