@@ -106,9 +106,9 @@ fn triangle(of: DMatrix<f64>, rows: usize) -> DMatrix<f64> {
     if found < rows { r.resize(rows, columns, 0.0) } else { r }
 }
 
-/// Rows `A d = b` on the state before the steps that were taken, in the first `count` rows of `all` (any x n +
-/// 1, `b` last); the others are zero. They are made a triangle where they are many: a factorisation at every step
-/// would take most of the time.
+/// Rows `A d = b` on the state before the steps that were taken, in the first `count` rows of `all` (any x
+/// n + 1, `b` last); the others are zero. They are made a triangle where they are many: a factorisation at
+/// every step would take most of the time.
 struct Backward {
     all: DMatrix<f64>,
     count: usize,
@@ -184,8 +184,8 @@ impl Backward {
         }
     }
 
-    /// Parts what rows say of the noise of a step, `N xi + A d = b` beside `xi = 0`, from what is left for `d`:
-    /// one reflection for each noise, of its unit row and all others.
+    /// Parts what rows say of the noise of a step, `N xi + A d = b` beside `xi = 0`, from what is left for
+    /// `d`: one reflection for each noise, of its unit row and all others.
     fn without_noise(&mut self, mut of_noise: DMatrix<f64>) -> OfNoise {
         let (q, n) = (of_noise.ncols(), self.all.ncols() - 1);
         let mut top = DMatrix::zeros(q, q + n + 1);

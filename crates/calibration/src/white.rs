@@ -1,10 +1,11 @@
 //! Probability that white noise is as correlated as a series.
 //!
-//! The statistic of Ljung and Box is a sum of squares of autocorrelations, which are not quite independent: for
-//! 200 values and 20 lags its variance is 47 where that of chi-square is 40, and it is beyond the chi-square
-//! quantile of 0.033 % five times as often. Its distribution for white normal noise depends on the numbers of
-//! values and lags alone, so the probability is the share of simulated series that are as correlated (Monte
-//! Carlo test: Barnard 1963; with the stopping rule of Besag and Clifford 1991, doi:10.1093/biomet/78.2.301).
+//! The statistic of Ljung and Box is a sum of squares of autocorrelations, which are not quite independent:
+//! for 200 values and 20 lags its variance is 47 where that of chi-square is 40, and it is beyond the
+//! chi-square quantile of 0.033 % five times as often. Its distribution for white normal noise depends on the
+//! numbers of values and lags alone, so the probability is the share of simulated series that are as
+//! correlated (Monte Carlo test: Barnard 1963; with the stopping rule of Besag and Clifford 1991,
+//! doi:10.1093/biomet/78.2.301).
 
 use obsdeg_ekf::consistency::{autocorrelation, ljung_box};
 use obsdeg_evidence::simulation::Noise;

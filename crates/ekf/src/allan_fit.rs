@@ -270,8 +270,8 @@ impl Fitting<'_> {
 
     /// The squared coefficient that would give an estimate as small as the one found, or a smaller one, with
     /// probability 1 - [`LIMIT`]: estimate and standard deviation are those by its own weights (Neyman). The
-    /// estimate is skewed to the right, so the normal quantile is on the safe side. An estimate below zero counts
-    /// as zero: chance would else give limits far below what the record resolves.
+    /// estimate is skewed to the right, so the normal quantile is on the safe side. An estimate below zero
+    /// counts as zero: chance would else give limits far below what the record resolves.
     fn limit(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
         let all = Self::with(others, k);
         let beyond = |x: f64| -> Option<bool> {

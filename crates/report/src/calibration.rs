@@ -504,7 +504,7 @@ fn mode(c: &Calibration) -> Vec<String> {
             number(k),
             c.curvature.refits - c.curvature.failed
         ),
-        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 1).", number(k)),
+        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 0.4).", number(k)),
         None => "Curvature: the run cannot be followed over what is left open.".into(),
     });
     out

@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
-use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
@@ -22,11 +21,10 @@ use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Fit, Moved,
-    Outlier, PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved,
+    Outlier, PositionFit, RecordReport, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
-use crate::levels;
 use crate::setup::{self, Setup};
 
 /// How many times wider than the prior that of the filter is.
@@ -49,6 +47,9 @@ pub(crate) struct Left {
     pub free: f64,
     /// What all others leave of it, normalised.
     pub normalised: f64,
+    /// What those before it leave of it, normalised: of a right model independent unit normals, whatever was
+    /// estimated from the record (nearly zero where they say nothing of it).
+    pub innovation: f64,
 }
 
 impl Left {
@@ -63,7 +64,7 @@ pub(crate) struct Diagnosed {
     pub all: Vec<Left>,
     pub second: SecondPath,
     /// Of every run alone: the sum of squares that it leaves, by least squares with the wide prior.
-    alone: Vec<f64>,
+    pub alone: Vec<f64>,
 }
 
 impl Diagnosed {
@@ -108,7 +109,8 @@ impl Diagnosed {
             })?;
             let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
             let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
-            for ((left, r_of), key) in smoothed.left_out.iter().zip(variances).zip(keys) {
+            let each = smoothed.left_out.iter().zip(variances).zip(keys).zip(&whitened);
+            for (((left, r_of), key), innovation) in each {
                 out.all.push(Left {
                     run: r,
                     key: *key,
@@ -116,6 +118,7 @@ impl Diagnosed {
                     r: r_of,
                     free: r_of * left.variance,
                     normalised: left.normalised(),
+                    innovation: *innovation,
                 });
             }
             let information = &estimate.at.information[r];
@@ -149,7 +152,7 @@ impl Diagnosed {
     }
 
     /// Sum of squares and degrees of freedom of some measurements.
-    fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
+    pub(super) fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
         let some = self.all.iter().filter(|l| of(l));
         some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
     }
@@ -191,19 +194,19 @@ pub(crate) struct Parts<'a> {
 }
 
 /// A functional that is reported.
-struct Asked {
+pub(super) struct Asked {
     name: String,
     unit: &'static str,
     status: Status,
     degree: Option<usize>,
     /// True if scheme and records determine it.
-    determined: bool,
+    pub determined: bool,
     /// True if they do so only with a prior that is stated.
     from_prior: bool,
     /// True if no covariance describes its error: what they leave open bends the run.
     left_open: bool,
     /// On the unknowns, in SI.
-    terms: Vec<(usize, f64)>,
+    pub terms: Vec<(usize, f64)>,
     /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the
     /// scheme.
     local: Vec<(usize, f64)>,
@@ -424,31 +427,6 @@ impl Parts<'_> {
         Some(out).filter(|r| r.stated > 0)
     }
 
-    /// Chi-square of everything: degrees of freedom are measurements minus what they determine.
-    fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
-        let (_, free) = self.found.sums(|_| true);
-        let left: f64 = self.estimate.at.cost - (&self.linear.root * &self.linear.x).norm_squared();
-        // what several records share counts once: every run alone leaves more free than all together
-        let alone = self.problem.runs.len() - 1;
-        let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
-        let shared = unknowns.iter().chain(combinations).filter(coefficients).count();
-        let degrees_of_freedom = free + (alone * shared) as f64;
-        let mean = left.max(0.0) / degrees_of_freedom.max(1.0);
-        Fit {
-            chi_square: left,
-            degrees_of_freedom,
-            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, 1.0 - levels::NOISE)
-                .map_both(|x| x / degrees_of_freedom.max(1.0)),
-            factor: mean.sqrt(),
-            passes: self.estimate.passes,
-        }
-    }
-
-    /// The first unknown that all runs share.
-    fn shared(&self) -> usize {
-        self.problem.unknowns.n - self.planned.platform.coefficients()
-    }
-
     fn positions(&self, determined: &[&Asked]) -> Result<Vec<PositionFit>, EkfError> {
         let names = &self.scheme.positions;
         let mut out = Vec::new();
@@ -551,22 +529,6 @@ impl Parts<'_> {
             force_g: run.reading.force,
         };
         self.problem.runs.iter().enumerate().map(of).collect()
-    }
-
-    /// What joining the records adds to what each leaves alone.
-    fn repeatability(&self, fit: &Fit) -> Option<Repeatability> {
-        let runs = self.problem.runs.len();
-        let (_, free) = self.found.sums(|_| true);
-        let degrees_of_freedom = fit.degrees_of_freedom - free;
-        (runs > 1 && degrees_of_freedom > 0.0).then(|| {
-            let joined = (fit.chi_square - self.found.alone.iter().sum::<f64>()).max(0.0);
-            Repeatability {
-                chi_square: joined / degrees_of_freedom,
-                degrees_of_freedom,
-                band: chi_square_band(degrees_of_freedom, 1.0, 1.0 - 2.0 * levels::REPEATABILITY)
-                    .map_both(|x| x / degrees_of_freedom),
-            }
-        })
     }
 
     fn outliers(&self) -> Vec<Outlier> {

@@ -7,6 +7,7 @@ mod earth;
 mod estimate;
 mod findings;
 mod force;
+mod goodness;
 mod gross;
 mod length;
 mod minimum;

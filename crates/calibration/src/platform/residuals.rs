@@ -16,10 +16,11 @@ const POINTS: usize = 1000;
 const LAGS: usize = 20;
 
 impl Parts<'_> {
-    /// Probability that independent residuals are correlated as these are.
+    /// Probability that independent residuals are correlated as these are, by those of the filter: between
+    /// those of a smoother an estimate leaves correlations of about minus its unknowns over their number.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
         let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
-        crate::white::whiteness(&own.map(|l| l.normalised).collect::<Vec<f64>>())
+        crate::white::whiteness(&own.map(|l| l.innovation).collect::<Vec<f64>>())
     }
 
     /// How the residuals of a channel go with the temperature, position by position: what is fixed to the

@@ -6,7 +6,8 @@ use super::Calibrating;
 use super::answer::{OutputFit, SystemFinding, SystemResidual};
 use super::fit::{At, leverage};
 use crate::least_squares::Solution;
-use crate::{levels, white};
+use crate::levels;
+use crate::white;
 
 impl Calibrating<'_> {
     pub(super) fn residuals(&self, at: &At, solution: &Solution) -> Vec<SystemResidual> {
@@ -102,8 +103,8 @@ impl Calibrating<'_> {
     }
 }
 
-/// Bound of all right residuals of so many, but for the probability of an outlier, where sigma is that of others
-/// with `free` degrees of freedom.
+/// Bound of all right residuals of so many, but for the probability of an outlier, where sigma is that of
+/// others with `free` degrees of freedom.
 fn student_gate(free: f64, of: usize) -> f64 {
     let each = levels::OUTLIER / of.max(1) as f64;
     match free.is_finite() {
