@@ -106,10 +106,14 @@ fn window(t: &[f64], values: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64,
         }
     }
     let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
-    // normal values in such steps, as the least difference shows them: equal neighbours are few to count
-    let by_step =
-        steps.iter().copied().fold(f64::INFINITY, f64::min) / (s * (4.0 * std::f64::consts::PI).sqrt());
-    let by_step = by_step.min(1.0);
+    // steps of a converter below the noise, as the least difference shows them: normal values equal their
+    // neighbours this often, too seldom to count; values that move by more than the noise do not
+    let step_of_values = steps.iter().copied().filter(|d| *d < s).fold(f64::INFINITY, f64::min);
+    let by_step = if step_of_values.is_finite() {
+        step_of_values / (s * (4.0 * std::f64::consts::PI).sqrt())
+    } else {
+        0.0
+    };
     // values that hardly ever repeat, and then do many times in a row
     for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
         *at += run.len();
