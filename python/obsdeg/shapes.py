@@ -3246,10 +3246,10 @@ class Curvature(Record):
 
     kappa: float | None
     """Largest difference of the run and its linear model along the longest axes of the estimates' errors, in sigma (dimensionless):
-    below 1 the linear covariance holds. Null if the run cannot be followed there, or if another minimum fits nearly as well.
+    below 0.4 the linear covariance holds. Null if the run cannot be followed there, or if another minimum fits nearly as well.
     """
     refits: int
-    """Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1)."""
+    """Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 0.4)."""
     failed: int
     """Number of repeated estimates that did not converge."""
     from_refits: bool

@@ -425,10 +425,10 @@ pub struct Fit {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Curvature {
     /// Largest difference of the run and its linear model along the longest axes of the estimates' errors, in
-    /// sigma (dimensionless): below 1 the linear covariance holds. Null if the run cannot be followed there,
-    /// or if another minimum fits nearly as well.
+    /// sigma (dimensionless): below 0.4 the linear covariance holds. Null if the run cannot be followed
+    /// there, or if another minimum fits nearly as well.
     pub kappa: Option<f64>,
-    /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 1).
+    /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 0.4).
     pub refits: usize,
     /// Number of repeated estimates that did not converge.
     pub failed: usize,

@@ -9,7 +9,7 @@
 //! give every state of the run with its covariance.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use obsdeg_ekf::{EkfError, Stage};
+use obsdeg_ekf::{EkfError, Stage, Transition};
 
 /// Run linearised along one trajectory: Phi, Q and output rows of every step ([`Stage`]s of one step), a root
 /// of Q, and the residuals of the measurements along the trajectory.
@@ -106,6 +106,117 @@ fn triangle(of: DMatrix<f64>, rows: usize) -> DMatrix<f64> {
     if found < rows { r.resize(rows, columns, 0.0) } else { r }
 }
 
+/// Rows `A d = b` on the state before the steps that were taken, in the first `count` rows of `all` (any x
+/// n + 1, `b` last); the others are zero. They are made a triangle where they are many: a factorisation at
+/// every step would take most of the time.
+struct Backward {
+    all: DMatrix<f64>,
+    count: usize,
+}
+
+/// Number of rows, in triangles, from which on rows are made a triangle.
+const TRIANGLES: usize = 3;
+
+impl Backward {
+    fn new(n: usize) -> Self {
+        Self { all: DMatrix::zeros(n + 1, n + 1), count: 0 }
+    }
+
+    /// Makes the rows a triangle.
+    fn compress(&mut self) -> Result<(), EkfError> {
+        let n = self.all.ncols();
+        if self.count == 0 {
+            return Ok(());
+        }
+        let own = self.all.view((0, 0), (self.count, n));
+        if let Some(k) = own.iter().position(|x| !x.is_finite()) {
+            let (row, column) = (k % self.count, k / self.count);
+            return Err(EkfError::NotFinite {
+                what: "the rows of a step",
+                value: own[(row, column)],
+                row,
+                column,
+            });
+        }
+        let found = own.into_owned().qr().r();
+        self.all.fill(0.0);
+        self.count = found.nrows();
+        self.all.view_mut((0, 0), found.shape()).copy_from(&found);
+        Ok(())
+    }
+
+    /// Rows on the state in front of a gap `e`: `A (d + e) = b`.
+    fn behind(&mut self, gap: &DVector<f64>) {
+        let n = gap.len();
+        let shift = self.all.columns(0, n) * gap;
+        let mut right = self.all.column_mut(n);
+        right -= shift;
+    }
+
+    /// Adds the measurements of a stage.
+    fn measured(&mut self, stage: &Stage, residuals: &[f64]) -> Result<(), EkfError> {
+        let n = self.all.ncols() - 1;
+        if self.count + stage.outputs.len() > TRIANGLES * (n + 1) {
+            self.compress()?;
+        }
+        let rows = self.count + stage.outputs.len();
+        if rows > self.all.nrows() {
+            self.all.resize_vertically_mut((2 * rows).min(TRIANGLES * (n + 1)).max(rows), 0.0);
+        }
+        for (output, residual) in stage.outputs.iter().zip(residuals) {
+            let weight = 1.0 / output.r.sqrt();
+            output.h.iter().for_each(|&(j, c)| self.all[(self.count, j)] += weight * c);
+            self.all[(self.count, n)] = weight * residual;
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    /// Rows on the state before a transition: `A Phi`.
+    fn before(&mut self, transition: &Transition) {
+        let active: Vec<DVector<f64>> =
+            transition.active().iter().map(|&i| self.all.column(i).into_owned()).collect();
+        transition.active().iter().for_each(|&i| self.all.column_mut(i).fill(0.0));
+        for (a, column) in active.iter().enumerate() {
+            for (j, &phi) in transition.row(a).iter().enumerate().filter(|(_, phi)| **phi != 0.0) {
+                self.all.column_mut(j).axpy(phi, column, 1.0);
+            }
+        }
+    }
+
+    /// Parts what rows say of the noise of a step, `N xi + A d = b` beside `xi = 0`, from what is left for
+    /// `d`: one reflection for each noise, of its unit row and all others.
+    fn without_noise(&mut self, mut of_noise: DMatrix<f64>) -> OfNoise {
+        let (q, n) = (of_noise.ncols(), self.all.ncols() - 1);
+        let mut top = DMatrix::zeros(q, q + n + 1);
+        for k in 0..q {
+            let v = of_noise.column(k).into_owned();
+            let length = (1.0 + v.norm_squared()).sqrt();
+            // (1, v) - (-length, 0)
+            let first = 1.0 + length;
+            let scale = 2.0 / (first * first + v.norm_squared());
+            top[(k, k)] = -length;
+            for j in k + 1..q {
+                let share = scale * v.dot(&of_noise.column(j));
+                top[(k, j)] = -share * first;
+                of_noise.column_mut(j).axpy(-share, &v, 1.0);
+            }
+            for j in 0..=n {
+                let mut column = self.all.rows_mut(0, self.count);
+                let mut column = column.column_mut(j);
+                let share = scale * v.dot(&column);
+                top[(k, q + j)] = -share * first;
+                column.axpy(-share, &v, 1.0);
+            }
+        }
+        OfNoise {
+            own: top.view((0, 0), (q, q)).into_owned(),
+            before: top.view((0, q), (q, n)).into_owned(),
+            right: top.view((0, q + n), (q, 1)).column(0).into_owned(),
+        }
+    }
+}
+
 impl Information {
     /// Information of a run.
     ///
@@ -113,51 +224,23 @@ impl Information {
     /// [`EkfError::NotFinite`].
     pub fn of(run: &Linearised) -> Result<Self, EkfError> {
         let n = run.states();
-        let mut rows: DMatrix<f64> = DMatrix::zeros(n + 1, n + 1);
+        let mut rows = Backward::new(n);
         let mut noise = Vec::with_capacity(run.stages.len());
         let mut next = run.residuals.len();
         let mut gaps = run.gaps.iter().rev().peekable();
         for (step, (stage, g)) in run.stages.iter().zip(&run.roots).enumerate().rev() {
-            let (m, q) = (stage.outputs.len(), g.ncols());
-            next -= m;
-            // A (d + e) = b behind a gap e
+            next -= stage.outputs.len();
             if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
-                let shift = rows.columns(0, n) * gap;
-                let mut right = rows.column_mut(n);
-                right -= shift;
+                rows.behind(gap);
             }
-            // measurements of this step
-            let mut with = rows.clone().resize(n + 1 + m, n + 1, 0.0);
-            for (i, output) in stage.outputs.iter().enumerate() {
-                let weight = 1.0 / output.r.sqrt();
-                output.h.iter().for_each(|&(j, c)| with[(n + 1 + i, j)] += weight * c);
-                with[(n + 1 + i, n)] = weight * run.residuals[next + i];
-            }
-            // carried to the step before, with the noise first
-            let a = with.columns(0, n);
-            let mut all = DMatrix::zeros(q + with.nrows(), q + n + 1);
-            all.view_mut((0, 0), (q, q)).fill_with_identity();
-            all.view_mut((q, 0), (with.nrows(), q)).copy_from(&(a * g));
-            all.view_mut((q, q), (with.nrows(), n)).copy_from(&(a * stage.transition.matrix()));
-            all.view_mut((q, q + n), (with.nrows(), 1)).copy_from(&with.columns(n, 1));
-            if let Some(k) = all.iter().position(|x| !x.is_finite()) {
-                let (row, column) = (k % all.nrows(), k / all.nrows());
-                return Err(EkfError::NotFinite {
-                    what: "the rows of a step",
-                    value: all[(row, column)],
-                    row,
-                    column,
-                });
-            }
-            let r = triangle(all, q + n + 1);
-            noise.push(OfNoise {
-                own: r.view((0, 0), (q, q)).into_owned(),
-                before: r.view((0, q), (q, n)).into_owned(),
-                right: r.view((0, q + n), (q, 1)).column(0).into_owned(),
-            });
-            rows = r.view((q, q), (n + 1, n + 1)).into_owned();
+            rows.measured(stage, &run.residuals[next..])?;
+            let of_noise = rows.all.view((0, 0), (rows.count, n)) * g;
+            rows.before(&stage.transition);
+            noise.push(rows.without_noise(of_noise));
         }
         noise.reverse();
+        rows.compress()?;
+        let rows = rows.all;
         Ok(Self {
             root: rows.view((0, 0), (n, n)).into_owned(),
             right: rows.view((0, n), (n, 1)).column(0).into_owned(),
@@ -298,7 +381,7 @@ impl Solution {
 
 #[cfg(test)]
 mod tests {
-    use obsdeg_ekf::{ProcessNoise, ScalarOutput, Transition};
+    use obsdeg_ekf::{ProcessNoise, ScalarOutput};
 
     use super::*;
 

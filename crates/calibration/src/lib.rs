@@ -27,12 +27,14 @@
 pub mod answer;
 pub mod bins;
 pub mod least_squares;
+pub mod levels;
 pub mod noise;
 pub mod platform;
 pub mod record;
 mod setup;
 pub mod still;
 pub mod system;
+mod white;
 #[cfg(feature = "parquet")]
 mod zstd_pages;
 

@@ -268,17 +268,17 @@ impl FitProblem<'_> {
         Some(self.solve(&Self::with(others, k), &by)?.covariance[(k, k)].sqrt())
     }
 
-    /// Limit of the squared coefficient: the value for which an estimate at most as large as the one
-    /// found has probability 1 - [`LIMIT`]. Estimate and standard deviation are those by its own
-    /// weights (Neyman). The estimate is skewed to the right, so the normal quantile is on the safe
-    /// side.
+    /// The squared coefficient that would give an estimate as small as the one found, or a smaller one, with
+    /// probability 1 - [`LIMIT`]: estimate and standard deviation are those by its own weights (Neyman). The
+    /// estimate is skewed to the right, so the normal quantile is on the safe side. An estimate below zero
+    /// counts as zero: chance would else give limits far below what the record resolves.
     fn limit(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
         let all = Self::with(others, k);
         let beyond = |x: f64| -> Option<bool> {
             let mut by = solved.x;
             by[k] = x;
             let own = self.solve(&all, &by)?;
-            Some(own.x[k] + LIMIT_SIGMAS * own.covariance[(k, k)].sqrt() > x)
+            Some(own.x[k].max(0.0) + LIMIT_SIGMAS * own.covariance[(k, k)].sqrt() > x)
         };
         let (mut low, mut high) = (0.0, self.without(others, solved, k)?.max(solved.x[k]));
         for _ in 0..DOUBLINGS {
@@ -486,7 +486,10 @@ mod tests {
                 let points: Vec<AllanPoint> =
                     (0..10).filter_map(|k| overlapping_variance(&all, 1 << k)).collect();
                 let found = fit(&points, &[samples], 0.95).expect("a fit");
-                fail += u32::from(found.terms[2].limit < walk);
+                let term = &found.terms[2];
+                fail += u32::from(term.limit < walk);
+                // 1.645 of 3 standard deviations of the square
+                assert!(term.limit > 0.73 * term.least, "{} {}", term.limit, term.least);
                 resolved += u32::from(found.terms[2].found.is_some());
                 flicker += u32::from(found.terms[1].found.is_some());
             }

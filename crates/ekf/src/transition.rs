@@ -75,8 +75,8 @@ impl Transition {
         &self.active
     }
 
-    /// The active row of index `a` (shape n).
-    pub(crate) fn row(&self, a: usize) -> &[f64] {
+    /// The active row of index `a` (shape n), the row `active()[a]` of Phi.
+    pub fn row(&self, a: usize) -> &[f64] {
         &self.rows[a * self.n..(a + 1) * self.n]
     }
 

@@ -65,8 +65,7 @@ pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth
 fn clock(c: &Clock) -> String {
     let begins = match (c.offset_s, c.offset_sigma_s) {
         (Some(at), Some(sigma)) => format!(
-            "; the scheme begins at {} s of its clock (estimated, sigma {} s; labels leave it open)",
-            estimate(Some(at), Some(sigma)),
+            "; the scheme begins at {at:.3} s of its clock (estimated, sigma {} s; labels leave it open)",
             number(sigma)
         ),
         (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
@@ -133,17 +132,22 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
         }
         Finding::Cells { record, column, kind_of_cells, value, count, lines } => {
-            let (cells, hold) = if *count == 1 { ("cell", "holds") } else { ("cells", "hold") };
-            let place = format!("column `{column}`{}, lines {} to {}", of(record, records), lines.0, lines.1);
+            let (cells, hold, repeat, them, were) = if *count == 1 {
+                ("cell", "holds", "repeats", "it", "was")
+            } else {
+                ("cells", "hold", "repeat", "them", "were")
+            };
+            let lines = match lines {
+                (first, last) if first == last => format!("line {first}"),
+                (first, last) => format!("lines {first} to {last}"),
+            };
+            let place = format!("column `{column}`{}, {lines}", of(record, records));
             match kind_of_cells {
                 CellKind::Code => format!(
-                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and \
-                     were left out; if that is a code of missing values, state `missing = [{value}]` under \
-                     [record]"
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside {them}, and {were} left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
                 ),
                 CellKind::Stuck => format!(
-                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, \
-                     and were left out; check whether the output is stuck"
+                    "{place}: {count} {cells} {repeat} the value {value} of the row before to the last digit, and {were} left out; check whether the output is stuck"
                 ),
             }
         }
@@ -248,9 +252,7 @@ fn left_open(c: &Calibration) -> Option<String> {
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };
     Some(format!(
-        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma \
-         describes the errors then, so no estimate is given. State priors of the drifts as small as is true \
-         (`priors` under [simulation]), or add positions"
+        "at these drifts {who} all unknowns open: over what the positions determine weakly or not at all, {why}. No sigma describes the errors then, so no estimate is given. State priors of psi and of the drifts as small as is true (`priors` under [simulation]), or add positions"
     ))
 }
 
@@ -525,7 +527,7 @@ fn mode(c: &Calibration) -> Vec<String> {
             number(k),
             c.curvature.refits - c.curvature.failed
         ),
-        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 1).", number(k)),
+        Some(k) => format!("Curvature {} sigma (the linear covariance holds below 0.4).", number(k)),
         None => "Curvature: the run cannot be followed over what is left open.".into(),
     });
     out

@@ -2,6 +2,7 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Omitted, SilentError};
+use obsdeg_calibration::levels::SUSPECT;
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
 use obsdeg_evidence::simulation::omitted::{
     Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
@@ -381,9 +382,10 @@ pub(crate) fn silent(of: &Omitted) -> String {
 /// Sentences of a calibration on errors that it does not estimate.
 pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     let mut out = vec![format!(
-        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has \
-         a chance of at most 1 % where nothing is wrong",
-        of.tried
+        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a chance of at most {:.1} % \
+         where nothing is wrong",
+        of.tried,
+        100.0 * SUSPECT
     )];
     let Some(s) = &of.suspicion else {
         out.push("no suspicion: chance explains the residuals as well as any of them".into());

@@ -2,6 +2,7 @@
 
 use obsdeg_calibration::noise::{ColumnNoise, NoiseCoefficient, SensorNoiseReport};
 
+use crate::calibration::tenths;
 use crate::document::{Block, Document, left, number, right};
 use crate::figure::{BLUE, Band, Figure, FigureError, ORANGE, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
@@ -43,12 +44,13 @@ fn resolved(c: &ColumnNoise) -> String {
 fn statements(r: &SensorNoiseReport) -> Vec<String> {
     let (from, to) = r.span_s;
     let mut out = vec![format!(
-        "{} rows from {} to {} s, {} s apart; {} gaps; other intervals differ by up to {} %.",
+        "{} rows from {} to {} s, {} s apart; {} gap{}; other intervals differ by up to {} %.",
         r.samples,
-        number(from),
-        number(to),
+        tenths(from),
+        tenths(to),
         number(r.interval_s),
         r.gaps,
+        if r.gaps == 1 { "" } else { "s" },
         number(100.0 * r.jitter)
     )];
     for c in &r.columns {

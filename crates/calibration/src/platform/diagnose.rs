@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
-use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
@@ -20,10 +19,10 @@ use super::observe::{By, channel_name};
 use super::offset::{Later, Offset};
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
-use super::{CalibrationError, Options, STRICT};
+use super::{CalibrationError, Options};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Fit, Moved,
-    Outlier, PositionFit, RecordReport, Repeatability, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved,
+    Outlier, PositionFit, RecordReport, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -48,6 +47,10 @@ pub(crate) struct MeasurementResidual {
     pub free: f64,
     /// Difference from the prediction by all other measurements, normalised.
     pub normalised: f64,
+    /// Innovation: difference from the prediction by the measurements before it, normalised. With a right model
+    /// innovations are independent unit normals, also after an estimate from the same record; nearly zero if
+    /// the measurements before it do not predict it.
+    pub innovation: f64,
 }
 
 impl MeasurementResidual {
@@ -61,8 +64,8 @@ impl MeasurementResidual {
 pub(crate) struct Diagnosed {
     pub all: Vec<MeasurementResidual>,
     pub second: SecondPath,
-    /// Residual sums of squares by run, each run alone, by least squares with the wide prior.
-    alone: Vec<f64>,
+    /// Sum of squares of each run alone, by least squares with the wide prior.
+    pub alone: Vec<f64>,
 }
 
 impl Diagnosed {
@@ -107,14 +110,16 @@ impl Diagnosed {
             })?;
             let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
             let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
-            for ((left, r_of), key) in smoothed.left_out.iter().zip(variances).zip(keys) {
-                out.all.push(MeasurementResidual {
+            let each = smoothed.left_out.iter().zip(variances).zip(keys).zip(&whitened);
+            for (((left, r_of), key), innovation) in each {
+                out.all.push(Left {
                     run: r,
                     key: *key,
                     residual: r_of * left.u,
                     r: r_of,
                     free: r_of * left.variance,
                     normalised: left.normalised(),
+                    innovation: *innovation,
                 });
             }
             let information = &estimate.at.information[r];
@@ -147,8 +152,8 @@ impl Diagnosed {
         (0..channels).map(of).collect()
     }
 
-    /// Sum of squares and degrees of freedom of the measurements that `of` selects.
-    fn sums(&self, of: impl Fn(&MeasurementResidual) -> bool) -> (f64, f64) {
+    /// Sum of squares and degrees of freedom of some measurements.
+    pub(super) fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
         let some = self.all.iter().filter(|l| of(l));
         some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
     }
@@ -189,21 +194,21 @@ pub(crate) struct Parts<'a> {
     pub interrupted: bool,
 }
 
-/// Functional of the unknowns that is reported.
-struct Asked {
+/// A functional that is reported.
+pub(super) struct Asked {
     name: String,
     unit: &'static str,
     status: Status,
     degree: Option<usize>,
-    /// True if scheme and records determine the functional.
-    determined: bool,
-    /// True if they determine it only with a stated prior.
+    /// True if scheme and records determine it.
+    pub determined: bool,
+    /// True if they do so only with a prior that is stated.
     from_prior: bool,
     /// True if no covariance describes its error, because undetermined unknowns cause too much curvature.
     left_open: bool,
-    /// Terms on the unknowns, in SI units.
-    terms: Vec<(usize, f64)>,
-    /// Terms in local coordinates at the estimate; `planned` has those at the attitudes of the scheme.
+    /// On the unknowns, in SI.
+    pub terms: Vec<(usize, f64)>,
+    /// Coefficients in local coordinates at the estimate, with the platform at the attitudes of the scheme.
     local: Vec<(usize, f64)>,
     planned: Vec<(usize, f64)>,
 }
@@ -422,32 +427,6 @@ impl Parts<'_> {
         Some(out).filter(|r| r.stated > 0)
     }
 
-    /// Chi-square of the fit: degrees of freedom are measurements minus the combinations that they determine.
-    fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
-        let (_, free) = self.found.sums(|_| true);
-        let left: f64 = self.estimate.at.cost - (&self.linear.root * &self.linear.x).norm_squared();
-        // unknowns common to several records count once: single runs leave more degrees of freedom than all
-        // together
-        let alone = self.problem.runs.len() - 1;
-        let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
-        let shared = unknowns.iter().chain(combinations).filter(coefficients).count();
-        let degrees_of_freedom = free + (alone * shared) as f64;
-        let mean = left.max(0.0) / degrees_of_freedom.max(1.0);
-        Fit {
-            chi_square: left,
-            degrees_of_freedom,
-            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, STRICT)
-                .map_both(|x| x / degrees_of_freedom.max(1.0)),
-            factor: mean.sqrt(),
-            passes: self.estimate.passes,
-        }
-    }
-
-    /// Index of the first unknown common to all runs.
-    fn shared(&self) -> usize {
-        self.problem.unknowns.n - self.planned.platform.coefficients()
-    }
-
     fn positions(&self, determined: &[&Asked]) -> Result<Vec<PositionFit>, EkfError> {
         let names = &self.scheme.positions;
         let mut out = Vec::new();
@@ -550,21 +529,6 @@ impl Parts<'_> {
             force_g: run.reading.force,
         };
         self.problem.runs.iter().enumerate().map(of).collect()
-    }
-
-    /// Increase of chi-square by joining the records, over the sum of their own.
-    fn repeatability(&self, fit: &Fit) -> Option<Repeatability> {
-        let runs = self.problem.runs.len();
-        let (_, free) = self.found.sums(|_| true);
-        let degrees_of_freedom = fit.degrees_of_freedom - free;
-        (runs > 1 && degrees_of_freedom > 0.0).then(|| {
-            let joined = (fit.chi_square - self.found.alone.iter().sum::<f64>()).max(0.0);
-            Repeatability {
-                chi_square: joined / degrees_of_freedom,
-                degrees_of_freedom,
-                band: chi_square_band(degrees_of_freedom, 1.0, STRICT).map_both(|x| x / degrees_of_freedom),
-            }
-        })
     }
 
     fn outliers(&self) -> Vec<Outlier> {

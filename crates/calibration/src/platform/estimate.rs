@@ -60,6 +60,8 @@ pub(crate) struct Unknowns {
     pub loose: DMatrix<f64>,
     /// Unknowns with a stated prior.
     pub stated: Vec<usize>,
+    /// Number of directions that priors determine and records do not.
+    pub given: usize,
     /// True if the scheme alone leaves directions undetermined, whatever priors are stated.
     pub undetermined: bool,
     /// Biases of all runs: their prior is a property of the gyros.
@@ -112,7 +114,17 @@ impl Unknowns {
         stated.sort_unstable();
         stated.dedup();
         let biases = index.iter().flat_map(|i| i[psi + coefficients..].iter().copied()).collect();
-        Self { index, n, prior: all, first: start, loose, biases, stated, undetermined: !null.is_empty() }
+        Self {
+            index,
+            n,
+            prior: all,
+            first: start,
+            loose,
+            biases,
+            stated,
+            given: 0,
+            undetermined: !null.is_empty(),
+        }
     }
 
     /// Removes from the box the combinations of its directions that prior rows on the unknowns (any x n)
@@ -131,6 +143,7 @@ impl Unknowns {
         let eigen = (seen.transpose() * &seen).symmetric_eigen();
         let most = eigen.eigenvalues.amax();
         let open: Vec<usize> = (0..m).filter(|&k| eigen.eigenvalues[k] <= RANK * most).collect();
+        self.given = m - open.len();
         self.loose = DMatrix::from_fn(self.n, open.len(), |i, c| {
             (0..m).map(|k| scaled[(i, k)] * eigen.eigenvectors[(k, open[c])]).sum()
         });

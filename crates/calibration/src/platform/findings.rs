@@ -2,12 +2,12 @@
 
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
-use super::STRICT;
 use super::diagnose::{MapBoth, Parts};
 use super::gross::Why;
 use super::length::wrong;
 use super::run::Run;
 use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
+use crate::levels;
 
 /// Largest difference of the two paths, in sigma, that counts as agreement.
 const AGREE: f64 = 1e-6;
@@ -33,12 +33,12 @@ impl Parts<'_> {
             let tests = (c.records.len() * c.channels.len()) as f64;
             for (k, channel) in c.channels.iter().enumerate() {
                 if let Some(probability) =
-                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < 1.0 - STRICT)
+                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < levels::CORRELATED)
                 {
                     let (record, channel) = (record.name.clone(), channel.channel.clone());
                     out.push(Finding::Correlated { record, channel, probability });
                 }
-                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < 1.0 - STRICT) {
+                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < levels::TEMPERATURE) {
                     out.push(Finding::Temperature {
                         record: record.name.clone(),
                         channel: channel.channel.clone(),
@@ -69,7 +69,7 @@ impl Parts<'_> {
     /// Finding on the length of the specific force of a run.
     fn force(&self, run: &Run) -> Option<Finding> {
         let reading = &run.reading;
-        let wrong = wrong(&reading.lengths)?;
+        let wrong = wrong(&reading.lengths, levels::FORCE / self.problem.runs.len() as f64)?;
         let end = |p: usize| ForceLength {
             position: self.scheme.positions[p].name.clone(),
             length_g: reading.lengths[p].map_or(f64::NAN, |l| l.length),
@@ -86,17 +86,14 @@ impl Parts<'_> {
 
     /// Findings on the fit: single positions, or the noise, or single components.
     fn fits(&self, c: &Calibration) -> Vec<Finding> {
-        let limits = |dof: f64, tests: usize| {
-            let strict = 1.0 - (1.0 - STRICT) / tests.max(1) as f64;
-            chi_square_band(dof.max(1e-3), 1.0, strict).map_both(|x| x / dof.max(1e-3))
-        };
         let all: Vec<&PositionFit> = c.positions.iter().filter(|p| p.degrees_of_freedom > 0.5).collect();
+        let most = |dof: f64| chi_square_quantile(dof, 1.0 - levels::POSITION / all.len() as f64) / dof;
         let mut chi: Vec<f64> = all.iter().map(|p| p.chi_square).collect();
         chi.sort_by(f64::total_cmp);
         let usual = chi.get(chi.len().saturating_sub(1) / 2).copied().unwrap_or(1.0);
         let mut apart: Vec<&&PositionFit> = all
             .iter()
-            .filter(|p| p.chi_square > limits(p.degrees_of_freedom, all.len()).1)
+            .filter(|p| p.chi_square > most(p.degrees_of_freedom))
             .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
             .collect();
         apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
@@ -120,7 +117,8 @@ impl Parts<'_> {
             return out;
         }
         for channel in &c.channels {
-            let band = limits(channel.degrees_of_freedom, c.channels.len());
+            let (dof, level) = (channel.degrees_of_freedom, levels::CHANNEL / c.channels.len() as f64);
+            let band = chi_square_band(dof.max(1e-3), 1.0, 1.0 - level).map_both(|x| x / dof.max(1e-3));
             if !(band.0..=band.1).contains(&channel.chi_square) {
                 out.push(Finding::Channel {
                     channel: channel.channel.clone(),
@@ -138,7 +136,7 @@ impl Parts<'_> {
         let dof = values.len() as f64;
         let left = values - rows * self.problem.values(&self.estimate.at.x);
         let chi = left.norm_squared() / dof;
-        (chi > chi_square_band(dof, 1.0, STRICT).1 / dof).then_some(chi)
+        (chi > chi_square_quantile(dof, 1.0 - levels::KNOWN) / dof).then_some(chi)
     }
 }
 
@@ -181,7 +179,7 @@ fn cells(run: &Run) -> Vec<Finding> {
 /// If the rate of the earth shows a right clock, positions were only held longer or shorter than in the
 /// scheme, and there is no finding.
 fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
-    let most = chi_square_quantile(1.0, 1.0 - (1.0 - STRICT) / c.records.len() as f64).sqrt();
+    let most = chi_square_quantile(1.0, 1.0 - levels::CLOCK / c.records.len() as f64).sqrt();
     let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());
     let beyond =
         |from: f64| by_earth.is_some_and(|e| (e.fast - from).abs() > most * e.sigma * c.fit.factor.max(1.0));

@@ -6,9 +6,8 @@
 //! `f_i^2` and `f_i` of the positions.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_ekf::consistency::chi_square_band;
+use obsdeg_ekf::consistency::chi_square_quantile;
 
-use super::STRICT;
 use crate::answer::{ForceCause, ForceError};
 
 /// Smallest deviation of the length from 1 g, in g, for which gravity or a scale of all axes is doubted.
@@ -77,9 +76,10 @@ fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<Line> {
 }
 
 impl Line {
-    fn fits(&self) -> bool {
+    /// True if chance leaves as much with a probability of `level`.
+    fn fits(&self, level: f64) -> bool {
         let free = self.free as f64;
-        free > 0.0 && self.chi_square <= chi_square_band(free, 1.0, STRICT).1
+        free > 0.0 && self.chi_square <= chi_square_quantile(free, 1.0 - level)
     }
 
     /// Scale error or zero of an axis from the last coefficient, with its standard deviation.
@@ -97,8 +97,9 @@ impl Line {
     }
 }
 
-/// Deviation of the lengths of the force at the positions of a record; `None` if there is none.
-pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
+/// Fault of the lengths of the force at the positions of a record; `None` where there is none. `level` is the
+/// probability of one where the record is right.
+pub(crate) fn wrong(lengths: &[Option<Length>], level: f64) -> Option<Wrong> {
     let places: Vec<usize> = (0..lengths.len()).filter(|&p| lengths[p].is_some()).collect();
     let all: Vec<Length> = lengths.iter().copied().flatten().collect();
     let by_length = |a: &usize, b: &usize| all[*a].length.total_cmp(&all[*b].length);
@@ -108,7 +109,8 @@ pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
     let ones = vec![1.0; all.len()];
     let mean = all.iter().map(|l| l.length).sum::<f64>() / all.len() as f64;
     let same = line(&all, std::slice::from_ref(&ones));
-    let differ = all[most].length - all[least].length > DIFFER && same.as_ref().is_some_and(|l| !l.fits());
+    let differ =
+        all[most].length - all[least].length > DIFFER && same.as_ref().is_some_and(|l| !l.fits(level));
     if !differ && (mean - 1.0).abs() <= ALIKE {
         return None;
     }
@@ -125,7 +127,7 @@ pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
                 let own: Vec<f64> = all.iter().map(of).collect();
                 let columns = if offset { vec![ones.clone(), own] } else { vec![own] };
                 let Some(line) = line(&all, &columns) else { continue };
-                if line.fits() || line.left <= PART * before {
+                if line.fits(level) || line.left <= PART * before {
                     found.extend(line.cause(error, axis, offset).map(|cause| (line.left, cause)));
                 }
             }
@@ -164,6 +166,10 @@ mod tests {
         directions.iter().map(of).collect()
     }
 
+    fn found(of: &[Option<Length>]) -> Option<Wrong> {
+        wrong(of, 5e-4)
+    }
+
     const SIX: [[f64; 3]; 6] = [
         [1.0, 2.0, 3.0],
         [-2.0, 1.0, 0.5],
@@ -175,17 +181,17 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told() {
-        assert_eq!(wrong(&lengths([0.0; 3], [0.0; 3], &SIX)), None);
-        // gravity off by a tenth of the limit of doubt, then by four times the limit
-        assert_eq!(wrong(&lengths([3e-5; 3], [0.0; 3], &SIX)), None);
-        let all = wrong(&lengths([1.2e-3; 3], [0.0; 3], &SIX)).expect("wrong");
+        assert_eq!(found(&lengths([0.0; 3], [0.0; 3], &SIX)), None);
+        // gravity by a tenth of what is doubted, and four times it
+        assert_eq!(found(&lengths([3e-5; 3], [0.0; 3], &SIX)), None);
+        let all = found(&lengths([1.2e-3; 3], [0.0; 3], &SIX)).expect("wrong");
         assert!(all.alike && all.causes.is_empty(), "{all:?}");
         for axis in 0..3 {
             let (mut scale, mut zero) = ([0.0; 3], [0.0; 3]);
             (scale[axis], zero[axis]) = (5e-4, -5e-4);
             for (found, error, by) in [
-                (wrong(&lengths(scale, [0.0; 3], &SIX)), ForceError::Scale, 5e-4),
-                (wrong(&lengths([0.0; 3], zero, &SIX)), ForceError::Zero, -5e-4),
+                (found(&lengths(scale, [0.0; 3], &SIX)), ForceError::Scale, 5e-4),
+                (found(&lengths([0.0; 3], zero, &SIX)), ForceError::Zero, -5e-4),
             ] {
                 let found = found.expect("wrong");
                 let [cause] = &found.causes[..] else { panic!("{found:?}") };
@@ -194,25 +200,25 @@ mod tests {
             }
         }
         // one axis beside another gravity
-        let both = wrong(&lengths([2e-3, 1e-3, 1e-3], [0.0; 3], &SIX)).expect("wrong");
+        let both = found(&lengths([2e-3, 1e-3, 1e-3], [0.0; 3], &SIX)).expect("wrong");
         let [cause] = &both.causes[..] else { panic!("{both:?}") };
         assert_eq!((cause.error, cause.axis.as_str()), (ForceError::Scale, "fx"));
         assert!((cause.by / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
         assert!((cause.besides.expect("there") / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
-        // errors of two axes have no single cause
-        let two = wrong(&lengths([5e-4, -4e-4, 0.0], [0.0; 3], &SIX)).expect("wrong");
+        // two axes are none
+        let two = found(&lengths([5e-4, -4e-4, 0.0], [0.0; 3], &SIX)).expect("wrong");
         assert!(!two.alike && two.causes.is_empty() && two.ends == [4, 3], "{two:?}");
     }
 
     /// If y is vertical throughout, its scale explains the lengths as well as a common one.
     #[test]
     fn what_is_not_told_is_not() {
-        let two = wrong(&lengths([0.0, 5e-4, 0.0], [0.0; 3], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
+        let two = found(&lengths([0.0, 5e-4, 0.0], [0.0; 3], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
         let two = two.expect("wrong");
         let [cause] = &two.causes[..] else { panic!("{two:?}") };
         assert_eq!((two.alike, cause.error, cause.axis.as_str()), (true, ForceError::Scale, "fy"));
         // a zero of y makes one longer and one shorter
-        let two = wrong(&lengths([0.0; 3], [0.0, 5e-4, 0.0], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
+        let two = found(&lengths([0.0; 3], [0.0, 5e-4, 0.0], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
         let two = two.expect("wrong");
         assert_eq!((two.alike, two.causes.len()), (false, 1), "{two:?}");
         assert_eq!(two.causes[0].error, ForceError::Zero);

@@ -17,6 +17,9 @@ const DRAWS: usize = 12;
 const SEED: u64 = 1;
 /// Most bins times squared unknowns of records whose minima are sought without curvature.
 const SEARCHED: usize = 1_000_000;
+/// Times that an iteration goes on where it has not settled and still leads down: a valley that bends takes
+/// many short steps.
+const LONGER: usize = 6;
 /// Least difference by which a sum of squares is lower than another.
 const LOWER: f64 = 1e-2;
 /// Largest difference in the sum of squares of a rival minimum: its likelihood is a thousandth or more, since
@@ -34,10 +37,27 @@ impl Problem<'_> {
     pub(super) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
         let before = self.passes.get();
         if !first {
-            return self.settle(x);
+            return self.longer(self.settle(x)?);
         }
-        let found = self.lowest(self.first(x)?)?;
+        let found = self.lowest(self.longer(self.first(x)?)?)?;
+        let found = self.longer(found)?;
         Ok(Estimate { passes: self.passes.get() - before, ..found })
+    }
+
+    /// The iteration from an estimate on where it has not settled and leads further down.
+    fn longer(&self, mut estimate: Estimate) -> Result<Estimate, CalibrationError> {
+        for _ in 0..LONGER {
+            if estimate.converged || self.stopped.get() {
+                break;
+            }
+            let next = self.settle(estimate.at.x.clone())?;
+            let stays = !next.converged && next.at.cost >= estimate.at.cost * (1.0 - 1e-9);
+            estimate = Estimate { rivals: estimate.rivals, ..next };
+            if stays {
+                break;
+            }
+        }
+        Ok(estimate)
     }
 
     /// Estimate without a search for a lower minimum.

@@ -7,6 +7,7 @@ mod earth;
 mod estimate;
 mod findings;
 mod force;
+mod goodness;
 mod gross;
 mod length;
 mod minimum;
@@ -249,7 +250,7 @@ impl Default for Options {
     }
 }
 
-/// Probability with which a right record lies in its bands.
+/// Probability with which what a right record leaves is below a bound that asks for a closer look.
 const STRICT: f64 = 0.999;
 /// Most rounds of leaving out outliers, or of estimating the noise.
 const ROUNDS: usize = 6;

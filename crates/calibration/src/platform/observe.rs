@@ -16,6 +16,7 @@ use super::timeline::{self, Gap, Intervals};
 use crate::Going;
 use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
+use crate::levels;
 use crate::record::{Column, Record, Row, Wanted};
 use crate::still::{DecidedSample, Detector};
 
@@ -702,9 +703,10 @@ impl SampleAssignment<'_> {
     /// either end) is kept for the check of positions.
     fn leave_out_gross(&mut self) {
         let noise = self.noise;
+        let stuck = levels::STUCK / self.rows.len().max(1) as f64;
         for p in 0..self.rows.len() {
             let rows = std::mem::take(&mut self.rows[p]);
-            let mut found = gross::cells(&rows, noise);
+            let mut found = gross::cells(&rows, noise, stuck);
             if self.layout.observed == Observed::Force {
                 gross::keep_turns(&rows, &mut found);
             }
@@ -919,7 +921,7 @@ pub(crate) fn observe(
             hint: match by {
                 By::Label | By::Both | By::Static => "its label does not occur".into(),
                 By::Timeline => format!(
-                    "the record is of {} to {} s, the scheme of 0 to {} s (a column `position` says what is where)",
+                    "the record is of {:.3} to {:.3} s, the scheme of 0 to {:.3} s (a column `position` says what is where)",
                     out.span.0,
                     out.span.1,
                     plan.duration_s()

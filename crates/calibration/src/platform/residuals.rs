@@ -2,15 +2,13 @@
 
 use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
-use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail, ljung_box};
+use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
 use super::diagnose::{MeasurementResidual, Parts};
 use super::observe::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
-/// Fewest residuals for which a correlation is reported.
-const FEWEST: usize = 40;
-/// Fewest residuals of a position for which the correlation with the temperature is reported.
+/// Fewest residuals of a position whose correlation with the temperature is told.
 const FEWEST_WARM: usize = 10;
 /// Most points of a series.
 const POINTS: usize = 1000;
@@ -18,12 +16,11 @@ const POINTS: usize = 1000;
 const LAGS: usize = 20;
 
 impl Parts<'_> {
-    /// Probability that independent residuals are as correlated as these.
+    /// Probability that independent residuals are correlated as these are, by those of the filter: between
+    /// those of a smoother an estimate leaves correlations of about minus its unknowns over their number.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
         let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
-        let series: Vec<f64> = own.map(|l| l.normalised).collect();
-        let lags = LAGS.min(series.len() / 4);
-        (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
+        crate::white::whiteness(&own.map(|l| l.innovation).collect::<Vec<f64>>())
     }
 
     /// Correlation of the residuals of a channel with the temperature, position by position: an effect fixed

@@ -25,6 +25,7 @@ use super::estimate::{Estimate, Problem};
 use super::offset::Later;
 use super::run::{Key, Run};
 use crate::answer::{Estimated, Omitted, SilentError};
+use crate::levels;
 
 /// Factor by which the start of the filter is wider than the prior.
 const WIDE: f64 = 1e4;
@@ -93,7 +94,8 @@ pub(super) fn omitted(
             |of| of.per_unit(j, &t.changes),
         ),
     });
-    let suspected = tested.score.explanation().map(|found| suspicion(&found, &model, &tested, quantities));
+    let suspected =
+        tested.score.explanation(levels::SUSPECT).map(|found| suspicion(&found, &model, &tested, quantities));
     let (suspicion, moved) = suspected.map_or((None, Vec::new()), |(s, moved)| (Some(s), moved));
     let found = Omitted {
         tried: tested.score.tried().len(),

@@ -29,6 +29,7 @@ pub use answer::{
 use crate::Going;
 use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::Solution;
+use crate::levels;
 use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
@@ -39,9 +40,7 @@ use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size,
 const SCHEMA: &str = "obsdeg.system-calibration/1";
 /// Largest ratio of sigmas, for a pull ten times as weak, of a determined unknown.
 const DETERMINED: f64 = 1.05;
-/// Probability with which right data lie in their bands.
-const STRICT: f64 = 0.999;
-/// Most integration steps over all rows, and in addition per row.
+/// Most steps of integration over all rows, and for each row besides.
 const STEPS: f64 = 50_000.0;
 const STEPS_A_ROW: f64 = 50.0;
 /// Most doublings of the number of integration steps.
@@ -312,7 +311,7 @@ impl<'a> Calibrating<'a> {
         let residuals = self.residuals(&at, &solution);
         let outputs = self.with_gates(self.outputs(&residuals, &at, &solution));
         let all_estimated = self.estimated.iter().all(|e| *e);
-        let band = chi_square_band(degrees_of_freedom as f64, 1.0, STRICT);
+        let band = chi_square_band(degrees_of_freedom as f64, 1.0, 1.0 - levels::NOISE);
         let band = (band.0 / degrees_of_freedom as f64, band.1 / degrees_of_freedom as f64);
         let mut findings = Vec::new();
         if self.problem.stopped {
@@ -325,7 +324,7 @@ impl<'a> Calibrating<'a> {
         }
         for o in &outputs {
             if let Some(probability) =
-                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < 1.0 - STRICT)
+                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < levels::CORRELATED)
             {
                 findings.push(SystemFinding::Correlated { output: o.output.clone(), probability });
             }

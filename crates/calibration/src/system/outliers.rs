@@ -1,14 +1,13 @@
 //! Residuals of the measurements by output, and measurements that disagree with the others.
 
-use obsdeg_ekf::consistency::{autocorrelation, chi_square_quantile, ljung_box, student_quantile};
+use obsdeg_ekf::consistency::{chi_square_quantile, student_quantile};
 
+use super::Calibrating;
 use super::answer::{OutputFit, SystemFinding, SystemResidual};
 use super::fit::{At, leverage};
-use super::{Calibrating, STRICT};
 use crate::least_squares::Solution;
-
-/// Fewest residuals of which a correlation is reported.
-const FEWEST: usize = 40;
+use crate::levels;
+use crate::white;
 
 impl Calibrating<'_> {
     pub(super) fn residuals(&self, at: &At, solution: &Solution) -> Vec<SystemResidual> {
@@ -45,7 +44,6 @@ impl Calibrating<'_> {
             let chi: f64 = own.iter().map(|r| (r.residual / r.sigma).powi(2)).sum();
             let squares: f64 = own.iter().map(|r| r.residual * r.residual).sum();
             let series: Vec<f64> = own.iter().map(|r| r.normalised).collect();
-            let lags = (series.len() / 4).min(20);
             let sigma = own.first().map(|r| r.sigma).filter(|s| own.iter().all(|r| r.sigma == *s));
             OutputFit {
                 output: self.model.outputs[j].0.name.clone(),
@@ -57,8 +55,7 @@ impl Calibrating<'_> {
                 degrees_of_freedom: free,
                 outlier_gate: None,
                 expected_rms: (f64::max(variance, 0.0) / own.len().max(1) as f64).sqrt(),
-                whiteness_probability: (series.len() >= FEWEST)
-                    .then(|| ljung_box(&autocorrelation(&series, lags), series.len())),
+                whiteness_probability: white::whiteness(&series),
             }
         };
         (0..self.model.outputs.len()).map(of).collect()
@@ -106,10 +103,10 @@ impl Calibrating<'_> {
     }
 }
 
-/// Gate in sigma that right residuals, `of` in number, exceed with a probability of one in a thousand in all;
-/// sigma comes from others with `free` degrees of freedom.
+/// Bound of all right residuals of so many, but for the probability of an outlier, where sigma is that of
+/// others with `free` degrees of freedom.
 fn student_gate(free: f64, of: usize) -> f64 {
-    let each = (1.0 - STRICT) / of.max(1) as f64;
+    let each = levels::OUTLIER / of.max(1) as f64;
     match free.is_finite() {
         true => student_quantile(free, 1.0 - each / 2.0),
         false => chi_square_quantile(1.0, 1.0 - each).sqrt(),

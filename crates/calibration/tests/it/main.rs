@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, reason = "what a sweep found")]
 
+mod alarms;
 mod campaign;
 mod cells;
 mod constraints;
@@ -12,6 +13,7 @@ mod models;
 mod next;
 mod omitted;
 mod round_trip;
+mod sheet;
 mod simulator;
 mod spoil;
 mod timeline;

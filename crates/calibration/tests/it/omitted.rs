@@ -10,7 +10,7 @@ use crate::round_trip::{conditions, of_csv, scheme};
 use crate::simulator::{Bench, attitude, csv, turned};
 
 /// Five cardinal attitudes under inertial carry: NUE USE ENU EUS DSW.
-fn five(k0_y_ug: f64, seed: u64) -> Bench {
+pub(crate) fn five(k0_y_ug: f64, seed: u64) -> Bench {
     let attitudes = [
         ("NUE", [0.0, 0.0, 0.0]),
         ("USE", [0.0, 0.0, -90.0]),
@@ -28,8 +28,8 @@ fn five(k0_y_ug: f64, seed: u64) -> Bench {
     }
 }
 
-/// Calibration of the record of a bench by Z1 and Z3, `C_c^n f - (0, 1, 0)`.
-fn calibrated(bench: &Bench) -> Calibration {
+/// Z1 and Z3 of the record of a bench, `C_c^n f - (0, 1, 0)`.
+pub(crate) fn calibrated(bench: &Bench) -> Calibration {
     required(bench, &[], &[])
 }
 

@@ -109,9 +109,8 @@ fn is_right(c: &Calibration) {
     assert!(c.consistent, "{:?}", c.findings);
 }
 
-/// Benches with real effects: turns take time, outputs are quantised, samples are lost, gyros drift at
-/// random.
-fn real(seed: u64) -> Bench {
+/// Benches as real ones are: turns take time, outputs are quantised, samples are lost, gyros drift at random.
+pub(crate) fn real(seed: u64) -> Bench {
     Bench {
         seed,
         slew_deg_s: Some(1.0),

@@ -13,8 +13,6 @@ use obsdeg_ekf::consistency::{chi_square_quantile, chi_square_tail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Probability of any suspicion where nothing is wrong.
-pub const LEVEL: f64 = 0.01;
 /// Confidence of the bound on chi-square above which a single error does not explain the residuals.
 const UNEXPLAINED: f64 = 0.999;
 /// Largest difference of the falls of chi-square within a group, at the size found: three sigma.
@@ -185,9 +183,9 @@ impl Score {
         tried.iter().filter(same).copied().collect()
     }
 
-    /// Best explanation of the residuals: a single error, or a pair where no single error suffices; `None`
-    /// where chance suffices.
-    pub fn explanation(&self) -> Option<Explanation> {
+    /// Best explanation of the residuals: a single error, or a pair if no single one explains them; `None` if
+    /// chance suffices. `level` is the probability of an explanation where nothing is wrong.
+    pub fn explanation(&self, level: f64) -> Option<Explanation> {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
         let fall = self.fall(best);
@@ -203,13 +201,13 @@ impl Score {
             groups: vec![self.group(best, &tried)],
             explained,
         };
-        // a band of all residuals hides a second error of many sigmas
-        let pair = if explained && probability >= LEVEL { None } else { self.best_pair(&tried, fall) };
-        pair.or_else(|| (probability < LEVEL).then_some(single))
+        // a band of all residuals hides a second error that is many sigmas large
+        let pair = if explained && probability >= level { None } else { self.best_pair(&tried, fall, level) };
+        pair.or_else(|| (probability < level).then_some(single))
     }
 
-    /// Best pair; `None` unless it explains significantly more than the best single error.
-    fn best_pair(&self, tried: &[usize], single: f64) -> Option<Explanation> {
+    /// The best pair, if it explains more than the best single error by more than chance.
+    fn best_pair(&self, tried: &[usize], single: f64, level: f64) -> Option<Explanation> {
         let pairs = tried.iter().enumerate().flat_map(|(k, &i)| tried[..k].iter().map(move |&j| [i, j]));
         let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
         let (mut errors, mut estimates, fall) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -217,7 +215,7 @@ impl Score {
         let left_over = self.left_over(fall, 2.0);
         let probability = (chi_square_tail(2.0, fall / left_over) * count).min(1.0);
         let more = chi_square_tail(1.0, (fall - single) / left_over) * tried.len() as f64;
-        if probability >= LEVEL || more >= LEVEL {
+        if probability >= level || more >= level {
             return None;
         }
         // the error with the larger fall of its own comes first

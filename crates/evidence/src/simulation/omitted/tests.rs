@@ -8,7 +8,7 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form, Gains};
 use obsdeg_exact::SplitMix64;
 
-use super::{FamilyEffect, LEVEL, OmittedColumns, OmittedEffects, Score, omitted_effects};
+use super::{FamilyEffect, OmittedColumns, OmittedEffects, Score, omitted_effects};
 use crate::simulation::{Attained, Conditions, Noise, Plan, no_prior, si_per_shown};
 
 const W_IE: f64 = 7.292115e-5;
@@ -648,6 +648,9 @@ impl Records {
     }
 }
 
+/// Probability of a suspicion where nothing is wrong.
+const LEVEL: f64 = 0.01;
+
 /// Shares of `count` records: suspicion without an error; the error or its group first at twice the visible
 /// size; found at the visible size. Then the computed power of the last.
 fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
@@ -662,8 +665,8 @@ fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
     let mut counts = [0usize; 3];
     for i in 0..count {
         let j = tried[i % tried.len()];
-        counts[0] += usize::from(records.score(&mut noise, &[]).explanation().is_some());
-        let twice = records.score(&mut noise, &[(j, 2.0 * records.visible(j))]).explanation();
+        counts[0] += usize::from(records.score(&mut noise, &[]).explanation(LEVEL).is_some());
+        let twice = records.score(&mut noise, &[(j, 2.0 * records.visible(j))]).explanation(LEVEL);
         counts[1] += usize::from(twice.is_some_and(|e| e.errors[0] == j || e.groups[0].contains(&j)));
         counts[2] += usize::from(records.score(&mut noise, &[(j, records.visible(j))]).fall(j) > limit);
     }
@@ -683,7 +686,7 @@ fn check_shares(count: usize, seed: u64, least: f64) {
         "suspicion without an error {none}, found at twice the visible size {twice}, at once {once} of {power}"
     );
     let band = |p: f64| 3.3 * (p * (1.0 - p) / count as f64).sqrt();
-    assert!(none <= 0.01 + band(0.01), "{none}");
+    assert!(none <= LEVEL + band(LEVEL), "{none}");
     assert!(twice >= least, "{twice}");
     assert!((once - power).abs() < band(power), "{once} instead of {power}");
 }
@@ -713,7 +716,7 @@ fn a_second_error_is_not_hidden_by_the_band() {
     let (mut both, mut in_band) = (0, 0);
     for _ in 0..20 {
         let sizes = [(first, 6.0 * records.visible(first)), (second, 8.0 / 3.0 * records.visible(second))];
-        let found = records.score(&mut noise, &sizes).explanation().expect("an explanation");
+        let found = records.score(&mut noise, &sizes).explanation(LEVEL).expect("an explanation");
         let named =
             |j: usize| (0..found.errors.len()).any(|k| found.errors[k] == j || found.groups[k].contains(&j));
         both += usize::from(found.errors.len() == 2 && named(first) && named(second));
