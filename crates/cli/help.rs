@@ -125,6 +125,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("solutions", SOLUTIONS, "Expressions and numbers of solutions: on or off"),
     ("omitted", SOLUTIONS, "Classes of errors that are not estimated: on or off"),
     ("sensitivities", SOLUTIONS, "Changes of the estimates per unit of such errors"),
+    ("why", SOLUTIONS, "Explain the verdict on an unknown, and what would improve it"),
     ("frame", SOLUTIONS, "Axes of Z in solutions: n or platform"),
     ("formulas", SOLUTIONS, "Print Z, its derivatives, psi and eps as formulas"),
     ("symbolic_limit", SOLUTIONS, "Work of the symbolic engine for one formula; 0: none"),

@@ -145,6 +145,9 @@ class Analyze(Seeded, Positions, total=False):
     sensitivities: bool
     """Changes of the estimates per unit of each error that a scheme does not estimate, by the weights of the record
     that the scheme states [default: False]."""
+    why: Names
+    """Unknowns whose verdicts are explained: what decides each, which assumptions it rests on, and the changes that make it observable or
+    lower its degree, in order of cost, each tried."""
     certificate: bool
     """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
     reduced: bool

@@ -64,6 +64,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "axes" => &["accelerometers", "gyros", "body", "x"],
         "path" => &["one-axis", "gimbals", "x"],
         "max-turn" => &["90", "180", "0.001", "0", "x"],
+        "why" => &["D_FX", "psi_y", "x", "nothing", ""],
         "combination" => &[
             "D_IX - D_IY",
             "psi_y + D_FX",

@@ -6,7 +6,7 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, with the most lines that `-h` may have.
 const COMMANDS: [(&str, usize); 14] = [
-    ("analyze", 50),
+    ("analyze", 51),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 51),

@@ -50,6 +50,7 @@ mod tables;
 mod vector;
 mod visible;
 mod walks;
+mod why;
 mod words;
 
 pub use budget::budget_csv;

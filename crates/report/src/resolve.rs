@@ -324,7 +324,7 @@ impl<'a> Group<'a> {
 
 /// Changes that are made together, in the imperative: `add a position NWU and one USE`. Lines are
 /// alternatives, so that none numbers the positions it adds.
-fn changes(list: &[Change]) -> String {
+pub(crate) fn changes(list: &[Change]) -> String {
     let mut before = "";
     let mut one = |c: &Change| {
         let (verb, what) = match c {
