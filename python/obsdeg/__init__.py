@@ -5,7 +5,7 @@
 >>> answer["D_FX"].degree
 1
 
-Ask with :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`, :func:`measure`, :func:`calibrate` and :func:`report`,
+Ask with :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`, :func:`measure`, :func:`next_measurement`, :func:`calibrate` and :func:`report`,
 of a :class:`Scheme` or a :class:`Model`; :func:`allan` gives the noise of sensors at rest; :func:`load` reads models of other tools, :mod:`obsdeg.campaign` asks many times.
 
 Options are those of the command line in snake case; answers are the JSON of a command line without the symbolic engine, byte for byte,
@@ -22,7 +22,7 @@ from typing import Any
 from . import options as options
 from . import shapes as shapes
 from ._calibrate import allan, calibrate
-from ._commands import analyze, compare, crosscheck, design, load, measure, paper, report, simulate
+from ._commands import analyze, compare, crosscheck, design, load, measure, next_measurement, paper, report, simulate
 from ._files import Text
 from ._model import Model
 from ._obsdeg import ProblemError, __version__
@@ -37,6 +37,7 @@ from ._results import (
     Design,
     Judgement,
     Judgements,
+    NextPositions,
     Part,
     Report,
     SensorNoise,
@@ -62,6 +63,7 @@ __all__ = [
     "Judgement",
     "Judgements",
     "Model",
+    "NextPositions",
     "Part",
     "ProblemError",
     "Record",
@@ -86,6 +88,7 @@ __all__ = [
     "design",
     "load",
     "measure",
+    "next_measurement",
     "options",
     "paper",
     "report",

@@ -22,6 +22,7 @@ from ._results import (
     CrossCheck,
     Design,
     Judgements,
+    NextPositions,
     Part,
     Progress,
     Report,
@@ -485,6 +486,74 @@ def measure(
     log: list[Rounded] = []
     given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
     answer: Sensors = ask((Sensors,), "design", given, log, progress)
+    return answer
+
+
+@named(options.NextMeasurement)
+def next_measurement(
+    scheme: Platform | File,
+    added: int = 1,
+    *,
+    candidates: Any = None,
+    after: Calibration | None = None,
+    days: Iterable[float] | None = None,
+    digits: int | None = DIGITS,
+    progress: Progress | bool | None = None,
+    **options: Unpack[options.NextMeasurement],
+) -> NextPositions:
+    """Which position to measure next, or which two: all extensions of a scheme by candidates, compared.
+
+    Parameters
+    ----------
+    scheme : Scheme or path
+        The scheme that is extended, with its conditions and requirements.
+    added : int
+        Number of positions that are added: 1 or 2.
+    candidates : str, positions, Scheme or path
+        ``"cardinal"`` (default), ``"grid:45"`` [deg], or a scheme whose positions are chosen from.
+    after : Calibration
+        A calibration that is known beforehand: the added positions are a run of their own.
+    days : iterable of float
+        Days since that calibration, ascending, in which the coefficients aged as ``[ageing]`` of the scheme states: ``schedule`` says what
+        brings them back to their requirements after each; the rest is of the last.
+    digits : int or None
+        As of :func:`analyze`.
+    progress : callable or bool
+        Hears how far the comparison is; True for a bar of tqdm. Where it returns False, the comparison ends with the best so far.
+    **options
+        In :class:`obsdeg.options.NextMeasurement`: ``observable``, ``requirement``, ``dwell`` [s], ``max_time`` [s], ``carry``, ...
+
+    Returns
+    -------
+    NextPositions
+        ``found``, best first, ``before``, ``meets``: the dwell that meets the requirements.
+
+    Raises
+    ------
+    ProblemError
+        What is wrong, with its place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme(["NUE", "NDW"])
+    >>> best = obsdeg.next_measurement(pair, observable="D_F", dwell=100)[0]
+    >>> [r.name for r in best.resolves]
+    ['D_FZ']
+    """
+    asked: dict[str, Any] = {**options, "next": added}
+    files: dict[str, Any] = {}
+    log: list[Rounded] = []
+    if isinstance(candidates, str) and (candidates == "cardinal" or candidates.startswith("grid:")):
+        asked["candidates"] = candidates
+    elif candidates is not None:
+        files["candidates_file"] = source(candidates, digits, log, "candidates")
+    if days is not None:
+        asked["days"] = [float(x) for x in days]
+    if after is not None:
+        files["after"] = {"name": "after", "text": after.json()}
+    given = request(asked, digits, log, conditions_file=source(scheme, digits, log, "scheme"), **files)
+    answer: NextPositions = ask((NextPositions,), "design", given, log, progress)
     return answer
 
 

@@ -275,6 +275,23 @@ class Measure(Seeded, total=False):
     """Limit of the work of a verdict, in millions of operations [default: 600]; the search may take fifty times as much."""
 
 
+class NextMeasurement(Seeded, Assumed, Measured, GyroNoise, total=False):
+    """The options of :func:`obsdeg.next_measurement` beside those that it names itself."""
+
+    observable: Names
+    """Coefficients or families that must be observable and are compared [default: all]."""
+    keep: int
+    """How many extensions are listed [default: 10]."""
+    max_time: Real
+    """Largest total time with slews in s."""
+    max_slew: Real
+    """Longest slew to an added position in s."""
+    slew_rate: Real
+    """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
+    gimbal: Names
+    """How far gimbals turn in degrees: ``["alpha=-90:90"]``."""
+
+
 class Report(Seeded, Assumed, Filtered, total=False):
     """The options of :func:`obsdeg.report`."""
 

@@ -22,6 +22,7 @@ SCHEMAS = [
     "design",
     "walks",
     "sensors",
+    "next",
     "part",
     "simulation",
     "system-run",

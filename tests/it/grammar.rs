@@ -65,6 +65,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "path" => &["one-axis", "gimbals", "x"],
         "max-turn" => &["90", "180", "0.001", "0", "x"],
         "why" => &["D_FX", "psi_y", "x", "nothing", ""],
+        "next" => &["1", "2", "3", "x"],
         "combination" => &[
             "D_IX - D_IY",
             "psi_y + D_FX",
@@ -379,8 +380,10 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     let mut out = vec![command.to_string()];
     // of designs some are about the outputs of a model
     let of_model = command == "design" && rng.below(4) == 0;
+    let of_next = command == "design" && rng.below(6) == 0;
     let always: &[&str] = match command {
         "design" if of_model => &["measure"],
+        "design" if of_next => &["next", "step"],
         "design" => &["positions", "restarts", "step"],
         "report" => &["output", "runs"],
         _ => &[],
@@ -405,6 +408,9 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     out.extend((0..several.min(operands.len())).map(|_| pick(rng, operands)));
     if of_model {
         out.push(pick(rng, &["m.toml", "m.toml", "s.toml"]));
+    }
+    if of_next && !of_model {
+        out.push(pick(rng, &["s.toml", "t.toml", "m.toml"]));
     }
     if command == "calibrate" {
         out.push(pick(rng, &["r.csv", "-", "none.csv"]));

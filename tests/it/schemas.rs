@@ -8,7 +8,7 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// The kinds of `obsdeg schema`.
-const KINDS: [&str; 20] = [
+const KINDS: [&str; 21] = [
     "allan",
     "analysis",
     "audit",
@@ -19,6 +19,7 @@ const KINDS: [&str; 20] = [
     "design",
     "model",
     "model-certificate",
+    "next",
     "optimum-certificate",
     "part",
     "scheme",

@@ -204,7 +204,7 @@ geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O
 [simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\naccelerometer_noise_g = 1e-5\naccelerometer_bias_instability_ug = 1\naccelerometer_correlation_time_s = 60\nazimuth_noise_deg = 1
 drift_noise = \"0.1 deg/sqrt(h)\"\nangle_random_walk_deg_sqrt_h = 0.001\nrate_random_walk_dph_sqrt_h = [0.1, 0, 0.1]
 bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\nestimates = {{ D = 1 }}\npriors = {{ D = 1 }}
-[requirements]\npsi = 1\n[bench]\nK0 = 20\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\nstatic = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\nalpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
+[requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\nstatic = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\nalpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
     );
     assert_eq!(broken(&all), Vec::<String>::new());
     let all = all.replace("[0, 1]", "[-180, 180]");

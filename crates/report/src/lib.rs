@@ -29,6 +29,7 @@ mod gimbals;
 mod html;
 mod latex;
 mod markdown;
+mod next;
 mod omitted;
 mod panels;
 #[cfg(feature = "pdf")]

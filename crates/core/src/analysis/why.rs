@@ -315,8 +315,11 @@ impl Asked<'_> {
         self.improvement(vec![change], platform.names(), &degree)
     }
 
-    /// Another carry, as the analysis has judged it.
+    /// Another carry, as the analysis has judged it; psi of a position is no unknown there.
     fn other_carries(&mut self) -> Vec<Improvement> {
+        if self.name().contains('@') {
+            return Vec::new();
+        }
         let found = self.found.carries.iter().filter_map(|report| {
             let own = report.differs.iter().find(|d| d.name == self.name())?;
             let degree = own.there.degree.filter(|&k| is_lower(Some(k), self.degree))?;

@@ -47,6 +47,8 @@ pub const PRIOR: Range = range(1e-9, 1e9, "");
 pub const VALUE: Range = range(-1e6, 1e6, "");
 /// A size (one sigma) of an error that is not estimated, in the unit of the error.
 pub const BENCH: Range = range(0.0, 1e9, "");
+/// A random walk of a coefficient between calibrations, in the unit of the coefficient per sqrt(day).
+pub const AGEING: Range = range(0.0, 1e9, "");
 /// A required standard deviation.
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 

@@ -97,6 +97,14 @@ pub enum SimulationError {
         /// What is not.
         what: String,
     },
+    /// A covariance that is known beforehand and that says nothing here.
+    #[error(
+        "the covariance of the calibration beforehand: {why}; expected that of an answer of obsdeg calibrate on coefficients of the scheme"
+    )]
+    KnownCovariance {
+        /// What is wrong with it.
+        why: String,
+    },
     /// A condition beyond its range.
     #[error(transparent)]
     Range(#[from] obsdeg_core::model::ranges::RangeError),

@@ -6,7 +6,7 @@ use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::SimulationError;
 
 use crate::design::nearest::Nearest;
-use crate::design::request::limits::{MAX_CANDIDATES, MAX_TURNING, MAX_UNKNOWNS};
+use crate::design::request::limits::{MAX_CANDIDATES, MAX_TURNING, MAX_UNKNOWNS, MOST_EXTENSIONS};
 
 /// Why no scheme is found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -34,6 +34,30 @@ pub enum DesignError {
     Positions {
         /// The number asked for.
         found: usize,
+    },
+    /// A number of added positions that is not compared.
+    #[error("{found} more positions; expected 1 or 2")]
+    Added {
+        /// The number asked for.
+        found: usize,
+    },
+    /// Too many extensions of a scheme.
+    #[error(
+        "{found} extensions or more; expected at most {}: fewer candidates, or one more position",
+        MOST_EXTENSIONS
+    )]
+    Extensions {
+        /// Their number.
+        found: usize,
+    },
+    /// Ageing without a calibration.
+    #[error("days are counted from a calibration; expected one beforehand")]
+    NoCalibration,
+    /// No extension keeps the limits.
+    #[error("no extension by the candidates keeps the limits: {limits}")]
+    NoExtension {
+        /// The limits, in words.
+        limits: String,
     },
     /// The drift itself is constant at one position only.
     #[error("a design needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]

@@ -1,0 +1,151 @@
+//! Further positions of a scheme, or after a calibration.
+
+use std::ops::RangeInclusive;
+
+use clap::Args;
+use obsdeg_calibration::answer::CovarianceTable;
+use obsdeg_core::model::ranges::Range;
+use obsdeg_design::next::{NextOptions, NextPositions, next};
+use obsdeg_evidence::simulation::KnownCovariance;
+use serde::{Deserialize, Serialize};
+
+use crate::arguments::{check_whole, whole};
+use crate::conditions::within;
+use crate::design::{Search, SearchFiles, assumed, stated};
+use crate::host::{Host, Now};
+use crate::problem::Problem;
+use crate::source::Source;
+
+/// Numbers of added positions.
+const ADDED: RangeInclusive<u64> = 1..=2;
+
+/// Further positions.
+#[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
+#[command(next_help_heading = "Further positions")]
+#[serde(default)]
+pub struct FurtherOptions {
+    /// Find the one position, or the two, by which the scheme gains most: its positions stay, and candidates
+    /// are added at its end. First count the required coefficients that become observable, then the worst
+    /// degree, then the largest uncertainty over its requirement (without requirements the largest sigma),
+    /// then the time; all extensions are compared
+    #[arg(long, value_name = "1|2", value_parser = whole::<usize>(ADDED))]
+    pub next: Option<usize>,
+
+    /// With --after: days since the calibration, such as 30,90,365, in which the coefficients aged as
+    /// [ageing] of the scheme states. For each the fewest positions (up to --next) and the shortest run that
+    /// meet every requirement again; the extensions are those after the last
+    #[arg(long, value_name = "DAYS", value_delimiter = ',', value_parser = within(DAYS))]
+    pub days: Vec<f64>,
+}
+
+/// Days since a calibration.
+const DAYS: Range = Range { low: 0.01, high: 36_500.0, unit: "days" };
+
+/// Options that are about further positions too.
+const TAKEN: [&str; 25] = [
+    "seed",
+    "days",
+    "next",
+    "candidates",
+    "carry",
+    "latitude",
+    "terms",
+    "axes",
+    "path",
+    "measured_azimuth",
+    "geometry",
+    "keep",
+    "observable",
+    "max_time",
+    "max_slew",
+    "slew_rate",
+    "gimbal",
+    "requirement",
+    "bench",
+    "dwell",
+    "step",
+    "noise",
+    "azimuth_noise",
+    "drift_noise",
+    "prior",
+];
+
+/// Further options: noise of the sensors.
+const NOISE: [&str; 6] = [
+    "accelerometer_instability",
+    "accelerometer_correlation_time",
+    "angle_random_walk",
+    "rate_random_walk",
+    "bias_instability",
+    "correlation_time",
+];
+
+/// Compares extensions of the scheme in a file.
+pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<NextPositions, Problem> {
+    let Some(added) = a.further.next else {
+        return Err(Problem::input(
+            "--after is the start of further positions; expected --next 1 or --next 2",
+        ));
+    };
+    check_whole("--next", added as u64, &ADDED)?;
+    if files.conditions_file.is_none() {
+        return Err(Problem::input("--next extends a scheme; expected a scheme file"));
+    }
+    let of_parts = !files.merge.is_empty() || files.resume.is_some();
+    let given = stated(a)?;
+    let names = given.keys().map(String::as_str).chain(of_parts.then_some("merge"));
+    if let Some(other) = names.into_iter().find(|name| !TAKEN.contains(name) && !NOISE.contains(name)) {
+        return Err(Problem::input(format!("--{} does nothing with --next", other.replace('_', "-"))));
+    }
+    for days in &a.further.days {
+        DAYS.check("--days", *days).map_err(|e| Problem::input(e.to_string()))?;
+    }
+    if !a.further.days.is_empty() && files.after.is_none() {
+        return Err(Problem::input("--days counts from a calibration; expected --after FILE"));
+    }
+    if a.further.days.windows(2).any(|pair| pair[0] >= pair[1]) {
+        return Err(Problem::input("--days: expected days in ascending order, as in 30,90,365"));
+    }
+    let (base, candidates, conditions) = assumed(a, files)?;
+    if !a.further.days.is_empty() && base.ageing.is_empty() {
+        return Err(Problem::input(
+            "--days needs the ageing of the coefficients; expected a table [ageing] in the scheme file, such as D_F = 0.002",
+        ));
+    }
+    let options = NextOptions {
+        candidates,
+        added,
+        required: a.wanted.observable.clone(),
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        keep: a.keep.unwrap_or(10).into(),
+        beforehand: files.after.as_ref().map(calibrated).transpose()?,
+        days: a.further.days.clone(),
+        seed: a.seed,
+    };
+    let going = |done, all| (host.going)(Now::of("comparing extensions", done, all));
+    Ok(next(&base, &conditions, &options, &going)?)
+}
+
+/// The covariance of a calibration, with what its residuals say of the noise.
+fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
+    let wrong = |found: &str| {
+        Problem::input(format!(
+            "{}: {found}; expected the calibration.json that `obsdeg calibrate -o` wrote of a scheme",
+            source.name
+        ))
+    };
+    let value: serde_json::Value = serde_json::from_str(&source.text).map_err(|_| wrong("no JSON"))?;
+    let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
+    if schema.split('/').next() != Some("obsdeg.calibration") {
+        return Err(wrong("no calibration of a scheme"));
+    }
+    let table = value.get("covariance").cloned().unwrap_or_default();
+    let table: CovarianceTable = serde_json::from_value(table)
+        .map_err(|e| wrong(&format!("a calibration of another version ({e})")))?;
+    let n = table.names.len();
+    if table.rescaled.len() != n || table.rescaled.iter().any(|row| row.len() != n) {
+        return Err(wrong("a covariance that is not square"));
+    }
+    Ok(KnownCovariance { names: table.names, covariance: table.rescaled })
+}
