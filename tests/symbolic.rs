@@ -52,11 +52,11 @@ fn systems_with_roots_and_angles() {
     let matrix = vec![strings(["r_2", "0"]), strings(["c_a", "s_a"])];
     let (values, verified) = w.ask(&solve(matrix, strings(["1", "0"]))).expect("solved");
     assert_eq!((values, verified), (strings(["1/2*r_2", "-1/2*c_a*r_2/s_a"]), false));
-    // 1/c is kept as such, and cos^2 + sin^2 = 1 is known: c x = 1, overdetermined but consistent
+    // 1/c is kept, and cos^2 + sin^2 = 1 is known: c x = 1, overdetermined but consistent
     let matrix = vec![strings(["c_a"]), strings(["c_a^2+s_a^2"])];
     let (values, _) = w.ask(&solve(matrix, strings(["1", "1/c_a"]))).expect("solved");
     assert_eq!(values, strings(["1/c_a"]));
-    // what has no unique solution says so, and the worker lives on
+    // a system without a unique solution is reported, and the worker continues
     for (right, reason) in [(["1", "1"], "inconsistent"), (["1", "2"], "underdetermined")] {
         let matrix = vec![strings(["1", "1"]), strings(["2", "2"])];
         let e = w.ask(&solve(matrix, strings(right))).expect_err("no solution");
@@ -105,19 +105,19 @@ fn factors_of_a_minor() {
     assert_eq!(factors, strings(["-1+x", "1+x"]));
 }
 
-/// `(1 + x)^40000` in an equation: hours, product by product.
+/// Request with `(1 + x)^40000` in an equation: hours of products.
 fn endless() -> Request {
     solve(vec![strings(["(1+x+wN)^40000"])], strings(["1"]))
 }
 
-/// Derivatives grow without any product being counted.
+/// Request with growing derivatives, whose work counts no products.
 fn uncounted() -> Request {
     let equations = strings(["(1+p+v)^9", "(1+p*v)^9"]);
     let dynamics = Dynamics { states: strings(["p", "v"]), equations, outputs: strings(["p"]) };
     request(Job::Derive { dynamics, order: 1000 })
 }
 
-/// The limit is one of work, where it is counted, and of processor time elsewhere; the next question is
+/// Counted work ends at the work limit, other work at a limit of processor time. The next question is
 /// answered.
 #[test]
 fn work_ends_at_its_limit() {
@@ -126,14 +126,14 @@ fn work_ends_at_its_limit() {
         assert_eq!(w.ask(&job), Err(WorkerError::OverLimit { limit: 1 }));
         assert_eq!(w.ask(&solve(vec![strings(["2"])], strings(["1"]))), Ok((strings(["1/2"]), false)));
     }
-    // no limit is too large to be counted with (one process at a time)
+    // every limit can be represented (one process at a time)
     w.rest();
     let mut w = worker_of(u64::MAX);
     assert_eq!(w.ask(&solve(vec![strings(["2"])], strings(["1"]))), Ok((strings(["1/2"]), false)));
 }
 
-/// Whoever started it may be killed at any time: its pipe is closed then, and the worker leaves in the middle
-/// of its work.
+/// The parent process may be killed at any time: its pipe closes, and the worker exits in the middle of its
+/// work.
 #[test]
 fn a_worker_ends_with_whoever_started_it() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
@@ -156,7 +156,7 @@ fn hold(path: &Path) -> File {
     file
 }
 
-/// A command that wants formulas, and the first line that it says on stderr.
+/// Starts a command that needs formulas, and reads the first line of its stderr.
 fn waiting(command: &mut Command) -> (Child, BufReader<std::process::ChildStderr>, String) {
     command.args(["analyze", "--angles", "25,0,0", "--angles", "NUE", "--format", "json"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
@@ -166,7 +166,7 @@ fn waiting(command: &mut Command) -> (Child, BufReader<std::process::ChildStderr
     (child, errors, line)
 }
 
-/// While another process has the engine, everybody waits and says so; then everybody has formulas.
+/// While another process has the engine, all others wait and say so; then all get formulas.
 #[test]
 fn everybody_waits_for_a_turn() {
     let held = hold(&lock::symbolic_lock_file());
@@ -183,8 +183,8 @@ fn everybody_waits_for_a_turn() {
     }
 }
 
-/// While another process keeps the engine the verdicts come all the same, and what is missing is said, quiet
-/// or not.
+/// While another process holds the engine, verdicts are given nevertheless, and missing parts are named, with
+/// --quiet too.
 #[test]
 fn a_held_engine_keeps_no_verdict_waiting() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -213,8 +213,8 @@ fn a_held_engine_keeps_no_verdict_waiting() {
     assert!(mark["waited_s"] == 0 && mark["advice"].to_string().contains("--engine-wait"), "{mark}");
 }
 
-/// The note while another process keeps the engine says what is missing, as the answer with the engine shows
-/// it to be, and nothing else; with a limit of 0 nobody is waited for, and the same is missing.
+/// While another process holds the engine, the note lists exactly the parts that the answer with the engine
+/// has in addition. With a limit of 0 there is no wait, and the same parts are missing.
 #[test]
 fn what_is_missing_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -275,7 +275,7 @@ fn what_is_missing_is_said() {
             assert_eq!(missing.contains(&clause), holds, "{angles}: {clause}: {missing}");
             kinds.extend(holds.then(|| clause.split_whitespace().last().map(String::from)));
         }
-        // the answer says so itself, where the list stands
+        // the answer says so beside the list
         let says = |a: &serde_json::Value| a["degenerate_loci_incomplete"].is_string();
         assert!(!says(&whole) && says(&busy) == missing.contains("degenerate angles"), "{angles}: {missing}");
         assert!(open(&whole) == 0 && !missing.contains("formulas of Z"), "{missing}");
@@ -283,8 +283,8 @@ fn what_is_missing_is_said() {
     assert!(kinds.len() >= 4, "{kinds:?}");
 }
 
-/// Of named angles the verdicts are said while the engine is waited for: before the answer, in the words of
-/// an answer without solutions.
+/// With named angles the verdicts are printed while the command waits for the engine, in the words of an
+/// answer without solutions.
 #[test]
 fn verdicts_are_said_before_the_engine_is_there() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -317,8 +317,8 @@ fn verdicts_are_said_before_the_engine_is_there() {
     }
 }
 
-/// No model starts the engine: with expressions, of every third reference model, nothing is missing while
-/// another process keeps it.
+/// Models do not need the engine: with expressions, for every third reference model, nothing is missing while
+/// another process holds it.
 #[test]
 fn no_model_starts_the_engine() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -28,11 +28,11 @@ NEGATIVE_POWERS = (-9, 9)
 
 
 class Refused(Exception):
-    """Why a certificate is not accepted."""
+    """Raised if a certificate is not accepted; its text is the reason."""
 
 
 class Unreadable(Refused):
-    """Why nothing is judged: a scheme file that is not TOML."""
+    """Raised if nothing can be judged: a scheme file that is not TOML."""
 
 
 def need(holds, place, says, found):
@@ -128,7 +128,7 @@ class Number:
 
 
 class Problem:
-    """A scheme, read and checked."""
+    """Scheme of a certificate, parsed and checked."""
 
     def __init__(self, value):
         names = ["carry", "latitude_deg", "measured_azimuth", "terms", "gyros", "accelerometers", "positions", "slews"]
@@ -178,7 +178,7 @@ class Problem:
         self.slews = self.read_slews(slews) if act else None
 
     def read_slews(self, slews):
-        """Per position the turns to it: what they are about, and angles."""
+        """Slews to each position: axes and angles."""
         n, out = len(self.positions), []
         for i, turns in enumerate(listed("problem.slews", slews, n, n)):
             place = f"problem.slews.{i}"
@@ -221,7 +221,8 @@ class Problem:
         return [(i + 1, k, c) for k in range(ORDERS) for i in range(n) for c in self.components()]
 
     def rows(self, cos_sin, zero, one, w_n, w_u, left=None):
-        """All rows as listed, in the arithmetic of the arguments; `left` gives what slews leave in psi."""
+        """All rows in the listed order, in the arithmetic of the arguments; `left` gives the effect of slews
+        on psi."""
 
         def dot(a, b):
             total = zero
@@ -243,7 +244,7 @@ class Problem:
         attitudes = [matrix(angles) for angles in self.positions]
         n, minus_one = len(self.names), -one
         torqued = left(self, attitudes) if self.slews else None
-        local = []  # per position the nine local quantities in terms of the unknowns
+        local = []  # per position the nine local quantities as rows over the unknowns
         for i, c in enumerate(attitudes):
             s = [[zero] * n for _ in range(9)]
             carried = attitudes[0] if self.carry == "inertial" else c
@@ -283,7 +284,7 @@ class Problem:
 
 
 class Randomness:
-    """Numbers that whoever wrote the certificate did not choose: SHA-256 of it, with a counter."""
+    """Numbers that the author of a certificate cannot choose: SHA-256 of the certificate, with a counter."""
 
     def __init__(self, data):
         self.seed, self.count = hashlib.sha256(data).digest(), 0
@@ -313,7 +314,7 @@ def order_of(problem):
 
 
 class PrimeField:
-    """A random prime p = 1 mod N with a random root of unity and random rates."""
+    """Random prime p = 1 mod N with a random root of unity and random rates."""
 
     def __init__(self, problem, random):
         n = self.n = order_of(problem)
@@ -353,7 +354,8 @@ class PrimeField:
         return [(triple, [x % self.p for x in row]) for triple, row in zip(problem.list_rows(), rows)]
 
     def left(self, problem, attitudes):
-        """Per position what the torquer errors have left in psi^n on the way to it: 3 rows, a column per coefficient."""
+        """Effect of the torquer errors on psi^n in the slews to each position: 3 rows, one column per
+        coefficient."""
         p = self.p
         total, out = [[0] * len(problem.coefficients) for _ in range(3)], []
 
@@ -401,10 +403,11 @@ class PrimeField:
 
 
 def judge(p, names, rows, functionals):
-    """Basis, ranks, and per functional status, degree and witness, by rows (segment, order, component; entries) modulo a prime."""
+    """Basis, ranks, and status, degree and witness of each functional, from rows (segment, order, component;
+    entries) modulo a prime."""
     n = len(names)
     found = [{"degree": None, "solution": None, "hidden_by": None, "excited_by": None} for _ in functionals]
-    # reduced echelon form; the columns beyond n tell how each row is made of the basis rows
+    # reduced echelon form; the columns after n express each row by the basis rows
     basis, reduced, ranks = [], {}, []
     for k in range(1 + max((triple[1] for triple, _ in rows), default=0)):
         for triple, row in rows:
@@ -467,7 +470,7 @@ def exact_cos_sin(angle):
 
 
 class Exact:
-    """The rows in exact arithmetic."""
+    """Rows in exact arithmetic."""
 
     def __init__(self, problem):
         zero, one = Number({}), Number({(1, 0, 0): Fraction(1)})
@@ -478,7 +481,7 @@ class Exact:
         self.problem, self.zero, self.rows = problem, zero, dict(zip(problem.list_rows(), sparse))
 
     def null_vectors(self, certificate, basis, ranks):
-        """Every vector listed is taken to zero by all rows up to its order."""
+        """Checks that all rows up to the order of each listed vector map it to zero."""
         names = self.problem.names
         orders = listed("null_vectors", certificate, len(ranks), len(ranks))
         for k, vectors in enumerate(orders):
@@ -499,7 +502,7 @@ class Exact:
                         need(not total, place, f"row ({i}, {order}, {c}) must take it to 0", "it does not")
 
     def solution(self, place, functional, rows, coefficients):
-        """The coefficients times the rows make the functional."""
+        """Checks that the coefficients times the rows equal the functional."""
         total = {name: -x for name, x in functional.items()}
         pole, equator = self.problem.pole, self.problem.equator
         for triple, number in zip(rows, listed(place, coefficients, len(rows), len(rows))):
@@ -536,10 +539,11 @@ def error_bound(problem, levels, combinations):
 
 
 def bits_of_turns(slews):
-    """What turns add to the binary logarithm of the norm of a row: denominators and sizes."""
+    """Binary logarithms of the denominators and sizes that turns contribute to the norm of a row."""
     turns = [turn for turns in slews for turn in turns]
     denominators = [q.denominator for about, _ in turns if isinstance(about, list) for x in about for q in x.terms.values()]
-    # exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a jump
+    # exponents of 2 and of the common denominator that make an attitude integral, and the largest one of a
+    # jump
     two = own = 0
     for position in slews:
         a2, a_own = 3, 0
@@ -555,7 +559,8 @@ def bits_of_turns(slews):
 
 
 def verify(data, scheme=None, blocks=None, seed=None):
-    """The sentences on an accepted certificate (bytes), of a scheme file (text) if it is given; of an optimum so many blocks are searched again."""
+    """Sentences on an accepted certificate (bytes), checked against a scheme file (text) if given. `blocks`
+    is the number of blocks of an optimum to search again."""
     need(len(data) <= 16 * 10**6, "certificate", "expected at most 16 MB", f"found {len(data)} bytes")
     try:
         value = json.loads(data.decode("utf-8"), object_pairs_hook=no_repetition)
@@ -618,7 +623,7 @@ def verify(data, scheme=None, blocks=None, seed=None):
 
 
 def compare(found, ranks, basis, claims):
-    """Refuses claims that differ from those found modulo a prime."""
+    """Refuses claims that differ from the results modulo a prime."""
     found_basis, found_ranks, witnesses = found
     same("ranks", ranks, found_ranks)
     same("basis", basis, found_basis)
@@ -628,7 +633,8 @@ def compare(found, ranks, basis, claims):
 
 
 def primes(each):
-    """Number of primes, and the probability that all mislead, where one does with a probability of at most `each`."""
+    """Number of primes, and the probability that all mislead, if one misleads with a probability of at most
+    `each`."""
     count = next((m for m in range(2, 9) if min(each, 1.0) ** m < 1e-12), None)
     need(count, "problem", "expected one that eight primes decide with a probability of error below 1e-12", "found a larger one")
     return count, each**count
@@ -639,7 +645,7 @@ def by_primes(count, bound):
 
 
 def rounded_up(x):
-    """One digit and an exponent, never below the number."""
+    """Number rounded up to one digit and an exponent."""
     shown = f"{x:.0e}"
     if float(shown) >= x:
         return shown
@@ -648,7 +654,8 @@ def rounded_up(x):
 
 
 def fewest_positions(problem, seen):
-    """Least number of positions that may determine so many coefficients; None where the counting argument does not hold."""
+    """Smallest number of positions that can determine a number of coefficients; None if the counting argument
+    does not apply."""
     if problem.pole:
         return None
     torqued = problem.carry == "inertial" and any(t in RATE for t in problem.terms)
@@ -657,7 +664,7 @@ def fewest_positions(problem, seen):
     while True:
         most = rows * k - (3 * k if problem.carry == "reset" else 3)
         if not problem.force and not torqued:
-            # the rows that hold no drift are about psi alone
+            # rows without drift concern psi only
             most = min(most, 3 * k - (problem.carry == "inertial" and not problem.azimuth))
         if most >= seen:
             return k
@@ -693,7 +700,7 @@ def no_repetition(pairs):
 
 
 def stated_slews(file, positions, claimed, decimal):
-    """The turns that a scheme file states; of a shortest turn those claimed, if they have its form."""
+    """Slews that a scheme file states; for a shortest slew the claimed ones, if they have its form."""
     out = [[]]
     difference = lambda a, b: decimal(Decimal(a) - Decimal(b))
     for i in range(1, len(positions)):
@@ -715,7 +722,8 @@ def stated_slews(file, positions, claimed, decimal):
 
 
 def is_shortest(turns):
-    """One turn below 180 degrees about the axis that the attitudes give, or a half turn about a direction whose first component not 0 is positive."""
+    """True for one turn below 180 degrees about the axis of the attitudes, or a half turn about a direction
+    whose first non-zero component is positive."""
     if not (isinstance(turns, list) and len(turns) == 1 and isinstance(turns[0], dict)):
         return False
     about, angle = turns[0].get("about"), nanodeg("slews", turns[0].get("angle_deg"))
@@ -731,7 +739,8 @@ def direction(about):
 
 
 def is_along(turns, stated, angle, decimal):
-    """One turn about a stated direction, by the stated angle if there is one: half a turn, or that below 180 degrees which the attitudes give."""
+    """True for one turn about a stated direction by the stated angle, otherwise by a half turn or by the
+    angle below 180 degrees of the attitudes."""
     if not (isinstance(turns, list) and len(turns) == 1 and isinstance(turns[0], dict) and len(stated) == 3):
         return False
     about, claimed = turns[0].get("about"), nanodeg("slews", turns[0].get("angle_deg"))
@@ -751,13 +760,13 @@ KEYS_OF_SCHEME = (
 
 
 def known_keys(table, known):
-    """Refuses keys that may have a part in the problem and are not known here."""
+    """Refuses unknown keys that may affect the problem."""
     other = [key for key in table if key not in known.split()]
     need(not other, "scheme", "expected keys of standing positions", f"found {text(other)}")
 
 
 def by_key(axes, keys):
-    """Axes of a scheme file, a table or a list in the order of the keys, as a table."""
+    """Axes of a scheme file as a table, from a table or from a list in the order of the keys."""
     own = dict(zip(keys, axes)) if isinstance(axes, list) and len(axes) == len(keys) else axes
     good = isinstance(own, dict) and sorted(own) == sorted(keys) and all(isinstance(a, str) for a in own.values())
     need(good, "scheme", f"expected axes {', '.join(keys)}", f"found {text(axes)}")
@@ -765,7 +774,7 @@ def by_key(axes, keys):
 
 
 def scheme_terms(file):
-    """The terms of a scheme file, families written out."""
+    """Terms of a scheme file, with families written out."""
     terms, frame = file.get("terms", ["F", "I", "O", "S"]), file.get("frame", "accelerometers")
     misalignments = {"accelerometers": ["GM", "M3"], "gyros": ["GM3", "M6"], "body": ["GM", "M6"]}
     need(isinstance(frame, str) and frame in misalignments, "scheme", "expected accelerometers, gyros or body", f"found {text(frame)}")
@@ -780,7 +789,7 @@ def scheme_terms(file):
 
 
 def read_scheme(scheme, claimed):
-    """The problem that a scheme file states."""
+    """Problem of a scheme file."""
     try:
         file = tomllib.loads(scheme, parse_float=Decimal)
     except tomllib.TOMLDecodeError as e:
@@ -831,14 +840,14 @@ def read_scheme(scheme, claimed):
 
 
 def cardinal(letters):
-    """The angles of an attitude by the directions of X_p, Y_p, Z_p."""
+    """Euler angles of an attitude given by the directions of X_p, Y_p, Z_p."""
     directions = {"N": (1, 0, 0), "U": (0, 1, 0), "E": (0, 0, 1), "S": (-1, 0, 0), "D": (0, -1, 0), "W": (0, 0, -1)}
     circle = {0: (1, 0), 90: (0, 1), 180: (-1, 0), -90: (0, -1)}
     need(isinstance(letters, str) and len(letters) == 3 and set(letters) <= set(directions), "scheme", "expected an attitude", f"found {text(letters)}")
     target, found = [directions[a] for a in letters], []
     for angles in product(circle, repeat=3):
         (ca, sa), (cb, sb), (cg, sg) = (circle[a] for a in angles)
-        # the columns of C = Mx My Mz
+        # columns of C = Mx My Mz
         x = (cb * cg, -ca * sg + sa * sb * cg, sa * sg + ca * sb * cg)
         y = (cb * sg, ca * cg + sa * sb * sg, -sa * cg + ca * sb * sg)
         if [x, y] == target[:2] and (-sb, sa * cb, ca * cb) == target[2]:

@@ -9,11 +9,11 @@ from verify_certificate import Randomness, by_primes, compare, integer, is_prime
 KEYS = ["layout", "problem", "unknowns", "ranks", "basis", "verdicts"]
 PROBLEM = ["states", "parameters", "constants", "inputs", "program", "rates", "outputs"]
 CLAIM = ["unknown", "status", "degree", "solution", "coefficients", "hidden_by", "excited_by"]
-LONG = 200  # longest text of a subexpression before it gets a name of its own
+LONG = 200  # length of a subexpression above which it gets a name
 
 
 def verify_model(value, data, scheme):
-    """The sentences on an accepted certificate."""
+    """Sentences on an accepted certificate."""
     need(scheme is None, "scheme file", "expected no file beside the certificate of a model: compare its equations", "found one")
     _, problem, unknowns, ranks, basis, verdicts = keys("certificate", value, KEYS)
     model = Model(problem)
@@ -41,7 +41,7 @@ def verify_model(value, data, scheme):
 
 
 class Model:
-    """The equations, read and checked."""
+    """Equations of a certificate, parsed and checked."""
 
     def __init__(self, value):
         states, parameters, constants, inputs, program, self.rates, outputs = keys("problem", value, PROBLEM)
@@ -79,14 +79,15 @@ class Model:
             integer("problem", node, 0, len(self.slots) + len(self.program) - 1)
 
     def rows(self, p, random, last):
-        """Derivatives of the Taylor coefficients of the outputs by the unknowns, orders 0 to `last`, at a random point modulo `p`."""
+        """Derivatives of the outputs' Taylor coefficients with respect to the unknowns, orders 0 to `last`,
+        at a random point modulo `p`."""
         size, n, first_input = len(self.slots), self.unknowns, len(self.slots) - len(self.degrees)
         values = [[] for _ in range(size + len(self.program))]  # Taylor coefficients
-        duals = [[] for _ in values]  # their derivatives by the unknowns, None for zeros
+        duals = [[] for _ in values]  # derivatives with respect to the unknowns, None for zeros
         rows = []
 
         def combined(terms):
-            """The sum of factor times dual."""
+            """Sum of factor times dual."""
             out = None
             for factor, dual in terms:
                 if dual is not None and factor:

@@ -49,7 +49,7 @@ def attitude(cos_sin, angles):
 
 
 def effects(problem, c, w_n, w_u):
-    """Per coefficient what it makes of the drift and of the errors of the accelerometers in n: six numbers."""
+    """Effects of one unit of each coefficient on the drift and the accelerometer errors in n: six numbers."""
     rate = [c[0][j] * w_n + c[1][j] * w_u for j in range(3)]
     of = {"gravity": [-x for x in c[1]], "force": c[1], "rate": rate}
     out = []
@@ -63,7 +63,7 @@ def effects(problem, c, w_n, w_u):
 
 
 def cos_sin(angle):
-    """Of an angle in 1e-9 degrees; exact at multiples of 90 degrees."""
+    """Cosine and sine of an angle in 1e-9 degrees; exact at multiples of 90 degrees."""
     quarter = TURN // 4
     turns = (angle + quarter // 2) // quarter
     x = math.radians((angle - turns * quarter) * 1e-9)
@@ -72,7 +72,8 @@ def cos_sin(angle):
 
 
 def behind(w_n, w_u, t):
-    """psi^n after t seconds by psi^n and eps^n before: exp(W t) and its integral, three rows of six."""
+    """psi^n after t seconds as rows over psi^n and eps^n before: exp(W t) and its integral, three rows of
+    six."""
     w = [[0, 0, -w_u], [0, 0, w_n], [w_u, -w_n, 0]]
     square, rate = times(w, w), math.hypot(w_n, w_u)
     x = rate * t
@@ -89,7 +90,7 @@ def behind(w_n, w_u, t):
 
 
 class Accuracy:
-    """The criterion of sequences: computed, and what it is at least."""
+    """Criterion of sequences: computed value and lower bound."""
 
     def __init__(self, problem, raw, required):
         self.carry, self.criterion = raw["carry"], raw["criterion"]
@@ -118,7 +119,8 @@ class Accuracy:
             self.alone = [self.rows_alone(e) for e in self.effects]
 
     def root_of_dwell(self, problem, raw, w_n, w_u):
-        """U with U^T U the information of a dwell on psi, eps, a; by Givens rotations, sample by sample."""
+        """U with U^T U equal to the information of a dwell on psi, eps, a; by Givens rotations, sample by
+        sample."""
         root = [[0.0] * 9 for _ in range(9)]
         for j in range(1, self.samples + 1):
             of_psi = behind(w_n, w_u, self.seconds * j / self.samples)
@@ -138,7 +140,7 @@ class Accuracy:
         return [row for row in root if any(row)]
 
     def rows_alone(self, effect):
-        """Rows of a position with its own psi, and the psi that makes them small."""
+        """Rows of a position with its own psi, and the psi that minimises them."""
         rows = times([row[3:] for row in self.root], effect)
         psi = [[0.0] * len(effect[0]) for _ in range(3)]
         leading = {next(j for j in range(9) if row[j]): i for i, row in enumerate(self.root)}
@@ -178,8 +180,8 @@ class Accuracy:
         return psi, rows + [new], own, information
 
     def value(self, state):
-        """The criterion as computed; what no rounding makes it fall below; the smallest pivot by its diagonal entry, 0 if a
-        coefficient is held by rounding alone; the number of unknowns that are left out."""
+        """Computed criterion; its lower bound in spite of rounding; smallest pivot relative to its diagonal
+        entry, 0 if only rounding determines a coefficient; number of omitted unknowns."""
         information = state[3]
         n, d = len(information), len(self.limits)
         first = n - d
@@ -238,7 +240,7 @@ class Accuracy:
         return math.sqrt(squared), math.sqrt(least) * (1 - 1e-13), smallest, left_out
 
     def energy(self, state, x):
-        """|Y x| at most, whatever rounding did."""
+        """Upper bound of |Y x| in spite of rounding."""
         _, rows, own, _ = state
         psi = len(x) - len(self.scales[0])
         eps, a = (sum(abs(y) * s for y, s in zip(x[psi:], scale)) for scale in self.scales)
@@ -276,7 +278,7 @@ def principal(a):
 
 
 class Space:
-    """Worst degrees of sets of candidates, and the turns of the platform axes that change nothing."""
+    """Worst degrees of sets of candidates, and the symmetric turns of the platform axes."""
 
     def __init__(self, problem, carry, required, primes, random):
         self.problem, self.reset, self.required, self.known, self.fields = problem, carry == "reset", required, {}, []
@@ -288,7 +290,7 @@ class Space:
             for triple, row in field.rows(problem):
                 i = triple[0] - 1
                 if carry == "inertial":
-                    # psi^n goes on: what takes psi^n = C psi takes psi times C^T
+                    # psi^n is carried: the map from psi^n = C psi becomes a map from psi by C^T
                     row[:3] = [sum(x * y for x, y in zip(row, line)) % field.p for line in attitudes[i]]
                 rows[i].append((triple, row))
             if self.reset:
@@ -339,7 +341,8 @@ class Space:
         return self.known[members]
 
     def certain(self, sequence):
-        """The largest degree by all primes, which a single one could make too small, and the number of undetermined unknowns."""
+        """Largest degree by all primes (a single prime could give too small a degree), and number of
+        undetermined unknowns."""
         found = [self.judged(p, rows, tuple(sorted(set(sequence)))) for p, rows in self.fields]
         degrees = [degree for degree, _ in found]
         return None if None in degrees else max(degrees), min(left for _, left in found)
@@ -356,7 +359,8 @@ class Space:
 
 
 def without_psi(p, rows):
-    """The combinations of the rows of one candidate that have no entries at its psi, by order, on the coefficients alone."""
+    """Combinations of the rows of one candidate without entries at its psi, by order, for the coefficients
+    only."""
     reduced, out = [], []
     for triple, row in rows:
         for pivot, e in reduced:
@@ -388,7 +392,7 @@ def read_required(raw, problem):
 
 
 class Search:
-    """The question, and what answers it."""
+    """Search of a certificate: request and claimed answer."""
 
     def __init__(self, raw, data):
         keys("problem", raw, PROBLEM)
@@ -443,7 +447,8 @@ class Search:
         return math.comb(self.n - start[-1] + left - 1, left) if self.carry == "reset" else self.n**left
 
     def cover(self, blocks, least):
-        """The blocks cover all sequences up to turns of the platform axes; returns the first candidates."""
+        """Checks that the blocks cover all sequences up to turns of the platform axes; returns the first
+        candidates."""
         for i, block in enumerate(listed("blocks", blocks, 100_000, 1)):
             for c in listed(f"blocks.{i}.start", keys(f"blocks.{i}", block, ["start", "sequences", "bound"])[0], self.k, 1):
                 integer(f"blocks.{i}.start", c, 1, self.n)
@@ -466,7 +471,7 @@ class Search:
         return firsts
 
     def replay(self, start, degree):
-        """All sequences of a block: their number, how many count, the least value and its sequence."""
+        """All sequences of a block: number, number of valid ones, smallest value and its sequence."""
         state = self.accuracy.start()
         for c in start:
             state = self.accuracy.extended(state, c)
@@ -496,7 +501,7 @@ class Search:
 
 
 def chance(problem, n, decisions):
-    """Bound on the probability that one prime misleads about so many decisions on n unknowns."""
+    """Bound on the probability that one prime misleads in a number of decisions on n unknowns."""
     own, problem.names = problem.names, [""] * n
     each = base.error_bound(problem, 1, []) / (1 + n)
     problem.names = own
@@ -504,7 +509,7 @@ def chance(problem, n, decisions):
 
 
 def unit(name):
-    """The unit of a coefficient, after a blank."""
+    """Unit of a coefficient, after a blank."""
     if name.startswith("D_"):
         return " deg/h"
     if name.startswith(("GM_", "M_")):
@@ -518,7 +523,8 @@ def between(place, x, least, most):
 
 
 def precise(raw, problem):
-    """Searches that double precision decides: cardinal candidates, all coefficients, away from equator and poles."""
+    """True for searches that double precision decides: cardinal candidates, all coefficients, away from
+    equator and poles."""
     for angle in (angle for angles in raw["candidates"] for angle in angles):
         need(float(angle) % 90 == 0, "problem.candidates", "expected multiples of 90 degrees", f"found {text(angle)}")
     away = 1 <= abs(float(raw["latitude_deg"])) <= 89
@@ -536,7 +542,7 @@ def unit_of(problem, criterion, required):
 
 
 def verify_optimum(value, data, scheme, blocks=None, seed=None):
-    """The sentences on an accepted certificate."""
+    """Sentences on an accepted certificate."""
     need(scheme is None, "scheme file", "expected no file beside the certificate of an optimum: compare its candidates", "found one")
     _, raw, degree, best, sequences, all_blocks = keys("certificate", value, KEYS)
     search = Search(raw, data)
@@ -578,7 +584,7 @@ def verify_optimum(value, data, scheme, blocks=None, seed=None):
 
 
 def choice(blocks, sequences, data, count, seed):
-    """Indices of the blocks that are searched again, and the seed of the choice."""
+    """Indices of the blocks to search again, and the seed of the choice."""
     if count is None:
         largest = max(block["sequences"] for block in blocks)
         count = len(blocks) if sequences <= ALL_UP_TO else ALL_UP_TO // largest

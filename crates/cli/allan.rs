@@ -18,12 +18,16 @@ Examples:
   obsdeg allan night.parquet --column wx --column wy -o noise
   gzip -dc night.csv.gz | obsdeg allan - --format json
 
-A record of sensors at rest, in CSV or Parquet: `t [s]` and columns with a unit, of gyros (deg/h, deg/s, mdeg/s, rad/s, mrad/s) or accelerometers (g, mg, ug, m/s^2). \
-Noise coefficients come from a fit to overlapping Allan variances with their covariances: angle (velocity) random walk, bias instability, rate (acceleration) random walk. \
-A coefficient is resolved if its square is more than three standard deviations, as they are without it; else its upper limit is printed. The answer ends with the `[simulation]` table \
-that other commands read. With -o it writes allan.json, coefficients.csv, deviations.csv, simulation.toml and figures.
+A record of sensors at rest, in CSV or Parquet: `t [s]` and columns with a unit, of gyros (deg/h, deg/s, \
+mdeg/s, rad/s, mrad/s) or accelerometers (g, mg, ug, m/s^2). Noise coefficients come from a fit to \
+overlapping Allan variances with their covariances: angle (velocity) random walk, bias instability, rate \
+(acceleration) random walk. A coefficient is resolved if its square is more than three standard deviations, \
+as they are without it; else its upper limit is printed. The answer ends with the `[simulation]` table that \
+other commands read. With -o it writes allan.json, coefficients.csv, deviations.csv, simulation.toml and \
+figures.
 
-Exit codes: 0 done, 1 noise of these kinds does not explain the deviations of a column, 2 bad input, 3 internal error, 130 interrupted.";
+Exit codes: 0 done, 1 noise of these kinds does not explain the deviations of a column, 2 bad input, 3 \
+internal error, 130 interrupted.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -52,7 +56,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     a.output.check_folder()?;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let found = allan(&a.asked, open_record(&a.record)?, &Host { worker: None, going: &going })?;

@@ -8,7 +8,7 @@ use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, 
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
-use crate::engine::{EngineArguments, Meanwhile, notice};
+use crate::engine::{EarlyVerdicts, EngineArguments, notice};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{Output, write_file, write_files};
@@ -28,7 +28,8 @@ Examples:
   obsdeg analyze --angles NUE --angles NDW --figures pictures
   obsdeg analyze scheme.toml --certificate c.json       the proof, for obsdeg verify and other checkers
 
-Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in rad/s and Z in g.
+Units: angles and latitude in deg; psi in rad and D in rad/s, rad/s/g inside the formulas, with wN, wU in \
+rad/s and Z in g.
 
 Exit codes: 0 done, 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -76,7 +77,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
         [(_, Input::Model(_))] => "judging the model",
         _ => "solving symbolically (--solutions off leaves it out)",
     };
-    // what has no certificate says so before anything is solved or written
+    // fails for a scheme or model without a certificate before anything is solved or written
     let certificate =
         a.certificate.as_ref().map(|path| Ok::<_, Failure>((path, certificate(&a.asked, &read)?)));
     let certificate = certificate.transpose()?;
@@ -106,8 +107,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The verdicts without solutions, a line each: what is said while the engine is waited for.
-fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> Meanwhile {
+/// Verdicts without solutions, one line each; printed while another process uses the symbolic engine.
+fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> EarlyVerdicts {
     let asked = Analyze { solutions: false, formulas: false, why: Vec::new(), ..asked.clone() };
     let read = Arc::clone(read);
     Box::new(move || {

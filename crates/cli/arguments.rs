@@ -1,4 +1,4 @@
-//! What commands take from the command line beside their options: files with schemes and models.
+//! Files with schemes and models on the command line, and the options that depend on them.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use obsdeg_evidence::requirements::Requirements;
 use crate::failure::Failure;
 use crate::input::{one_on_stdin, read_all, read_as};
 
-/// Which options of a command were given, in snake case and as they are written.
+/// Options given on the command line of `command`: in snake case, and as they are written.
 pub(crate) fn given(command: &Command, matches: &ArgMatches) -> Given {
     let given = command.get_arguments().filter_map(|arg| {
         let id = arg.get_id().as_str();
@@ -20,7 +20,7 @@ pub(crate) fn given(command: &Command, matches: &ArgMatches) -> Given {
     Given::of(given)
 }
 
-/// What is judged: schemes and models, told apart by what they say.
+/// Schemes and models to judge; the content of a file decides which of the two it is.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What is judged")]
 pub(crate) struct Files {
@@ -38,7 +38,7 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Their texts; none where positions are given by angles.
+    /// Texts of the files; empty if positions are given by angles.
     pub(crate) fn read(&self) -> Result<Vec<Source>, Failure> {
         match (&self.scheme, &self.model) {
             (Some(path), _) => Ok(vec![read_as(path, Expected::Scheme)?]),
@@ -48,7 +48,7 @@ impl Files {
     }
 }
 
-/// The files of a command that takes several and nothing else to judge.
+/// Scheme and model files of a command that has no other input to judge.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What is judged")]
 pub(crate) struct AllFiles {
@@ -66,7 +66,7 @@ pub(crate) struct AllFiles {
 }
 
 impl AllFiles {
-    /// The texts of all of them.
+    /// Texts of all files.
     pub(crate) fn read(&self) -> Result<Vec<Source>, Failure> {
         one_on_stdin(self.files.iter().chain(&self.scheme).chain(&self.model))?;
         let mut read = read_all(&self.files)?;
@@ -79,7 +79,7 @@ impl AllFiles {
     }
 }
 
-/// Exit code for requirements that are missed, for scripts.
+/// `--require-met`: the exit code reports missed requirements to scripts.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct RequireMet {
     /// Exit with 1 if a stated requirement is missed (2: none is stated)
@@ -91,29 +91,30 @@ impl RequireMet {
     /// Refuses an answer in which no requirement is stated.
     ///
     /// # Errors
-    /// A failure of the input, before anything is written.
+    /// Input error, before anything is written.
     pub(crate) fn check<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
         let mut all = all.into_iter().peekable();
         let none = all.peek().is_none() || all.any(|r| r.stated == 0);
         match self.require_met && none {
             true => Err(Failure::input(
-                "--require-met: no requirement is stated (of some scheme); expected --requirement NAME=SIGMA or [requirements] in the scheme file".into(),
+                "--require-met: no requirement is stated (of some scheme); expected --requirement NAME=SIGMA \
+                 or [requirements] in the scheme file".into(),
             )),
             false => Ok(()),
         }
     }
 
-    /// Says by the exit code that a requirement is missed.
+    /// Reports a missed requirement by the exit code.
     ///
     /// # Errors
-    /// A failed check, behind the answer.
+    /// Failed check, after the answer is printed.
     pub(crate) fn decide<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
         let missed = self.require_met && all.into_iter().any(Requirements::any_missed);
         if missed { Err(Failure::check()) } else { Ok(()) }
     }
 }
 
-/// What a command says that judges one scheme or model at a time.
+/// Help of `files` for a command that judges one scheme or model at a time.
 pub(crate) fn one_file(arg: Arg) -> Arg {
     match arg.get_id() == "files" {
         true => arg.num_args(0..=1).action(clap::ArgAction::Set).help(

@@ -1,4 +1,4 @@
-//! `obsdeg calibrate`: what a scheme determines, from the record of its run.
+//! `obsdeg calibrate`: estimates of what a scheme or model determines, from records of its runs.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -8,7 +8,7 @@ use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
 
 use crate::arguments::RequireMet;
 use crate::failure::Failure;
-use crate::input::{Kind, is_stdin, open_record, read, read_as};
+use crate::input::{FileKind, is_stdin, open_record, read, read_as};
 use crate::interrupt;
 use crate::output::{Output, to_a_folder};
 use crate::progress::Bar;
@@ -23,15 +23,21 @@ Examples:
   obsdeg calibrate examples/influenza/model.toml examples/influenza/data.csv --profile beta
   gzip -dc examples/handheld/record.csv.gz | obsdeg calibrate examples/handheld/accelerometers.toml -
 
-A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the accelerometers in platform axes; m/s^2, mg, ug as well; increments of velocity since the row before, as pulses are, in m/s, cm/s, mm/s, um/s), \
-`Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` where the azimuth is measured, and `position` with the names of the \
-scheme (empty while the platform turns); without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a mean with a sigma of \
-its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts \
-instead of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. Columns are separated by commas, semicolons or tabs (then with decimal commas too); a column `t` without a unit may hold dates. With -o it writes calibration.json, coefficients.csv, \
-covariance.csv, residuals.csv and figures.
+A record has a header with units: `t [s]`, three of `fx [g]` `fy [g]` `fz [g]` (outputs of the \
+accelerometers in platform axes; m/s^2, mg, ug as well; increments of velocity since the row before, as \
+pulses are, in m/s, cm/s, mm/s, um/s), `Zx Zy Zz` or `Z1 Z3` (`Z2` with unknown accelerometers), `Za [deg]` \
+where the azimuth is measured, and `position` with the names of the scheme (empty while the platform turns); \
+without that column the timeline of the scheme says what is where. `sigma_fx [g]` and so on make a row a \
+mean with a sigma of its own. `alpha [deg] beta [deg] gamma [deg]` are held against the attitudes of the \
+scheme, and what is left of the measurements against a temperature `T [degC]`. Other names, counts instead \
+of units, and positions that are to be found as intervals at rest: `[record]` of the scheme (obsdeg schema \
+scheme) or model. Lines that begin with # are comments, an empty cell is a value that is not there. Columns \
+are separated by commas, semicolons or tabs (then with decimal commas too); a column `t` without a unit may \
+hold dates. With -o it writes calibration.json, coefficients.csv, covariance.csv, residuals.csv and figures.
 
-Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, once the records are \
-read).";
+Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is \
+missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, \
+once the records are read).";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -64,7 +70,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say here.
+/// Help of shared options for `calibrate`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.help("Write calibration, coefficients, residuals and figures to a folder"),
@@ -80,7 +86,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.asked.given = given;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let (source, records) = a.read()?;
@@ -101,7 +107,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 }
 
 impl Arguments {
-    /// The scheme or the model, with its file, and the records of its runs.
+    /// Scheme or model file, and the paths of the records of its runs.
     fn read(&self) -> Result<(Source, &[PathBuf]), Failure> {
         self.check_kinds()?;
         let (source, records) = if let Some(path) = &self.model {
@@ -123,7 +129,8 @@ impl Arguments {
         }
     }
 
-    /// Refuses files in the place of others, with the command in the right order where it can be told.
+    /// Refuses a file of the wrong kind; if the order of the files is wrong, the message shows the right
+    /// command.
     fn check_kinds(&self) -> Result<(), Failure> {
         let given = self.model.as_ref().or(self.scheme.as_ref());
         let (first, records) = match (given, &self.files[..]) {
@@ -131,36 +138,37 @@ impl Arguments {
             (None, [first, records @ ..]) => (first, records),
             (None, []) => return Ok(()),
         };
-        let runs_of = |kind| matches!(kind, Some(Kind::Scheme | Kind::Model));
-        let other = records.iter().find(|path| runs_of(Kind::of(path)));
+        let runs_of = |kind| matches!(kind, Some(FileKind::Scheme | FileKind::Model));
+        let other = records.iter().find(|path| runs_of(FileKind::of(path)));
         let name = first.display();
-        match (Kind::of(first), other) {
-            (Some(Kind::Record), Some(file)) => {
+        match (FileKind::of(first), other) {
+            (Some(FileKind::Record), Some(file)) => {
                 let records: Vec<String> = std::iter::once(first)
                     .chain(records.iter().filter(|path| *path != file))
                     .map(|path| path.display().to_string())
                     .collect();
-                let kind = Kind::of(file).map_or_else(String::new, |k| k.to_string());
+                let kind = FileKind::of(file).map_or_else(String::new, |k| k.to_string());
                 Err(Failure::input(format!(
                     "{name} is a record and {file} {kind}; expected `obsdeg calibrate {file} {}`",
                     records.join(" "),
                     file = file.display()
                 )))
             }
-            (Some(kind @ Kind::Record), None) => Err(Failure::input(format!(
+            (Some(kind @ FileKind::Record), None) => Err(Failure::input(format!(
                 "{name} is {kind}; expected a scheme or model file, then records: `obsdeg calibrate scheme.toml {name}`"
             ))),
-            (Some(kind @ Kind::Calibration), _) => Err(Failure::input(format!(
-                "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior {name}` takes it for what was known before)"
+            (Some(kind @ FileKind::Calibration), _) => Err(Failure::input(format!(
+                "{name} is {kind}, which `obsdeg calibrate` wrote; expected a scheme or model file (`--prior \
+                 {name}` takes it for what was known before)"
             ))),
             _ => {
-                let wrong = |path: &&PathBuf| Kind::of(path).is_some_and(|kind| kind != Kind::Record);
-                let Some((path, kind)) = records.iter().find(wrong).and_then(|p| Some((p, Kind::of(p)?)))
+                let wrong = |path: &&PathBuf| FileKind::of(path).is_some_and(|kind| kind != FileKind::Record);
+                let Some((path, kind)) = records.iter().find(wrong).and_then(|p| Some((p, FileKind::of(p)?)))
                 else {
                     return Ok(());
                 };
                 let hint = match kind {
-                    Kind::Calibration => {
+                    FileKind::Calibration => {
                         format!("`--prior {}` takes it for what was known before", path.display())
                     }
                     _ => format!("one scheme or model, which is {name}"),

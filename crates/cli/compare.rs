@@ -14,8 +14,9 @@ Examples:
   obsdeg compare examples/five-positions/scheme.toml examples/six-positions/scheme.toml
   obsdeg compare a.toml b.toml --carry inertial --requirement D=0.05 --format markdown -o review.md
 
-Requirements are those of a scheme file, [requirements], or --requirement; without, none is judged. Predicted sigmas are those at the end \
-of the scheme, with the random drift and the priors that are stated. Gyro noise adds the noise floor of every coefficient.
+Requirements are those of a scheme file, [requirements], or --requirement; without, none is judged. \
+Predicted sigmas are those at the end of the scheme, with the random drift and the priors that are stated. \
+Gyro noise adds the noise floor of every coefficient.
 
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -35,11 +36,11 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say here.
+/// Help of shared options for `compare`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "files" => arg.help("Scheme files (TOML); - is stdin"),
-        // one is refused, with where it can be judged
+        // `--model` is refused; the message names the command that judges models
         "model" => arg.hide(true),
         "carry" => arg.help("What is carried between positions, for all schemes"),
         "latitude" => arg.help("Latitude in degrees, for all schemes (default: that of the file, or 28.2)"),

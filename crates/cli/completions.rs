@@ -52,7 +52,7 @@ Examples:
   obsdeg man analyze | man -l -
   obsdeg man -o ~/.local/share/man/man1                 then: man obsdeg-analyze";
 
-/// The pages: of the program and of every command.
+/// Manual pages of the program and of every command, each with its name.
 fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command)> {
     let program = (command.get_name().to_string(), command.clone());
     let of: Vec<_> = command.get_subcommands().cloned().collect();
@@ -63,7 +63,8 @@ fn pages(command: &clap::Command) -> impl Iterator<Item = (String, clap::Command
     std::iter::once(program).chain(of)
 }
 
-/// A page; what stands after the help has sections of its own, in which examples keep their lines.
+/// Manual page of `command` in roff. The text after the help becomes sections of its own; examples keep their
+/// lines.
 fn page(command: clap::Command) -> std::io::Result<Vec<u8>> {
     let footer = command.get_after_long_help().or(command.get_after_help());
     let footer = footer.map(ToString::to_string).unwrap_or_default();
@@ -88,7 +89,7 @@ fn page(command: clap::Command) -> std::io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// The manual: a page, or all of them in a folder.
+/// Prints one manual page, or writes all pages to a folder.
 pub(crate) fn man(a: &ManArguments) -> Result<(), Failure> {
     let mut command = command().disable_help_subcommand(true);
     command.build();

@@ -17,11 +17,12 @@ Examples:
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 --truth exact     (at the scheme's own drifts)
   obsdeg crosscheck examples/lotka-volterra/model.toml
 
-Evidence: a. degrees, ranks, null space, combinations and partners by samples of a model of its own in many digits, and log-log \
-slopes of sigma against the dwell, b. prior inflation and null vectors, c. covariance against inverse information, and the model \
-against equations of direction cosines, d. Monte Carlo consistency, e. rank correlation of orders, f. filters that are wrong on \
-purpose. What is not resolvable, by a test that is stated, neither agrees nor disagrees. With -o it writes evidence.json and its \
-figures as SVG and PNG.
+Evidence: a. degrees, ranks, null space, combinations and partners by samples of a model of its own in many \
+digits, and log-log slopes of sigma against the dwell, b. prior inflation and null vectors, c. covariance \
+against inverse information, and the model against equations of direction cosines, d. Monte Carlo \
+consistency, e. rank correlation of orders, f. filters that are wrong on purpose. What is not resolvable, by \
+a test that is stated, neither agrees nor disagrees. With -o it writes evidence.json and its figures as SVG \
+and PNG.
 
 Exit codes: 0 nothing disagrees, 1 something disagrees, 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -45,7 +46,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let input = a.asked.input.read_one(a.files.read()?)?;
     let bar = Bar::start(a.output.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         true
     };
     let evidence = crosscheck(&a.asked, &input, &Host { worker: None, going: &going });

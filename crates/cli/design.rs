@@ -35,17 +35,22 @@ Examples:
   obsdeg design model.toml --measure states             the fewest outputs that make all unknowns of a model observable
   obsdeg design model.toml --measure \"x1, x1 + x3\" --own-outputs --observable k1,k2 --max-degree 4
 
-Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, coordinate exchange from random \
-starts. Where order matters and repositioning takes no time, a bound on what the last two positions can add leaves most of many sequences out (branch \
-and bound): eight of the 24 cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on what any scheme of the candidates can reach says how far the best found is from it at most. Where units \
-differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, found by exchange. With slews \
-half turns are tried in both directions: NUE (-N) NDW is the one that is right-handed about South. The folder of -o holds design.json, \
-winner.toml (a scheme file), its positions as a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
+Up to 50 million sequences are searched exhaustively, with --within 0 all, which proves the best; beyond, \
+coordinate exchange from random starts. Where order matters and repositioning takes no time, a bound on what \
+the last two positions can add leaves most of many sequences out (branch and bound): eight of the 24 \
+cardinal attitudes in some minutes. Under reset carry information adds over positions, so that a bound on \
+what any scheme of the candidates can reach says how far the best found is from it at most. Where units \
+differ (--terms all) the criterion is d or margin; where torquer errors act on slews, schemes are walks, \
+found by exchange. With slews half turns are tried in both directions: NUE (-N) NDW is the one that is \
+right-handed about South. The folder of -o holds design.json, winner.toml (a scheme file), its positions as \
+a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
 
-Of a model the answer is which of the candidates to measure: minimal sets, the front of their number or cost against the largest degree, and the \
-cheapest set of each unknown, each with its proof.
+Of a model the answer is which of the candidates to measure: minimal sets, the front of their number or cost \
+against the largest degree, and the cheapest set of each unknown, each with its proof.
 
-Exit codes: 0 done (with --minimum also when no positions do), 1 the first scheme misses a requirement (with --require-met), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before anything was found.";
+Exit codes: 0 done (with --minimum also when no positions do), 1 the first scheme misses a requirement (with \
+--require-met), 2 bad input (also when no scheme can be found), 3 internal error, 130 interrupted before \
+anything was found.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(to_a_folder), mut_args(words))]
@@ -82,7 +87,7 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
-/// What shared options say and need here.
+/// Help and conflicts of shared options for `design`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "latitude" => arg.help("Latitude in degrees (default: 28.2)"),
@@ -114,7 +119,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let bar = Bar::start(a.output.target.quiet);
     let interrupted = interrupt::flag()?;
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let asked = Search { certificate: a.certificate.is_some(), ..a.asked.clone() };
@@ -123,7 +128,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     match designed? {
         Designed::Schemes(mut found) => {
             if let (Some(path), Some(file)) = (&a.certificate, found.take_certificate()) {
-                // its question, its best sequences and its cover; blocks are for those who doubt
+                // checks the question, the best sequences and the cover, but searches no block again
                 let replay = Replay { blocks: Some(0), seed: Some(0) };
                 if let Err(refused) = verify_with(&file.bytes, None, &replay) {
                     return Err(Failure::input(format!("no certificate: its check refuses it ({refused})")));
@@ -152,7 +157,8 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Writes a part to its file, whole or interrupted, and says which; and which options act later.
+/// Writes a complete or interrupted part to its file; says so, and names the options that act at the merge
+/// only.
 fn write_part(part: &Part, Arguments { asked, output, .. }: &Arguments) -> Result<(), Failure> {
     let text = serde_json::to_string(part).map_err(|e| Failure::internal(e.to_string()))?;
     output.target.replace(format!("{text}\n").as_bytes())?;

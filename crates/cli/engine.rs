@@ -1,4 +1,4 @@
-//! The symbolic engine as the commands use it.
+//! The symbolic engine for the commands: limits, messages while waiting, licence notice.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use obsdeg_symbolic::{Waiting, Worker, WorkerConfig, WorkerError};
 use crate::failure::{Failure, say};
 use crate::progress::Spinner;
 
-/// How much the engine may do.
+/// Limits of the symbolic engine: work, and waiting time.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Solutions")]
 pub(crate) struct EngineArguments {
@@ -28,9 +28,9 @@ pub(crate) struct EngineArguments {
 }
 
 impl EngineArguments {
-    /// The symbolic engine in a process of its own, if this build has one; nothing starts yet. `meanwhile`
-    /// gives what can be said while others hold it.
-    pub(crate) fn worker(&self, quiet: bool, meanwhile: Meanwhile) -> Result<Option<Worker>, Failure> {
+    /// The symbolic engine in a process of its own, `None` if this build has none; nothing starts yet.
+    /// `meanwhile` gives the verdicts to print while another process holds the engine.
+    pub(crate) fn worker(&self, quiet: bool, meanwhile: EarlyVerdicts) -> Result<Option<Worker>, Failure> {
         if !cfg!(feature = "symbolica") {
             return Ok(None);
         }
@@ -49,13 +49,13 @@ impl EngineArguments {
         })))
     }
 
-    /// What `work` finds with the engine, with a sign of life, and what the engine says of itself; then the
-    /// next process may have it.
+    /// Result of `work` with the engine, which is then free for the next process. Shows a spinner, then the
+    /// notice of the engine.
     pub(crate) fn lend<T>(
         &self,
         message: &'static str,
         quiet: bool,
-        meanwhile: Meanwhile,
+        meanwhile: EarlyVerdicts,
         work: impl FnOnce(Option<&mut Worker>) -> Result<T, Failure>,
     ) -> Result<(T, Vec<String>), Failure> {
         let mut worker = self.worker(quiet, meanwhile)?;
@@ -70,32 +70,36 @@ impl EngineArguments {
     }
 }
 
-/// Names on stderr the parts of the answer that are missing without the engine, and how to get them; quiet or
-/// not.
+/// Names on stderr the parts of the answer that are missing without the engine, and how to get them;
+/// `--quiet` does not suppress this.
 pub(crate) fn say_busy(worker: &Worker) {
     let why = match worker.failure() {
         Some(WorkerError::Busy { seconds: 0 }) => {
-            "another obsdeg process holds it, and --engine-wait 0 does not wait. Run the command again, or wait (--engine-wait)".into()
+            "another obsdeg process holds it, and --engine-wait 0 does not wait. Run the command again, or \
+             wait (--engine-wait)"
+                .into()
         }
         Some(WorkerError::Busy { seconds }) => format!(
-            "another obsdeg process held it for more than {seconds} s. Run the command again, or wait longer (--engine-wait)"
+            "another obsdeg process held it for more than {seconds} s. Run the command again, or wait longer \
+             (--engine-wait)"
         ),
         Some(WorkerError::OverLimit { limit: 0 }) => "--symbolic-limit 0 switches it off".into(),
         _ => return,
     };
     say(&format!(
-        "what needs the symbolic engine is missing or in decimals (the notes of a table and the JSON answer say what): {why}"
+        "what needs the symbolic engine is missing or in decimals (the notes of a table and the JSON answer \
+         say what): {why}"
     ));
 }
 
-/// Verdicts that need no engine, line by line: asked for once, when the wait for it has lasted a second.
-pub(crate) type Meanwhile = Box<dyn Fn() -> Vec<String> + Send + Sync>;
+/// Verdicts that need no engine, one per line; called once, after the wait for the engine has lasted 1 s.
+pub(crate) type EarlyVerdicts = Box<dyn Fn() -> Vec<String> + Send + Sync>;
 
-/// Says that the engine is waited for, at most how many seconds, and the verdicts, which need none.
+/// Says on stderr that the command waits for the engine, at most `wait` s, and prints the verdicts.
 fn say_waiting(wait: u64, meanwhile: &[String]) {
     eprintln!(
-        "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once per user, and --solutions off \
-         does without it; Ctrl-C ends this command"
+        "waiting for another obsdeg process, at most {wait} s (--engine-wait): the symbolic engine runs once \
+         per user, and --solutions off does without it; Ctrl-C ends this command"
     );
     if !meanwhile.is_empty() {
         eprintln!("verdicts, which do not wait for it:");
@@ -105,7 +109,7 @@ fn say_waiting(wait: u64, meanwhile: &[String]) {
     }
 }
 
-/// The banner of the engine is its licence notice: whole, and after the answer.
+/// Prints the banner of the engine, its licence notice, unabridged and after the answer.
 pub(crate) fn notice(banner: &[String], quiet: bool) {
     for line in banner.iter().filter(|_| !quiet) {
         say(line);

@@ -1,4 +1,4 @@
-//! Failures: what is said on stderr, and the exit code.
+//! Failures: messages on stderr and exit codes.
 
 use std::process::ExitCode;
 
@@ -9,22 +9,22 @@ use obsdeg_report::{ReportError, in_ascii, visible};
 
 use crate::terminal::plain_messages;
 
-/// A check failed.
+/// Exit code of a failed check.
 const CHECK: u8 = 1;
-/// Bad input.
+/// Exit code of bad input.
 pub(crate) const INPUT: u8 = 2;
-/// A defect of the program.
+/// Exit code of a defect of the program.
 pub(crate) const INTERNAL: u8 = 3;
-/// The user did not want to wait: the code that a shell gives a program ended by Ctrl-C.
+/// Exit code of an interrupted command: the code that a shell gives a program ended by Ctrl-C.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// Says something of several lines on stderr. Names, paths and keys come from whoever wrote the input:
-/// nothing in them reaches a terminal but text.
+/// Prints a message of one or more lines on stderr. Names, paths and keys in it come from the input, so
+/// control characters are written out: a terminal shows them and does not obey them.
 pub(crate) fn say(message: &str) {
     say_as(message, |line| line.into());
 }
 
-/// The same, every line made of what it is without anything that a terminal would obey.
+/// Prints every line of `message` on stderr, without control characters and passed through `made`.
 fn say_as(message: &str, made: impl Fn(&str) -> String) {
     let plain = plain_messages();
     for line in message.lines() {
@@ -33,8 +33,8 @@ fn say_as(message: &str, made: impl Fn(&str) -> String) {
     }
 }
 
-/// A line in the colours of clap's errors; `drawn`: one that may draw a place of a text, with a margin and
-/// marks below what is meant.
+/// A line in the colours of clap's errors. `drawn`: true if the line may belong to a drawn excerpt of a text,
+/// with a margin and marks below the place that is meant.
 fn colored(line: &str, drawn: bool) -> String {
     let error = AnsiColor::Red.on_default().bold();
     let margin = AnsiColor::BrightBlue.on_default().bold();
@@ -56,37 +56,37 @@ fn colored(line: &str, drawn: bool) -> String {
     if end > 0 { format!("{margin}{before}{margin:#}{text}") } else { text }
 }
 
-/// Why a command stopped.
+/// Error message and exit code with which a command stops.
 #[derive(Debug)]
 pub(crate) struct Failure {
     message: String,
-    /// True if the lines behind the first draw a place of a text.
+    /// True if the lines after the first draw an excerpt of a text.
     drawn: bool,
     code: u8,
 }
 
 impl Failure {
-    /// The input is wrong.
+    /// Bad input.
     pub(crate) fn input(message: String) -> Self {
         Self { message: format!("error: {message}"), drawn: false, code: INPUT }
     }
 
-    /// A check failed: what was printed says which.
+    /// A failed check, without a message of its own: the printed answer names the check.
     pub(crate) fn check() -> Self {
         Self { message: String::new(), drawn: false, code: CHECK }
     }
 
-    /// Interrupted with something written that another run goes on with.
+    /// Interrupted after a partial result was written, from which another run continues.
     pub(crate) fn unfinished(message: String) -> Self {
         Self { message, drawn: false, code: INTERRUPTED }
     }
 
-    /// The program is wrong.
+    /// A defect of the program.
     pub(crate) fn internal(message: String) -> Self {
         Self { message: format!("internal error: {message}"), drawn: false, code: INTERNAL }
     }
 
-    /// The input is wrong at a place of a text, which is drawn.
+    /// Bad input at a place of a text; the message draws the place.
     fn at(message: &str, place: &Place) -> Self {
         let annotation = AnnotationKind::Primary.span(place.span.clone());
         let snippet = Snippet::source(&place.text).path(&place.name).annotation(annotation);
@@ -123,7 +123,7 @@ impl From<ReportError> for Failure {
 mod tests {
     use super::*;
 
-    /// Colours add nothing but themselves, and stand where clap has them: title, margin, marks.
+    /// Colours add only escape sequences, at the places where clap has them: title, margin, marks.
     #[test]
     fn messages_are_coloured() {
         let place = Place { name: "a.toml".into(), text: "carry = \"x | ^\"\n".into(), span: 8..15 };

@@ -1,9 +1,9 @@
-//! Files put in place: whole or not at all, and never in place of what is no file.
+//! Files are put in place completely or not at all, and replace regular files only.
 //!
-//! What is written comes first into a folder beside its destination, `.obsdeg-NAME-PID-N`, and is moved from
-//! there. Whoever uses that folder holds a lock on the file `lock` in it, which the system releases when the
-//! process ends, however it ends. So a folder whose lock is free was left by a process that was killed: the
-//! next run that writes NAME removes it, and nothing else.
+//! New files are written into a folder beside their destination, `.obsdeg-NAME-PID-N`, and moved from there.
+//! The process that uses the folder holds a lock on the file `lock` in it. The system releases the lock when
+//! the process ends, however it ends. A folder whose lock is free was therefore left by a process that was
+//! killed: the next run that writes NAME removes it, and nothing else.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{Error, ErrorKind, Result, Write};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The folder that is written to; locked while files are put in place, which an interrupt waits for.
+/// Folder for new files; locked while files are put in place, so that an interrupt waits for the end.
 static STAGING: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 const LOCK: &str = "lock";
@@ -20,19 +20,19 @@ fn staging() -> MutexGuard<'static, Option<PathBuf>> {
     STAGING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits until no file is being put in place and removes what was not: the program is about to end. Nothing
-/// is written beside a destination from now on: whoever wants to waits for the end.
+/// Waits until no file is being put in place and removes the folder of new files: the program is about to
+/// end. The lock is kept, so later attempts to write wait until the process ends.
 pub(crate) fn abandon() {
     let mut held = staging();
     if let Some(folder) = held.take() {
-        // the next run removes what cannot be removed now
+        // the next run removes a folder that cannot be removed now
         let _ = fs::remove_dir_all(folder);
     }
     std::mem::forget(held);
 }
 
-/// Refuses a file beyond the limit that the system sets (`ulimit -f`): the signal of a write beyond it ends
-/// the program with the folder left there.
+/// Refuses a file larger than the limit of the system (`ulimit -f`). A write beyond it sends a signal that
+/// ends the program and leaves the folder behind.
 fn within_limit(bytes: &[u8]) -> Result<()> {
     #[cfg(unix)]
     {
@@ -46,10 +46,10 @@ fn within_limit(bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Where a file goes: through symbolic links to the file behind them.
+/// Path of the file that is written: symbolic links are followed to the file behind them.
 ///
 /// # Errors
-/// What is no regular file is neither written to nor replaced.
+/// Paths of anything but a regular file: these are neither written to nor replaced.
 pub(crate) fn destination(path: &Path) -> Result<PathBuf> {
     let refuse =
         |found: &str| Err(Error::new(ErrorKind::InvalidInput, format!("it is {found}; expected a file")));
@@ -64,12 +64,12 @@ pub(crate) fn destination(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The folder that a file is in.
+/// Folder that contains the file.
 pub(crate) fn folder(file: &Path) -> &Path {
     file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What is there, in words.
+/// Name of a file type, for messages.
 pub(crate) fn kind(found: fs::FileType) -> &'static str {
     #[cfg(unix)]
     {
@@ -87,11 +87,11 @@ pub(crate) fn kind(found: fs::FileType) -> &'static str {
     if found.is_dir() { "a folder" } else { "no regular file" }
 }
 
-/// Writes files and moves them in place in their order; `target` is what the user named, a file or a folder
-/// of these files. Files that are replaced keep their permissions, others have the usual ones.
+/// Writes files, then moves them in place in their order. `target` is the path that the user named: a file,
+/// or a folder of these files. Replaced files keep their permissions; new files have the usual ones.
 ///
 /// # Errors
-/// With the file that could not be written; nothing is in place then, unless moving failed.
+/// The file that could not be written. No file is in place then, unless moving failed.
 pub(crate) fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> std::result::Result<(), (PathBuf, Error)> {
     let at = |path: &Path| {
         let path = path.to_path_buf();
@@ -104,7 +104,7 @@ pub(crate) fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> std::result::R
     for (path, bytes) in files {
         within_limit(bytes).map_err(at(path))?;
     }
-    // behind a link, so that moving stays within one file system
+    // the folder lies where links lead, so that moving stays within one file system
     let beside = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
     let new = Staging::beside(&beside).map_err(at(target))?;
     for (i, ((path, bytes), end)) in files.iter().zip(&ends).enumerate() {
@@ -124,12 +124,12 @@ pub(crate) fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> std::result::R
 /// A folder beside a destination, removed when it is dropped.
 struct Staging {
     folder: PathBuf,
-    /// Held: the folder is in use.
+    /// Lock that marks the folder as in use.
     _lock: File,
 }
 
 impl Staging {
-    /// A new folder, after those that runs before this one have left there.
+    /// Makes a new folder, after removing the folders that killed runs left.
     fn beside(target: &Path) -> Result<Self> {
         let parent = folder(target);
         let prefix = prefix(target);
@@ -141,14 +141,14 @@ impl Staging {
             let mut builder = fs::DirBuilder::new();
             #[cfg(unix)]
             std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-            // an interrupt finds the folder as soon as it is there
+            // the folder is registered as soon as it exists, so that an interrupt finds it
             let mut held = staging();
             match builder.create(&folder) {
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
                 made => made?,
             }
             *held = Some(folder.clone());
-            // until it is locked, another run may take it for left over
+            // before the lock is taken, another run may remove the folder as left over
             let lock = match File::create_new(folder.join(LOCK)) {
                 Err(e) if e.kind() == ErrorKind::NotFound => continue,
                 lock => lock?,
@@ -156,7 +156,7 @@ impl Staging {
             drop(held);
             match lock.try_lock() {
                 Err(TryLockError::WouldBlock) => continue,
-                // a file system without locks: nobody removes the folder either
+                // a file system without locks: other runs do not remove the folder either
                 Ok(()) | Err(TryLockError::Error(_)) => {}
             }
             if folder.join(LOCK).exists() {
@@ -165,9 +165,9 @@ impl Staging {
         }
     }
 
-    /// The file that will replace `end`.
+    /// Writes file number `i`, which will replace `end`.
     fn write(&self, i: usize, bytes: &[u8], end: &Path) -> Result<()> {
-        // no file comes into a folder that an interrupt removes
+        // the guard keeps an interrupt from removing the folder during the write
         let held = staging();
         let mut file = File::create_new(self.folder.join(i.to_string()))?;
         drop(held);
@@ -182,20 +182,20 @@ impl Staging {
 impl Drop for Staging {
     fn drop(&mut self) {
         let mut held = staging();
-        // the next run removes what cannot be removed now
+        // the next run removes a folder that cannot be removed now
         let _ = fs::remove_dir_all(&self.folder);
         *held = None;
     }
 }
 
-/// What the names of the folders beside a destination begin with.
+/// Beginning of the names of the folders beside a destination.
 fn prefix(target: &Path) -> String {
     let name = target.file_name().unwrap_or_default().to_string_lossy();
     // names have at most 255 bytes
     format!(".obsdeg-{}-", name.chars().take(40).collect::<String>())
 }
 
-/// Removes folders whose names are `prefix`, two numbers, and which nobody holds.
+/// Removes folders named `prefix` and two numbers, unless a process holds their lock.
 fn remove_left_over(parent: &Path, prefix: &str) {
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
@@ -205,7 +205,7 @@ fn remove_left_over(parent: &Path, prefix: &str) {
             continue;
         }
         match File::open(entry.path().join(LOCK)) {
-            // what cannot be removed is left
+            // a folder that cannot be removed stays
             Ok(lock) if lock.try_lock().is_ok() => drop(fs::remove_dir_all(entry.path())),
             Err(e) if e.kind() == ErrorKind::NotFound => drop(fs::remove_dir(entry.path())),
             _ => {}
@@ -224,7 +224,7 @@ mod tests {
         out
     }
 
-    /// What a run leaves when it is killed.
+    /// A folder as a killed run leaves it, with the file of its lock.
     fn left(folder: &Path, name: &str) -> File {
         fs::create_dir(folder.join(name)).expect("made");
         fs::write(folder.join(name).join("0"), "half").expect("written");
@@ -240,7 +240,7 @@ mod tests {
         {
             left(folder.path(), name);
         }
-        // between the making of a folder and of its lock
+        // state between the creation of a folder and of its lock
         fs::create_dir(at(".obsdeg-a.json-13-0")).expect("made");
         let live = left(folder.path(), ".obsdeg-a.json-14-0");
         live.try_lock().expect("locked");

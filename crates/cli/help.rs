@@ -1,10 +1,10 @@
-//! `-h`: a line for every option, inputs first; `--help` has what options say at length, with their ranges
+//! `-h` prints a line for every option, inputs first; `--help` prints the full texts of options, with ranges
 //! and words.
 
 use clap::builder::StyledStr;
 use clap::{Arg, ArgAction, Command};
 
-/// Where an option stands.
+/// Heading of an option's help section; `None` is clap's default section.
 type Section = Option<&'static str>;
 
 const ASSUMED: Section = Some("Assumptions");
@@ -21,8 +21,8 @@ const SOLUTIONS: Section = Some("Solutions");
 const CONTROLS: Section = Some("Controls");
 const OUTPUT: Section = Some("Output");
 
-/// Options by their names in the program, with the section where they stand and their line; what a command
-/// says of one of its own comes first, as `calibrate.step`.
+/// One-line help texts: option by its name in the program, section, line. An entry for one command, as
+/// `calibrate.step`, has precedence.
 const LINES: &[(&str, Section, &str)] = &[
     ("calibrate.files", None, "Scheme or model file, then records of its runs; - is stdin"),
     ("allan.record", None, "Record of sensors at rest (CSV or Parquet); - is stdin"),
@@ -161,8 +161,8 @@ const LINES: &[(&str, Section, &str)] = &[
     ("kind", None, "What the schema describes, such as analysis, design or scheme"),
 ];
 
-/// A command with a line for every option, and with its examples and notes behind `--help`; `short`: of `-h`,
-/// where lines name the words themselves.
+/// `command` with a line for every option, and with its examples and notes in `--help` only. `short`: true
+/// for `-h`, whose lines name the words of an option themselves.
 pub(crate) fn in_lines(command: Command, short: bool) -> Command {
     let name = command.get_name().to_string();
     let notes = command.get_after_help().cloned();
@@ -183,7 +183,7 @@ pub(crate) fn in_lines(command: Command, short: bool) -> Command {
     }
 }
 
-/// The line of an option of a command, if it has one.
+/// One-line help of an option of a command, `None` if the table has none.
 fn line(command: &str, id: &str) -> Option<&'static (&'static str, Section, &'static str)> {
     let own = format!("{command}.{id}");
     LINES.iter().find(|(of, ..)| *of == own).or_else(|| LINES.iter().find(|(of, ..)| *of == id))
@@ -192,7 +192,7 @@ fn line(command: &str, id: &str) -> Option<&'static (&'static str, Section, &'st
 fn in_a_line(arg: Arg, command: &str, short: bool) -> Arg {
     let Some((_, section, text)) = line(command, arg.get_id().as_str()) else { return arg };
     let long: StyledStr = arg.get_long_help().or(arg.get_help()).cloned().unwrap_or_default();
-    // an option that every command has comes behind those of the section
+    // --seed, which every command has, comes last in its section
     let arg = if arg.get_id() == "seed" { arg.display_order(900) } else { arg };
     let has_words = arg.get_action().takes_values();
     arg.help(*text).long_help(long).help_heading(*section).hide_possible_values(short && has_words)

@@ -13,18 +13,18 @@ use crate::failure::Failure;
 /// Largest input file, in bytes.
 const MAX_FILE: u64 = 50_000_000;
 
-/// What a file is meant as.
+/// Kind of file that a text is meant to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     Scheme,
     Model,
     Calibration,
     Record,
 }
 
-impl Kind {
-    /// What the file at `path` is meant as, by how it begins; nothing is said of stdin, pipes and what cannot
-    /// be read.
+impl FileKind {
+    /// Kind of the file at `path`, judged by its beginning. `None` for stdin, pipes and files that cannot be
+    /// read.
     pub(crate) fn of(path: &Path) -> Option<Self> {
         const BEGINNING: u64 = 1 << 16;
         if is_stdin(path) || !path.metadata().is_ok_and(|m| m.is_file()) {
@@ -43,7 +43,7 @@ impl Kind {
         } else if text.trim_start().starts_with('{') || model_file::is_model(&text) {
             Some(Self::Model)
         } else {
-            // no line of TOML has commas without an equals sign before them, but within brackets
+            // outside brackets, no line of TOML has a comma without an equals sign before it
             header
                 .filter(|h| h.contains([',', ';', '\t']) && !h.contains(['=', '{', '}']))
                 .map(|_| Self::Record)
@@ -51,7 +51,7 @@ impl Kind {
     }
 }
 
-impl std::fmt::Display for Kind {
+impl std::fmt::Display for FileKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Scheme => "a scheme",
@@ -67,8 +67,8 @@ pub(crate) fn is_stdin(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// The text of a file, or of stdin (`-`); `what` it is stands in the errors. Pipes and devices are read too
-/// (`/dev/stdin`, `<(command)`), up to the same limit; a pipe that nobody writes to is refused.
+/// Text of a file, or of stdin (`-`). `what` names the kind of file in errors. Pipes and devices are read too
+/// (`/dev/stdin`, `<(command)`), up to the same limit. A pipe that nobody writes to is refused.
 pub(crate) fn read(path: &Path, what: &str) -> Result<Source, Failure> {
     let stdin = is_stdin(path);
     let path = if stdin { Path::new("stdin") } else { path };
@@ -103,7 +103,7 @@ pub(crate) fn read(path: &Path, what: &str) -> Result<Source, Failure> {
     Ok(Source::new(path.display().to_string(), text))
 }
 
-/// A file that must be a scheme, or a model.
+/// Text of a file that must be a scheme, or must be a model.
 pub(crate) fn read_as(path: &Path, must_be: Expected) -> Result<Source, Failure> {
     let what = if must_be == Expected::Model { "model" } else { "scheme" };
     Ok(Source { must_be, ..read(path, what)? })
@@ -117,13 +117,13 @@ pub(crate) fn one_on_stdin<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Resu
     }
 }
 
-/// Files with schemes and models.
+/// Texts of files with schemes and models.
 pub(crate) fn read_all(paths: &[PathBuf]) -> Result<Vec<Source>, Failure> {
     one_on_stdin(paths.iter())?;
     paths.iter().map(|path| read(path, "scheme or model")).collect()
 }
 
-/// Opens without waiting for somebody to write into a pipe; reading waits for whoever has it open.
+/// Opens a file without waiting for a writer of a pipe; reads wait for the process that has the pipe open.
 #[cfg(unix)]
 pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
     use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -138,7 +138,7 @@ pub(crate) fn open(path: &Path) -> Io<std::fs::File> {
     std::fs::File::open(path)
 }
 
-/// A record that is a file, or stdin.
+/// Opens a record: a file, or stdin.
 pub(crate) fn open_record(path: &Path) -> Result<Record, Failure> {
     let wrong = |e: &dyn std::fmt::Display| Failure::input(e.to_string());
     if path == Path::new("-") {

@@ -1,5 +1,5 @@
-//! Ctrl-C, and the signals by which a system ends a program (SIGTERM, SIGHUP): they end it, or long work that
-//! has something to show.
+//! Ctrl-C, and the signals with which a system ends a program (SIGTERM, SIGHUP). They end the program, or
+//! long work that has a partial result.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,7 +8,7 @@ use crate::failure::{Failure, INTERRUPTED};
 use crate::files;
 
 /// From now on an interrupt ends the program at once, with the code that a shell gives a program ended by
-/// Ctrl-C. Files that are being put in place are all there first; otherwise there is none.
+/// Ctrl-C. Files that are being put in place are completed first; otherwise none is left.
 pub(crate) fn ends() -> Result<(), Failure> {
     listen(|| {
         eprintln!("interrupted");
@@ -16,7 +16,8 @@ pub(crate) fn ends() -> Result<(), Failure> {
     })
 }
 
-/// True once the user has interrupted: work ends with what it has. A second interrupt ends the program.
+/// Flag that is true after an interrupt: work then ends with its partial result. A second interrupt ends the
+/// program.
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&interrupted);

@@ -1,4 +1,4 @@
-//! `obsdeg licences`: what others wrote of this build, under which licences, and the texts of these.
+//! `obsdeg licences`: third-party parts of this build, their licences, and the texts of these.
 
 use clap::Args;
 
@@ -26,10 +26,10 @@ pub(crate) struct Arguments {
     texts: bool,
 }
 
-/// The table of all builds.
+/// Compressed table of third-party packages of all builds.
 const TABLE: &[u8] = include_bytes!("../../licenses/third-party.z");
 
-/// The parts of this build, as the table names them.
+/// Parts of this build, as the table names them.
 const PARTS: &[&str] = match (cfg!(feature = "symbolica"), cfg!(feature = "pdf")) {
     (false, false) => &["program"],
     (true, false) => &["program", "symbolica"],

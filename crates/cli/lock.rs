@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// In the runtime folder of the user, else in the temporary folder under the user's number.
+/// Path of the lock file: in the runtime folder of the user, else in the temporary folder under the user's
+/// number.
 pub(crate) fn symbolic_lock_file() -> PathBuf {
     let runtime = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
     match runtime.filter(|folder| folder.is_absolute() && is_own(folder)) {

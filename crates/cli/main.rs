@@ -96,9 +96,9 @@ enum Command {
     Schema(schema::Arguments),
 }
 
-/// The command line as it is read: a negative number behind an option is its value, so that the option can
-/// say what it expects. Behind an option that takes one any exponent counts (`-1e-5`); behind others only
-/// what cannot be an option.
+/// The command line with its rules for negative numbers. After an option with a value, a negative number is
+/// that value, so that the error can name what is expected. After a numeric option any exponent counts
+/// (`-1e-5`); after others only text that cannot be an option.
 fn command() -> clap::Command {
     let takes =
         |a: &clap::Arg| !a.is_positional() && matches!(a.get_action(), ArgAction::Set | ArgAction::Append);
@@ -118,8 +118,8 @@ fn command() -> clap::Command {
     })
 }
 
-/// Where an argument belongs that a command does not know: the commands that have such an option, or where a
-/// file goes that no command is named for.
+/// Hint for an argument that a command does not know. It names the commands that have such an option, or the
+/// command for a file in place of a command.
 fn hint(e: &clap::Error) -> Option<String> {
     let is_file =
         |text: &str| std::path::Path::new(text).extension().is_some_and(|x| x == "toml" || x == "json");
@@ -147,8 +147,8 @@ fn hint(e: &clap::Error) -> Option<String> {
     None
 }
 
-/// The arguments, and which of them concern one kind of file; what is wrong with them is said, and nothing of
-/// theirs but text.
+/// The parsed arguments, and the options that concern one kind of file only. Errors are printed without
+/// control characters of the arguments.
 fn arguments() -> Result<(Cli, Given), ExitCode> {
     let command = command();
     let parsed = command.clone().try_get_matches().and_then(|matches| {
@@ -161,13 +161,13 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
             e.remove(ContextKind::SuggestedArg);
             e.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![hint.into()]));
         } else if e.kind() == ErrorKind::UnknownArgument {
-            // that it might be meant as a file whose name begins so
+            // drops clap's suggestion to pass the option as a file name
             e.remove(ContextKind::Suggested);
         }
         let message = e.render().to_string();
         let text = message.lines().all(|line| visible(line) == line);
         if !e.use_stderr() || text && (message.is_ascii() || !terminal::plain_messages()) {
-            // in colour, where there is any; nobody listens if that fails
+            // coloured where the terminal has colours; a failure to print has no reader
             let _ = e.print();
         } else {
             say(&message);
@@ -177,7 +177,7 @@ fn arguments() -> Result<(Cli, Given), ExitCode> {
 }
 
 fn run() -> Result<(), ExitCode> {
-    // started by the program itself, for symbolic jobs on stdin and stdout
+    // the program starts itself in this mode, for symbolic jobs on stdin and stdout
     if std::env::args_os().nth(1).is_some_and(|a| a == "symbolic-worker") {
         return symbolic_worker().map_err(|failure| failure.report());
     }
@@ -204,7 +204,7 @@ fn run() -> Result<(), ExitCode> {
 #[cfg(feature = "symbolica")]
 fn symbolic_worker() -> Result<(), Failure> {
     let input = std::io::BufReader::new(std::io::stdin());
-    // whoever started it has left, or the time is up: at once, in the middle of whatever is computed
+    // the parent has ended or the time is up: ends at once, in the middle of a computation
     #[allow(clippy::exit, reason = "nobody waits for the other thread")]
     let end = || std::process::exit(0);
     let served = obsdeg_symbolic::worker::serve(&lock::symbolic_lock_file(), input, std::io::stdout(), end);
@@ -217,7 +217,7 @@ fn symbolic_worker() -> Result<(), Failure> {
 }
 
 fn main() -> ExitCode {
-    // a panic is a defect of the program: its message is on stderr already
+    // a panic is a defect of the program; its message is already on stderr
     match std::panic::catch_unwind(run) {
         Ok(done) => done.err().unwrap_or(ExitCode::SUCCESS),
         Err(_) => ExitCode::from(failure::INTERNAL),

@@ -1,11 +1,11 @@
-//! The command that a report names.
+//! Command line that a report names as its origin.
 
-/// The command of this process without what says where its answer goes.
+/// Command line of this process without the options for the place of the answer.
 pub(crate) fn command() -> String {
     without_target(std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned()))
 }
 
-/// A command that gives the same answer.
+/// Command line that gives the same answer: `arguments` without the options for its place.
 fn without_target(arguments: impl Iterator<Item = String>) -> String {
     let mut out = String::from("obsdeg");
     let mut arguments = arguments;
@@ -23,7 +23,7 @@ fn without_target(arguments: impl Iterator<Item = String>) -> String {
     out
 }
 
-/// As a shell takes it for one argument.
+/// Argument quoted so that a shell reads it as one.
 fn quoted(a: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "_-./=,:@%+".contains(c);
     if !a.is_empty() && a.chars().all(plain) { a.into() } else { format!("'{}'", a.replace('\'', "'\\''")) }

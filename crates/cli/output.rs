@@ -1,4 +1,4 @@
-//! Where results go: to stdout, to a file or into a folder, whole or not at all.
+//! Writes results to stdout, a file or a folder, completely or not at all.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ const FORMATS: [Word<Format>; 5] = [
     ("latex", "tables for \\input (booktabs, longtable, amsmath)", Format::Latex),
 ];
 
-/// In which format and where results are written.
+/// Format and destination of results.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct Output {
@@ -43,7 +43,7 @@ pub(crate) struct Output {
     pub(crate) target: Target,
 }
 
-/// Where results are written.
+/// Destination of results.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct Target {
@@ -60,22 +60,23 @@ pub(crate) struct Target {
     pub(crate) quiet: bool,
 }
 
-/// Endings of files that something else writes: no folder is called so.
+/// Endings of files that other programs write; a destination with such an ending is no folder.
 const ELSEWHERE: [&str; 13] =
     ["html", "htm", "pdf", "xlsx", "xls", "ods", "parquet", "xml", "yaml", "yml", "svg", "png", "toml"];
 
-/// What a file's name ends in, in small letters.
+/// Ending of a file name, in small letters.
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|e| e.to_string_lossy().to_lowercase())
 }
 
-/// What the options say where there are figures and series too ([`Output::write_folder`]).
+/// Help of options for commands that also write figures and series ([`Output::write_folder`]).
 pub(crate) fn to_a_folder(arg: Arg) -> Arg {
     let arg = match arg.get_id().as_str() {
         "format" => arg.help("The format on stdout (default: table)"),
-        "output" => arg
-            .value_name("DIR")
-            .help("Write summary, series and figures to a folder; a name that ends in .json, .md, .csv or .tex: the answer alone"),
+        "output" => arg.value_name("DIR").help(
+            "Write summary, series and figures to a folder; a name that ends in .json, .md, .csv or .tex: \
+             the answer alone",
+        ),
         "force" => arg.help("Replace files in an existing folder"),
         "quiet" => arg,
         _ => return arg,
@@ -84,33 +85,33 @@ pub(crate) fn to_a_folder(arg: Arg) -> Arg {
 }
 
 impl Output {
-    /// The options that were given of how an answer is worded.
+    /// Options for the wording of an answer that were given.
     pub(crate) fn wording(&self) -> impl Iterator<Item = &'static str> {
         let given =
             [("--format", self.format.is_some()), ("--table", self.table.is_some()), ("--ascii", self.ascii)];
         given.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// True if the ending says that the answer alone goes to a file, where there may be a folder with figures
-    /// and series too.
+    /// True if the ending makes the destination a file with the answer alone. Only for commands that may also
+    /// write a folder with figures and series.
     fn is_file(&self) -> bool {
         let path = self.target.path().filter(|path| !path.is_dir());
         let files = ["json", "md", "csv", "tex", "txt"];
         path.and_then(ending).is_some_and(|e| files.contains(&e.as_str()) || ELSEWHERE.contains(&e.as_str()))
     }
 
-    /// Refuses early, before any work, a folder with something in it, or a file that is there.
+    /// Refuses, before any work, a folder that is not empty, or an existing file.
     pub(crate) fn check_folder(&self) -> Result<(), Failure> {
         if self.is_file() { self.check() } else { self.target.check_folder() }
     }
 
-    /// Refuses early, before any work, what cannot be written.
+    /// Refuses, before any work, a destination that cannot be written, and an unknown format.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         self.format()?;
         self.target.check()
     }
 
-    /// The format that is asked for, or that of the file's ending.
+    /// The requested format, or the format of the file's ending.
     fn format(&self) -> Result<Format, Failure> {
         let by_ending = match self.target.path().and_then(ending).as_deref() {
             Some("json") => Format::Json,
@@ -121,7 +122,8 @@ impl Output {
                 let pages = ["html", "htm", "pdf"].contains(&other);
                 let pages = if pages { " (pages are written by `obsdeg report`)" } else { "" };
                 return Err(Failure::input(format!(
-                    "no format for .{other} here; expected a file that ends in .json, .md, .csv, .tex or .txt (a table), or --format{pages}"
+                    "no format for .{other} here; expected a file that ends in .json, .md, .csv, .tex or \
+                     .txt (a table), or --format{pages}"
                 )));
             }
             _ if self.table.is_some() => Format::Csv,
@@ -136,7 +138,7 @@ impl Output {
         }
     }
 
-    /// A result as text.
+    /// Text of a result in a format.
     fn text(&self, result: &impl Answer, format: Format, layout: Layout) -> Result<String, Failure> {
         Ok(match format {
             Format::Csv => csv(result, self.table.as_deref())?,
@@ -151,7 +153,7 @@ impl Output {
         self.target.write(self.text(result, self.format()?, layout)?.as_bytes(), &[])
     }
 
-    /// Writes a result to stdout and, if there is a folder, its JSON and `more` into that.
+    /// Writes a result to stdout and, if a folder is given, its JSON and the files of `more` into the folder.
     pub(crate) fn write_folder<E>(
         &self,
         result: &impl Answer,
@@ -182,13 +184,12 @@ impl Output {
 }
 
 impl Target {
-    /// The file or folder; none is stdout.
+    /// Path of the file or folder; `None` is stdout.
     pub(crate) fn path(&self) -> Option<&Path> {
         self.output.as_deref().filter(|path| *path != Path::new("-"))
     }
 
-    /// Refuses early, before any work, what cannot be written to a file: one that exists, and what is no
-    /// file.
+    /// Refuses, before any work, an existing file (without `--force`) and a path that is no regular file.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(path) = self.path() else { return Ok(()) };
         files::destination(path).map_err(|e| cannot_write(path, &e))?;
@@ -198,7 +199,7 @@ impl Target {
         }
     }
 
-    /// Refuses early a folder with something in it.
+    /// Refuses, before any work, a folder that is not empty.
     pub(crate) fn check_folder(&self) -> Result<(), Failure> {
         if self.output.as_deref() == Some(Path::new("-")) {
             return Err(Failure::input(
@@ -208,7 +209,7 @@ impl Target {
         self.path().map_or(Ok(()), |folder| self.check_emptiness(folder))
     }
 
-    /// Refuses early a folder beside the file with something in it.
+    /// Refuses, before any work, a folder beside the file that is not empty.
     pub(crate) fn check_beside(&self, folder: &str) -> Result<(), Failure> {
         let beside = self.path().map(|path| files::folder(path).join(folder));
         beside.map_or(Ok(()), |folder| self.check_emptiness(&folder))
@@ -226,18 +227,19 @@ impl Target {
         Ok(())
     }
 
-    /// The file if it is there and is not to be replaced.
+    /// Path of the destination if it exists and may not be replaced.
     pub(crate) fn existing(&self) -> Option<&Path> {
         self.path().filter(|path| path.exists() && !self.force)
     }
 
-    /// Writes `text` to the file, in place of what is there.
+    /// Writes `text` to the file, over an existing one.
     pub(crate) fn replace(&self, text: &[u8]) -> Result<(), Failure> {
         let Some(path) = self.path() else { return print(text) };
         place(path, &[(path.to_path_buf(), text)])
     }
 
-    /// Writes `text` to the file or to stdout; beside a file what it refers to, which comes first.
+    /// Writes `text` to the file or to stdout. Beside a file, the files that the text refers to are written
+    /// first.
     pub(crate) fn write(&self, text: &[u8], beside: &[File]) -> Result<(), Failure> {
         let Some(path) = self.path() else { return print(text) };
         self.check()?;
@@ -250,7 +252,7 @@ fn cannot_write(path: &Path, e: &std::io::Error) -> Failure {
     Failure::input(format!("cannot write {}: {e}", path.display()))
 }
 
-/// Refuses what is there and is no folder.
+/// Refuses an existing path that is no folder.
 fn check_is_folder(path: &Path) -> Result<(), Failure> {
     match path.exists() && !path.is_dir() {
         true => Err(Failure::input(format!("{} is a file; expected a folder", path.display()))),
@@ -258,35 +260,35 @@ fn check_is_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Puts files into a folder, which is made where there is none; those that are there are replaced only when
-/// `force` says so.
+/// Puts files into a folder, which is created if missing. Existing files are replaced only if `force` is
+/// true.
 pub(crate) fn write_files(folder: &Path, files: &[File], force: bool) -> Result<(), Failure> {
     check_is_folder(folder)?;
     if let Some((path, _)) = below(folder, files).find(|(path, _)| path.exists() && !force) {
         return Err(Failure::input(format!("{} exists; --force replaces it", path.display())));
     }
-    // a home of one's own may have no manual yet
+    // the manual's folder may be missing in a new home folder
     std::fs::create_dir_all(folder).map_err(|e| cannot_write(folder, &e))?;
     place(folder, &below(folder, files).collect::<Vec<_>>())
 }
 
-/// Puts one file in place, over what is there.
+/// Puts one file in place, over an existing one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     files::destination(path).map_err(|e| cannot_write(path, &e))?;
     place(path, &[(path.to_path_buf(), bytes)])
 }
 
-/// Where files go below a folder.
+/// Paths and contents of files in a folder.
 fn below<'a>(folder: &'a Path, files: &'a [File]) -> impl Iterator<Item = (PathBuf, &'a [u8])> {
     files.iter().map(|file| (folder.join(&file.name), file.bytes.as_slice()))
 }
 
-/// Puts files in place; `target` is what the user named.
+/// Puts files in place; `target` is the path that the user named.
 fn place(target: &Path, files: &[(PathBuf, &[u8])]) -> Result<(), Failure> {
     files::place(target, files).map_err(|(path, e)| cannot_write(&path, &e))
 }
 
-/// Writes to stdout; a reader that has left is no error.
+/// Writes to stdout; a closed pipe is no error.
 pub(crate) fn print(text: &[u8]) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text).and_then(|()| stdout.flush()) {

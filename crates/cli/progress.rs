@@ -1,4 +1,4 @@
-//! A sign of life on stderr for what takes longer than a second.
+//! Spinner and progress bar on stderr for work that takes longer than a second.
 
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -8,17 +8,17 @@ use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use obsdeg_commands::Now;
 use obsdeg_report::visible;
 
-/// What a spinner goes through, in characters that every terminal has.
+/// Characters of the spinner, which every terminal has.
 const TURNS: &str = "|/-\\ ";
 
-/// Shows a spinner on a terminal until it is dropped, if that takes longer than a second.
+/// Shows a spinner on a terminal after one second, until it is dropped.
 pub(crate) struct Spinner {
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Spinner {
-    /// A spinner with a message; silent when `quiet`.
+    /// Starts a spinner with a message; shows nothing if `quiet`.
     pub(crate) fn start(message: &'static str, quiet: bool) -> Self {
         if quiet {
             return Self { stop: None, thread: None };
@@ -43,33 +43,33 @@ impl Drop for Spinner {
     fn drop(&mut self) {
         self.stop.take(); // the thread sees the channel close
         if let Some(thread) = self.thread.take() {
-            // a panic there has said so already
+            // the panic of the thread has printed its message
             let _ = thread.join();
         }
     }
 }
 
-/// A bar on a terminal, once the work has taken a second.
+/// Progress bar on a terminal, shown after one second of work.
 pub(crate) struct Bar {
     bar: ProgressBar,
     started: Instant,
     quiet: bool,
 }
 
-/// A bar of work of known length.
+/// Template of the bar for work of known length.
 const KNOWN: &str = "{msg} [{bar:40}] {pos}/{len}, {eta} left";
-/// Where nobody knows how much there is.
+/// Template for work of unknown length.
 const UNKNOWN: &str = "{spinner} {msg}: {human_pos}, {elapsed}";
 
 impl Bar {
-    /// A bar; silent when `quiet`.
+    /// Starts a bar; shows nothing if `quiet`.
     pub(crate) fn start(quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
         Self { bar, started: Instant::now(), quiet }
     }
 
-    /// How far the work is; of a search its rate and the best so far.
-    pub(crate) fn shows(&self, now: &Now) {
+    /// Shows how far the work is; for a search also its rate per second and the best criterion so far.
+    pub(crate) fn show(&self, now: &Now) {
         let mut what = visible(&now.what).into_owned();
         if let Some(examined) = now.examined {
             let rate = examined as f64 / self.started.elapsed().as_secs_f64().max(1e-3);
@@ -86,16 +86,16 @@ impl Bar {
         if let Some(total) = now.total {
             self.bar.set_length(total);
         }
-        self.at(now.done);
+        self.set_position(now.done);
     }
 
-    /// What is being done.
-    pub(crate) fn says(&self, what: &str) {
+    /// Shows the name of the current work.
+    pub(crate) fn set_message(&self, what: &str) {
         self.bar.set_message(visible(what).into_owned());
     }
 
-    /// So much is done.
-    fn at(&self, done: u64) {
+    /// Sets the position of the bar, and shows the bar after one second.
+    fn set_position(&self, done: u64) {
         if !self.quiet && self.bar.is_hidden() && self.started.elapsed() > Duration::from_secs(1) {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }

@@ -23,8 +23,9 @@ Examples:
   obsdeg report examples/two-compartment/model.toml -o review.md
   obsdeg report scheme.toml --calibration calibration -o review.html
 
-The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have their pictures in a \
-folder of their own beside it, review_figures for review.md. The same command writes the same bytes.
+The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have \
+their pictures in a folder of their own beside it, review_figures for review.md. The same command writes the \
+same bytes.
 
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -63,7 +64,7 @@ pub(crate) struct Arguments {
     engine: EngineArguments,
 }
 
-/// What shared options say here.
+/// Help of shared options for `report`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.required(true).help("The file to be written"),
@@ -94,13 +95,13 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let mut worker = a.engine.worker(a.target.quiet, Box::new(Vec::new))?;
     let bar = Bar::start(a.target.quiet);
     let going = |now| {
-        bar.shows(&now);
+        bar.show(&now);
         true
     };
     let mut host = Host { worker: worker.as_mut(), going: &going };
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     a.met.check(reviewed.requirements())?;
-    bar.says("writing");
+    bar.set_message("writing");
     let written = reviewed.files(&origin, format, &folder)?;
     drop(bar);
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
@@ -109,7 +110,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.met.decide(reviewed.requirements())
 }
 
-/// A calibration, and what it is called: its folder.
+/// Reads a calibration; its name is that of its folder.
 fn calibration(path: &Path) -> Result<CalibrationFile, Failure> {
     let file = if path.is_dir() { path.join("calibration.json") } else { path.to_path_buf() };
     let named = if path.is_dir() { Some(path) } else { path.parent() };
@@ -117,7 +118,7 @@ fn calibration(path: &Path) -> Result<CalibrationFile, Failure> {
     Ok(CalibrationFile { name, source: read(&file, "calibration")? })
 }
 
-/// The format that is asked for, or that of the file's ending.
+/// The requested format, or the format of the file's ending.
 fn format(asked: Option<ReviewFormat>, path: &Path) -> Result<ReviewFormat, Failure> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let by_ending = match ending.as_deref() {

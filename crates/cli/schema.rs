@@ -23,7 +23,7 @@ use crate::failure::Failure;
 use crate::output;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Kind {
+enum SchemaKind {
     /// The JSON of `obsdeg allan`
     Allan,
     /// The JSON of `obsdeg analyze`
@@ -73,43 +73,43 @@ enum Kind {
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// What the schema describes
-    kind: Kind,
+    kind: SchemaKind,
 }
 
 pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let mut schema = match a.kind {
-        Kind::Allan => written::<SensorNoiseReport>(),
-        Kind::Analysis => written::<SchemeAnalysis>(),
-        Kind::Certificate => written::<Certificate>(),
-        Kind::ModelCertificate => written::<ModelCertificate>(),
-        Kind::OptimumCertificate => written::<OptimumCertificate>(),
-        Kind::Audit => written::<Audit>(),
-        Kind::Simulation => written::<Simulation>(),
-        Kind::Crosscheck => written::<CrossCheck>(),
-        Kind::Calibration => written::<Calibration>(),
-        Kind::Comparison => written::<Comparison>(),
-        Kind::Design => written::<Design>(),
-        Kind::Part => written::<Part>(),
-        Kind::Walks => written::<Walks>(),
-        Kind::Sensors => written::<Sensors>(),
-        Kind::Next => written::<NextPositions>(),
-        Kind::Scheme => schema_for!(SchemeFile),
-        Kind::System => written::<SystemAnalysis>(),
-        Kind::SystemRun => written::<SystemRun>(),
-        Kind::SystemCalibration => written::<SystemCalibration>(),
-        Kind::SystemEvidence => written::<SystemEvidence>(),
-        Kind::Model => schema_for!(ModelFile),
+        SchemaKind::Allan => written::<SensorNoiseReport>(),
+        SchemaKind::Analysis => written::<SchemeAnalysis>(),
+        SchemaKind::Certificate => written::<Certificate>(),
+        SchemaKind::ModelCertificate => written::<ModelCertificate>(),
+        SchemaKind::OptimumCertificate => written::<OptimumCertificate>(),
+        SchemaKind::Audit => written::<Audit>(),
+        SchemaKind::Simulation => written::<Simulation>(),
+        SchemaKind::Crosscheck => written::<CrossCheck>(),
+        SchemaKind::Calibration => written::<Calibration>(),
+        SchemaKind::Comparison => written::<Comparison>(),
+        SchemaKind::Design => written::<Design>(),
+        SchemaKind::Part => written::<Part>(),
+        SchemaKind::Walks => written::<Walks>(),
+        SchemaKind::Sensors => written::<Sensors>(),
+        SchemaKind::Next => written::<NextPositions>(),
+        SchemaKind::Scheme => schema_for!(SchemeFile),
+        SchemaKind::System => written::<SystemAnalysis>(),
+        SchemaKind::SystemRun => written::<SystemRun>(),
+        SchemaKind::SystemCalibration => written::<SystemCalibration>(),
+        SchemaKind::SystemEvidence => written::<SystemEvidence>(),
+        SchemaKind::Model => schema_for!(ModelFile),
     };
     let name = a.kind.to_possible_value();
     let name = name.as_ref().map_or("", |v| v.get_name());
-    // layouts of which keys have changed since the first
+    // version 2: layouts whose keys have changed since version 1
     let version = if ["comparison", "design", "part", "simulation"].contains(&name) { 2 } else { 1 };
     schema.insert("$id".into(), format!("urn:obsdeg:{name}:{version}").into());
     let text = serde_json::to_string_pretty(&schema).map_err(|e| Failure::internal(e.to_string()))?;
     output::print((text + "\n").as_bytes())
 }
 
-/// The schema of what is written: what is left out there may be missing.
+/// Schema of written JSON: keys that the program may leave out are not required.
 fn written<T: JsonSchema>() -> Schema {
     SchemaSettings::default().for_serialize().into_generator().into_root_schema_for::<T>()
 }

@@ -15,10 +15,12 @@ Examples:
   obsdeg simulate scheme.toml --slew-rate 1 --carry inertial -o run
   obsdeg simulate examples/lotka-volterra/model.toml -o run
 
-What nothing states is that of the paper's run, which the answer says: psi(0) 0.1 deg each, D_F 11, 12, 13 deg/h, D_I D_O D_S 5 deg/h/g, \
-random drift 0.01 deg/h, noise 1e-5 g, steps of 10 s, 1000 s a position, 28.2 deg North. Requirements are judged by the predicted sigmas, with the random \
-drift and the priors that are stated; the run is an example, its sigmas stand beside them. With -o it writes summary.json, series.csv, series.parquet and, as SVG and PNG, two \
-figures per unknown (estimate, .error), all in one, and those of the paper; with a bench budget.csv too.
+What nothing states is that of the paper's run, which the answer says: psi(0) 0.1 deg each, D_F 11, 12, 13 \
+deg/h, D_I D_O D_S 5 deg/h/g, random drift 0.01 deg/h, noise 1e-5 g, steps of 10 s, 1000 s a position, 28.2 \
+deg North. Requirements are judged by the predicted sigmas, with the random drift and the priors that are \
+stated; the run is an example, its sigmas stand beside them. With -o it writes summary.json, series.csv, \
+series.parquet and, as SVG and PNG, two figures per unknown (estimate, .error), all in one, and those of the \
+paper; with a bench budget.csv too.
 
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 

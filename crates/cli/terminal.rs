@@ -1,17 +1,17 @@
-//! Terminals and pipes: width, colours, and characters that stdout and stderr take.
+//! Terminals and pipes: width, colours, and the character sets of stdout and stderr.
 
 use std::io::IsTerminal;
 
 use obsdeg_report::Layout;
 
-/// Columns of a table that does not go to a terminal.
+/// Layout of a table that does not go to a terminal: 120 columns, no colours.
 pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };
 
-/// Width, colours and characters of a table on stdout.
+/// Width, colours and character set of a table on stdout.
 pub(crate) fn layout(ascii: bool) -> Layout {
     let stdout = std::io::stdout();
     let terminal = stdout.is_terminal();
-    let ascii = ascii || plain(terminal, said);
+    let ascii = ascii || plain(terminal, variable);
     if !terminal {
         return Layout { ascii, ..PIPE };
     }
@@ -22,23 +22,24 @@ pub(crate) fn layout(ascii: bool) -> Layout {
     }
 }
 
-/// Value of an environment variable; none if it is empty.
-fn said(name: &str) -> Option<String> {
+/// Value of an environment variable; `None` if it is unset or empty.
+fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|v| !v.is_empty())
 }
 
-/// True if a stream takes nothing but ASCII. Without a locale that is the C locale, whose characters are
-/// those of ASCII: a terminal is believed to be of it, but what goes into pipes is read as files are, as
-/// UTF-8 (and Windows knows no such variables).
-fn plain(terminal: bool, said: impl Fn(&str) -> Option<String>) -> bool {
-    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&said);
+/// True if a stream takes ASCII only. Without a locale variable the locale is C, whose characters are ASCII.
+/// That is assumed of a terminal only: pipes are read as UTF-8, as files are, and Windows has no such
+/// variables.
+fn plain(terminal: bool, variable: impl Fn(&str) -> Option<String>) -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(&variable);
     let utf8 = locale.map(|l| ["utf-8", "utf8"].iter().any(|u| l.to_lowercase().contains(u)));
-    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && said("TERM").is_some_and(|t| t == "dumb")
+    !utf8.unwrap_or(!terminal || cfg!(windows)) || terminal && variable("TERM").is_some_and(|t| t == "dumb")
 }
 
-/// True if messages are ASCII: asked on the command line, which may be wrong otherwise, or by what stderr is.
+/// True if messages are ASCII: by `--ascii` (even on a command line that is otherwise wrong), or by the
+/// character set of stderr.
 pub(crate) fn plain_messages() -> bool {
-    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), said)
+    std::env::args_os().any(|a| a == "--ascii") || plain(std::io::stderr().is_terminal(), variable)
 }
 
 #[cfg(test)]
@@ -55,7 +56,7 @@ mod tests {
         for terminal in [true, false] {
             assert!(of(terminal, &[("LANG", "C")]) && of(terminal, &[("LC_CTYPE", "de_DE.ISO-8859-1")]));
             assert!(!of(terminal, &[("LANG", "C.UTF-8")]) && !of(terminal, &[("LANG", "en_US.utf8")]));
-            // the first of them wins
+            // the first variable that is set decides
             assert!(of(terminal, &[("LC_ALL", "POSIX"), ("LANG", "C.UTF-8")]));
             assert!(!of(terminal, &[("LC_CTYPE", "C.UTF-8"), ("LANG", "C")]));
         }

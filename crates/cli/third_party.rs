@@ -1,10 +1,10 @@
-//! What others wrote of a build: packages, their licences, and the texts of these, each once. The table is
-//! `licenses/third-party.z` (JSON, deflated), written from the graphs of all builds by
-//! `tests/it/licences.rs`, which reads this file too.
+//! Third-party packages of a build, their licences, and the texts of these, each once. The table is
+//! `licenses/third-party.z` (JSON, deflated). `tests/it/licences.rs` writes it from the dependency graphs of
+//! all builds and includes this file.
 
 use serde::{Deserialize, Serialize};
 
-/// Packages and texts of all builds.
+/// Packages and licence texts of all builds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ThirdParty {
     /// Packages by name and version.
@@ -13,7 +13,7 @@ pub(crate) struct ThirdParty {
     pub(crate) texts: Vec<String>,
 }
 
-/// A crate, font or script that some build holds.
+/// A crate, font or script in some build.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Package {
     pub(crate) name: String,
@@ -23,13 +23,14 @@ pub(crate) struct Package {
     pub(crate) licence: String,
     /// Address of the source.
     pub(crate) source: String,
-    /// Builds that hold it: program, symbolica (the program with that feature), pdf (likewise), wheel,
+    /// Builds that contain it: program, symbolica (the program with that feature), pdf (likewise), wheel,
     /// workbench.
     pub(crate) builds: Vec<String>,
-    /// Operating systems and architectures that it is limited to, as `linux-x86_64`; empty if it is not.
+    /// Operating systems and architectures of the package, as `linux-x86_64`; empty if it is in the builds of
+    /// all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) platforms: Vec<String>,
-    /// Indices of its texts.
+    /// Indices of its texts in `ThirdParty::texts`.
     pub(crate) texts: Vec<usize>,
 }
 
@@ -38,7 +39,7 @@ pub(crate) const PLATFORMS: [&str; 6] =
     ["linux-x86_64", "linux-aarch64", "macos-x86_64", "macos-aarch64", "windows-x86_64", "windows-aarch64"];
 
 impl ThirdParty {
-    /// The packages of a build, which is named by its parts, on a platform, and their texts alone.
+    /// Packages of a build on a platform, and their texts. `builds` names the parts of the build.
     pub(crate) fn of(&self, builds: &[&str], platform: &str) -> ThirdParty {
         let here = |p: &&Package| {
             p.builds.iter().any(|b| builds.contains(&b.as_str()))
@@ -61,7 +62,7 @@ impl ThirdParty {
         out
     }
 
-    /// A line for every package.
+    /// Table of the packages, one line each.
     pub(crate) fn list(&self) -> String {
         let width = |of: fn(&Package) -> &str| {
             self.packages.iter().map(|p| of(p).chars().count()).max().unwrap_or_default()
@@ -81,7 +82,7 @@ impl ThirdParty {
         out
     }
 
-    /// The texts, each below the packages that it belongs to; those of the packages so named, or all.
+    /// Licence texts, each below the packages it applies to. `names` selects packages; empty selects all.
     pub(crate) fn words(&self, names: &[String]) -> String {
         let mut out = String::new();
         for (index, text) in self.texts.iter().enumerate() {
@@ -98,7 +99,7 @@ impl ThirdParty {
     }
 }
 
-/// Lines of at most 80 characters, broken at spaces.
+/// Text broken at spaces into lines of at most 80 characters.
 fn wrapped(text: &str) -> String {
     let mut out = String::new();
     let mut length = 0;

@@ -20,9 +20,10 @@ Examples:
   obsdeg design --positions 4 --carry inertial --certificate best.json
   obsdeg verify best.json --blocks 3                     an optimum: three of its blocks, searched again
 
-It prints one sentence per unknown: what was verified, and how. Certificates of kind exact are checked in exact arithmetic, those of \
-kind modular modulo two primes that a hash of the certificate chooses. The chapter Certificates of the book specifies the file, so that \
-other checkers can be written; tools/verify_certificate.py is one.
+It prints one sentence per unknown: what was verified, and how. Certificates of kind exact are checked in \
+exact arithmetic, those of kind modular modulo two primes that a hash of the certificate chooses. The \
+chapter Certificates of the book specifies the file, so that other checkers can be written; \
+tools/verify_certificate.py is one.
 
 Exit codes: 0 accepted, 1 refused (the reason is printed), 2 bad input, 3 internal error, 130 interrupted.";
 

@@ -1,9 +1,9 @@
-//! Which unknowns of a system can be solved from its output, and how many derivatives does each need?
+//! Exact observable degrees: the unknowns that the output of a system determines, and the number of
+//! derivatives that each needs.
 //!
-//! The front door of obsdeg: a scheme or a model goes in, an answer comes out. An answer is plain data, the
-//! same that the program writes as JSON. What stands behind it (the crates `obsdeg-core`, `obsdeg-evidence`,
-//! `obsdeg-design`, `obsdeg-calibration`) may change its modules from version to version; the names here
-//! stay.
+//! Every function takes a scheme or a model and returns an answer. An answer is plain data, with the same
+//! content as the program's JSON. The crates behind it (`obsdeg-core`, `obsdeg-evidence`, `obsdeg-design`,
+//! `obsdeg-calibration`) may change their modules from version to version; the names here stay.
 //!
 //! | question | function | answer |
 //! | --- | --- | --- |
@@ -24,7 +24,8 @@
 //! let positions = [[0, 0, 0], [180, 0, 0]].map(|angles| angles.map(Angle::from_degrees));
 //! let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
 //! let degree = |name| answer.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
-//! assert_eq!((degree("psi_x"), degree("D_FX"), degree("D_FY"), degree("D_FZ")), (Some(0), Some(1), Some(2), None));
+//! assert_eq!((degree("psi_x"), degree("D_FX")), (Some(0), Some(1)));
+//! assert_eq!((degree("D_FY"), degree("D_FZ")), (Some(2), None));
 //! # Ok::<(), obsdeg::error::AnalysisError>(())
 //! ```
 //!
@@ -33,7 +34,9 @@
 //! ```
 //! use obsdeg::{ModelOptions, analyze_model, read_model};
 //!
-//! let model = read_model("name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }")?;
+//! let model = read_model(
+//!     "name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }",
+//! )?;
 //! let answer = analyze_model(&model, ModelOptions::default())?;
 //! assert_eq!(answer.quantities.iter().map(|q| q.degree).collect::<Vec<_>>(), [Some(0), Some(1)]);
 //! # Ok::<(), obsdeg::error::ModelError>(())
@@ -44,7 +47,9 @@
 //! ```
 //! use obsdeg::{Conditions, CrossCheckOptions, crosscheck, read_scheme, simulate};
 //!
-//! let scheme = read_scheme("carry = 'inertial'\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]")?;
+//! let scheme = read_scheme(
+//!     "carry = 'inertial'\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]",
+//! )?;
 //! let (run, _record) = simulate(&scheme, &Conditions::default(), 1)?;
 //! assert!(run.quantities.iter().filter(|e| e.name == "D_FX").all(|e| e.error.abs() < 4.0 * e.sigma));
 //!
@@ -58,7 +63,8 @@
 //! ```
 //! use obsdeg::{Conditions, DesignOptions, Scheme, design};
 //!
-//! let options = DesignOptions { positions: Some(3), required: vec!["D_F".into()], ..DesignOptions::default() };
+//! let required = vec!["D_F".into()];
+//! let options = DesignOptions { positions: Some(3), required, ..DesignOptions::default() };
 //! let found = design(&Scheme::default(), &Conditions::default(), &options, &|_| true)?;
 //! assert!(found.found.iter().all(|s| s.positions.len() == 3));
 //! # Ok::<(), obsdeg::error::DesignError>(())
@@ -75,7 +81,8 @@
 //! let positions = [[0, 0, 0], [180, 0, 0]].map(|angles| angles.map(Angle::from_degrees));
 //! let [w_n, w_u] = earth_rates(28.2);
 //! let m = platform_matrices(&Scheme::of_angles(positions), [w_n, w_u])?;
-//! let z = |component: usize, order: u32, i: usize| (&m.h * m.f.pow(order) * &m.s[i]).row(component).into_owned();
+//! let rows = |order: u32, i: usize| &m.h * m.f.pow(order) * &m.s[i];
+//! let z = |component: usize, order: u32, i: usize| rows(order, i).row(component).into_owned();
 //! let d_fx = 0.5 * (w_u * (z(0, 0, 0) + z(0, 0, 1)) - z(1, 1, 0) - z(1, 1, 1));
 //! for (name, entry) in m.unknowns.iter().zip(d_fx.iter()) {
 //!     assert!((entry - f64::from(u8::from(name == "D_FX"))).abs() < 1e-15, "{name}");
@@ -103,7 +110,7 @@ pub use obsdeg_evidence::compare::{Comparison, Entry as Compared, compare};
 pub use obsdeg_evidence::crosscheck::{CrossCheck, CrossCheckOptions, crosscheck};
 pub use obsdeg_evidence::simulation::{Conditions, Simulation, simulate};
 
-/// Errors of the functions of this crate; each names the place, what was expected and what was found.
+/// Errors of this crate's functions; each names the place, the expected and the found.
 pub mod error {
     pub use obsdeg_calibration::{CalibrationError, SystemCalibrationError as ModelCalibrationError};
     pub use obsdeg_core::analysis::AnalysisError;

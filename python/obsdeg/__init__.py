@@ -5,13 +5,16 @@
 >>> answer["D_FX"].degree
 1
 
-Ask with :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`, :func:`measure`, :func:`next_measurement`, :func:`calibrate` and :func:`report`,
-of a :class:`Scheme` or a :class:`Model`; :func:`allan` gives the noise of sensors at rest; :func:`load` reads models of other tools, :mod:`obsdeg.campaign` asks many times.
+Functions: :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`,
+    :func:`measure`, :func:`next_measurement`, :func:`calibrate` and :func:`report`
+take a :class:`Scheme` or a :class:`Model`. :func:`allan` estimates the noise of sensors at rest. :func:`load`
+reads models of other tools. :mod:`obsdeg.campaign` runs searches and sweeps of many tasks.
 
-Options are those of the command line in snake case; answers are the JSON of a command line without the symbolic engine, byte for byte,
-with attributes. Angles and latitudes are exact: an ``int`` and a ``str`` as they are, a ``float`` by its shortest text. What is computed
-(``0.1 + 0.2``) is rounded to nine decimals, which the answer says (``answer.rounded``). What is wrong with a request is a
-:class:`ProblemError`, a ``ValueError`` with ``message``, ``file``, ``line`` and ``column``.
+Options have the names of the command line in snake case. Answers have the attributes of the command line's
+JSON (without the symbolic engine), which they return byte for byte. Angles and latitudes are exact: an
+``int`` and a ``str`` as they are, a ``float`` by its shortest text. A computed number (``0.1 + 0.2``) is
+rounded to nine decimals, and the answer lists it (``answer.rounded``). An invalid request raises a
+:class:`ProblemError`, which is a ``ValueError`` with ``message``, ``file``, ``line`` and ``column``.
 """
 
 from __future__ import annotations
@@ -96,13 +99,13 @@ __all__ = [
     "simulate",
 ]
 
-#: Of the docstrings.
+#: Format of the docstrings.
 __docformat__ = "numpy"
 load.__module__ = paper.__module__ = __name__
 
 
 def __getattr__(name: str) -> Any:
-    # what is not always wanted is loaded when it is asked for
+    # optional modules are imported at their first use
     if name in ("campaign", "importers"):
         return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""What a task of a sweep asks: as it is written, and in canonical form, by which tasks are told apart."""
+"""Tasks of a sweep as text: as written by the user, and in canonical form for comparison by value."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from ._texts import _fraction, _of_fraction
 
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
 _NUMBER = re.compile(_DECIMAL.pattern + r"([eE][+-]?\d{1,4})?", re.ASCII)
-# a drift noise: its blanks do not count, none needs no unit
+# a drift noise: blanks are ignored, and zero needs no unit
 _WITH_UNIT = re.compile(rf"({_NUMBER.pattern})(deg/h|deg/sqrt\(h\))", re.ASCII)
 
 
 def plain(value: Any) -> Any:
-    """What is no JSON by itself, with all its digits.
+    """JSON value of an object that JSON does not know, with all digits.
 
     Raises:
-        TypeError: a value that JSON cannot hold.
+        TypeError: JSON cannot represent the value.
     """
     if isinstance(value, Text):
         return value.text
     fraction = None if isinstance(value, (int, float, Decimal)) else _fraction(value)
     if fraction is not None:
-        # by the rule of analyze
+        # rounded by the rule of analyze
         value = Decimal(_of_fraction(*fraction, 9))
     if isinstance(value, Decimal):
-        # a number, unless a double would lose digits
+        # a JSON number, unless a double would lose digits
         number = float(value)
         return number if value.is_finite() and Decimal(repr(number)) == value else str(value)
     if isinstance(value, os.PathLike):
@@ -51,20 +51,21 @@ def plain(value: Any) -> Any:
 
 
 def written(options: Any) -> str:
-    """Options as JSON, as they were given.
+    """Options as JSON text, as they were given.
 
     Raises:
-        TypeError: a value that JSON cannot hold.
+        TypeError: JSON cannot represent the value.
     """
     return json.dumps(options, sort_keys=True, default=plain)
 
 
 def checked(task: Any, number: int, reserved: Container[str]) -> dict[str, Any]:
-    """A task as a folder can hold it: options by name, tags by name, in text that can be written.
+    """The task as a dict, checked so that a folder can store it: names of options and tags, and text that can
+    be written.
 
     Raises:
-        ValueError: what is wrong with the task, by its number.
-        TypeError: a value that JSON cannot hold.
+        ValueError: the task is invalid; the message gives its number.
+        TypeError: JSON cannot represent the value.
     """
     if not isinstance(task, Mapping):
         raise ValueError(f"task number {number}: found {_short(task)}; expected a mapping of options by name")
@@ -86,12 +87,12 @@ def checked(task: Any, number: int, reserved: Container[str]) -> dict[str, Any]:
 
 
 def stand_in(task: Any, number: int) -> dict[str, Any]:
-    """What a folder holds in the place of a task that it cannot hold."""
+    """Record that a folder stores in place of a task that cannot be stored."""
     return {"number": number, "found": _short(task)}
 
 
 def _short(value: Any) -> str:
-    """A value in at most 200 ASCII characters."""
+    """Text of a value, at most 200 ASCII characters."""
     try:
         text = ascii(value)
     except (RecursionError, ValueError):
@@ -100,11 +101,11 @@ def _short(value: Any) -> str:
 
 
 def key(task: Mapping[str, Any]) -> bytes:
-    """A digest of a task by value: 0, ``0.0``, ``"0"``, ``Decimal("0.00")`` and numpy's 0 are one, and a
-    missing option is the same as None.
+    """Digest of a task by value: 0, ``0.0``, ``"0"``, ``Decimal("0.00")`` and numpy's 0 are equal, and a
+    missing option equals None.
 
     Raises:
-        TypeError: a value that JSON cannot hold.
+        TypeError: JSON cannot represent the value.
     """
     as_read = json.loads(written(task))
     by_value = {name: _canonical(name, value) for name, value in as_read.items() if value is not None}
@@ -112,7 +113,7 @@ def key(task: Mapping[str, Any]) -> bytes:
 
 
 def digest(asked: Any) -> str:
-    """A name for what is asked of this version of the program."""
+    """Name of a request to this version of the program."""
     return hashlib.sha256(written([obsdeg.__version__, asked]).encode()).hexdigest()[:16]
 
 
@@ -124,12 +125,12 @@ def _canonical(name: str, value: Any) -> Any:
             return _drift_noise(str(plain_option(value)))
         return _by_value(READ.get(name, plain_option)(value))
     except (TypeError, ValueError):
-        # what no option can be is an error when it is judged; until then it is what it was written as
+        # an invalid option keeps its text here; the error is raised when the task is judged
         return value
 
 
 def _by_value(value: Any) -> Any:
-    """The options of a request, with one text for each number; a text and a number stay different."""
+    """The options of a request with one text per number; a text and a number stay different."""
     if isinstance(value, (list, tuple)):
         return [_by_value(v) for v in value]
     if isinstance(value, bool):
@@ -142,7 +143,7 @@ def _by_value(value: Any) -> Any:
 
 
 def _part(text: str) -> str:
-    # angles are read without exponents, values of unknowns with
+    # angles have no exponents, values of unknowns may have them
     name, equals, value = text.rpartition("=")
     return name.strip() + equals + _number(value.strip(), _NUMBER if equals else _DECIMAL)
 

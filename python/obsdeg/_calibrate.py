@@ -71,48 +71,51 @@ def calibrate(
     progress: Progress | bool | None = None,
     **options: Any,
 ) -> Any:
-    """What a scheme or model determines, estimated from the records of its runs; ``passed`` is False where the model does not explain them.
+    """Estimates the unknowns that a scheme or model determines from the records of its runs; ``passed`` is
+    False if the model does not explain them.
 
-    Records are files, frames or arrays. Missing values (None, NaN, null, empty cells) are samples that are not there; the
-    answer counts them by column (``answer.records[0].empty_cells`` of a scheme).
+    Records are files, frames or arrays. Missing values (None, NaN, null, empty cells) are missing samples.
+    The answer counts them by column (``answer.records[0].empty_cells`` of a scheme).
 
     Parameters
     ----------
     what : Scheme, Model, positions or path
         The scheme or model.
     *records : path, text stream, frame or mapping
-        Files (CSV, Parquet), streams of CSV, frames of pandas, or of polars, pyarrow and others with the C interface of Arrow,
-        or columns by name. Columns are named as in files: ``t [s]``, ``position``, ``fx [g]``, ``fy [g]``, ``fz [g]``; of a model
-        ``t`` in its unit and its outputs. An index of pandas that is a time is the time. Dates count from 1970 in UTC.
+        Files (CSV, Parquet), streams of CSV, frames of pandas, polars, pyarrow and others with the C
+        interface of Arrow, or columns by name. Columns have the names of files: ``t [s]``, ``position``, ``fx
+        [g]``, ``fy [g]``, ``fz [g]``; for a model ``t`` in its unit and the outputs. A time index of pandas
+        is used as the time. Dates count from 1970 in UTC.
     t : array, optional
-        Times of a record of arrays, in s, of a model in its unit; or dates, or spans of time.
+        Times of a record of arrays: numbers in s (for a model in its unit), dates, or time spans.
     f : array of shape (n, 3), frame of three columns, or mapping, optional
         Specific force along X, Y, Z of the platform, in g.
     position : array, optional
-        Position of every sample: its name, or its number from 1; 0, None, NaN or an empty text where it is at none.
+        Position of every sample: its name, or its number from 1. Samples between positions have 0, None, NaN
+        or an empty text.
     outputs : mapping of arrays, optional
-        Outputs and known inputs of a model, by name, in their units.
+        Outputs and known inputs of a model by name, in their units.
     prior : Calibration, SystemCalibration or path
-        A calibration before, or the file that ``obsdeg calibrate -o`` wrote of it.
+        Previous calibration, or the file that ``obsdeg calibrate -o`` wrote for it.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far it is, and ends it where it returns False; True for a bar of tqdm.
+        Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options
-        Those of ``obsdeg calibrate``, in :class:`obsdeg.options.Calibrate`: ``noise`` [g], ``step`` [s], ``gravity`` [m/s^2],
-        ``gate``, ``starts``, ``profile``, ...
+        Options of ``obsdeg calibrate``, see :class:`obsdeg.options.Calibrate`: ``noise`` [g], ``step`` [s],
+        ``gravity`` [m/s^2], ``gate``, ``starts``, ``profile``, ...
 
     Returns
     -------
     Calibration or SystemCalibration
-        Of a scheme, or of a model.
+        Answer for a scheme, or for a model.
 
     Raises
     ------
     ProblemError
-        What is wrong with a record, with its line; the header is line 1 of a frame or of arrays.
+        Invalid record; the message gives the line. The header of a frame or of arrays is line 1.
     TypeError, ValueError
-        What is no record; arrays of different lengths.
+        Not a record, or arrays of different lengths.
 
     Examples
     --------
@@ -149,28 +152,31 @@ def calibrate(
 def allan(
     record: Record, *, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any
 ) -> SensorNoise:
-    """Noise of gyros and accelerometers at rest: Allan deviation, coefficients with sigma, and settings for simulations.
+    """Noise of gyros and accelerometers at rest: Allan deviation, coefficients with sigma, and settings for
+    simulations.
 
     Parameters
     ----------
     record : path, text stream, frame or mapping
-        A record as of :func:`calibrate`: its columns are named as in files (``t [s]``, ``wx [deg/h]``, ``fx [g]``).
+        A record as for :func:`calibrate`, with the column names of files (``t [s]``, ``wx [deg/h]``, ``fx
+        [g]``).
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far it is, and ends it where it returns False; True for a bar of tqdm.
+        Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options
-        Those of ``obsdeg allan``, in :class:`obsdeg.options.Allan`: ``column``, ``confidence``, ``gravity`` [m/s^2].
+        Options of ``obsdeg allan``, see :class:`obsdeg.options.Allan`: ``column``, ``confidence``,
+        ``gravity`` [m/s^2].
 
     Returns
     -------
     SensorNoise
-        ``passed`` is False where noise of these kinds does not explain the deviations.
+        Noise coefficients; ``passed`` is False if these kinds of noise do not explain the deviations.
 
     Raises
     ------
     ProblemError
-        What is wrong with the record, with its line.
+        Invalid record; the message gives the line.
 
     Examples
     --------
@@ -193,7 +199,7 @@ def allan(
 
 
 def _names(what: Judged) -> list[str]:
-    """The names of the positions of a scheme; none of what is not read yet."""
+    """Names of the positions of a scheme; empty for a file, which is not read here."""
     if not isinstance(what, Scheme):
         return [f"p{i}" for i in range(1, len(list(what)) + 1)] if are_positions(what) else []  # type: ignore[arg-type]
     return [str(table.get("name") or f"p{i}") for i, table in enumerate(what._read()["position"], 1)]

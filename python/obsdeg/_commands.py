@@ -52,7 +52,7 @@ def ask(
     rounded: list[Rounded],
     progress: Progress | bool | None = None,
 ) -> Any:
-    """What a command answers; where that may be of several kinds it says which."""
+    """Answer of a command, as one of the given classes."""
     asked = (command, request, None)
     if progress is None:
         return answered(kinds, _obsdeg.answer(command, request), asked, rounded)
@@ -65,7 +65,7 @@ def ask(
 
 
 def answered(kinds: tuple[type[Answer], ...], rust: _obsdeg.Answer, asked: Any, rounded: list[Rounded]) -> Any:
-    """An answer of the engine as one of the classes that it may be of."""
+    """Answer of the engine in its class; the layout decides between several classes."""
     kind = kinds[0]
     if len(kinds) > 1:
         kind = Judgements if rust.layout is None else KINDS[rust.layout]
@@ -73,7 +73,7 @@ def answered(kinds: tuple[type[Answer], ...], rust: _obsdeg.Answer, asked: Any, 
 
 
 def kinds_of(what: tuple[Any, ...], of_scheme: type[Answer], of_model: type[Answer]) -> tuple[type[Answer], ...]:
-    """The classes that an answer may be of: whether it is a scheme or a model is known of all but files."""
+    """Possible classes of an answer; both for a file, whose kind is not known yet."""
     if not what or isinstance(what[0], Scheme):
         return (of_scheme,)
     if isinstance(what[0], Model):
@@ -89,7 +89,7 @@ def _one(
     digits: int | None,
     progress: Progress | bool | None,
 ) -> Any:
-    """Asks a command that takes angles, schemes or models."""
+    """Calls a command that takes angles, schemes or models."""
     log: list[Rounded] = []
     if len(what) == 1 and "angles" not in options and are_positions(what[0]):
         asked = request({"angles": what[0], **options}, digits, log)
@@ -136,25 +136,27 @@ def analyze(*what: Judged, digits: int | None = DIGITS, progress: Progress | boo
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        What is judged: one, or several. None where ``angles`` are given.
+        Systems to judge, one or several; none if ``angles`` are given.
     digits : int or None
-        Decimals, 0 to 9, to which computed angles and latitudes are rounded; None rounds nothing. ``answer.rounded`` says what was.
+        Decimals, 0 to 9, to which computed angles and latitudes are rounded; None rounds nothing.
+        ``answer.rounded`` lists rounded values.
     progress : callable or bool
-        Called ten times a second; True for a bar of tqdm. Where it returns False the analysis ends with a ``KeyboardInterrupt``,
-        as it does where a key is pressed.
+        Called ten times a second; True shows a bar of tqdm. If it returns False, the analysis ends with a
+        ``KeyboardInterrupt``, as it does on Ctrl-C.
     **options
-        Those of ``obsdeg analyze``, in :class:`obsdeg.options.Analyze` with their units: ``carry``, ``latitude`` [deg], ``terms``,
-        ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``, ``frame``, ``formulas``, ``certificate``, ``seed``, ...
+        Options of ``obsdeg analyze``, see :class:`obsdeg.options.Analyze` for units: ``carry``, ``latitude``
+        [deg], ``terms``, ``axes``, ``combination``, ``path``, ``measured_azimuth``, ``order``, ``solutions``,
+        ``frame``, ``formulas``, ``certificate``, ``seed``, ...
 
     Returns
     -------
     Analysis, SystemAnalysis or Judgements
-        Of a scheme, of a model, or of several.
+        Answer for a scheme, for a model, or for several.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -195,24 +197,25 @@ def simulate(*what: Judged, digits: int | None = DIGITS, progress: Progress | bo
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        A scheme or model with numbers; none where ``angles`` are given.
+        Scheme or model with numbers; none if ``angles`` are given.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Called ten times a second; where it returns False the run ends with a ``KeyboardInterrupt``.
+        Called ten times a second; if it returns False, the run ends with a ``KeyboardInterrupt``.
     **options
-        Those of ``obsdeg simulate``, in :class:`obsdeg.options.Simulate` with their units: ``dwell`` and ``step`` [s], ``noise`` [g],
-        ``requirement``, ``value`` and ``prior`` [deg, deg/h, deg/h/g], ``truth``, ``filter``, ...
+        Options of ``obsdeg simulate``, see :class:`obsdeg.options.Simulate` for units: ``dwell`` and ``step``
+        [s], ``noise`` [g], ``requirement``, ``value`` and ``prior`` [deg, deg/h, deg/h/g], ``truth``,
+        ``filter``, ...
 
     Returns
     -------
     Simulation or SystemRun
-        Of a scheme, or of a model. ``run["D_FX"].sigma`` is in ``run["D_FX"].unit``.
+        Answer for a scheme, or for a model. ``run["D_FX"].sigma`` is in ``run["D_FX"].unit``.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -244,29 +247,29 @@ def crosscheck(
 
 @named(options.Crosscheck)
 def crosscheck(*what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Any) -> Any:
-    """The exact verdicts against a filter; ``passed`` is False where something disagrees.
+    """Checks the exact verdicts against a filter; ``passed`` is False if they disagree.
 
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        A scheme or model with numbers; none where ``angles`` are given.
+        Scheme or model with numbers; none if ``angles`` are given.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far it is, and ends it where it returns False; True for a bar of tqdm.
+        Called with the progress; ends the work if it returns False. True shows a bar of tqdm.
     **options
-        Those of ``obsdeg crosscheck``, in :class:`obsdeg.options.Crosscheck`: of :func:`simulate`, and ``runs``, ``filter_carry``,
-        ``filter_latitude`` [deg], ``filter_drop``.
+        Options of ``obsdeg crosscheck``, see :class:`obsdeg.options.Crosscheck`: options of :func:`simulate`,
+        and ``runs``, ``filter_carry``, ``filter_latitude`` [deg], ``filter_drop``.
 
     Returns
     -------
     CrossCheck or SystemEvidence
-        Of a scheme, or of a model.
+        Answer for a scheme, or for a model.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -284,23 +287,24 @@ def crosscheck(*what: Judged, digits: int | None = DIGITS, progress: Progress | 
 def compare(
     *what: Judged, digits: int | None = DIGITS, progress: Progress | bool | None = None, **options: Unpack[options.Compare]
 ) -> Comparison:
-    """Schemes side by side: degrees, and sigmas of the coefficients at the end of each.
+    """Compares schemes side by side: degrees, and sigmas of the coefficients at the end of each.
 
     Parameters
     ----------
     *what : positions, Scheme or path
-        Two schemes or more; positions are called ``scheme 1``, ``scheme 2``, ...
+        Two schemes or more; schemes given as positions are called ``scheme 1``, ``scheme 2``, ...
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Called ten times a second; where it returns False the comparison ends with a ``KeyboardInterrupt``.
+        Called ten times a second; if it returns False, the comparison ends with a ``KeyboardInterrupt``.
     **options
-        Those of ``obsdeg compare``, in :class:`obsdeg.options.Compare`: ``dwell`` and ``step`` [s], ``noise`` [g], ``requirement``, ...
+        Options of ``obsdeg compare``, see :class:`obsdeg.options.Compare`: ``dwell`` and ``step`` [s],
+        ``noise`` [g], ``requirement``, ...
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -370,41 +374,44 @@ def design(
     progress: Progress | bool | None = None,
     **options: Any,
 ) -> Any:
-    """Finds schemes: the best of so many positions, or with ``minimum=True`` the fewest that do.
+    """Finds the best schemes with a given number of positions, or the fewest sufficient positions with
+    ``minimum=True``.
 
     Parameters
     ----------
     positions : int
         Number of positions.
     candidates : str, positions, Scheme or path
-        ``"cardinal"``, ``"grid:45"`` [deg], ``"free"``, or a scheme whose positions are chosen from.
+        Candidate attitudes: ``"cardinal"``, ``"grid:45"`` [deg], ``"free"``, or a scheme with the positions
+        to choose from.
     part : (int, int)
-        (I, N): only part I of N of all sequences; the answer is a :class:`Part`.
+        (I, N): searches part I of N of all sequences; the answer is a :class:`Part`.
     conditions : Scheme or path
-        A scheme whose conditions hold; as many positions as it has are searched where no number is asked for.
+        Scheme whose conditions apply. Its number of positions is the default of ``positions``.
     resume : Part or str
-        That part as far as it came.
+        Unfinished part to continue.
     merge : iterable of Part or str
-        The parts, put together to the answer of the whole; they know the options of their search. What they list is
-        evaluated again; that they were searched as they state is believed, but for ``check=N`` blocks that are searched again.
+        Parts to merge into the answer of the whole search; they contain its options. Listed schemes are
+        evaluated again. The search itself is repeated only for ``check=N`` blocks.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far the search is; True for a bar of tqdm. Where it returns False, and on a keyboard interrupt, the search
-        ends with the best so far.
+        Called with the progress; True shows a bar of tqdm. If it returns False, and on Ctrl-C, the search
+        ends with the best scheme so far.
     **options
-        Those of ``obsdeg design``, in :class:`obsdeg.options.Design`: ``minimum``, ``observable``, ``criterion``, ``dwell`` [s],
-        ``max_time`` [s], ``gimbal`` [deg], ...
+        Options of ``obsdeg design``, see :class:`obsdeg.options.Design`: ``minimum``, ``observable``,
+        ``criterion``, ``dwell`` [s], ``max_time`` [s], ``gimbal`` [deg], ...
 
     Returns
     -------
     Design, Part or Walks
-        A :class:`Part` of one with ``part``; :class:`Walks` with ``minimum=True`` where torquer errors are among the ``terms``.
+        A :class:`Part` if ``part`` is given; :class:`Walks` with ``minimum=True`` if the ``terms`` include
+        torquer errors.
 
     Raises
     ------
     ProblemError
-        What is wrong; nothing was found.
+        Invalid request, or no scheme was found.
 
     Examples
     --------
@@ -444,31 +451,35 @@ def measure(
     progress: Progress | bool | None = None,
     **options: Unpack[options.Measure],
 ) -> Sensors:
-    """Which quantities to measure so that the unknowns of a model are observable: minimal sets, with proof.
+    """Finds the quantities to measure so that the unknowns of a model are observable: minimal sets, with
+    proof.
 
     Parameters
     ----------
     model : Model or path
         The model.
     candidates : str or iterable of str
-        What sets are chosen from: ``"states"``, ``"outputs"``, ``"inputs"``, ``"parameters"``, ``"candidates"`` (those of the file), names and
-        expressions such as ``"x1 + x3"`` [default: candidates if the file has any, else states].
+        Candidate quantities: ``"states"``, ``"outputs"``, ``"inputs"``, ``"parameters"``, ``"candidates"``
+        (those of the file), names and expressions such as ``"x1 + x3"`` [default: candidates if the file has
+        any, else states].
     own_outputs : bool
-        The outputs of the model stay, and candidates are added; by default candidates replace them.
+        True: candidates are added to the outputs of the model. By default they replace the outputs.
     progress : callable or bool
-        Called ten times a second; True for a bar of tqdm. Where it returns False the search ends.
+        Called ten times a second; True shows a bar of tqdm. If it returns False, the search ends.
     **options
-        In :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``, ``order``, ``work_limit``, ``seed``.
+        Options, see :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``,
+        ``order``, ``work_limit``, ``seed``.
 
     Returns
     -------
     Sensors
-        ``front`` from the cheapest set to that of the smallest degree, ``sets``, ``quantities``, and what proves them.
+        ``front`` from the cheapest set to the set with the smallest degree, ``sets``, ``quantities``, and
+        their proofs.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -481,7 +492,7 @@ def measure(
     ['b']
     """
     asked: dict[str, Any] = dict(options)
-    # an empty text: the candidates of the model
+    # an empty text means the candidates of the model
     asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(candidates or ())
     log: list[Rounded] = []
     given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
@@ -571,25 +582,26 @@ def report(
     progress: Progress | bool | None = None,
     **options: Unpack[options.Report],
 ) -> Report:
-    """The design review of schemes and models, as a page.
+    """Writes the design review of schemes and models as a page.
 
     Parameters
     ----------
     *what : positions, Scheme, Model or path
-        What is reviewed: one, or several.
+        Systems to review, one or several.
     calibrations : mapping
-        What was estimated from records, by the names that the page calls them.
+        Calibrations by their names on the page.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far it is; True for a bar of tqdm.
+        Called with the progress; True shows a bar of tqdm.
     **options
-        Those of ``obsdeg report``, in :class:`obsdeg.options.Report`: of :func:`simulate`, and ``runs``.
+        Options of ``obsdeg report``, see :class:`obsdeg.options.Report`: options of :func:`simulate`, and
+        ``runs``.
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------
@@ -606,7 +618,7 @@ def report(
 
 
 def paper(*, seed: int = 1) -> Audit:
-    """The equations and claims of the paper against the algebra.
+    """Checks the equations and claims of the paper against the algebra.
 
     Parameters
     ----------
@@ -624,19 +636,20 @@ def paper(*, seed: int = 1) -> Audit:
 
 
 def load(path: str | os.PathLike[str], **options: Any) -> Scheme | Model:
-    """A scheme or a model from a file, of this program or of others: TOML, JSON, SBML, PEtab, ``@ODEmodel``, STRIKE-GOLDD.
+    """Reads a scheme or a model from a file of this program or of others: TOML, JSON, SBML, PEtab,
+    ``@ODEmodel``, STRIKE-GOLDD.
 
     Parameters
     ----------
     path : path
         The file.
     **options
-        Those of the reader of its kind, such as ``outputs={"y": "A + B"}`` for SBML.
+        Options of the reader for its kind, such as ``outputs={"y": "A + B"}`` for SBML.
 
     Raises
     ------
     obsdeg.importers.ImportProblem
-        What cannot be imported, by construct and place.
+        Unsupported construct; the message gives construct and place.
 
     Examples
     --------

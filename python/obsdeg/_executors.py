@@ -1,5 +1,4 @@
-"""Executors of campaigns: number of workers, whether a cluster still answers, replacement of one that
-broke."""
+"""Executors of campaigns: number of workers, reachability of a cluster, replacement of a broken executor."""
 
 from __future__ import annotations
 
@@ -11,16 +10,16 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-#: Makes an executor; one that is broken, because a worker was killed, is replaced by another.
+#: Makes an executor; called again if it broke because a worker was killed.
 Executors = Callable[[], Executor]
 
-#: Seconds between two looks at a cluster from which nothing comes, and until it has to answer one.
+#: Seconds between two checks of a silent cluster, and limit of its answer time.
 PULSE = 5.0
 #: Name of the processes of :func:`processes`.
 WORKER = "obsdeg campaign worker"
-#: Exit code of such a process that was to begin a campaign itself.
+#: Exit code of a worker process that was about to start a campaign itself.
 UNGUARDED = 71
-#: Seconds for which the thread of a broken pool is waited for.
+#: Seconds to wait for the manager thread of a broken pool.
 BROKEN = 5.0
 GUARD = (
     "the script begins its campaign again in every worker, which imports it, so that no worker can start; "
@@ -29,10 +28,10 @@ GUARD = (
 
 
 def processes(workers: int | None = None) -> ProcessPoolExecutor:
-    """A pool of processes on this machine, by default as many as it has cores.
+    """Pool of processes on this machine, by default one per core.
 
-    They do not begin as copies of this process (``fork``), of which another thread may be half way through
-    something, and end when it ends, also where it is killed.
+    The processes are not copies of this process (``fork``), since another of its threads may hold a lock.
+    They end when this process ends, even if it is killed.
     """
     start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
     context = copy.copy(multiprocessing.get_context(start))
@@ -46,13 +45,13 @@ def processes(workers: int | None = None) -> ProcessPoolExecutor:
 
 
 def check_main() -> None:
-    """Refuses to begin a campaign in a process that is still importing the script that started it.
+    """Refuses to start a campaign in a process that is still importing the script of its parent.
 
-    A process of :func:`processes` ends in silence: its driver has the error, once (:func:`unguarded`).
+    A process of :func:`processes` exits silently: its driver reports the error, once (:func:`unguarded`).
 
     Raises:
-        RuntimeError: what the script lacks.
-        SystemExit: the same, in the server that newer versions of Python fork workers from.
+        RuntimeError: the script has no guard of its main part.
+        SystemExit: the same, in the server process from which newer versions of Python fork workers.
     """
     here = multiprocessing.current_process()
     if not getattr(here, "_inheriting", False):
@@ -63,17 +62,18 @@ def check_main() -> None:
 
 
 def unguarded(pool: Executor) -> str | None:
-    """Why no process of a broken pool can begin, if one ended in :func:`check_main`; None otherwise."""
+    """Reason why no process of a broken pool can start, if one ended in :func:`check_main`; None otherwise.
+    """
     processes = dict(getattr(pool, "_processes", None) or {}) if isinstance(pool, ProcessPoolExecutor) else {}
     manager = getattr(pool, "_executor_manager_thread", None)
     if manager is not None:
-        # it asks for exit codes too, and each can be read once
+        # the manager thread reads exit codes too, and each can be read only once
         manager.join(BROKEN)
     return GUARD if any(process.exitcode == UNGUARDED for process in processes.values()) else None
 
 
 def _end_with_parent() -> None:
-    """Ends a worker whose parent was killed; it would wait for ever for what comes after its last task."""
+    """Ends a worker whose parent was killed; it would wait for further tasks for ever."""
     parent = multiprocessing.parent_process()
 
     def watch() -> None:
@@ -85,12 +85,12 @@ def _end_with_parent() -> None:
 
 
 def workers_of(pool: Executor) -> int:
-    """Number of tasks that an executor works on at once; 32 where it does not say."""
+    """Number of tasks that an executor works on at once; 32 if it is not known."""
     client = _dask(pool)
     if client is not None:
         try:
             return sum(worker["nthreads"] for worker in _identity(client)["workers"].values())
-        except Exception:  # a scheduler that does not answer is noticed by `unreachable`
+        except Exception:  # `unreachable` reports a scheduler that does not answer
             return 1
     counted = getattr(pool, "workers", None)
     if callable(counted):
@@ -100,7 +100,7 @@ def workers_of(pool: Executor) -> int:
 
 
 def unreachable(pool: Executor) -> str | None:
-    """Why nothing more can come from a cluster, or None. Asks the scheduler of Dask; waits at most
+    """Reason why a cluster can return nothing more, or None. Asks the scheduler of Dask and waits at most
     :data:`PULSE` seconds."""
     client = _dask(pool)
     if client is None:
@@ -113,7 +113,7 @@ def unreachable(pool: Executor) -> str | None:
 
 
 def _identity(client: Any) -> Any:
-    """What the scheduler of Dask says of itself and its workers, or an error after :data:`PULSE` seconds."""
+    """Description of the scheduler of Dask and its workers; an error after :data:`PULSE` seconds."""
     if client.status not in ("running", "connecting"):
         raise RuntimeError(f"the client of Dask is {client.status}")
     return client.sync(client.scheduler.identity, callback_timeout=PULSE)
@@ -125,40 +125,40 @@ def _dask(pool: Executor) -> Any:
 
 
 def close(pool: Executor, at_once: bool) -> None:
-    """Ends an executor; never raises.
+    """Closes an executor; never raises.
 
     Args:
-        at_once: processes of this machine that still work are killed: one that began while its pool broke
-            would be waited for without end when this process ends.
+        at_once: True kills working processes on this machine: this process would otherwise wait
+            for ever for one that started while its pool broke.
     """
     processes = dict(getattr(pool, "_processes", None) or {}) if isinstance(pool, ProcessPoolExecutor) else {}
     try:
         try:
             pool.shutdown(wait=False, cancel_futures=True)
         except TypeError:
-            # Dask's has no such option
+            # Dask has no such option
             pool.shutdown(wait=False)
     except (Exception, CancelledError):
-        # the executor of a lost cluster cannot even be closed; the loss is reported by who noticed it
+        # the executor of a lost cluster cannot be closed either; its loss is reported elsewhere
         pass
     for process in processes.values() if at_once else ():
         try:
             process.kill()
         except (OSError, ValueError):
-            # it has ended
+            # the process has ended
             continue
 
 
 def _call(fn: Callable[..., Any], args: Any, kwargs: Any) -> Any:
-    # what Ray takes must be a function; a partial one is none
+    # Ray accepts plain functions only, not partial ones
     return fn(*args, **kwargs)
 
 
 class RayExecutor(Executor):
-    """Ray as an executor.
+    """Executor on Ray.
 
     Args:
-        options: those of ``ray.init``, where Ray does not run yet; it then runs until the process ends.
+        options: options of ``ray.init`` if Ray does not run yet; it then runs until the process ends.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -166,11 +166,11 @@ class RayExecutor(Executor):
 
         if not ray.is_initialized():
             ray.init(**options)
-        # what a lost worker had in hand is tried again by the campaign, not there
+        # the campaign, not Ray, repeats the tasks of a lost worker
         self._remote = ray.remote(max_retries=0)(_call)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Hands a call to Ray."""
+        """Submits a call to Ray."""
         future: Future[Any] = self._remote.remote(fn, args, kwargs).future()
         return future
 

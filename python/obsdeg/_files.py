@@ -1,4 +1,4 @@
-"""Texts with names: what schemes and models are, and what files hold."""
+"""Texts with names: schemes and models, and the contents of files."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ._texts import Rounded, as_json
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-#: A file, or what is in one.
+#: Path of a file, or its content.
 Path_ = Union[str, "os.PathLike[str]"]
 
 
 def place(path: Path, text: bytes) -> None:
-    """Writes a file whole or not at all."""
+    """Writes a file completely or not at all."""
     import tempfile
 
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -37,12 +37,12 @@ def place(path: Path, text: bytes) -> None:
         raise
 
 
-#: Most characters of a text that is read: as many as bytes on the command line.
+#: Largest number of characters of a text, equal to the limit of bytes on the command line.
 TEXT = 50_000_000
 
 
 def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
-    """The text of a file, which may be a device or a pipe that has no end.
+    """Text of a file, which may be a device or an endless pipe.
 
     Raises:
         ValueError: more than :data:`TEXT` characters.
@@ -55,16 +55,16 @@ def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
 
 
 class Text:
-    """A text with a name: what :class:`Scheme` and :class:`Model` are. It does not change once it is made.
+    """A text with a name, the base of :class:`Scheme` and :class:`Model`. It is immutable.
 
     Attributes
     ----------
     text : str
-        What a file holds.
+        Content of a file.
     name : str
-        What errors and reports call it.
+        Name in errors and reports.
     rounded : tuple of Rounded
-        Computed angles that were rounded when it was made; see :class:`Scheme`.
+        Computed angles that were rounded at construction; see :class:`Scheme`.
     """
 
     kind = "any"
@@ -90,7 +90,7 @@ class Text:
 
     @classmethod
     def read(cls, path: Path_) -> Self:
-        """From a file (TOML; a model may be JSON)."""
+        """Reads a file (TOML; a model may be JSON)."""
         made: Self = cls._of(read_text(path), os.fspath(path))
         return made
 
@@ -101,11 +101,11 @@ class Text:
         return made
 
     def write(self, path: Path_) -> None:
-        """To a file."""
+        """Writes the text to a file."""
         Path(path).write_text(self.text, encoding="utf-8")
 
     def check(self) -> Self:
-        """Reads it as the engine does, without judging it.
+        """Reads the text as the engine does, without judging it.
 
         Returns
         -------
@@ -115,19 +115,19 @@ class Text:
         Raises
         ------
         ProblemError
-            What is wrong with it, with its line and column.
+            Invalid text; the message gives line and column.
         """
         try:
-            # reads the text, then finds that a record without a time is none
+            # the engine reads the text, and then rejects the record because it has no time
             _obsdeg.calibrate(as_json({"sources": [self._source()]}), [("check", b"x\n1\n")])
         except _obsdeg.ProblemError as problem:
-            # others are of records, or of schemes and models that have no numbers
+            # other messages concern records, or schemes and models without numbers
             if problem.file is not None or problem.message.startswith(self.name):
                 raise
         return self
 
     def _read(self) -> Mapping[str, Any]:
-        """The keys of the text; numbers with a point are decimals."""
+        """Keys of the text; numbers with a decimal point are decimals."""
         if self._data is None:
             object.__setattr__(self, "_data", MappingProxyType(_parsed(self.text, self.name)))
         data: Mapping[str, Any] = self._data
@@ -156,11 +156,11 @@ class Text:
 
 
 def _parsed(text: str, name: str) -> dict[str, Any]:
-    """The keys of a text in TOML or JSON.
+    """Keys of a text in TOML or JSON.
 
     Raises:
-        ValueError: it is neither.
-        ImportError: this Python reads no TOML.
+        ValueError: the text is neither.
+        ImportError: this Python has no reader of TOML.
     """
     try:
         if text.lstrip().startswith("{"):
@@ -172,12 +172,12 @@ def _parsed(text: str, name: str) -> dict[str, Any]:
 
 
 class Texted(Protocol):
-    """What an importer gives: a model's text, and what it is called."""
+    """Result of an importer: text of a model and its name."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the model."""
 
     @property
     def text(self) -> str:
-        """A scheme or model."""
+        """Text of the scheme or model."""

@@ -1,4 +1,4 @@
-"""Records as the engine reads them: from files, frames and arrays of any kind."""
+"""Records in the form of the engine, from files, frames and arrays of any kind."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-#: A record as the engine takes it: a name, and its bytes where it is no file.
+#: Record in the form of the engine: name, and content if it is not a file.
 Given = tuple[str, "bytes | None"]
 _EXPECTED = "a file (CSV, Parquet), a text stream, a frame of pandas, polars or pyarrow, or columns by name"
 
 
 def record(given: Any, place: int) -> Given:
-    """A record that is given as a whole.
+    """Record from one object: a file, a stream, a frame or columns.
 
     Raises:
-        TypeError: nothing that has columns.
+        TypeError: the object has no columns.
         ImportError: pyarrow, which reads frames of other libraries, is not installed.
     """
     name = f"record {place}"
@@ -39,19 +39,19 @@ def record(given: Any, place: int) -> Given:
 def arrays(
     t: Any, f: Any, position: Any, outputs: Mapping[str, Any] | None, names: Sequence[str] = (), time: str = "t [s]"
 ) -> Given | None:
-    """A record of arrays; None where there are none.
+    """Record from arrays; None if there are no arrays.
 
     Args:
-        t: times in s, of a model in its unit, or dates; None takes the index of `f` or of an output.
-        f: specific force along X, Y, Z of the platform in g, a row per sample.
+        t: times in s (for a model in its unit), or dates; None uses the index of `f` or of an output.
+        f: specific force along X, Y, Z of the platform in g, one row per sample.
         position: label of every sample, or its number from 1 in `names`.
         outputs: outputs and inputs of a model by name.
         names: names of the positions of the scheme.
         time: header of a time without dates.
 
     Raises:
-        TypeError: f and outputs at once, or no times.
-        ValueError: lengths that differ, or a force that has not three components.
+        TypeError: both f and outputs, or no times.
+        ValueError: different lengths, or a force without three components.
     """
     if f is None and outputs is None:
         if t is not None or position is not None:
@@ -77,7 +77,7 @@ def arrays(
 
 
 def _forces(f: Any) -> dict[str, list[Any]]:
-    """The columns of a force: three columns, or a row of three per sample."""
+    """Columns of a force given as three columns, or as rows of three."""
     if isinstance(f, Mapping):
         parts = [_values(f[axis]) for axis in _axes_of(list(f))]
     elif hasattr(f, "columns") or hasattr(f, "column_names"):
@@ -93,7 +93,7 @@ def _forces(f: Any) -> dict[str, list[Any]]:
 
 
 def _axes_of(names: list[Any]) -> list[Any]:
-    """The names of three columns along X, Y, Z: those that begin so, else as they stand."""
+    """Names of the three columns along X, Y, Z: by their first letters, otherwise in the given order."""
     if len(names) != 3:
         raise ValueError(f"f: found the columns {', '.join(map(str, names))}; expected three, along X, Y and Z in g")
     found = [[n for n in names if str(n).lower().startswith((f"f{axis}", axis))] for axis in "xyz"]
@@ -101,7 +101,7 @@ def _axes_of(names: list[Any]) -> list[Any]:
 
 
 def _label(position: Any, names: Sequence[str]) -> Any:
-    """The name of a position that is given by its number."""
+    """Name of a position that is given by its number."""
     if isinstance(position, (int, float)) and not isinstance(position, bool) and position == position:
         number = int(position)
         if number != position or number < 0 or (names and number > len(names)):
@@ -112,7 +112,7 @@ def _label(position: Any, names: Sequence[str]) -> Any:
 
 
 def _time_index(of: Any) -> Any:
-    """The index of pandas, where it is a time."""
+    """Index of a pandas object, if it is a time."""
     index = getattr(of, "index", None)
     if index is None or not hasattr(index, "dtype"):
         return None
@@ -121,7 +121,7 @@ def _time_index(of: Any) -> Any:
 
 
 def _of_pandas(frame: Any, with_time: bool = True) -> dict[str, Any]:
-    """Columns by name; an index that is a time is the column of the time where there is none."""
+    """Columns by name; a time index becomes the time column if there is none."""
     columns: dict[str, Any] = {}
     there = {str(name).split(" ")[0] for name in frame.columns}
     if with_time and "t" not in there and (index := _time_index(frame)) is not None:
@@ -143,10 +143,10 @@ def _of_arrow(frame: Any) -> dict[str, Any]:
 
 
 def _values(column: Any) -> list[Any]:
-    """A column as a list; what is missing is None, dates are those of Python (to us), spans of time are seconds."""
+    """Column as a list: None for missing values, Python dates (to us), seconds for time spans."""
     kind = str(getattr(column, "dtype", ""))
     if kind.startswith(("datetime64", "timedelta64")) and not hasattr(column, "isna"):
-        # of numpy, which makes numbers of finer units than Python has
+        # numpy makes numbers of time units that are finer than those of Python
         column = column.astype(f"{kind.partition('[')[0]}[us]")
     if hasattr(column, "isna") and hasattr(column, "astype"):
         found = [None if missing else value for value, missing in zip(column.tolist(), column.isna().tolist(), strict=True)]
@@ -183,7 +183,7 @@ def _are_dates(values: Sequence[Any]) -> bool:
 
 
 def _csv(columns: Mapping[str, Any], name: str) -> bytes:
-    """Columns as the text of a record: shortest texts of floats, nothing for what is missing, ISO 8601 for dates.
+    """Record as CSV text: shortest texts of floats, empty cells for missing values, ISO 8601 for dates.
 
     Raises:
         ValueError: columns of different lengths.
@@ -193,7 +193,7 @@ def _csv(columns: Mapping[str, Any], name: str) -> bytes:
     if len(set(lengths.values())) > 1:
         said = ", ".join(f"{length} of {key}" for key, length in lengths.items())
         raise ValueError(f"{name}: found {said}; expected as many of each")
-    # dates are in a column without a unit
+    # a column of dates has no unit
     head = [key.partition(" [")[0] if _are_dates(column) else key for key, column in values.items()]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -1,4 +1,4 @@
-"""Tasks of a sweep as rows: what a worker does with a chunk, and which tasks the files of a folder hold."""
+"""Tasks of a sweep as rows: work of a worker on a chunk, and tasks in the files of a folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ._files import place
 from ._work import INPUT
 from .options import Analyze, Simulate
 
-# what only numbers have: noise, dwells, requirements
+# options that only a simulation has: noise, dwells, requirements
 _MEASURED = Simulate.__optional_keys__ - Analyze.__optional_keys__
 _JUDGED = Analyze.__optional_keys__ - Simulate.__optional_keys__
 
@@ -26,7 +26,7 @@ WHAT = ("scheme", "model", "tags")
 
 
 def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What is found of a task, a row per unknown."""
+    """Results of a task, one row per unknown."""
     what: list[Any] = []
     for key_, kind in (("scheme", obsdeg.Scheme), ("model", obsdeg.Model)):
         if key_ in task:
@@ -35,7 +35,7 @@ def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
     if len(what) > 1:
         raise ValueError("found a scheme and a model; expected one of them")
     options = {name: value for name, value in task.items() if name not in WHAT}
-    # classes are of schemes
+    # only schemes have classes of omitted errors
     bare = {"solutions": False} if "model" in task else {"solutions": False, "omitted": False}
     exact = {**bare, **{k: v for k, v in options.items() if k not in _MEASURED}}
     verdicts = obsdeg.analyze(*what, **exact).to_dict()
@@ -53,13 +53,13 @@ def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What was asked and what is found of a task, a row per unknown."""
+    """Options and results of a task, one row per unknown."""
     asked = _options(task)
     return [{**asked, **row} for row in judged_rows(task)]
 
 
 def _options(task: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns that say what was asked."""
+    """Columns with the options of a task."""
     return {"task": name_of(task), **{name: str(value) for name, value in task.items() if name not in WHAT}}
 
 
@@ -70,7 +70,7 @@ def name_of(task: Mapping[str, Any]) -> str:
         return json.dumps({name: repr(value) for name, value in task.items()}, sort_keys=True)
 
 
-#: Columns of what is found, with their types in Parquet.
+#: Columns of results, with their types in Parquet.
 FOUND = {
     "rank": "int64",
     "name": "string",
@@ -83,22 +83,22 @@ FOUND = {
 }
 
 
-#: Names that are columns of every table, and so no options of a task.
+#: Names of the columns of every table, which are therefore no options of a task.
 COLUMNS = frozenset(("task", *FOUND))
 
 
 def row_of(task: Mapping[str, Any], error: BaseException) -> dict[str, Any]:
-    """The row of a task that has no answer."""
+    """Row of a task without an answer."""
     return {**_options(task), **dict.fromkeys(FOUND), "error": said(error)}
 
 
 def said(error: BaseException) -> str:
-    """An error as a row says it."""
+    """Text of an error in a row."""
     return str(error) if isinstance(error, INPUT) else f"{type(error).__name__}: {error}"
 
 
 def parquet(rows: list[dict[str, Any]], columns: list[str]) -> bytes:
-    """Rows as a Parquet file, with these columns first whether a row has them or not."""
+    """Rows as a Parquet file that begins with the given columns, even if no row has them."""
     import pyarrow
     import pyarrow.parquet
 
@@ -112,8 +112,8 @@ def parquet(rows: list[dict[str, Any]], columns: list[str]) -> bytes:
 
 @dataclass(frozen=True)
 class Judged:
-    """What came of a chunk: seconds, the name of its file, its bytes where the worker does not see the
-    folder, and what was wrong with tasks by their place in it."""
+    """Result of a chunk: seconds, name of its file, its bytes if the worker does not see the folder, and
+    errors with the index of their task."""
 
     seconds: float
     name: str | None
@@ -122,7 +122,7 @@ class Judged:
 
 
 def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str], record: bool) -> Judged:
-    """Judges the tasks of a chunk, and writes the file with their rows into a folder where one is named."""
+    """Judges the tasks of a chunk, and writes the file with their rows into a folder if one is given."""
     tasks, stage = chunk
     start = time.perf_counter()
     rows: list[dict[str, Any]] = []
@@ -132,10 +132,10 @@ def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str],
         try:
             found = _rows(task)
         except (MemoryError, OSError, KeyboardInterrupt, SystemExit):
-            # of this machine, not of the task: tried again
+            # an error of the machine, not of the task: the task is tried again
             raise
         except BaseException as e:
-            # the panic of the engine is no Exception, and cannot be sent
+            # a panic of the engine is no Exception, and cannot be pickled
             problem = e if isinstance(e, INPUT) else RuntimeError(f"{type(e).__name__}: {e}")
             wrong.append((i, problem))
             if not record:
@@ -153,7 +153,7 @@ def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str],
 
 
 def done(folder: Path) -> set[bytes]:
-    """The tasks of this version that the files of a folder hold, by value."""
+    """Tasks of this version that the files of a folder contain, by value."""
     import pyarrow
     import pyarrow.parquet
 

@@ -9,7 +9,7 @@ from typing import Any
 from ._files import Text
 from ._texts import exact, toml
 
-#: A name that is no function and no part of a number.
+#: Name that is neither a function nor part of a number.
 _NAME = re.compile(r"(?<![\w.])([^\W\d]\w*)(?!\w|\s*\()")
 _GROUPS = ("parameters", "known_inputs", "unknown_inputs", "constants", "definitions")
 
@@ -17,28 +17,30 @@ _GROUPS = ("parameters", "known_inputs", "unknown_inputs", "constants", "definit
 class Model(Text):
     """Any system x' = f(x, u, p, t), z = h(x, u, p, t): states, unknown constants and outputs.
 
-    It is checked when it is made of parts, and does not change: :meth:`replace` makes a changed copy.
+    A model made of parts is checked at construction. It is immutable; :meth:`replace` makes a changed copy.
 
     Parameters
     ----------
     text : str or system, optional
-        The text of a model file (TOML or JSON), which is read when it is used, or by :meth:`check`; or what
-        the importers give.
+        Text of a model file (TOML or JSON), which is read at its first use or by :meth:`check`; or the result
+        of an importer.
     name : str
         Name of the system in reports; of a text, what errors call it.
     states : mapping, or iterable of SymPy equations
-        The derivative of every state by name, as a formula (``{"x": "-k*x"}``), an expression of SymPy, or the keys of a
-        model file (``{"x": {"equation": "-k*x", "unit": "mg"}}``); or equations ``Eq(x(t).diff(t), -k*x(t))``.
+        The derivative of every state by name, as a formula (``{"x": "-k*x"}``), an expression of SymPy, or
+        the keys of a model file (``{"x": {"equation": "-k*x", "unit": "mg"}}``); or equations
+        ``Eq(x(t).diff(t), -k*x(t))``.
     parameters : iterable of names or symbols, or mapping of names to units
-        The unknown constants; all names without another meaning, if left out.
+        Unknown constants; by default all names without another meaning.
     outputs : mapping
-        What is measured, by name.
+        Measured quantities by name.
     starts : mapping, optional
-        Known values at the start by state, exact; ``"known"`` for one of any value. Others are unknown.
+        Exact known values at the start by state; ``"known"`` for a known but generic value. Other starts are
+        unknown.
     known_inputs, unknown_inputs : iterable of names, or mapping, optional
-        Functions of time. A mapping says their kind as a model file does: ``{"u": "constant"}``.
+        Functions of time. A mapping states their kinds as in a model file: ``{"u": "constant"}``.
     constants : mapping, optional
-        Known constants: exact values, or None for any value.
+        Known constants: exact values, or None for a generic value.
     definitions : mapping, optional
         Names of subexpressions.
     **keys
@@ -47,9 +49,9 @@ class Model(Text):
     Raises
     ------
     ProblemError
-        What is wrong, such as a name without a meaning.
+        Invalid model, such as a name without a meaning.
     ImportProblem
-        What is wrong with an expression of SymPy.
+        Unsupported expression of SymPy.
 
     Examples
     --------
@@ -105,23 +107,25 @@ class Model(Text):
 
     @classmethod
     def from_text(cls, text: str, *, name: str = "model.toml") -> Model:
-        """From the text of a model file (TOML or JSON), which is read when it is used, or by :meth:`check`."""
+        """Model from the text of a model file (TOML or JSON), which is read at its first use or by
+        :meth:`check`."""
         made: Model = cls._of(text, name)
         return made
 
     def replace(self, **changes: Any) -> Model:
-        """A copy with other keys of its file.
+        """Copy with changed keys of its file.
 
         Parameters
         ----------
         **changes
-            Keys of a model file: of the tables ``states``, ``outputs``, ``constants``, ``definitions`` and ``simulation`` only the
-            entries that are given change, and None takes one away; all other keys are replaced, by None taken away.
+            Keys of a model file. In the tables ``states``, ``outputs``, ``constants``, ``definitions`` and
+            ``simulation`` only the given entries change, and None removes an entry. Other keys are replaced,
+            and None removes a key.
 
         Raises
         ------
         ProblemError
-            What is wrong with the copy.
+            Invalid copy.
 
         Examples
         --------
@@ -143,7 +147,7 @@ class Model(Text):
 
     @property
     def states(self) -> dict[str, str]:
-        """The derivative of every state, as a formula."""
+        """Derivative of every state, as a formula."""
         return _formulas(self._read().get("states", {}), "equation")
 
     @property
@@ -178,7 +182,7 @@ def _is_sympy(value: Any) -> bool:
 
 
 def _has_sympy(parts: Mapping[str, Any]) -> bool:
-    """True if an expression or a name is of SymPy."""
+    """True if an expression or a name belongs to SymPy."""
     for part in parts.values():
         entries = [*part.keys(), *part.values()] if isinstance(part, Mapping) else part
         if entries is not None and not isinstance(entries, str) and any(map(_is_sympy, entries)):
@@ -203,7 +207,7 @@ def _of_sympy(name: str, parts: Mapping[str, Any], keys: Mapping[str, Any]) -> s
 
 
 def _written(name: str, parts: Mapping[str, Any], keys: Mapping[str, Any]) -> str:
-    """A model file of formulas as texts."""
+    """Text of a model file with all formulas as texts."""
     starts = dict(parts["starts"] or {})
     states = {}
     for state, rate in dict(parts["states"] or {}).items():
@@ -224,7 +228,7 @@ def _written(name: str, parts: Mapping[str, Any], keys: Mapping[str, Any]) -> st
 
 
 def _others(data: Mapping[str, Any]) -> list[str]:
-    """Names in formulas that are nothing else, in their order: the parameters."""
+    """Parameters: names in formulas without another meaning, in order of appearance."""
     formulas: list[str] = []
     for table in ("states", "definitions", "outputs", "constants"):
         for value in data.get(table, {}).values():
@@ -250,7 +254,7 @@ def _group(group: str, given: Any) -> Any:
 
 
 def _formula(value: Any) -> str:
-    """A formula as a text; of a number all its digits, of a fraction its parts."""
+    """Formula as text; a number with all its digits, a fraction as a quotient."""
     if isinstance(value, str):
         return value
     parts = (getattr(value, "numerator", None), getattr(value, "denominator", 1))
@@ -260,7 +264,7 @@ def _formula(value: Any) -> str:
 
 
 def _toml(data: Mapping[str, Any]) -> str:
-    """A model file; tables come last, each with a line per entry."""
+    """Text of a model file; tables come last, with one line per entry."""
     tables = {k: v for k, v in data.items() if isinstance(v, Mapping)}
     lists = {k: v for k, v in data.items() if isinstance(v, (list, tuple)) and v and all(isinstance(x, Mapping) for x in v)}
     head = [f"{_key(k)} = {_value(v)}" for k, v in data.items() if k not in tables and k not in lists]
@@ -282,7 +286,7 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """A value as TOML, with keys of tables that need quotes in quotes."""
+    """Value in TOML; keys of tables are quoted if necessary."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(str(k))} = {_value(v)}" for k, v in value.items()) + " }" if value else "{}"
     if isinstance(value, (list, tuple)):

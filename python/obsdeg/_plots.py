@@ -1,4 +1,4 @@
-"""Pictures of answers, by matplotlib, which is loaded when one is drawn."""
+"""Pictures of answers by matplotlib, which is imported when one is drawn."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
     Canvas = Figure | SubFigure
 
-#: Inches of a row with a name, and most names that are written.
+#: Height in inches of a row with a name, and largest number of names.
 _ROW, _NAMES = 0.24, 60
 
 
 def figure_of(width: float, height: float) -> Figure:
-    """An empty figure of pyplot, in inches.
+    """Empty figure of pyplot, with its size in inches.
 
     Raises:
         ImportError: matplotlib is not installed.
@@ -31,7 +31,7 @@ def figure_of(width: float, height: float) -> Figure:
 
 
 def picture(draw: Callable[[Canvas], list[Axes]], width: float, height: float) -> str | None:
-    """A picture in a page, as HTML; None where matplotlib is not installed."""
+    """Picture in a page as HTML; None if matplotlib is not installed."""
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
@@ -47,16 +47,16 @@ def picture(draw: Callable[[Canvas], list[Axes]], width: float, height: float) -
 
 
 def height_of(names: int) -> float:
-    """Height in inches of a panel with so many names."""
+    """Height in inches of a panel with `n` names."""
     return 1.0 + _ROW * max(4, min(names, _NAMES))
 
 
-#: A group of points beside names: label, values (None where there is none), marker, colour, True if it is filled.
+#: Group of points beside names: label, values (None if missing), marker, colour, True if filled.
 _Group = tuple[str, Sequence[Any], str, str, bool]
 
 
 def _dots(axes: Axes, labels: Sequence[str], groups: Sequence[_Group], x: str) -> None:
-    """Positive numbers by name, on a logarithmic axis; the first name is the uppermost."""
+    """Draws positive numbers by name on a logarithmic axis, with the first name on top."""
     places = range(len(labels))
     drawn = False
     for label, values, marker, colour, filled in groups:
@@ -85,7 +85,7 @@ def _panels(canvas: Canvas, count: int, **options: Any) -> list[Axes]:
 
 
 def simulation(of: _results.Simulation | _results.SystemRun, canvas: Canvas) -> list[Axes]:
-    """Sigmas at the start and at the end of a run, what was predicted and what is required."""
+    """Draws sigmas at the start and at the end of a run, predicted and required sigmas."""
     rows = of.to_dict()["quantities"]
     labels = [f"{q['name']} [{q['unit']}]" if q["unit"] else q["name"] for q in rows]
     groups: list[_Group] = [
@@ -100,7 +100,7 @@ def simulation(of: _results.Simulation | _results.SystemRun, canvas: Canvas) -> 
 
 
 def histories(of: _results.Simulation | _results.SystemRun, names: Sequence[str], canvas: Canvas) -> list[Axes]:
-    """Truth, estimate and sigma over time, a panel per unknown."""
+    """Draws truth, estimate and sigma over time, one panel per unknown."""
     series = of.series()
     units = {q["name"]: q["unit"] for q in of.to_dict()["quantities"]}
     time = next(c for c in series if c == "t_s" or c == "t" or c.startswith("t_"))
@@ -113,7 +113,7 @@ def histories(of: _results.Simulation | _results.SystemRun, names: Sequence[str]
             axes.fill_between(t, estimate - sigma, estimate + sigma, color="tab:blue", alpha=0.2, label=None if i else "one sigma")
             axes.plot(t, estimate, color="tab:blue", label=None if i else "estimate")
             axes.plot(t, run[columns["true"]], color="black", linestyle="--", label=None if i else "truth")
-        # the first samples, which know next to nothing, would set the scale
+        # the first samples have large errors and would set the scale
         settled = series.iloc[len(series) // 10 :]
         low = min((settled[columns["estimate"]] - settled[columns["sigma"]]).min(), series[columns["true"]].min())
         high = max((settled[columns["estimate"]] + settled[columns["sigma"]]).max(), series[columns["true"]].max())
@@ -129,7 +129,7 @@ def histories(of: _results.Simulation | _results.SystemRun, names: Sequence[str]
 
 
 def comparison(of: _results.Comparison, canvas: Canvas) -> list[Axes]:
-    """Sigmas of the coefficients at the end of each scheme."""
+    """Draws sigmas of the coefficients at the end of each scheme."""
     schemes = of.to_dict()["schemes"]
     names = list(dict.fromkeys(q["name"] for s in schemes for q in s["quantities"]))
     tables = [{q["name"]: q for q in s["quantities"]} for s in schemes]
@@ -146,7 +146,7 @@ def comparison(of: _results.Comparison, canvas: Canvas) -> list[Axes]:
 
 
 def design(of: _results.Design, canvas: Canvas) -> list[Axes]:
-    """The criterion of the schemes that were found, and its least value in a total time."""
+    """Draws the criterion of the found schemes, and its smallest value by total time."""
     answer = of.to_dict()
     found, front = answer["found"], answer["front"]
     search = answer["search"] or {}
@@ -159,7 +159,7 @@ def design(of: _results.Design, canvas: Canvas) -> list[Axes]:
         panels[0].plot([f["value"] for f in shown], range(len(shown)), "o", color="tab:blue")
         panels[0].set_yticks(range(len(shown)), labels, fontsize="x-small")
         panels[0].invert_yaxis()
-        # equal values differ by rounding, which is not to be seen
+        # equal values differ by rounding, which the axis must not show
         least, most = shown[0]["value"], shown[-1]["value"]
         if abs(most - least) < 1e-3 * abs(least):
             panels[0].set_xlim(sorted((0.9 * least, 1.1 * least)))
@@ -181,7 +181,7 @@ def design(of: _results.Design, canvas: Canvas) -> list[Axes]:
 
 
 def calibration(of: _results.Calibration, canvas: Canvas) -> list[Axes]:
-    """Residuals over time, and sigmas beside what was predicted and is required."""
+    """Draws residuals over time, and sigmas beside predicted and required ones."""
     answer = of.to_dict()
     panels = _panels(canvas, 2, height_ratios=[1, max(1.0, _ROW * len(answer["quantities"]) / 2.2)])
     for i, series in enumerate(answer["series"]):
@@ -194,7 +194,7 @@ def calibration(of: _results.Calibration, canvas: Canvas) -> list[Axes]:
 
 
 def system_calibration(of: _results.SystemCalibration, canvas: Canvas) -> list[Axes]:
-    """Residuals over time, and sigmas of the estimates."""
+    """Draws residuals over time, and sigmas of the estimates."""
     import io
 
     import pandas
@@ -220,7 +220,7 @@ def _residuals(axes: Axes, time: str) -> None:
 
 
 def _estimates(axes: Axes, rows: list[dict[str, Any]]) -> None:
-    """Sigmas beside the estimates in words."""
+    """Draws sigmas beside the estimates in words."""
 
     def label(q: dict[str, Any]) -> str:
         if q["estimate"] is None or q["sigma"] is None:
@@ -236,7 +236,7 @@ def _estimates(axes: Axes, rows: list[dict[str, Any]]) -> None:
 
 
 def crosscheck(of: _results.CrossCheck, canvas: Canvas) -> list[Axes]:
-    """Sigma against the dwell, by accuracy order."""
+    """Draws sigma against the dwell, by accuracy order."""
     axes = canvas.subplots()
     seen: set[Any] = set()
     for curve in of.to_dict()["slopes"]:
@@ -258,7 +258,7 @@ def crosscheck(of: _results.CrossCheck, canvas: Canvas) -> list[Axes]:
 
 
 def system_evidence(of: _results.SystemEvidence, canvas: Canvas) -> list[Axes]:
-    """Slopes of sigma against the horizon, predicted and measured."""
+    """Draws slopes of sigma against the horizon, predicted and measured."""
     rows = of.to_dict()["quantities"]
     axes = canvas.subplots()
     for key, marker, colour in (("predicted", "o", "0.4"), ("measured", "x", "tab:blue")):

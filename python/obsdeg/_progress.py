@@ -8,7 +8,7 @@ from ._results import Progress
 
 
 def heard(progress: Progress | bool | None) -> tuple[Any, Any]:
-    """What the engine calls, and what is to be closed at the end: ``True`` stands for a bar of tqdm."""
+    """Function that the engine calls, and the bar to close at the end; ``True`` selects a bar of tqdm."""
     if progress is not True:
         return (progress or None), None
     try:

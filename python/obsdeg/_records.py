@@ -13,9 +13,10 @@ Read = Callable[[Any], Any]
 
 
 class Record:
-    """An object of the JSON: its keys are attributes (with ``_`` behind those that are words of Python: ``pass_``) and items.
+    """Object of the JSON: its keys are attributes (with ``_`` appended to keywords of Python: ``pass_``) and
+    items.
 
-    What the JSON leaves out is None, or an empty list.
+    A key that the JSON omits is None, or an empty list.
     """
 
     __slots__ = ("_of",)
@@ -46,7 +47,7 @@ class Record:
         return len(self._of)
 
     def keys(self) -> Any:
-        """The names of what it holds; ``dict(record)`` has all."""
+        """Names of the keys; ``dict(record)`` has all of them."""
         return self._of.keys()
 
     def __dir__(self) -> list[str]:
@@ -62,7 +63,7 @@ class Record:
         return hash(json.dumps(self._of, sort_keys=True))
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain dicts and lists, a copy of its own."""
+        """Independent copy as plain dicts and lists."""
         return copy.deepcopy(self._of)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -76,14 +77,14 @@ class Record:
 
 
 class Shape:
-    """What the JSON of an answer holds, as types of attributes."""
+    """JSON of an answer, with types of its attributes."""
 
 
 def found(kind: type, of: Any, name: str, where: str) -> Any:
-    """An attribute.
+    """Attribute of an object.
 
     Raises:
-        AttributeError: there is none; the error names those that there are.
+        AttributeError: no such attribute; the message lists the available names.
     """
     known = fields(kind)
     key = _key(name)
@@ -100,10 +101,10 @@ def _key(name: str) -> str:
 
 
 def rows(of: Any, table: str) -> list[dict[str, Any]]:
-    """A list of an answer as rows: objects within its objects have dotted names, lists of words are joined by semicolons.
+    """List of an answer as rows: nested objects have dotted names, lists of words are joined by semicolons.
 
     Raises:
-        ValueError: there is no such list.
+        ValueError: no such list.
     """
     if not isinstance(of, dict) or not isinstance(of.get(table), list):
         lists = [key for key, value in of.items() if isinstance(value, list)] if isinstance(of, dict) else []
@@ -125,7 +126,7 @@ def _row(of: dict[str, Any], above: str) -> dict[str, Any]:
 
 
 def untyped(value: Any) -> Any:
-    """A value of no known type."""
+    """Value of an unknown type."""
     if isinstance(value, dict):
         return Record(value)
     return [untyped(v) for v in value] if isinstance(value, list) else value
@@ -135,7 +136,7 @@ _FIELDS: dict[type, dict[str, Read]] = {}
 
 
 def fields(kind: type) -> dict[str, Read]:
-    """How each attribute of a class is read; what is missing is read from None."""
+    """Reader of each attribute of a class; a missing value is read from None."""
     if kind not in _FIELDS:
         hints = {_key(name): hint for name, hint in get_type_hints(kind).items() if not name.startswith("_")}
         _FIELDS[kind] = {name: _reader(hint) for name, hint in hints.items()}
@@ -143,7 +144,7 @@ def fields(kind: type) -> dict[str, Read]:
 
 
 def _plain(value: Any) -> Any:
-    # what is inside an answer does not change
+    # nested values of an answer must not change
     return copy.deepcopy(value) if isinstance(value, (dict, list)) else value
 
 
@@ -169,7 +170,7 @@ def _reader(hint: Any) -> Read:
 
 
 def _chosen(records: list[type[Record]], other: Read) -> Read:
-    """That of several types which a value is of: its constants are those, and it has all keys."""
+    """The type among several that fits a value: its constants match, and it has all keys."""
 
     def read(value: Any) -> Any:
         if value is None:

@@ -1,4 +1,4 @@
-"""What is asked: schemes, models and options as the request that the engine reads."""
+"""Requests to the engine: schemes, models and options."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ._model import Model
 from ._scheme import Scheme
 from ._texts import DIGITS, Attitude, Rounded, as_json, assignments, attitudes, changed, decimal, exact
 
-#: A scheme, a model, or the path of a file with one.
+#: Scheme, model, or path of a file with one.
 Source = Union[Scheme, Model, str, "os.PathLike[str]", Texted]
-#: What is judged: a scheme, a model, the path of a file with one, or positions.
+#: System to judge: scheme, model, path of a file with one, or positions.
 Judged = Union[Source, Iterable[Attitude]]
 
 
@@ -23,11 +23,11 @@ def _texts(value: Any) -> list[str]:
 
 
 def plain(value: Any) -> Any:
-    """A truth value, a text, a whole number, a list or a number as JSON has it."""
+    """Boolean, text, whole number, list or number in JSON's form."""
     if isinstance(value, (bool, str, int)):
         return value
     if type(value).__name__ in ("bool_", "bool"):
-        # of numpy
+        # booleans of numpy
         return bool(value)
     if hasattr(value, "__index__"):
         return operator.index(value)
@@ -48,7 +48,7 @@ def _immune(value: Any) -> list[str]:
     return _texts(value) if names else assignments(value)
 
 
-#: How options are read that are not as JSON has them.
+#: Readers of options that differ from their form in JSON.
 READ: dict[str, Callable[[Any], Any]] = {
     "angles": attitudes,
     "latitude": exact,
@@ -73,18 +73,18 @@ READ: dict[str, Callable[[Any], Any]] = {
     "rate_random_walk": _per_axis,
     "bias_instability": _per_axis,
 }
-#: Options that decide verdicts and are read exactly, beside the angles.
+#: Options that decide verdicts and are read exactly, besides the angles.
 _EXACT = ("latitude", "filter_latitude")
 
 
 def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[Rounded] | None = None, **files: Any) -> str:
-    """A request as JSON.
+    """Request in JSON.
 
     Args:
-        options: options by name; None is one that was not given.
+        options: options by name; None means "not given".
         digits: decimals to which computed angles and latitudes are rounded; None keeps all.
-        log: takes what was rounded.
-        files: texts of files, and lists of them; what is empty is left out.
+        log: list to which rounded numbers are added.
+        files: texts of files, and lists of them; empty ones are omitted.
     """
     asked: dict[str, Any] = {}
     for name, value in options.items():
@@ -107,15 +107,15 @@ def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[R
 
 
 def are_positions(what: Any) -> bool:
-    """True if it is a list of positions, and not a scheme, a model or the path of a file."""
+    """True for a list of positions; false for a scheme, a model or the path of a file."""
     return not isinstance(what, (Text, str, os.PathLike)) and not hasattr(what, "text") and isinstance(what, Iterable)
 
 
 def source(what: Judged, digits: int | None = DIGITS, log: list[Rounded] | None = None, name: str = "scheme.toml") -> dict[str, str]:
-    """What a request has of a scheme, a model, a file, or positions, which are a scheme of this name.
+    """Entry of a request for a scheme, a model, a file, or positions, which become a scheme with this name.
 
     Raises:
-        TypeError: none of these.
+        TypeError: another type.
     """
     if isinstance(what, Text):
         if log is not None and what.rounded:
@@ -134,7 +134,7 @@ def source(what: Judged, digits: int | None = DIGITS, log: list[Rounded] | None 
 
 
 def sources(what: Iterable[Judged], digits: int | None, log: list[Rounded]) -> list[dict[str, str]]:
-    """What a request has of schemes, models and files in their order."""
+    """Entries of a request for schemes, models and files, in order."""
     several = list(what)
     if len(several) == 1:
         return [source(several[0], digits, log)]

@@ -1,4 +1,4 @@
-"""Answers: attributes as the JSON names them, tables as data frames, pages for notebooks."""
+"""Answers: attributes named as in the JSON, tables as data frames, pages for notebooks."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
     from ._scheme import Scheme
 
-#: Asks again for an answer whose Rust side is gone, after pickle: (command, request, records).
+#: Request that restores the engine's side of an answer after pickle: (command, request, records).
 _Asked = tuple[str, str, list[tuple[str, bytes | None]] | None]
 
 
 class Answer:
-    """What a command answers. Keys of its JSON are attributes; that is read when one is asked for."""
+    """Answer of a command. The keys of its JSON are attributes; the JSON is parsed at the first access."""
 
-    #: The list of the JSON that is the main table, and the way to it.
+    #: Path of the main table, a list of the JSON.
     _main = "quantities"
 
     def __init__(self, rust: _obsdeg.Answer | None, asked: _Asked | None, rounded: tuple[Rounded, ...] = ()) -> None:
-        # as attributes of answers are set, only faster
+        # same effect as setting attributes, but faster
         self.__dict__.update(_rust=rust, _asked=asked, _json=None, _data=None, _rounded=rounded)
 
     if TYPE_CHECKING:
@@ -43,10 +43,10 @@ class Answer:
 
     @staticmethod
     def from_json(text: str) -> Answer:
-        """An answer from its JSON, as :meth:`json`, a file of ``-o`` or ``--format json`` has it.
+        """Answer from its JSON, as :meth:`json`, a file of ``-o`` or ``--format json`` contains it.
 
-        It has attributes, names, iteration and its main table; what only the engine writes (texts, figures, pages) must be asked
-        for again.
+        It has attributes, names, iteration and its main table. Texts, figures and pages come from the engine
+        only and need a new for again.
 
         Parameters
         ----------
@@ -56,12 +56,12 @@ class Answer:
         Returns
         -------
         Answer
-            Of the class that its layout names, such as :class:`Analysis`.
+            Answer in the class of its layout, such as :class:`Analysis`.
 
         Raises
         ------
         ValueError
-            The text is no JSON, or has no layout of this version.
+            The text is not JSON, or has no layout of this version.
 
         Examples
         --------
@@ -92,11 +92,12 @@ class Answer:
 
     @property
     def rounded(self) -> tuple[Rounded, ...]:
-        """Computed angles and latitudes that were rounded before they were judged, with the numbers given and taken, in degrees."""
+        """Computed angles and latitudes that were rounded before the verdict, with the given and the used
+        numbers in degrees."""
         return self._rounded
 
     def _rounding(self) -> str:
-        """A sentence on what was rounded; nothing where nothing was."""
+        """Sentence on rounded numbers; empty if none was rounded."""
         if not self._rounded:
             return ""
         several = f" and {len(self._rounded) - 1} more" if len(self._rounded) > 1 else ""
@@ -109,40 +110,41 @@ class Answer:
 
     @property
     def passed(self) -> bool:
-        """Whether the command line would exit with 0: False where something disagrees or is not explained."""
+        """True if the command line would exit with 0: no check disagrees, and the data are explained."""
         if self._asked is None and self._rust is None and isinstance(self._dict().get("passed"), bool):
             return bool(self._dict()["passed"])
         return self._answer().passed
 
     def json(self) -> str:
-        """What ``obsdeg COMMAND --format json`` prints, byte for byte."""
+        """Output of ``obsdeg COMMAND --format json``, byte for byte."""
         if self._json is None:
             self._json = self._answer().written("json")
         return self._json
 
     def _dict(self) -> Any:
-        """The JSON as dicts and lists, which are not to be changed."""
+        """JSON as dicts and lists, which must not be changed."""
         if self._data is None:
             self._data = json.loads(self.json())
         return self._data
 
     def to_dict(self) -> Any:
-        """The JSON as plain dicts and lists, a copy of its own."""
+        """Independent copy of the JSON as plain dicts and lists."""
         return json.loads(self.json())
 
     def text(self, format: str = "table") -> str:
-        """As the command line prints it: table, json, markdown, csv or latex."""
+        """Output of the command line: table, json, markdown, csv or latex."""
         return self._answer().written(format)
 
     def csv(self, table: str | None = None) -> str:
-        """A list of the JSON as CSV, the main one where none is named."""
+        """List of the JSON as CSV, by default the main one."""
         return self._answer().table(table)
 
     def to_frame(self, table: str | None = None) -> pandas.DataFrame:
-        """A list of the JSON as a pandas DataFrame (which has the dataframe interchange protocol, for polars and others).
+        """List of the JSON as a pandas DataFrame (with the dataframe interchange protocol, for polars and
+        others).
 
         Raises:
-            ProblemError: there is no such list; the error names those that there are.
+            ProblemError: no such list; the message lists the available names.
         """
         import pandas
 
@@ -152,7 +154,8 @@ class Answer:
         return pandas.read_csv(io.StringIO(text)) if text.strip() else pandas.DataFrame()
 
     def files(self) -> dict[str, bytes]:
-        """What ``-o`` writes into a folder beside the JSON: figures (SVG, PNG), series, schemes that were found."""
+        """Files that ``-o`` writes into a folder beside the JSON: figures (SVG, PNG), series, found schemes.
+        """
         return self._answer().files()
 
     if not TYPE_CHECKING:
@@ -187,7 +190,7 @@ class Answer:
         return {kind: data for kind, data in bundle.items() if (not include or kind in include) and (not exclude or kind not in exclude)}
 
     def _figure(self) -> str | None:
-        """The picture that belongs below the answer in a notebook, as HTML or SVG."""
+        """Picture below the answer in a notebook, as HTML or SVG."""
         return None
 
     def __eq__(self, other: object) -> bool:
@@ -213,7 +216,7 @@ def _drawn(of: Answer, *names: str) -> str | None:
 
 
 class Drawn(Answer):
-    """An answer that has a picture."""
+    """An answer with a picture."""
 
     def plot(self, *, figure: Figure | SubFigure | None = None) -> list[Axes]:
         """Draws the answer with matplotlib.
@@ -221,12 +224,13 @@ class Drawn(Answer):
         Parameters
         ----------
         figure : matplotlib Figure or SubFigure, optional
-            Where it is drawn; a new figure of pyplot if left out.
+            Figure to draw in; by default a new figure of pyplot.
 
         Returns
         -------
         list of matplotlib Axes
-            The panels, for titles and lines of your own; ``axes[0].figure.savefig("answer.png")`` writes the picture.
+            The panels, to which titles and lines can be added; ``axes[0].figure.savefig("answer.png")``
+            writes the picture.
 
         Raises
         ------
@@ -255,7 +259,7 @@ class Drawn(Answer):
 
 
 class Run(Drawn):
-    """A run of a filter, whose estimates are drawn over time too."""
+    """A run of a filter, with estimates over time."""
 
     if TYPE_CHECKING:
 
@@ -263,8 +267,8 @@ class Run(Drawn):
         def names(self) -> list[str]: ...
 
     def series(self) -> pandas.DataFrame:
-        """Truth, estimate and sigma over time; a column each, with its unit. It is made once, which takes seconds: the engine
-        draws the figures of the run with it."""
+        """Truth, estimate and sigma over time, one column each, with units. The first call takes seconds,
+        since the engine draws the figures of the run too."""
         if "_series" not in self.__dict__:
             import pandas
 
@@ -273,15 +277,15 @@ class Run(Drawn):
         return found.copy()
 
     def plot(self, *names: str, figure: Figure | SubFigure | None = None) -> list[Axes]:
-        """Draws the run with matplotlib: sigmas of all unknowns, or the histories of some.
+        """Draws the run with matplotlib: sigmas of all unknowns, or histories of selected ones.
 
         Parameters
         ----------
         *names : str
-            Unknowns whose truth, estimate and sigma are drawn over time, a panel each; without names the sigmas of all unknowns
-            at the start and at the end, with what was predicted and what is required.
+            Unknowns whose truth, estimate and sigma are drawn over time, one panel each. Without names:
+            sigmas of all unknowns at the start and at the end, with predicted and required sigmas.
         figure : matplotlib Figure or SubFigure, optional
-            Where it is drawn; a new figure of pyplot if left out.
+            Figure to draw in; by default a new figure of pyplot.
 
         Returns
         -------
@@ -293,7 +297,7 @@ class Run(Drawn):
         ImportError
             matplotlib is not installed (``pip install 'obsdeg[plots]'``).
         KeyError
-            There is no such unknown.
+            No such unknown.
 
         Examples
         --------
@@ -317,7 +321,8 @@ _R = TypeVar("_R", bound=Record)
 
 
 class Named(Generic[_R]):
-    """An answer on unknowns: ``answer["D_FX"]`` is what it says of one, and iteration goes through all in their order."""
+    """An answer on unknowns: ``answer["D_FX"]`` is the entry of one, and iteration goes through all in order.
+    """
 
     if TYPE_CHECKING:
 
@@ -327,7 +332,7 @@ class Named(Generic[_R]):
 
     @property
     def names(self) -> list[str]:
-        """The names of the unknowns, in model order."""
+        """Names of the unknowns, in the order of the model."""
         return [q["name"] for q in self._dict()["quantities"]]
 
     def __getitem__(self, name: str) -> _R:
@@ -349,7 +354,8 @@ class Named(Generic[_R]):
 
 
 class Judgement(Answer):
-    """The observable degree of every unknown, of a scheme (:class:`Analysis`) or any system (:class:`SystemAnalysis`)."""
+    """Observable degree of every unknown of a scheme (:class:`Analysis`) or any system
+    (:class:`SystemAnalysis`)."""
 
     if TYPE_CHECKING:
         rank: int
@@ -362,12 +368,12 @@ class Judgement(Answer):
 
     @property
     def degrees(self) -> dict[str, int | None]:
-        """The observable degree by unknown; None where it is not determined."""
+        """Observable degree by unknown; None if it is not determined."""
         return {q["name"]: q["degree"] for q in self._dict()["quantities"]}
 
     @property
     def statuses(self) -> dict[str, shapes.Status]:
-        """The status by unknown."""
+        """Status by unknown."""
         return {q["name"]: q["status"] for q in self._dict()["quantities"]}
 
     def _summary(self) -> str:
@@ -376,7 +382,7 @@ class Judgement(Answer):
 
 
 class Analysis(Named[shapes.Quantity], Judgement, shapes.Analysis):
-    """The observable degree of every unknown of a scheme.
+    """Observable degree of every unknown of a scheme.
 
     Examples
     --------
@@ -393,11 +399,11 @@ class Analysis(Named[shapes.Quantity], Judgement, shapes.Analysis):
 
 
 class SystemAnalysis(Named[shapes.SystemQuantity], Judgement, shapes.SystemAnalysis):
-    """The observable degree of every unknown of a model."""
+    """Observable degree of every unknown of a model."""
 
 
 class Judgements(Answer):
-    """The answers on several schemes and models, in their order: a sequence of :class:`Judgement`."""
+    """Answers on several schemes and models, in order: a sequence of :class:`Judgement`."""
 
     def __len__(self) -> int:
         return len(self._dict())
@@ -408,7 +414,7 @@ class Judgements(Answer):
         if self._asked is not None:
             command, request, _ = self._asked
             asked = json.loads(request)
-            # asked again only for what the JSON of all does not hold
+            # a single request only for what the common JSON does not contain
             part = (command, json.dumps({**asked, "sources": [asked["sources"][i]]}), None)
         judgement = KINDS[one["answer"]["schema"]](None, part)
         if part is None:
@@ -421,7 +427,7 @@ class Judgements(Answer):
 
     @property
     def names(self) -> list[str]:
-        """The names of what was judged."""
+        """Names of the judged schemes and models."""
         return [one["file"] for one in self._dict()]
 
     def _summary(self) -> str:
@@ -429,7 +435,8 @@ class Judgements(Answer):
 
 
 class Comparison(Drawn, shapes.Comparison):
-    """Schemes side by side: ``comparison["a.toml"]`` or ``comparison[0]`` is what it says of one; iteration goes through all."""
+    """Schemes side by side: ``comparison["a.toml"]`` or ``comparison[0]`` is the entry of one; iteration goes
+    through all."""
 
     _main = "schemes"
 
@@ -455,7 +462,7 @@ class Comparison(Drawn, shapes.Comparison):
 
 
 class Design(Drawn, shapes.Design):
-    """Schemes that were found, the best first: ``design[0]`` is the first, and iteration goes through all."""
+    """Found schemes, the best first: ``design[0]`` is the best; iteration goes through all."""
 
     _main = "found"
 
@@ -472,10 +479,10 @@ class Design(Drawn, shapes.Design):
         return True
 
     def winner(self) -> Scheme:
-        """The best scheme that was found.
+        """Best scheme of the search.
 
         Raises:
-            LookupError: there is none.
+            LookupError: no scheme was found.
         """
         return _winner(self)
 
@@ -490,13 +497,14 @@ class Design(Drawn, shapes.Design):
 
 
 class Walks(Answer, shapes.Walks):
-    """The fewest positions where torquer errors make schemes walks (``design(minimum=True)`` with their terms)."""
+    """Fewest positions of slew sequences on which torquer errors act (``design(minimum=True)`` with their
+    terms)."""
 
     def winner(self) -> Scheme:
-        """The scheme that was found.
+        """Scheme of the slew sequence.
 
         Raises:
-            LookupError: there is none.
+            LookupError: no scheme was found.
         """
         return _winner(self)
 
@@ -513,7 +521,8 @@ def _winner(of: Answer) -> Scheme:
 class Sensors(Named[shapes.SensorUnknown], Answer, shapes.Sensors):
     """Sets of outputs of a model that make its unknowns observable, with proof.
 
-    ``found["k1"]`` is the cheapest set of an unknown, ``found.front`` the sets from the cheapest to that of the smallest degree.
+    ``found["k1"]`` is the cheapest set for an unknown. ``found.front`` lists the sets from the cheapest to
+    the set with the smallest degree.
     """
 
     _main = "front"
@@ -532,7 +541,7 @@ class NextPositions(Answer, shapes.NextPositions):
 
 
 class Part(Answer, shapes.Part):
-    """A part of a search, to be put together with the others by ``design(merge=...)``."""
+    """A part of a search, to be merged with the others by ``design(merge=...)``."""
 
     def _repr_html_(self) -> str:
         part = self._dict()
@@ -549,7 +558,7 @@ class CrossCheck(Named[shapes.QuantityEvidence], Drawn, shapes.CrossCheck):
     """The exact verdicts on a scheme against a filter."""
 
     if TYPE_CHECKING:
-        # of the answer and of its JSON, which are the same
+        # attribute of both the answer and its JSON, with equal values
         passed: bool
 
     def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
@@ -570,10 +579,10 @@ class SystemEvidence(Named[shapes.SystemQuantityEvidence], Drawn, shapes.SystemE
 
 
 class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
-    """What a scheme determines, estimated from records."""
+    """Estimates of the unknowns that a scheme determines, from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
-        """The covariance matrix of the estimates."""
+        """Covariance matrix of the estimates."""
         return self.to_frame("covariance")
 
     def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
@@ -588,10 +597,10 @@ class SensorNoise(Answer, shapes.SensorNoiseReport):
 
 
 class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalibration):
-    """What a model determines, estimated from records."""
+    """Estimates of the unknowns that a model determines, from records."""
 
     def covariance_frame(self) -> pandas.DataFrame:
-        """The covariance matrix of the estimates."""
+        """Covariance matrix of the estimates."""
         return self.to_frame("covariance")
 
     def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
@@ -602,10 +611,10 @@ class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalib
 
 
 class Audit(Answer, shapes.Audit):
-    """The paper against the algebra."""
+    """Equations and claims of the paper, checked against the algebra."""
 
 
-#: The answers by the schemas that they name.
+#: Classes of answers by the schemas that they name.
 KINDS: dict[str, type[Answer]] = {
     "obsdeg.analysis/1": Analysis,
     "obsdeg.system/1": SystemAnalysis,
@@ -627,11 +636,11 @@ KINDS: dict[str, type[Answer]] = {
 
 
 class Report(Answer):
-    """The design review as a page."""
+    """Design review as a page."""
 
     @property
     def html(self) -> str:
-        """The page."""
+        """HTML of the page."""
         return self.json()
 
     def to_dict(self) -> dict[str, str]:
@@ -639,10 +648,10 @@ class Report(Answer):
         return {"html": self.html}
 
     def write(self, path: Any) -> None:
-        """To a file that ends in ``.html``; one that is there is replaced.
+        """Writes the page to a file with the extension ``.html``; an existing file is replaced.
 
         Raises:
-            ValueError: another ending; PDF, Markdown and LaTeX are written by ``obsdeg report``.
+            ValueError: another extension; ``obsdeg report`` writes PDF, Markdown and LaTeX.
         """
         if os.path.splitext(os.fspath(path))[1].lower() not in (".html", ".htm"):
             raise ValueError(f"found {os.fspath(path)!r}; expected a file that ends in .html (`obsdeg report` writes .pdf, .md and .tex)")
@@ -659,5 +668,6 @@ class Report(Answer):
         return f'<iframe srcdoc="{escape(self.html, quote=True)}" width="100%" height="600"></iframe>'
 
 
-#: Hears how far an answer is: what is done, how much, of how much (if known), sequences examined, best so far; ends it by False.
+#: Called with the progress: current work, amount done, total amount (if known), number of examined sequences,
+#: best value so far. Returning False ends the work.
 Progress = Callable[[str, int, "int | None", "int | None", "float | None"], "bool | None"]

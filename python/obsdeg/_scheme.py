@@ -14,10 +14,10 @@ from ._texts import DIGITS, Attitude, Number, Rounded, as_json, attitudes, chang
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-#: What is carried between positions.
+#: Carry of psi between positions.
 Carry = Literal["platform", "inertial", "reset"]
 CARRIES = ("platform", "inertial", "reset")
-#: A position as a scheme has it: direction letters, or three angles in degrees, exact, or the names of generic ones.
+#: Position in a scheme: direction letters, three exact angles in degrees, or names of generic angles.
 Position = Union[str, "tuple[Decimal | str, Decimal | str, Decimal | str]"]
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)", re.ASCII)
@@ -26,34 +26,34 @@ _AXES = {"N": (1, 0, 0), "S": (-1, 0, 0), "U": (0, 1, 0), "D": (0, -1, 0), "E": 
 
 
 class Scheme(Text):
-    """A torquing scheme: positions, and how the platform gets from one to the next.
+    """A torquing scheme: positions, and the slews of the platform between them.
 
-    It is checked when it is made, and does not change: :meth:`replace` makes a changed copy.
+    It is checked at construction and immutable; :meth:`replace` makes a changed copy.
 
     Parameters
     ----------
     positions : iterable of positions
-        A position each: three Euler angles alpha, beta, gamma in degrees (`C_c^n = Mx My Mz`; a text names a
+        Positions: three Euler angles alpha, beta, gamma in degrees (`C_c^n = Mx My Mz`; a text names a
         generic angle), or the directions of X_p, Y_p, Z_p as letters (``"NUE"``).
     name : str
         Name of the scheme in reports.
     carry : {"platform", "inertial", "reset"}, optional
-        What of psi goes on between positions; platform where it is left out.
+        Part of psi that is carried between positions; by default "platform".
     latitude : number, optional
-        Latitude in degrees, -90 to 90; generic where it is left out.
+        Latitude in degrees, -90 to 90; generic by default.
     digits : int or None
-        Decimals, 0 to 9, to which computed angles and latitudes (float, `Decimal`, `Fraction`, rationals of SymPy) are
-        rounded; ``rounded`` says which were, and so does every answer on the scheme. With None nothing is rounded, and
-        more than nine decimals are an error. An ``int`` and a text are exact as they are.
+        Decimals, 0 to 9, to which computed angles and latitudes (float, `Decimal`, `Fraction`, rationals of
+        SymPy) are rounded. ``rounded`` and every answer on the scheme list the rounded ones. With None
+        nothing is rounded, and more than nine decimals are an error. An ``int`` and a text are always exact.
     angles : iterable of positions
-        Another name of `positions`.
+        Alternative name of `positions`.
     **keys
         Other keys of a scheme file, such as ``simulation={"slew_rate_deg_s": 2}`` or ``terms=["F", "I"]``.
 
     Raises
     ------
     ValueError
-        What is no position, carry or latitude; a :class:`ProblemError` for other keys.
+        Invalid position, carry or latitude; a :class:`ProblemError` for other keys.
     TypeError
         A value of another type.
 
@@ -105,27 +105,28 @@ class Scheme(Text):
 
     @classmethod
     def from_text(cls, text: str, *, name: str = "scheme.toml") -> Scheme:
-        """From the text of a scheme file (TOML), which is read when it is used, or by :meth:`check`."""
+        """Scheme from the text of a scheme file (TOML), which is read at its first use or by :meth:`check`.
+        """
         made: Scheme = cls._of(text, name)
         return made
 
     def replace(self, *, positions: Iterable[Attitude] | None = None, digits: int | None = DIGITS, **changes: Any) -> Self:
-        """A copy with other positions or other keys.
+        """Copy with other positions or other keys.
 
         Parameters
         ----------
         positions : iterable of positions, optional
-            All positions of the copy, as those of :class:`Scheme`; names, dwells and slews that the scheme
-            states for its own are those of the copy at the same place.
+            All positions of the copy, as for :class:`Scheme`. Names, dwells and slews of the scheme
+            apply to the position of the copy at the same place.
         digits : int or None
-            As that of :class:`Scheme`.
+            Same as for :class:`Scheme`.
         **changes
-            ``carry``, ``latitude`` [deg], ``name``, and other keys of a scheme file; None takes a key away.
+            ``carry``, ``latitude`` [deg], ``name``, and other keys of a scheme file; None removes a key.
 
         Raises
         ------
         ValueError
-            As :class:`Scheme`.
+            Same as for :class:`Scheme`.
 
         Examples
         --------
@@ -161,7 +162,8 @@ class Scheme(Text):
 
     @property
     def angles(self) -> tuple[tuple[float | str, float | str, float | str], ...]:
-        """Euler angles alpha, beta, gamma of every position in degrees; the name of a generic angle is a text."""
+        """Euler angles alpha, beta, gamma of every position in degrees; the name of a generic angle is a
+        text."""
         positions = self.positions
         of_letters = self._angles_of_letters() if any(isinstance(p, str) for p in positions) else {}
         found = [of_letters[p] if isinstance(p, str) else tuple(a if isinstance(a, str) else float(a) for a in p) for p in positions]
@@ -177,12 +179,12 @@ class Scheme(Text):
 
     @property
     def carry(self) -> Carry:
-        """What of psi goes on between positions."""
+        """Part of psi that is carried between positions."""
         return cast("Carry", self._read().get("carry", "platform"))
 
     @property
     def latitude(self) -> Decimal | None:
-        """Latitude in degrees; None where it is generic."""
+        """Latitude in degrees; None if generic."""
         found = self._read().get("latitude_deg")
         return None if found is None else Decimal(found)
 
@@ -218,7 +220,7 @@ def _decimals(text: str, what: str) -> None:
 
 
 def _table(text: str, place: int) -> dict[str, Any]:
-    """The keys of a position in a scheme file."""
+    """Keys of a position in a scheme file."""
     if "@" in text:
         raise ValueError(f"found {text!r}; expected an attitude (segments that turn are written in a scheme file)")
     parts = [part.strip() for part in text.split(",")]

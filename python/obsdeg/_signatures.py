@@ -10,9 +10,10 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def named(options: Any) -> Callable[[_F], _F]:
-    """Gives a function that takes ``**options`` a signature with the keys of a `TypedDict` as keyword parameters.
+    """Gives a function that takes ``**options`` a signature with the keys of a `TypedDict` as keyword
+    parameters.
 
-    Each has the default None, which asks for what the engine takes where an option is not given.
+    Each has the default None, which selects the engine's default.
     """
 
     def decorated(function: _F) -> _F:
@@ -29,7 +30,7 @@ def named(options: Any) -> Callable[[_F], _F]:
 
 
 def _annotations(options: Any) -> dict[str, Any]:
-    # those of the parents come first
+    # keys of the parents come first
     found: dict[str, Any] = {}
     for base in getattr(options, "__orig_bases__", ()):
         found.update(_annotations(base) if hasattr(base, "__total__") else {})

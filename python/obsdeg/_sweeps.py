@@ -1,4 +1,4 @@
-"""Sweeps as tidy tables: a row per unknown of a task, numbers as numbers, with tags of the user's own."""
+"""Sweeps as tidy tables: one row per unknown of a task, numbers as numbers, with the user's own tags."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ._work import INPUT
 if TYPE_CHECKING:
     import pandas
 
-#: Tasks that a thread or worker takes at a time.
+#: Number of tasks that a thread or worker takes at a time.
 _CHUNK = 20
 _NUMBERS = ("latitude", "filter_latitude")
 _WIDTH: dict[str, str] = {"rank": "Int64", "degree": "Int64", "sigma": "float64"}
 
 
 def threads() -> Executor:
-    """A thread for each core: the engine works beside the interpreter."""
+    """Executor with one thread per core: the engine releases the interpreter."""
     return ThreadPoolExecutor(os.cpu_count() or 1)
 
 
@@ -36,31 +36,35 @@ def table(
     errors: Literal["record", "raise"] = "record",
     heard: Callable[[int], None] | None = None,
 ) -> pandas.DataFrame:
-    """Judges many schemes and models: a tidy table with a row per unknown, in the order of the tasks.
+    """Judges many schemes and models. Returns a tidy table with one row per unknown, in the order of the
+    tasks.
 
     Parameters
     ----------
     tasks : iterable of mappings
-        As of :func:`sweep`: options of :func:`obsdeg.analyze` each (and of :func:`obsdeg.simulate`, where sigmas are
-        wanted), with ``angles``, ``scheme`` or ``model``, and ``tags``: names and values of your own, which are columns.
+        Same as for :func:`sweep`: options of :func:`obsdeg.analyze` (and of :func:`obsdeg.simulate` if sigmas
+        are needed), with ``angles``, ``scheme`` or ``model``, and ``tags``: names and values of additional
+        columns.
     executor : callable
-        Makes an executor of :mod:`concurrent.futures`; by default threads of this process, one a core.
+        Makes an executor of :mod:`concurrent.futures`; by default threads of this process, one per core.
     errors : {"record", "raise"}
-        A task that cannot be judged has one row with the message in the column ``error``, or ends the sweep.
+        "record": a task that cannot be judged gets one row with the message in the column ``error``. "raise":
+        it ends the sweep.
     heard : callable, optional
-        Told how many tasks are done.
+        Called with the number of finished tasks.
 
     Returns
     -------
     pandas.DataFrame
-        Columns: ``task`` (number of the task, from 0), the tags, the options that are numbers or texts, ``rank``, ``name``, ``status``,
-        ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``; ``error`` where there is one.
-        ``table.set_index([...]).to_xarray()`` makes a data set of xarray of it.
+        Columns: ``task`` (number of the task, from 0), the tags, the options that are numbers or texts,
+            ``rank``, ``name``, ``status``,
+        ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``; ``error`` for tasks with an
+        error. ``table.set_index([...]).to_xarray()`` converts it to a data set of xarray.
 
     Raises
     ------
     ProblemError
-        What is wrong with a task, with ``errors="raise"``.
+        Invalid task, with ``errors="raise"``.
 
     Examples
     --------
@@ -85,7 +89,7 @@ def table(
 
 
 def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
-    """The files of a :func:`sweep` as the tidy table that :func:`table` makes, whatever options each task has.
+    """Files of a :func:`sweep` as the tidy table of :func:`table`, even if tasks have different options.
 
     Parameters
     ----------
@@ -95,7 +99,7 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        As :func:`table`.
+        Same as for :func:`table`.
 
     Examples
     --------
@@ -128,7 +132,7 @@ def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, Any]
 
 
 def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, list[dict[str, Any]]]]:
-    """The rows of some tasks."""
+    """Rows of some tasks."""
     found = []
     for number, given in chunk:
         asked = _asked(number, stand_in(given, number))
@@ -145,7 +149,7 @@ def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, li
 
 
 def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns of a row that say what was asked."""
+    """Columns of a row that contain the options of the task."""
     options = {name: _value(name, value) for name, value in task.items() if name not in (*WHAT, "angles")}
     given = task.get("tags")
     given = given if isinstance(given, Mapping) else {}
@@ -154,7 +158,7 @@ def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _value(name: str, value: Any) -> Any:
-    """An option as a number or a text."""
+    """Option as a number or a text."""
     if hasattr(value, "item"):
         value = value.item()
     if value is None or isinstance(value, (bool, int, float)):

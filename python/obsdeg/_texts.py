@@ -1,4 +1,4 @@
-"""Numbers as exact decimals, schemes as texts: what goes from Python into a request."""
+"""Numbers as exact decimals and schemes as texts, for requests from Python."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from json.encoder import encode_basestring_ascii
 from numbers import Rational
 from typing import Any, NamedTuple, Union
 
-#: A number that is taken exactly: integers, fractions (also of SymPy) and floats by the rule of :func:`exact`; a text as it is written.
+#: Number that is taken exactly: integers, fractions (of SymPy too) and floats by the rule of :func:`exact`; a
+#: text as written.
 Number = Union[int, float, str, Decimal, Rational]
-#: Three Euler angles in degrees, three direction letters (``"NUE"``), or a text as on the command line (``"0,0,0@X_p:360"``).
+#: Three Euler angles in degrees, three direction letters (``"NUE"``), or a text as on the command line
+#: (``"0,0,0@X_p:360"``).
 Attitude = Union[str, Sequence[Number]]
-#: Decimals of an angle in degrees: the engine takes at most nine.
+#: Decimals of an angle in degrees: the engine accepts at most nine.
 DIGITS = 9
-#: Most positions of a scheme.
+#: Largest number of positions of a scheme.
 POSITIONS = 1000
 
 
 class Rounded(NamedTuple):
-    """A number that was rounded before it was judged."""
+    """A number that was rounded before the verdict."""
 
     name: str
     """Name of the number, such as ``alpha of position 2`` or ``latitude``."""
@@ -40,15 +42,15 @@ def _no_number(x: Any) -> TypeError:
 
 
 def exact(x: Number, digits: int | None = DIGITS) -> str:
-    """A number that decides verdicts, as a decimal text.
+    """Decimal text of a number that decides verdicts.
 
-    A number that is computed (float, `Decimal`, `Fraction`, rational of SymPy) is rounded to `digits` decimals, half to even;
-    an `int` and a text stay as they are. None keeps all digits of the shortest text of a float, which the engine then refuses
-    beyond nine.
+    A computed number (float, `Decimal`, `Fraction`, rational of SymPy) is rounded to `digits` decimals, half
+    to even; an `int` and a text stay as they are. None keeps all digits of the shortest text of a float,
+    which the engine then refuses beyond nine.
 
     Raises:
-        TypeError: not a number; a 32-bit or 16-bit float, whose shortest text is not what was written.
-        ValueError: not finite; a fraction without a decimal text where `digits` is None.
+        TypeError: not a number, or a 32-bit or 16-bit float, whose shortest text is not what was written.
+        ValueError: not finite, or a fraction without a decimal text if `digits` is None.
     """
     if type(x) is int:
         return str(x)
@@ -69,7 +71,7 @@ def exact(x: Number, digits: int | None = DIGITS) -> str:
         held = f"it holds {Decimal(float(x))}, which may not be what was written" if float(x) == float(x) else "it is no number"
         raise TypeError(f"found {x!r} of type {kind}: {held}, and numbers are exact here; expected a str, int, Decimal or 64-bit float")
     if getattr(x, "is_Float", False):
-        # of SymPy
+        # numbers of SymPy
         return exact(float(x), digits)
     try:
         return str(operator.index(x))  # type: ignore[arg-type]
@@ -121,7 +123,7 @@ def _of_fraction(p: int, q: int, digits: int | None) -> str:
 
 
 def changed(given: Number, taken: str) -> bool:
-    """True if the text that is judged is not the number that was given."""
+    """True if the judged text differs from the given number."""
     if isinstance(given, float):
         text = float.__repr__(given)
         return taken != text and Decimal(taken) != Decimal(text)
@@ -136,7 +138,7 @@ def changed(given: Number, taken: str) -> bool:
 
 
 def decimal(x: Number) -> str:
-    """A number as a decimal with all its digits; a number of numpy with 32 bits is that of its shortest text.
+    """Decimal with all digits of a number; a 32-bit number of numpy is taken by its shortest text.
 
     Raises:
         TypeError: not a number.
@@ -151,15 +153,15 @@ def decimal(x: Number) -> str:
 
 
 def attitude(angles: Attitude, digits: int | None = DIGITS, place: int = 1, log: list[Rounded] | None = None) -> str:
-    """An attitude as on the command line.
+    """Attitude in the notation of the command line.
 
     Args:
         digits: decimals to which computed angles are rounded.
         place: number of the position, from 1.
-        log: takes what was rounded.
+        log: list to which rounded numbers are added.
 
     Raises:
-        TypeError: no angles.
+        TypeError: not angles.
         ValueError: not three angles.
     """
     if isinstance(angles, str):
@@ -186,23 +188,23 @@ def attitude(angles: Attitude, digits: int | None = DIGITS, place: int = 1, log:
 
 
 def attitudes(positions: Iterable[Attitude], digits: int | None = DIGITS, log: list[Rounded] | None = None) -> list[str]:
-    """Attitudes of positions in their order; computed angles are rounded to `digits` decimals, and `log` takes which.
+    """Attitudes of positions, in order; computed angles are rounded to `digits` decimals and added to `log`.
 
     Raises:
-        TypeError: no list of positions.
+        TypeError: not a list of positions.
         ValueError: more positions than a scheme may have.
     """
     if isinstance(positions, (str, bytes, bytearray, set, frozenset, Mapping)) or not isinstance(positions, Iterable):
         raise TypeError(f"angles: found {positions!r}; expected a list of positions, as in [(0, 0, 0), (180, 0, 0)]")
     found = [attitude(a, digits, i, log) for i, a in enumerate(islice(positions, POSITIONS + 1), 1)]
     if len(found) > POSITIONS:
-        # a generator may never end
+        # a generator may be endless
         raise ValueError(f"angles: found more than {POSITIONS} positions; expected at most {POSITIONS}")
     return found
 
 
 def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:
-    """Numbers by the names of unknowns or families, ``{"D": 0.05}``, as on the command line."""
+    """Numbers by the names of unknowns or families, ``{"D": 0.05}``, in the notation of the command line."""
     if isinstance(given, str):
         return [given]
     if isinstance(given, Mapping):
@@ -211,7 +213,7 @@ def assignments(given: Mapping[str, Any] | Iterable[str]) -> list[str]:
 
 
 def as_json(value: Any) -> str:
-    """A value as JSON: what ``json.dumps`` writes, for a third of what that takes between calls of the engine."""
+    """Value in JSON: the text of ``json.dumps`` in a third of its time between calls of the engine."""
     kind = type(value)
     if kind is str:
         return encode_basestring_ascii(value)
@@ -227,7 +229,7 @@ def as_json(value: Any) -> str:
 
 
 def toml(value: Any) -> str:
-    """A value as TOML."""
+    """Value in TOML."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Texts in TOML: Python 3.10 has no reader of its own."""
+"""Texts in TOML: Python 3.10 has no reader in its library."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 
 def loads(text: str, parse_float: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The keys of a text in TOML.
+    """Keys of a text in TOML.
 
     Raises:
-        ValueError: the text is no TOML.
+        ValueError: the text is not TOML.
         ImportError: Python 3.10 without the package `tomli`.
     """
     if sys.version_info >= (3, 11):

@@ -1,4 +1,4 @@
-"""Tasks through executors that break: each ends once, with a result or an error."""
+"""Tasks on executors that may break: each ends once, with a result or an error."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from typing import Any
 
 from ._executors import PULSE, Executors, close, unguarded, unreachable, workers_of
 
-#: Errors of input: the same task would raise them again. ``obsdeg.ProblemError`` is a ValueError.
+#: Errors of input, which the same task would raise again. ``obsdeg.ProblemError`` is a ValueError.
 INPUT = (ValueError, TypeError, PicklingError)
-#: What `draw` returns when there is no task.
+#: Returned by `draw` when there is no task.
 END: Any = object()
-#: Seconds for which a cluster may leave every look unanswered before it is given up.
+#: Seconds after which a cluster that answers no check is given up.
 PATIENCE = 30.0
-#: Executors in a row that may take no task.
+#: Number of consecutive executors that may refuse all tasks.
 REFUSED = 3
 #: Seconds between two counts of the workers.
 COUNTED = 10.0
 
 
 class CampaignError(RuntimeError):
-    """What a campaign could not do.
+    """Error of a campaign.
 
     Attributes:
-        task: the task that failed as often as it may; None where no executor could be had.
-        pending: other tasks that were drawn and are not done.
+        task: the task that failed too often; None if no executor was available.
+        pending: other drawn tasks that are not finished.
     """
 
     def __init__(self, text: str, task: Any = None, pending: list[Any] | None = None) -> None:
@@ -39,7 +39,7 @@ class CampaignError(RuntimeError):
 
 @dataclass
 class Ended:
-    """A task that ended: `result`, or where it failed `tries` times, the last `error`."""
+    """A finished task: `result`, or the last `error` after `tries` failures."""
 
     task: Any
     result: Any = None
@@ -49,7 +49,7 @@ class Ended:
 
 @dataclass
 class _Tried:
-    """A task that has not ended: failures of its own, and executors that broke while they had it."""
+    """An unfinished task: number of its failures, and number of executors that broke while they had it."""
 
     task: Any
     tries: int = 0
@@ -60,16 +60,16 @@ class Work:
     """Tasks on their way through executors.
 
     A task is in exactly one place: not drawn, `pending`, `waiting` (handed out), `suspects`, or ended. A pool
-    that breaks does not say which of its tasks broke it. Those it had are tried again, and after `retries`
-    losses one at a time with no other beside it, so that the task that is reported is the one that did it.
+    that breaks does not tell which of its tasks broke it. Its tasks are tried again, and after `retries`
+    losses one at a time, so that the reported task is the one that broke the executor.
 
     Args:
-        function: what is done with a task.
-        draw: the next task, or :data:`END`; is asked again after each task that ends.
-        executor: makes the executor, and another where one broke.
-        retries: how often a task is tried again.
-        ahead: most tasks that are handed out; None for twice the number of workers, at least 8.
-        divide: the tasks that one consists of which failed too often, tried instead of it; none where it
+        function: called with each task.
+        draw: returns the next task, or :data:`END`; called again after each finished task.
+        executor: makes the executor, and another if one broke.
+        retries: number of times that a task is tried again.
+        ahead: largest number of tasks handed out; None for twice the number of workers, at least 8.
+        divide: returns the parts of a task that failed too often, which are tried instead; empty if it
             cannot be divided.
     """
 
@@ -90,14 +90,14 @@ class Work:
         self._counted = (-COUNTED, 0)
 
     def open(self) -> list[Any]:
-        """Tasks that were drawn and have not ended."""
+        """Drawn tasks that have not ended."""
         return [t.task for t in (*self.waiting.values(), *self.pending, *self.suspects)]
 
     def ended(self) -> Iterator[Ended]:
-        """Every task that is drawn, once, in the order in which they end.
+        """Yields every drawn task once, in the order of their ends.
 
         Raises:
-            CampaignError: no executor can be had, or the cluster does not answer.
+            CampaignError: no executor is available, or the cluster does not answer.
         """
         pool = self.executor()
         fruitless = 0
@@ -120,8 +120,8 @@ class Work:
                     elif end is not None:
                         broken = end
                 if broken is not None:
-                    # one that had tasks has them counted as losses, which end; one that takes none says
-                    # nothing of any task
+                    # tasks in a broken executor count as losses, which are limited; an executor that takes no
+                    # task counts here
                     fruitless = 0 if self.waiting else fruitless + 1
                     if (why := unguarded(pool)) is not None:
                         raise self._without_workers(why)
@@ -130,7 +130,7 @@ class Work:
                         raise self._without_workers(why or str(broken) or type(broken).__name__) from broken
                     yield from self._lose(broken)
                     close(pool, at_once=True)
-                    # what starts workers may itself be starting again
+                    # the service that starts workers may be restarting
                     time.sleep(fruitless / 4)
                     pool = self._another(broken)
                     self._counted = (-COUNTED, 0)
@@ -138,7 +138,8 @@ class Work:
             close(pool, at_once=bool(self.waiting))
 
     def _hand_out(self, pool: Executor) -> Iterator[Ended | BaseException]:
-        """Fills the executor. Yields tasks that it refuses as input, and the error of one that takes none."""
+        """Fills the executor. Yields tasks that it refuses as input, and the error of an executor that takes
+        none."""
         room = 1 if self._alone() else self._room(pool)
         while len(self.waiting) < room:
             if not self.pending and (drawn := self.draw()) is not END:
@@ -161,7 +162,7 @@ class Work:
                 self.waiting[future] = self.pending.popleft()
 
     def _alone(self) -> bool:
-        """True if the only task that is handed out is a suspect."""
+        """True if a suspect is the only task handed out."""
         return len(self.waiting) == 1 and next(iter(self.waiting.values())).losses > self.retries
 
     def _room(self, pool: Executor) -> int:
@@ -177,7 +178,7 @@ class Work:
         """Waits until a task ends.
 
         Raises:
-            CampaignError: the cluster leaves every question unanswered.
+            CampaignError: the cluster does not answer.
         """
         silent_since: float | None = None
         while not wait(self.waiting, timeout=PULSE, return_when=FIRST_COMPLETED).done:
@@ -191,8 +192,8 @@ class Work:
                 raise self._without_workers(why)
 
     def _taken(self, future: Future[Any]) -> Ended | BaseException | None:
-        """What a future that is done says: the end of its task, that its executor broke, or None where the
-        task is tried again."""
+        """Outcome of a finished future: end of its task, error of a broken executor, or None if the task is
+        tried again."""
         tried = self.waiting[future]
         try:
             error = future.exception()
@@ -202,7 +203,7 @@ class Work:
             del self.waiting[future]
             return Ended(tried.task, future.result())
         if isinstance(error, (BrokenExecutor, CancelledError)):
-            # what the others say is heard first: it stays among those that wait
+            # the task stays in `waiting`, since the other futures are read first
             return error
         del self.waiting[future]
         tried.tries += 1
@@ -214,7 +215,8 @@ class Work:
         return None
 
     def _lose(self, broken: BaseException) -> list[Ended]:
-        """Takes back what a broken executor had; the ends of tasks that broke it by themselves too often."""
+        """Takes back the tasks of a broken executor. Returns the ends of tasks that broke one alone too
+        often."""
         alone = self._alone()
         lost = list(self.waiting.values())
         self.waiting.clear()
@@ -230,7 +232,7 @@ class Work:
         return []
 
     def _given_up(self, tried: _Tried, error: BaseException) -> Ended | None:
-        """The end of a task that failed too often, or None if the tasks of which it consists are tried."""
+        """End of a task that failed too often, or None if its parts are tried."""
         parts = self.divide(tried.task)
         self.suspects.extend(_Tried(part, losses=self.retries + 1) for part in parts)
         return None if parts else Ended(tried.task, error=error, tries=tried.tries)

@@ -1,18 +1,18 @@
-"""Searches and sweeps on as many machines as there are, through any executor of :mod:`concurrent.futures`.
+"""Searches and sweeps on any number of machines, through any executor of :mod:`concurrent.futures`.
 
-A search is cut into parts (``obsdeg design --part``), a sweep into chunks. Each is a file in a folder,
-written whole or not at all and named by what was asked: a driver that was killed goes on where it was, a
-worker that was killed costs what it had in hand. Every task is done, pending, or reported by name. There is
-no scheduler here: that is the executor's.
+A search is divided into parts (``obsdeg design --part``), a sweep into chunks. Each is a file in a folder,
+written completely or not at all and named by its request. A killed driver resumes where it was; a
+killed worker costs its current work. Every task is done, pending, or reported by name. The
+executor does the scheduling.
 
 With Dask Distributed::
 
     with distributed.Client("scheduler:8786") as client:
         found = campaign.design("search", 40, executor=client.get_executor, positions=7, carry="inertial")
 
-With Ray: ``executor=campaign.RayExecutor``. On one machine, the default: :func:`processes`. A script that
-starts processes has its work below ``if __name__ == "__main__":``, as everywhere in Python; one without it
-ends in a :class:`CampaignError` that says so.
+With Ray: ``executor=campaign.RayExecutor``. Default, on one machine: :func:`processes`. A script that
+starts processes needs ``if __name__ == "__main__":`` around its work, as everywhere in Python; without it
+it ends in a :class:`CampaignError` that says so.
 """
 
 from __future__ import annotations
@@ -42,13 +42,14 @@ from ._work import END, INPUT, CampaignError, Ended, Work
 
 __all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "read", "run", "sweep", "table", "threads"]
 
-#: Seconds of work in a file of a sweep, where chunks follow the measured time.
+#: Seconds of work per file of a sweep, if the size of chunks follows the measured time.
 FILE_SECONDS = 10.0
-#: Most tasks in such a file.
+#: Largest number of tasks in such a file.
 FILE_TASKS = 5000
-#: Tasks whose options are columns of every file; later ones add columns where they have others.
+#: Number of first tasks whose options are columns of every file; options of later tasks add columns to their
+#: files.
 FIRST = 500
-#: Seconds after which a part of a search is written as far as it is.
+#: Seconds after which an unfinished part of a search is written.
 CHECKPOINT = 300.0
 
 
@@ -60,20 +61,21 @@ def run(
     retries: int = 2,
     ahead: int | None = None,
 ) -> Iterator[tuple[Any, Any]]:
-    """Yields every task with its result, in the order in which they end.
+    """Yields every task with its result, in the order of their ends.
 
     Args:
-        function: what is done, importable by the workers.
-        tasks: hashable or not; they are drawn as they are handed out, so that memory does not grow with them.
+        function: called with each task; importable by the workers.
+        tasks: any objects; they are drawn when handed out, so that memory does not grow with their number.
         executor: makes the executor.
-        retries: how often a task is tried again when its worker was lost or its function failed. Errors of
-            input (``ValueError``, ``TypeError``) are not tried again.
-        ahead: most tasks that are handed out at a time; by default twice the number of workers, at least 8.
+        retries: number of times that a task is tried again if its worker was lost or its function failed.
+            Errors of input (``ValueError``, ``TypeError``) are not tried again.
+        ahead: largest number of tasks handed out at a time; by default twice the number of workers, at least
+            8.
 
     Raises:
-        CampaignError: a task failed too often, no executor can be had, or the scheduler of a cluster has not
-            answered for 30 s; ``pending`` has the tasks that were drawn and are not done.
-        obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``.
+        CampaignError: a task failed too often, no executor is available, or the scheduler of a cluster has
+            not answered for 30 s; ``pending`` lists the drawn tasks that are not finished.
+        obsdeg.ProblemError: a task is invalid; the message names it, and ``task`` is the task.
     """
     check_main()
     if ahead is not None:
@@ -88,7 +90,7 @@ def run(
 
 
 def _failed(end: Ended, name: str, work: Work | None = None) -> Exception:
-    """The error of a task that names it: one of input stays what it is, with the task before its text."""
+    """Error that names its task: an error of input keeps its type, with the task before its text."""
     error = end.error
     assert error is not None
     if isinstance(error, INPUT):
@@ -110,13 +112,13 @@ def _check(name: str, found: int, least: int) -> None:
         raise ValueError(f"{name}: found {found}; expected at least {least}")
 
 
-#: A part of a search: its options, its number of how many, the part as far as it is, and seconds until the
-#: next checkpoint.
+#: Part of a search: options, its number, number of parts, unfinished part, and seconds until the next
+#: checkpoint.
 _Part = tuple[dict[str, Any], int, int, "str | None", float]
 
 
 def _search(task: _Part) -> tuple[str, bool]:
-    """A part as far as it comes until the next checkpoint, and True if it is complete."""
+    """A part up to the next checkpoint, and True if it is complete."""
     options, number, of, before, seconds = task
     end = time.monotonic() + seconds
     resumed = {} if before is None else {"resume": before}
@@ -126,7 +128,7 @@ def _search(task: _Part) -> tuple[str, bool]:
 
 
 def _part(file: Path) -> tuple[str | None, bool]:
-    """A part as it was written, and True if it is complete; None where there is none."""
+    """A written part, and True if it is complete; None if there is none."""
     try:
         text = file.read_text(encoding="utf-8")
         return text, bool(json.loads(text)["complete"])
@@ -145,22 +147,22 @@ def design(
     heard: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> obsdeg.Design:
-    """Searches in parts, and puts them together: the answer of ``obsdeg.design(**options)`` and, under
-    ``search.parts``, what it was put together from.
+    """Searches in parts and merges them. Returns the answer of ``obsdeg.design(**options)`` with a report on
+    the parts in ``search.parts``.
 
     Args:
-        folder: holds the parts; the same search in the same folder goes on with them.
-        parts: how many.
-        checkpoint: seconds after which a part that is not complete is written as far as it is: most of the
-            work of a part that a kill costs.
-        check: number of blocks of the parts, chosen at random, that are searched again at the end.
-        heard: told how many parts are done, of how many.
-        options: those of :func:`obsdeg.design`.
+        folder: folder of the parts; the same search in the same folder resumes them.
+        parts: number of parts.
+        checkpoint: seconds after which an unfinished part is written: the largest amount of
+            work on a part that a kill costs.
+        check: number of random blocks of the parts that are searched again at the end.
+        heard: called with the number of finished parts and the number of all parts.
+        options: options of :func:`obsdeg.design`.
 
     Raises:
         CampaignError: a part failed too often, or the scheduler of a cluster does not answer.
-        obsdeg.ProblemError: what is wrong with the options.
-        OSError: a part that cannot be written, by its number; those that are there stay.
+        obsdeg.ProblemError: invalid options.
+        OSError: a part cannot be written; the message gives its number. Other parts are kept.
     """
     check_main()
     _check("parts", parts, 1)
@@ -185,7 +187,7 @@ def design(
         except OSError as e:
             raise OSError(e.errno, f"part {i} of {parts} cannot be written: {e.strerror}", str(files[i])) from e
         if not complete:
-            # what is searched at once may take longer than until the next checkpoint
+            # a step that cannot be interrupted may need more time than one checkpoint
             left.append((options, i, parts, text, 2 * seconds if text == before else seconds))
             continue
         done += 1
@@ -199,7 +201,8 @@ def design(
 
 
 def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
-    """Every combination of options: ``grid(angles=[...], latitude=range(91), carry=["platform", "reset"])``."""
+    """Every combination of options: ``grid(angles=[...], latitude=range(91), carry=["platform", "reset"])``.
+    """
     for name, values_of in axes.items():
         if isinstance(values_of, (str, bytes)):
             raise TypeError(f"{name}: found {values_of!r}; expected a list of values, as in [{values_of!r}]")
@@ -209,15 +212,15 @@ def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[Path]:
-    """A folder within a folder for what workers write, while no other driver works there."""
+    """Folder for the output of workers inside a folder, while no other driver works there."""
     lock = _locked(folder)
     try:
         for left in folder.glob(".sweep-*"):
-            # of a driver that was killed; its workers, if they still work, have nowhere to write
+            # left by a killed driver; its workers, if still running, cannot write any more
             shutil.rmtree(left, ignore_errors=True)
         stage = Path(tempfile.mkdtemp(prefix=".sweep-", dir=folder))
         try:
-            # workers may be other users
+            # workers may belong to other users
             stage.chmod(folder.stat().st_mode & 0o777)
             yield stage
         finally:
@@ -228,7 +231,7 @@ def _alone(folder: Path) -> Iterator[Path]:
 
 
 def _locked(folder: Path) -> int | None:
-    """Holds a folder as long as this process lives; None where the system has no such locks."""
+    """Locks a folder for the life of this process; None if the system has no such locks."""
     if os.name != "posix":
         return None
     import fcntl
@@ -240,14 +243,15 @@ def _locked(folder: Path) -> int | None:
         os.close(handle)
         raise RuntimeError(f"{folder}: found another sweep at work in it; expected one at a time") from None
     except OSError:
-        # some network file systems
+        # some network file systems have no locks
         os.close(handle)
         return None
     return handle
 
 
 class _Chunks:
-    """Number of tasks in a file: a fixed one, or those of :data:`FILE_SECONDS` by the time of others."""
+    """Number of tasks per file: fixed, or that of :data:`FILE_SECONDS` by the measured time of earlier ones.
+    """
 
     def __init__(self, fixed: int | None) -> None:
         self.fixed, self.seconds, self.size = fixed, 0.0, 1
@@ -258,7 +262,7 @@ class _Chunks:
     def took(self, seconds: float, tasks: int) -> None:
         each = seconds / tasks
         self.seconds = each if self.seconds == 0 else 0.7 * self.seconds + 0.3 * each
-        # four times as many at most: the first tasks may be the easy ones
+        # at most four times as many: the first tasks may be the easy ones
         self.size = max(1, min(FILE_TASKS, 4 * self.size, int(FILE_SECONDS / max(self.seconds, 1e-6))))
 
 
@@ -272,35 +276,35 @@ def sweep(
     errors: Literal["raise", "record"] = "raise",
     heard: Callable[[int], None] | None = None,
 ) -> Path:
-    """Judges many schemes: a row per unknown, in Parquet files that come as they are done.
+    """Judges many schemes. Writes one row per unknown into Parquet files, which appear as they are finished.
 
     Args:
-        folder: holds the files, one a chunk, named by what it asks, written by the workers where they see the
-            folder; one sweep at a time works in it. Tasks that are there are not asked again, whatever the
-            chunks; tasks are the same where their options have the same values: 0, ``"0"`` and
-            ``numpy.float64(0)`` are one. :func:`read` gives all as a tidy table with numbers and tags. The column ``task``
-            holds all options of a row as JSON; each option of the first 500 tasks is a column of text too,
-            others in the files where a task has them (pandas shows the columns of one file: take those from
-            ``task``).
-        tasks: options of :func:`obsdeg.analyze` each, as :func:`grid` makes them; ``scheme`` is a
-            :class:`obsdeg.Scheme`, or the text of a scheme file, ``model`` a :class:`obsdeg.Model` or its text;
-            ``tags`` are names and values of your own. A task with options that only
+        folder: folder of the files, one per chunk and named by its request. Workers that see the folder write
+            them; only one sweep at a time works in it. Tasks in the folder are not judged again, whatever
+            their chunks. Tasks are equal if their options have equal values: 0, ``"0"`` and
+            ``numpy.float64(0)`` are equal. :func:`read` returns a tidy table with numbers and tags. The
+            column ``task`` contains all options of a row as JSON. Each option of the first 500 tasks is also
+            a text column; options of other tasks are columns in their own files only (pandas shows the
+            columns of one file: use ``task``).
+        tasks: options of :func:`obsdeg.analyze`, as :func:`grid` makes them; ``scheme`` is a
+            :class:`obsdeg.Scheme`, or the text of a scheme file, ``model`` a :class:`obsdeg.Model` or its
+            text; ``tags`` are additional names and values. A task with options that only
             :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated
-            too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` says
-            whether it is a measured one; elsewhere these are empty.
-        chunk: tasks that are judged together; by default those of about 10 s, by measured time.
-        retries: how often tasks are tried again whose worker was lost; then a chunk is divided, until the
-            task that did it is found.
-        errors: a task that cannot be judged ends the sweep and is named (``"raise"``), or has one row with
+            too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` tells
+            if it comes from the samples. Without simulation these are empty.
+        chunk: number of tasks judged together; by default about 10 s of work, by measured time.
+        retries: number of times that tasks of a lost worker are tried again. Then the chunk is divided until
+            the responsible task is found.
+        errors: a task that cannot be judged ends the sweep and is named (``"raise"``), or gets one row with
             the message in the column ``error`` (``"record"``), and counts as done.
-        heard: told how many tasks are done.
+        heard: called with the number of finished tasks.
 
     Raises:
         CampaignError: a task failed too often, or the scheduler of a cluster does not answer; the folder
-            holds what is done, and the same sweep goes on with the rest.
-        obsdeg.ProblemError: what is wrong with a task, which it names and has as ``task``; the rest of its
-            chunk is kept.
-        RuntimeError: another sweep is at work in the folder.
+            keeps the finished tasks, and the same sweep resumes with the rest.
+        obsdeg.ProblemError: a task is invalid; the message names it, and ``task`` is the task. The rest of
+            its chunk is kept.
+        RuntimeError: another sweep works in the folder.
     """
     check_main()
     if chunk is not None:
@@ -336,7 +340,7 @@ def _sweep(
     columns = list(dict.fromkeys(["task", *options, *FOUND]))
 
     def wrong(end: Ended, task: dict[str, Any]) -> None:
-        """Records the error of a task without an answer in a file of its own, or raises it."""
+        """Records the error of a task without an answer in a separate file, or raises it."""
         assert end.error is not None
         if not record:
             raise _failed(Ended(task, error=end.error, tries=end.tries), name_of(task), work)
@@ -392,14 +396,14 @@ def _sweep(
 
 
 def _halves(chunk: tuple[list[dict[str, Any]], str | None]) -> list[Any]:
-    """The two halves of a chunk that failed too often; none of a single task."""
+    """The two halves of a chunk that failed too often; empty for a single task."""
     tasks, stage = chunk
     half = len(tasks) // 2
     return [(tasks[:half], stage), (tasks[half:], stage)] if half else []
 
 
 def _published(judged: Judged, stage: Path, folder: Path) -> bool:
-    """Moves the file of a chunk to where it is read; False if the worker wrote it where this machine does not
+    """Moves the file of a chunk to its final place; False if the worker wrote it where this machine does not
     see it."""
     if judged.name is None:
         return True

@@ -1,4 +1,4 @@
-"""What the tests of the importers share: the judge, the reference models, the published problems."""
+"""Shared parts of the tests of the importers: judge, reference models, published problems."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from typing import Any
 
 import pytest
 
-# A shell that puts this run in the background has it ignore the interrupt key, which the tests press.
+# A shell that runs the tests in the background makes them ignore the interrupt key, which some tests press.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-#: The checkout.
+#: Folder of the checkout.
 ROOT = Path(__file__).resolve().parents[2]
 
 try:
     import obsdeg.importers  # noqa: F401
 except ModuleNotFoundError:
-    # not installed: the sources
+    # without an installed package: the sources
     sys.path.insert(0, str(ROOT / "python"))
 
 
@@ -37,7 +37,8 @@ def _program() -> str:
 
 
 def judge(model: str, *options: str) -> dict[str, Any]:
-    """The answer of `analyze` to a model's text, as its JSON. The one place that says who judges."""
+    """JSON answer of `analyze` to the text of a model. All tests of the importers judge models through this
+    function."""
     command = [_program(), "analyze", "-", "--format", "json", "--solutions", "off", *options]
     done = subprocess.run(command, input=model, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
@@ -46,12 +47,12 @@ def judge(model: str, *options: str) -> dict[str, Any]:
 
 
 def statuses(model: str) -> dict[str, str]:
-    """The status of every unknown."""
+    """Status of every unknown."""
     return {q["name"]: q["status"] for q in judge(model)["quantities"]}
 
 
 def shared(part: str) -> Path:
-    """A folder of the data that stands beside the checkout; a test fails where there is none."""
+    """Folder of the data beside the checkout; a test fails if it is missing."""
     found = ROOT.parent / "shared" / part
     if not found.is_dir():
         pytest.fail(f"{found} is missing: the data of these tests stand beside the checkout, in `shared`")
@@ -59,6 +60,6 @@ def shared(part: str) -> Path:
 
 
 def references() -> dict[str, dict[str, Any]]:
-    """The published systems with known verdicts, `tests/data/models`, by name."""
+    """Published systems with known verdicts, `tests/data/models`, by name."""
     files = sorted((ROOT / "tests" / "data" / "models").glob("*.json"))
     return {f.stem: json.loads(f.read_text(encoding="utf-8")) for f in files}

@@ -1,4 +1,5 @@
-"""PEtab problems by other programs: tables read with csv, the model simulated by libRoadRunner, observables evaluated by Python."""
+"""PEtab problems by other programs: tables read with csv, model simulated by libRoadRunner, observables
+evaluated by Python."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from toml_numbers import value
 
 @dataclass
 class Tables:
-    """The tables of a problem, and its SBML."""
+    """Tables of a problem, and its SBML."""
 
     folder: Path
     conditions: dict[str, dict[str, str]]
@@ -28,7 +29,7 @@ class Tables:
 
     @staticmethod
     def read(problem: Path) -> Tables:
-        """Those that a YAML file names."""
+        """Tables that a YAML file names."""
         layout = yaml.safe_load(problem.read_text())
         part, folder = layout["problems"][0], problem.parent
 
@@ -46,12 +47,12 @@ class Tables:
         )
 
     def estimated(self) -> list[str]:
-        """Parameters that are estimated."""
+        """Estimated parameters."""
         return [n for n, p in self.parameters.items() if p["estimate"] == "1"]
 
 
 def _number(text: str, values: Mapping[str, float]) -> float | None:
-    """A cell: a number, a parameter, or nothing."""
+    """Cell of a table: a number, a parameter, or None."""
     text = (text or "").strip()
     if not text or text.lower() == "nan":
         return None
@@ -62,7 +63,7 @@ def _number(text: str, values: Mapping[str, float]) -> float | None:
 
 
 def prepared(tables: Tables, condition: str, values: Mapping[str, float]) -> roadrunner.RoadRunner:
-    """The model in a condition at its start, with these parameters."""
+    """Model in a condition at its start, with the given parameters."""
     document = libsbml.readSBMLFromString(tables.sbml)
     model = document.getModel()
     numbers = dict(values)
@@ -89,7 +90,8 @@ def prepared(tables: Tables, condition: str, values: Mapping[str, float]) -> roa
 
 
 def written(folder: Path, sbml: str, tables: Mapping[str, str]) -> Path:
-    """A problem of a model and of tables (`parameters`, `conditions`, `observables`, `measurements`), whose columns stand apart by blanks; `-` is nothing."""
+    """Problem of a model and tables (`parameters`, `conditions`, `observables`, `measurements`) with columns
+    separated by blanks; `-` is an empty cell."""
     (folder / "model.xml").write_text(sbml)
     for name, text in tables.items():
         rows = [["" if cell == "-" else cell for cell in line.split()] for line in text.strip().splitlines()]
@@ -102,7 +104,7 @@ def written(folder: Path, sbml: str, tables: Mapping[str, str]) -> Path:
 
 @dataclass
 class Model:
-    """A simulator with the names of its states as the model means them: concentrations, or amounts."""
+    """Simulator with the names of its states as the model means them: concentrations, or amounts."""
 
     simulator: roadrunner.RoadRunner
     states: list[str]
@@ -110,7 +112,7 @@ class Model:
 
     @staticmethod
     def of(simulator: roadrunner.RoadRunner, sbml: str) -> Model:
-        """The states of a simulator."""
+        """States of a simulator."""
         model = libsbml.readSBMLFromString(sbml).getModel()
         keys = {s.getId(): s.getId() if s.getHasOnlySubstanceUnits() else f"[{s.getId()}]" for s in model.getListOfSpecies()}
         rated = [r.getVariable() for r in model.getListOfRules() if r.isRate()]
@@ -122,17 +124,17 @@ class Model:
         return float(self.simulator[self.keys.get(name, name)])
 
     def move(self, values: Mapping[str, float], time: float) -> None:
-        """Puts it somewhere."""
+        """Sets the states."""
         self.simulator.model.setTime(time)
         for name in self.states:
             self.simulator[self.keys.get(name, name)] = values[name]
 
     def rate(self, name: str) -> float:
-        """The derivative of a state."""
+        """Derivative of a state."""
         return float(self.simulator[self.keys.get(name, name) + "'"])
 
     def size(self, name: str) -> float:
-        """What a rate is made of, in size: the sum of all reactions that change a state."""
+        """Size of a rate: the sum of the magnitudes of all reactions that change a state."""
         if not self.simulator.model.getNumReactions():
             return abs(self.rate(name))
         matrix = self.simulator.getFullStoichiometryMatrix()
@@ -147,7 +149,7 @@ class Model:
 
 
 def observed(model: Model, tables: Tables, row: Mapping[str, str], values: Mapping[str, float], time: float) -> Any:
-    """What an observable is worth where the model stands now."""
+    """Value of an observable at the present state."""
     name = row["observableId"]
     given = [p for p in (row.get("observableParameters") or "").split(";") if p]
     names: dict[str, Any] = {f"observableParameter{i + 1}_{name}": mpmath.mpf(_number(p, values) or 0) for i, p in enumerate(given)}

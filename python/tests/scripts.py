@@ -1,6 +1,6 @@
 """Reference models as texts in the syntax of other tools, for tests that read them back.
 
-The formulas are those of the data, as they stand there; only names are put into the syntax of the tool.
+The formulas are those of the data, unchanged; only names are written in the syntax of the tool.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ Model = dict[str, Any]
 
 
 def is_plain(model: Model) -> bool:
-    """One run from a free start: what all tools can say."""
+    """True for models with one run from a free start, which all tools can express."""
     special = ("experiments", "segments", "segment_constants", "known_initial_values", "known_initial_conditions", "input_assumption")
     return not any(model.get(key) for key in special)
 
 
-#: Variables of a script, which no symbol may be called.
+#: Variables of a script, which no symbol may use as its name.
 VARIABLES = ("x", "u", "w", "p", "h", "f", "h1", "ics", "known_ics")
 
 
 def renamed(model: Model) -> Model:
-    """The model with other names for what a script calls its variables: `x` becomes `x0`."""
+    """Model with other names in place of a script's variables: `x` becomes `x0`."""
 
     def names(value: Any) -> Any:
         if isinstance(value, str):
@@ -36,12 +36,13 @@ def renamed(model: Model) -> Model:
 
 
 def _close(formula: str) -> str:
-    """Without blanks, which part the entries of a vector: `[a +b]` has two."""
+    """Formula without blanks, which separate the entries of a vector: `[a +b]` has two."""
     return formula.replace(" ", "").replace("+", " + ")
 
 
 def matlab(model: Model) -> str:
-    """A script of STRIKE-GOLDD, with its habits: continued lines, comments, rows apart by blanks, commas and lines, transposes."""
+    """Script in the style of STRIKE-GOLDD: continued lines, comments, rows separated by blanks, commas and
+    lines, transposes."""
     states, parameters, inputs = model["states"], model["params"], model["known_inputs"]
     unknown, constants = model.get("unknown_inputs", []), model.get("known_constants", [])
     names = [*states, *parameters, *inputs, *unknown, *constants]
@@ -64,11 +65,11 @@ def matlab(model: Model) -> str:
 
 
 def julia(model: Model) -> str:
-    """A text with `@ODEmodel`."""
+    """Text with `@ODEmodel`."""
     of_time = {*model["states"], *model["known_inputs"]}
 
     def text(formula: str) -> str:
-        # decimals are rationals there
+        # decimals are written as rationals
         formula = re.sub(r"(?<![\w.])(\d+)\.(\d+)", lambda m: f"({int(m[1] + m[2])}//{10 ** len(m[2])})", formula)
         return re.sub(r"[A-Za-z_]\w*", lambda m: f"{m[0]}(t)" if m[0] in of_time else m[0], formula)
 

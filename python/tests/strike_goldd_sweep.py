@@ -1,9 +1,10 @@
-"""Reads all models of STRIKE-GOLDD and holds the equations that are read against those that Octave evaluates.
+"""Reads all models of STRIKE-GOLDD and compares the equations with those that Octave evaluates.
 
     python strike_goldd_sweep.py FOLDER
 
-FOLDER holds scripts (`*.m`, at any depth), which are not part of this project. Octave runs each with a `syms` that gives numbers, so that it says what
-the scripts mean with its own reader. Prints a line a script that differs or is refused, and the totals; exits with 1 where something differs.
+FOLDER contains scripts (`*.m`, at any depth), which are not part of this project. Octave runs each with a
+`syms` that gives numbers, so that its own reader decides their meaning. Prints one line per script that
+differs or is refused, and the totals; exits with 1 if any differs.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from obsdeg.importers.formula import names_in
 
 
 def number_of(name: str) -> float:
-    """The number that a symbol has in Octave; as `octave/number_of.m`."""
+    """Number of a symbol in Octave, as in `octave/number_of.m`."""
     h = 0
     for c in name.encode():
         h = (31 * h + c) % 1000003
@@ -27,7 +28,7 @@ def number_of(name: str) -> float:
 
 
 def octave(script: Path) -> list[tuple[str, list[float], list[float]]]:
-    """What a script saves: names, f and h."""
+    """Variables that a script saves: names, f and h."""
     folder = Path(__file__).with_name("octave")
     program = f"warning('off','all'); addpath('{folder}'); run('{script}');"
     done = subprocess.run(["octave-cli", "--no-init-file", "--eval", program], capture_output=True, text=True, timeout=60, check=False)
@@ -38,7 +39,7 @@ def octave(script: Path) -> list[tuple[str, list[float], list[float]]]:
 
 
 def same(script: Path) -> tuple[int, list[str]]:
-    """How many models a script has, and what differs."""
+    """Number of models in a script, and the differences."""
     text = script.read_text(encoding="utf-8", errors="replace")
     names = strike_goldd.models(text)
     systems = [strike_goldd.read(text, model=i + 1) for i in range(len(names))]
@@ -56,7 +57,7 @@ def same(script: Path) -> tuple[int, list[str]]:
 
 
 def main(folder: str) -> int:
-    """The sweep."""
+    """Reads and compares all scripts."""
     models = scripts = differ = refused = 0
     for script in sorted(Path(folder).rglob("*.m")):
         try:

@@ -1,4 +1,4 @@
-"""The pages of the API name everything that is public, with what is said of it."""
+"""The pages of the API list every public name with its description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Campaigns: parts are the whole, whoever works; workers and drivers are killed."""
+"""Campaigns: merged parts equal the whole search with any executor, and with killed workers and drivers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PAIR = [(0, 0, 0), (180, 0, 0)]
 
 
 def without_parts(found: obsdeg.Design) -> dict[str, Any]:
-    """The answer as that of a search as a whole."""
+    """The answer without the report on its parts."""
     answer = found.to_dict()
     assert answer["search"].pop("parts")["versions"] == [obsdeg.__version__]
     return answer
@@ -34,7 +34,7 @@ SEARCH: dict[str, Any] = {"positions": 3, "carry": "inertial", "observable": ["D
 
 
 def _once_killed(folder: Path, task: int) -> int:
-    """Kills its worker the first time that it is asked for 5."""
+    """Kills its worker at the first call with 5."""
     mark = folder / "killed"
     if task == 5 and not mark.exists():
         mark.write_text(str(os.getpid()))
@@ -53,7 +53,7 @@ def test_a_killed_worker_costs_what_it_had_in_hand(tmp_path: Path) -> None:
 
 
 def test_the_threads_of_the_engine_are_not_waited_for(tmp_path: Path) -> None:
-    # a search in this process first: its threads would be no part of a copy of it
+    # a search in this process first: its threads would not be part of a forked copy
     whole = obsdeg.design(**SEARCH)
     assert without_parts(campaign.design(tmp_path, 2, **SEARCH)) == whole.to_dict()
     assert campaign.processes(1).submit(os.getppid).result() != os.getpid()
@@ -86,7 +86,7 @@ def test_parts_are_the_whole(tmp_path: Path) -> None:
     repeated = campaign.design(tmp_path, 4, check=1000, **SEARCH).to_dict()["search"]["parts"]
     assert repeated["searched_again"] == repeated["blocks"]
     assert heard == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    # nothing is done twice; another question has other files
+    # finished work is not repeated; another request has other files
     again = campaign.design(tmp_path, 4, heard=lambda *_: pytest.fail("done already"), **SEARCH)
     assert again.json() == found.json()
     with pytest.raises(obsdeg.ProblemError):
@@ -118,7 +118,7 @@ def test_a_driver_that_was_killed_goes_on(tmp_path: Path) -> None:
     assert len(files) == 33 and all(f.stat().st_mtime_ns == t for f, t in there.items())
     rows = pandas.read_parquet(sorted(files))
     assert len(rows) == 144 * 9 * 15
-    # against the program's own, one by one
+    # against single answers of the program
     for angles, latitude in [("[(0, 0, 0), (180, 0, 0)]", "0"), ("[(35, 0, 0), (180, 50, 0)]", "40")]:
         own = obsdeg.analyze(angles=eval(angles), latitude=latitude, solutions=False)  # noqa: S307
         mine = rows[(rows["angles"] == angles) & (rows["latitude"] == latitude)]
@@ -130,7 +130,7 @@ def test_noise_is_an_axis(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     pair = [(0, 0, 0), (180, 0, 0)]
     asked: dict[str, Any] = {"angles": pair, "carry": "inertial"}
-    # white noise of Z alone
+    # white noise of Z only
     tasks = [asked, *(asked | {"noise": n, "angle_random_walk": 0} for n in (1e-5, 2e-5))]
     own = {task["noise"]: obsdeg.simulate(**task) for task in tasks[1:]}
     for chunk in (1, 3):
@@ -147,7 +147,7 @@ def test_noise_is_an_axis(tmp_path: Path) -> None:
             assert dict(mine["outcome"]) == {q.name: q.outcome for q in run.quantities}
             assert dict(mine["unit"]) == {q.name: q.unit for q in run.quantities}
             sigma[noise] = mine["sigma"]
-        # what is measured is as much worse, what only the prior knows is as it was
+        # observable sigmas double with the noise; sigmas from the prior only do not change
         ratio = sigma[2e-5] / sigma[1e-5]
         assert ratio["D_FX"] == pytest.approx(2, rel=1e-3) and ratio["D_IX"] == pytest.approx(1)
 
@@ -175,7 +175,7 @@ def test_dask_with_a_worker_killed(tmp_path: Path) -> None:
 
 
 def search_with_a_worker_killed(folder: Path, executor: Any, victim: int) -> None:
-    """Parts are the whole, a worker killed by its process id when the first part is there."""
+    """Merged parts equal the whole search although a worker is killed when the first part exists."""
     killed: list[int] = []
 
     def heard(done: int, of: int) -> None:
@@ -194,14 +194,14 @@ def test_ray_with_a_worker_killed(tmp_path: Path) -> None:
     try:
 
         def executor() -> Executor:
-            # the functions of this file are found there too
+            # workers find the functions of this file too
             path = os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
             where = {"env_vars": {"PYTHONPATH": path}}
             return campaign.RayExecutor(num_cpus=2, include_dashboard=False, log_to_driver=False, runtime_env=where)
 
         marks = tmp_path / "marks"
         marks.mkdir()
-        # killed by itself, with what it has in hand
+        # the worker kills itself during its task
         assert dict(campaign.run(partial(_once_killed, marks), range(20), executor=executor)) == {i: i * i for i in range(20)}
         assert (marks / "killed").exists()
         search_with_a_worker_killed(tmp_path / "search", executor, executor().submit(os.getpid).result())
@@ -230,7 +230,7 @@ def test_arrays_are_told_apart_by_all_their_digits(tmp_path: Path) -> None:
     tasks: list[dict[str, Any]] = [dict(angles=a, terms="F") for a in [*near, *long]]
     rows = pandas.read_parquet(campaign.sweep(tmp_path, tasks, chunk=1, executor=lambda: ThreadPoolExecutor(1)))
     assert rows["task"].nunique() == 4
-    # each can be asked again
+    # each task can be judged again from its row
     for asked in rows["task"].unique():
         found = rows[rows["task"] == asked]
         assert dict(zip(found["name"], found["status"], strict=True)) == obsdeg.analyze(**json.loads(asked), solutions=False).statuses
@@ -269,7 +269,8 @@ def test_options_of_some_tasks_and_schemes(tmp_path: Path) -> None:
 
 
 def test_a_malformed_task_is_named_and_loses_nothing(tmp_path: Path) -> None:
-    """A task that a folder cannot hold is named by its number or has a row; the others are done, and the folder is read."""
+    """A task that a folder cannot store is named by its number or gets a row; the others are finished, and
+    the folder is readable."""
     good = [dict(angles=PAIR, latitude=x) for x in (1, 2)]
     circular: list[Any] = []
     circular.append(circular)
@@ -296,7 +297,7 @@ def test_a_malformed_task_is_named_and_loses_nothing(tmp_path: Path) -> None:
 
 
 def test_decimals_are_numbers(tmp_path: Path) -> None:
-    """A decimal is the number that it is, for every option; a text that an option refuses stays another task."""
+    """A decimal keeps its value for every option; a text that an option refuses stays a different task."""
     forms: list[Any] = [1000, 1000.0, Decimal("1000"), Decimal("1E3")]
     campaign.sweep(tmp_path, [dict(angles=PAIR, latitude=28, dwell=d) for d in forms], executor=campaign.threads)
     assert len(campaign.read(tmp_path)) == 15
@@ -307,7 +308,7 @@ def test_decimals_are_numbers(tmp_path: Path) -> None:
 
 
 def test_fractions_are_numbers() -> None:
-    """Fractions and rationals of SymPy are taken, alone and in lists, as `analyze` takes them."""
+    """Fractions and rationals of SymPy are accepted, alone and in lists, as by `analyze`."""
     latitudes: list[Any] = [Fraction(1, 2), Fraction(100, 3), sympy.Rational(100, 3)]
     rows = campaign.table([dict(angles=PAIR, latitude=x) for x in latitudes], executor=campaign.threads)
     assert len(rows) == 45

@@ -1,6 +1,7 @@
-"""Nothing lost, nothing twice: executors that break at random, and kills of workers, pools and drivers.
+"""No task is lost or repeated with executors that break at random, and with killed workers, pools and
+drivers.
 
-`CAMPAIGN_RUNS` is the number of sweeps with kills, 2 where it is not set; `.ci/run release` makes 200.
+`CAMPAIGN_RUNS` is the number of sweeps with kills, by default 2; `.ci/run release` makes 200.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from obsdeg import _work, campaign
 
 
 def without_parts(found: obsdeg.Design) -> dict[str, Any]:
-    """The answer as that of a search as a whole."""
+    """The answer without the report on its parts."""
     answer = found.to_dict()
     assert answer["search"].pop("parts")["versions"] == [obsdeg.__version__]
     return answer
@@ -38,7 +39,7 @@ PAIR = [(0, 0, 0), (180, 0, 0)]
 
 
 class Frail(Executor):
-    """Works in a thread, in an order drawn at random, until a call comes of which `breaks` is true."""
+    """Executor in a thread that runs its calls in random order until `breaks` is true for one of them."""
 
     def __init__(self, draws: random.Random, breaks: Callable[[Any], bool], refuses: float = 0.0) -> None:
         self.draws, self.breaks, self.refuses = draws, breaks, refuses
@@ -227,7 +228,7 @@ def test_one_sweep_at_a_time(tmp_path: Path) -> None:
 
 
 def test_workers_that_do_not_see_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # what a worker writes goes elsewhere, as on a machine with another disk below the same name
+    # workers write elsewhere, as on a machine with another disk under the same name
     from obsdeg import _judged
 
     elsewhere = tmp_path / "elsewhere"
@@ -295,7 +296,7 @@ def test_a_part_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
     found = campaign.design(tmp_path, 2, executor=lambda: Watched(1), checkpoint=0.05, **options)
     assert without_parts(found) == whole.to_dict() and incomplete > 1
     assert len(list(tmp_path.iterdir())) == 2
-    # a driver that was killed left one part as far as it was
+    # a killed driver left one unfinished part
     task = (options, 2, 2, None, 0.05)
     text, complete = campaign._search(task)
     assert not complete
@@ -305,7 +306,7 @@ def test_a_part_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
 
 
 def _scheduler(folder: Path) -> tuple[Any, list[subprocess.Popen[bytes]]]:
-    """A client of Dask whose scheduler and worker are processes of their own."""
+    """Client of Dask whose scheduler and worker run in separate processes."""
     distributed = pytest.importorskip("distributed")
     file = str(folder / "scheduler.json")
     python = [sys.executable, "-m"]
@@ -323,7 +324,7 @@ def _scheduler(folder: Path) -> tuple[Any, list[subprocess.Popen[bytes]]]:
 
 
 class Silent(Executor):
-    """As Dask's executor when its scheduler answers nothing: what is handed out never ends."""
+    """Stands in for Dask's executor with a silent scheduler: no call ever ends."""
 
     class Client:
         status = "running"
@@ -394,7 +395,7 @@ if __name__ == "__main__":
 
 
 def _workers(driver: int) -> list[int]:
-    """The processes of a driver's pool, and the server from which they fork."""
+    """Processes of a driver's pool, and the server from which they fork."""
     children: dict[int, list[int]] = {}
     for entry in Path("/proc").iterdir():
         try:
@@ -478,7 +479,7 @@ elif sys.argv[1] == "sweep":
 else:
     list(campaign.run(abs, range(5)))
 """
-#: Workers as systems without a fork server start them.
+#: Workers started as on systems without a fork server.
 SPAWNED = """
 import multiprocessing
 multiprocessing.get_all_start_methods = lambda: ["spawn"]

@@ -1,4 +1,4 @@
-"""A certificate that the package writes is accepted by the checker that needs neither the package nor the program."""
+"""The checker that needs neither the package nor the program accepts a certificate of the package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""PEtab problems made for it: what conditions, segments, steady states and options do that the published ones do not, or not alone."""
+"""Constructed PEtab problems: cases of conditions, segments, steady states and options that the published
+ones lack or combine."""
 
 from __future__ import annotations
 
@@ -62,11 +63,11 @@ def test_conditions_parameters_and_segments(tmp_path: Path) -> None:
     path = written(tmp_path, SBML, TABLES)
     found = load(path)
     numbers = Numbers(found.text)
-    # cut at 1 and 2, at 1, at 1
+    # divided at 1 and 2, at 1, at 1
     assert (numbers.experiments, numbers.segments) == (3, 3)
     assert list(numbers.parameters) == ["k", "g_1", "g_2", "B_0", "s_1", "s_2"]
     assert any(n.endswith("of the noise alone: noise") for n in found.notes) and any("logarithm" in n for n in found.notes)
-    # behind 2 the others are where they were
+    # after t = 2 the other experiments stay in their last segment
     says_the_problem(path, found.text, (0.5, 1.5, 2.5))
     assert set(numbers.file["outputs"]) == {"y", "y_2", "z"}
 
@@ -119,7 +120,8 @@ STEADY_TABLES = {
 
 
 def test_a_steady_state_keeps_what_reactions_keep(tmp_path: Path) -> None:
-    """A = make/lose and C = 3 on A/(off + on A), of the sum 3 of B and C; then the run sees on A and off, but of on, make and lose no more."""
+    """A = make/lose and C = 3 on A/(off + on A), with the sum 3 of B and C. The run then shows A and off, but
+    not on, make and lose."""
     found = load(written(tmp_path, STEADY, STEADY_TABLES))
     numbers = Numbers(found.text)
     a, c = 0.4 / 0.3, 3 * 0.9 * (0.4 / 0.3) / (0.6 + 0.9 * 0.4 / 0.3)
@@ -149,7 +151,7 @@ def test_a_condition_may_start_elsewhere_than_in_the_steady_state_before(tmp_pat
 def test_what_is_measured_at_the_end_of_time_is_a_steady_state(tmp_path: Path) -> None:
     rows = "observableId simulationConditionId time measurement\ny run inf 0.1\n"
     found = load(written(tmp_path, STEADY, STEADY_TABLES | {"measurements": rows}))
-    # one number is seen: C
+    # one number is determined: C
     assert judge(found.text)["rank"] == 1 + 3
     assert {n for n, s in statuses(found.text).items() if s == "observable"} == {"B_ss", "C_ss"}
 

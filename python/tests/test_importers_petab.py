@@ -1,4 +1,5 @@
-"""The published PEtab problems: who is judged, with which verdict, and whether what is judged is the problem."""
+"""The published PEtab problems: judged ones with their verdicts, refused ones, and the agreement of the
+imported text with the problem."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from toml_numbers import Numbers, value
 
 from obsdeg.importers import ImportProblem, load
 
-#: By first author: options, unknowns, and those that are not observable.
+#: Judged problems by first author: options, number of unknowns, and the unobservable ones.
 JUDGED: dict[str, tuple[dict[str, Any], int, set[str]]] = {
     "Armistead": ({}, 10, set()),
     "Bachmann": ({}, 101, {"init_EpoRJAK2"}),
@@ -55,17 +56,17 @@ JUDGED: dict[str, tuple[dict[str, Any], int, set[str]]] = {
     "Zhao": ({}, 21, set()),
     "Zheng": ({}, 60, set()),
 }
-#: What is refused without options, by what, and where.
+#: Refused problems by first author: refused construct without options, and its place.
 REFUSED = {
     "Blasi": ("the steady state before a run", "16 equations that must be solved together"),
     "Liu": ("event _E0", "a condition on the state `U`"),
 }
-#: A time in every segment, where there are several.
+#: Times in every segment, for problems with several.
 TIMES = {"Brannmark": (1.0, 9.0), "Oliveira": (10.0, 50.0, 150.0), "Weber": (10.0, 24.5)}
 
 
 def problem(name: str) -> Path:
-    """The YAML file of a problem."""
+    """YAML file of a problem."""
     return min(shared("data/petab").glob(f"{name}_*/*.yaml"))
 
 
@@ -81,7 +82,7 @@ def test_all_problems_are_judged_or_refused() -> None:
 
 @pytest.mark.parametrize("name", sorted(JUDGED))
 def test_verdicts(name: str) -> None:
-    # 36 experiments of 101 unknowns: 2.2e9 operations, and the default limit says so
+    # 36 experiments of 101 unknowns need 2.2e9 operations, and the default limit says so
     answer = judge(imported(name), *(["--work-limit", "3000"] if name == "Bachmann" else []))
     _, unknowns, lost = JUDGED[name]
     assert answer["unknowns"] == unknowns
@@ -98,7 +99,7 @@ def test_what_has_no_counterpart_is_refused_by_construct_and_place(name: str) ->
 
 
 def drawn(tables: Tables, numbers: Numbers, rng: random.Random) -> dict[str, float]:
-    """Random values of what is estimated; when something switches is as the table says."""
+    """Random values of the estimated parameters; switching times keep the values of the table."""
     values = {n: rng.uniform(0.5, 1.5) for n in tables.parameters}
     for n, row in tables.parameters.items():
         if row["estimate"] != "1" or n not in numbers.parameters:
@@ -111,7 +112,7 @@ def close(a: Any, b: Any, size: float) -> bool:
 
 
 class Imported:
-    """The imported text of a problem at a point, experiment by experiment."""
+    """Imported text of a problem at a point, experiment by experiment."""
 
     def __init__(self, text: str, values: dict[str, float]) -> None:
         self.numbers = Numbers(text)
@@ -125,7 +126,7 @@ class Imported:
             self.values["root"] = mpmath.sqrt(abs(value(left, names)))
 
     def plain(self, found: dict[str, Any], experiment: int) -> dict[str, Any]:
-        """Without the number of a copy."""
+        """Name without the number of its copy."""
         tail = f"_at{experiment + 1}"
         return {n.removesuffix(tail): v for n, v in found.items() if n.endswith(tail)} if self.copies else found
 
@@ -163,7 +164,8 @@ def test_equations_outputs_and_starts_are_those_of_a_simulator(name: str) -> Non
 
 
 def says_the_problem(path: Path, text: str, times: tuple[float, ...]) -> None:
-    """Holds that every condition is an experiment of the text, at random points at a time in every segment; and every experiment a condition."""
+    """Asserts that every condition is an experiment of the text and vice versa, at random points at one time
+    in every segment."""
     tables, rng = Tables.read(path), random.Random(path.name)
     values = drawn(tables, Numbers(text), rng)
     mine = Imported(text, values)

@@ -1,4 +1,4 @@
-"""What a simulator says of unknowns of PEtab problems that are not observable."""
+"""Unobservable unknowns of PEtab problems, confirmed by a simulator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from petab_oracle import Model, Tables, observed, prepared
 
 
 def scaled(*factors: tuple[int, str]) -> Callable[[dict[str, float], float], dict[str, float]]:
-    """A change that multiplies each of the names (apart by blanks) by c^power."""
+    """Change that multiplies each name (separated by blanks) by c^power."""
 
     def change(values: dict[str, float], c: float) -> dict[str, float]:
         powers = {n: k for k, names in factors for n in names.split()}
@@ -22,7 +22,7 @@ def scaled(*factors: tuple[int, str]) -> Callable[[dict[str, float], float], dic
 
 
 def sneyd(number: str, other: str) -> Callable[[dict[str, float], float], dict[str, float]]:
-    """k_i + l_-j, l_j/l_-j and k_-i/k_i are all that is seen of these four."""
+    """Change that keeps k_i + l_-j, l_j/l_-j and k_-i/k_i, the observable combinations of these four."""
 
     def change(values: dict[str, float], c: float) -> dict[str, float]:
         v = values
@@ -39,7 +39,7 @@ def sneyd(number: str, other: str) -> Callable[[dict[str, float], float], dict[s
 
 
 mrna, proteins = "init_X_mRNA init_Y_mRNA init_Z_mRNA tps_active tps_repr", "init_X_protein init_Y_protein init_Z_protein"
-#: Changes that no output sees.
+#: Changes that affect no output.
 UNSEEN = {
     "Bachmann": [scaled((1, "init_EpoRJAK2"))],
     "Borghans": [
@@ -64,7 +64,7 @@ def test_what_is_not_observable_can_be_changed_and_no_simulation_sees_it(name: s
         measured.setdefault(row["simulationConditionId"], {})[key] = row
     rng = random.Random(name)
     if name == "Sneyd":
-        # those of the table are so far apart that single ones are hardly seen
+        # nominal values differ so much in size that the effect of some would be hidden
         nominal = {n: rng.uniform(0.5, 1.5) for n in nominal}
     conditions = rng.sample(sorted(measured), min(4, len(measured)))
 
@@ -74,7 +74,7 @@ def test_what_is_not_observable_can_be_changed_and_no_simulation_sees_it(name: s
             end = max(float(r["time"]) for r in tables.measurements if r["simulationConditionId"] == condition)
             model = Model.of(prepared(tables, condition, values), tables.sbml)
             model.simulator.integrator.relative_tolerance = 1e-11
-            # a number for all is scaled by the starts, which may be zero
+            # one tolerance for all states would be scaled by the starts, which may be zero
             model.simulator.integrator.absolute_tolerance = [1e-13] * len(model.states)
             before = 0.0
             for time in (0.1 * end, 0.4 * end, end):
@@ -90,7 +90,7 @@ def test_what_is_not_observable_can_be_changed_and_no_simulation_sees_it(name: s
         assert sum(changed[n] != v for n, v in nominal.items()) >= 1
         for a, b in zip(first, run(changed), strict=True):
             assert abs(a - b) <= 1e-6 * max(abs(a), abs(b)) + 1e-9
-        # and it is seen when one of them changes alone, where there are several
+        # changing only one of several parameters affects an output
         parts = [n for n, v in nominal.items() if changed[n] != v]
         if len(parts) > 1:
             alone = (run(nominal | {n: changed[n]}) for n in parts)

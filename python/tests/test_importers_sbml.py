@@ -1,4 +1,5 @@
-"""SBML: every construct that is read against a simulator or a verdict known by hand, every one that is refused with its place."""
+"""SBML: every supported construct against a simulator or a verdict by hand, every refused construct with its
+place."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ def mathml(formula: str) -> str:
 def document(
     species: Mapping[str, str] = NONE, *, parameters: Mapping[str, float] = NONE, reactions: str = "", more: str = "", volume: float = 2.0
 ) -> str:
-    """An SBML text of level 3: species with attributes, parameters that are constant, reactions, and what else is written."""
+    """SBML text of level 3: species with attributes, constant parameters, reactions, and further elements."""
     kinds = 'substanceUnits="mole" constant="false" compartment="c"'
     listed = "".join(f'<species id="{n}" {kinds} {a}/>' for n, a in species.items())
     values = "".join(f'<parameter id="{n}" value="{v!r}" constant="true"/>' for n, v in parameters.items())
@@ -57,7 +58,7 @@ def _ordered(more: str, reactions: str) -> str:
 
 
 def reaction(name: str, rate: str, takes: dict[str, float], gives: dict[str, float], local: Mapping[str, float] = NONE) -> str:
-    """A reaction."""
+    """SBML text of a reaction."""
     refs = lambda kind, of: (
         f"<{kind}>"
         + "".join(f'<speciesReference species="{n}" stoichiometry="{k}" constant="true"/>' for n, k in of.items())
@@ -80,7 +81,7 @@ CONC = 'initialConcentration="1.5" hasOnlySubstanceUnits="false" boundaryConditi
 AMOUNT = 'initialAmount="3" hasOnlySubstanceUnits="true" boundaryCondition="false"'
 HELD = 'initialConcentration="2" hasOnlySubstanceUnits="false" boundaryCondition="true"'
 
-#: Texts, with what is measured.
+#: Texts with their measured quantities.
 KINDS = {
     "concentrations and amounts": (
         document({"A": CONC, "B": AMOUNT}, parameters={"k": 0.3}, reactions=reaction("r", "c*k*A*B", {"A": 2}, {"B": 1.5})),
@@ -186,7 +187,7 @@ DECAY = reaction("r", "c*k*A", {"A": 1}, {})
 
 
 def test_a_known_dose_tells_the_scale_of_what_is_measured(file: Any) -> None:
-    """y = s A: s and the unknown A(0) are told apart only where a known amount is added."""
+    """y = s A: s and the unknown A(0) are distinguished only if a known amount is added."""
     options: dict[str, Any] = {"outputs": {"y": "s*A"}, "unknown": ["k", "s"], "starts": "unknown"}
     species, parameters = {"A": CONC}, {"k": 0.3, "s": 2.0}
     without = statuses(load(file(document(species, parameters=parameters, reactions=DECAY)), **options).text)

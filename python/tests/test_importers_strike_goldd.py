@@ -1,7 +1,8 @@
-"""Models of STRIKE-GOLDD in its syntax have the verdicts that are published of them.
+"""Models of STRIKE-GOLDD in its syntax have their published verdicts.
 
-The texts are written here, from the equations as they are published; no file of the tool is. Where a verdict is from is said with each: its manual, its authors' supplement of AutoRepar
-(boxes: what the tool printed), StrikePy, the same authors' tool in Python, or another tool, StructuralIdentifiability.jl.
+The texts are written here from the published equations; no file of the tool is included. Each verdict names
+its source: the manual, the authors' supplement of AutoRepar (boxes: output of the tool), StrikePy, the same
+authors' tool in Python, or another tool, StructuralIdentifiability.jl.
 """
 
 from __future__ import annotations
@@ -77,13 +78,13 @@ def c2m(unknown: str, known: bool) -> str:
 
 
 def without(text: str, *ones: str, of: str) -> str:
-    """A text whose parameters `of` are unknown, but for those that are 1."""
+    """Text with unknown parameters `of`; those equal to 1 are known."""
     every = of.split()
     return text.format(unknown=" ".join(n for n in every if n not in ones), **{n: "1" if n in ones else n for n in every})
 
 
 def names(text: str) -> set[str]:
-    """Words, and `x1..4` for x1 x2 x3 x4."""
+    """Words of a text, with `x1..4` for x1 x2 x3 x4."""
     out: set[str] = set()
     for word in text.split():
         head, dots, last = word.partition("..")
@@ -95,7 +96,7 @@ MANUAL, REPAIR, PORT = "STRIKE-GOLDD manual 4.3", "supplement of AutoRepar", "St
 OTHER = "StructuralIdentifiability.jl 0.1"
 RAMP: dict[str, Any] = {"unknown_inputs": 1}
 X10 = "x1..9 x10 s1..4"
-#: Texts, options, what is not observable, and where that is published.
+#: Texts, options, unobservable names, and source of the verdict.
 PUBLISHED: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "two compartments, any input": (c2m("k1e k12 k21 b", True), {}, "", f"{MANUAL}.1"),
     "two compartments, constant input": (c2m("k1e k12 k21 b", True), {"known_inputs": 0}, "x2 k1e k12 k21 b", f"{MANUAL}.1"),
@@ -104,7 +105,7 @@ PUBLISHED: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "two compartments, unknown ramp": (c2m("k1e, k12, k21", False), RAMP, "x2 v v' k1e k12 k21", f"{MANUAL}.2"),
     "two compartments, elimination known": (c2m("k12 k21", False), {"unknown_inputs": 0}, "", f"{MANUAL}.2"),
     "two compartments, elimination known, ramp": (c2m("k12 k21", False), RAMP, "", f"{MANUAL}.2"),
-    # box 1 calls x2 observable, which the third of its symmetries moves: the text has the three
+    # box 1 calls x2 observable, although the third of its symmetries changes it: this list has the three
     "Vajda": (VAJDA.format(unknown="t1;t2;t3;t4", t2="t2"), RAMP, "t2 t3 x2", f"{REPAIR}, 1: symmetry (3)"),
     "Vajda, repaired": (VAJDA.format(unknown="t1;t3;t4", t2="1"), RAMP, "", f"{REPAIR}, 1: box 4"),
     "pharmacokinetics": (without(PK, of="k1 s3"), RAMP, "k1 k2 k3 k7 s2 s3 x1..4 u1 u1'", f"{REPAIR}, 2: box 1"),
@@ -113,13 +114,13 @@ PUBLISHED: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "glucose alone": (without(BIG, of="P si"), {}, "P si B I", f"{REPAIR}, 3: box 1"),
     "glucose alone, half repaired": (without(BIG, "P", of="P si"), {}, "si B I", f"{REPAIR}, 3: box 5"),
     "glucose alone, repaired": (without(BIG, "P", "si", of="P si"), {}, "", f"{REPAIR}, 3: box 6"),
-    # box 1 lists what each of the symmetries moves
+    # box 1 lists the names that each symmetry changes
     "NFkB": (without(NFKB, of="k0 k6 k10"), RAMP, f"k0 k1 k6 k8 k10 u1 u1' {X10}", f"{REPAIR}, 4: box 1"),
     "NFkB, a third repaired": (without(NFKB, "k0", of="k0 k6 k10"), RAMP, f"k6 k8 k10 {X10}", f"{REPAIR}, 4: box 4"),
     "NFkB, two thirds repaired": (without(NFKB, "k0", "k6", of="k0 k6 k10"), RAMP, f"k10 {X10}", f"{REPAIR}, 4: box 8"),
     "NFkB, repaired": (without(NFKB, "k0", "k6", "k10", of="k0 k6 k10"), RAMP, "", f"{REPAIR}, 4: box 11"),
 }  # fmt: skip
-#: Reference models that are in the collections of STRIKE-GOLDD or StrikePy too, and what judged them.
+#: Reference models that the collections of STRIKE-GOLDD or StrikePy contain, with the tool that judged them.
 COLLECTED = {
     "bolie_glucose": PORT,
     "clock_reaction_cr": PORT,
@@ -149,7 +150,7 @@ def test_verdicts_are_those_that_are_published(name: str) -> None:
 @pytest.mark.parametrize("name", COLLECTED)
 def test_verdicts_are_those_of_other_tools(name: str) -> None:
     model = references()[name]
-    # who judged is what the model says of itself
+    # the model names the tool of its verdict
     assert COLLECTED[name].split()[0] in model["reference"]
     model = scripts.renamed(model)
     degree = model.get("unknown_input_max_derivative")
@@ -163,5 +164,5 @@ def test_there_are_more_than_thirty() -> None:
     sources = Counter(s.partition(",")[0].partition(" 4.3")[0] for *_, s in PUBLISHED.values()) + Counter(COLLECTED.values())
     assert sources["STRIKE-GOLDD manual"] == 7 and sources[REPAIR] == 12 and sources[PORT] == 6
     assert sum(sources.values()) == 34
-    # the same system is asked once with each input
+    # the same system is used once with each input
     assert len({text for text, *_ in PUBLISHED.values()}) == 15

@@ -1,4 +1,5 @@
-"""Formulas, habits of other tools' texts, refusals by line, and `load`, which sees what a file is."""
+"""Formulas, styles of other tools' texts, refusals by line, and `load`, which recognises the kind of a file.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +92,7 @@ def test_a_script_may_save_several_models() -> None:
     assert strike_goldd.models(BOLIE) == ["Bolie", "Bolie_both"]
     first = strike_goldd.read(BOLIE)
     assert first.notes == ["model Bolie; the script saves others: Bolie_both"] and list(first.known_inputs) == ["delta"]
-    # the scale of the second state is not seen
+    # the scale of the second state is not observable
     assert {n for n, s in statuses(to_toml(first)).items() if s != "observable"} == {"q2", "p2", "p4"}
     both = strike_goldd.read(BOLIE, model="Bolie_both")
     assert {n for n, s in statuses(to_toml(both)).items() if s != "observable"} == {"Vp"}
@@ -136,7 +137,7 @@ def test_vectors_are_numbered_chosen_and_filled() -> None:
 
 
 def test_what_is_saved_counts() -> None:
-    """An input may be a symbol of this name; what is not saved is no part of the model."""
+    """An input may be a symbol of this name; variables that are not saved are not part of the model."""
     text = "syms x1 a u w v\nx = x1; p = a; f = -a*x1 + u + w + v; h = x1;\nsave('m','x','p','h','f','u','w')\nu = v;\nsave('n','x','p','h','f')"
     first, second = strike_goldd.read(text), strike_goldd.read(text, model="n")
     assert (list(first.known_inputs), list(first.unknown_inputs), list(first.constants)) == (["u"], ["w"], ["v"])

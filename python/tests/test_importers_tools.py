@@ -1,4 +1,4 @@
-"""Texts of other tools: the 141 published systems read back from their syntax have the verdicts that are known of them."""
+"""Texts of other tools: the 141 published systems read back from their syntax have their known verdicts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from obsdeg.importers import (
 )
 
 MODELS = {n: scripts.renamed(m) for n, m in references().items() if scripts.is_plain(m)}
-#: Beyond these functions a text of the tools cannot say what a model is.
+#: Models that texts of the tools can express: rational functions only.
 RATIONAL = {n: m for n, m in MODELS.items() if not m.get("unknown_inputs") and not m.get("known_constants") and "(t)" not in str(m)}
 
 
 def agrees(model: scripts.Model, text: str) -> None:
-    """Every verdict and, where it is known, the rank order by order."""
+    """Asserts every verdict and, if known, the rank order by order."""
     answer = judge(text)
     found = {q["name"]: q["status"] == "observable" for q in answer["quantities"]}
     expected = model["expected"]
@@ -53,7 +53,7 @@ def test_models_of_si_jl_have_the_verdicts_that_are_known(name: str) -> None:
     model = RATIONAL[name]
     system = sijl.read(scripts.julia(model))
     assert list(system.states) == model["states"]
-    # what stands in no equation is not seen there
+    # names that occur in no equation are missing in the text
     assert set(system.parameters) <= set(model["params"]) and set(system.known_inputs) <= set(model["known_inputs"])
     unseen = set(model["params"]) - set(system.parameters)
     expected = {k: [n for n in v if n not in unseen] for k, v in model["expected"].items() if isinstance(v, list)}
@@ -66,7 +66,7 @@ def test_exports_say_the_same_system(name: str) -> None:
     toml = to_toml(strike_goldd.read(scripts.matlab(model)))
     before = statuses(toml)
     back = sympy_system.read(exporters.to_sympy(toml))
-    # a name of Python's own, as lambda, is lambda_ there
+    # a keyword of Python, such as lambda, becomes lambda_
     assert {n.rstrip("_"): s for n, s in statuses(to_toml(back)).items()} == {n.rstrip("_"): s for n, s in before.items()}
     if any(f"{f}(" in toml for f in ("sin", "cos", "tan", "exp", "sqrt")):
         with pytest.raises(ImportProblem, match="rational function"):

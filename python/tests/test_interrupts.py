@@ -1,4 +1,4 @@
-"""Keys are heard while the engine works, and copies of a process (fork) work as it does."""
+"""The interrupt key works while the engine works, and forked copies of a process work too."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ PAIR = [(0, 0, 0), (180, 0, 0)]
 
 
 def chain(length: int) -> obsdeg.Model:
-    """A model whose analysis takes more than a minute for a length of 400: each state feeds the next."""
+    """Model in which each state feeds the next; with a length of 400 its analysis takes more than a minute.
+    """
     rates = [f'x{i} = {{ equation = "k{i}*x{max(i - 1, 0)} - x{i}" }}' for i in range(length)]
     lines = ['name = "chain"', "[states]", *rates, "[parameters]", *(f"k{i} = {{}}" for i in range(length))]
     return obsdeg.Model.from_text("\n".join([*lines, "[outputs]", f'y = "x{length - 1}"']) + "\n")
 
 
 def transcendental() -> obsdeg.Model:
-    """A model that is judged in real numbers of many digits."""
+    """Model that is judged in real numbers of many digits."""
     text = chain(60).text.replace('"x59"', '"tanh(x59)"')
     return obsdeg.Model.from_text(text.replace('- x0"', '- sin(x0)"'))
 
 
 def oscillator(rows: int) -> tuple[obsdeg.Model, str]:
-    """A model and a record that it fits in half a minute."""
+    """Model and record whose fit takes half a minute."""
     text = (
         'name = "oscillator"\n[states]\nx = "v"\nv = "-k*x - c*v"\n[parameters]\nk = {}\nc = {}\n[outputs]\ny = "x"\n'
         "[simulation]\nvalues = { x = 1, v = 0, k = 9, c = 0.1 }\nnoise = { y = 0.01 }\n"
@@ -78,7 +79,7 @@ def test_a_key_is_heard_within_half_a_second(name: str) -> None:
     finally:
         key.cancel()
     assert pressed, "too short for this test"
-    # of the processor, which may have other work, per core
+    # processor time, scaled by cores, since other programs may run
     assert time.process_time() - pressed[0][1] < 0.5 * (os.cpu_count() or 1)
     assert time.monotonic() - pressed[0][0] < 5
 

@@ -1,4 +1,4 @@
-"""What an importer takes on is counted before the work is done: hostile texts end in a sentence, at once."""
+"""The importers count work before doing it: hostile texts are refused at once with a sentence."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PYTHON = "rates = {{'x': {rate}}}\noutputs = {{'y': 'x'}}\n"
 
 
 def doubled(times: int, form: str, end: str = "\n") -> str:
-    """Definitions of which each has the one before twice."""
+    """Definitions that each use the previous one twice."""
     return end.join(form.format(new=f"a{i + 1}", old=f"a{i}") for i in range(times))
 
 
@@ -52,7 +52,7 @@ def nested(depth: int) -> str:
 
 
 def doubling(times: int) -> str:
-    """Functions of which each calls the one before twice."""
+    """Functions that each call the previous one twice."""
     math = '<math xmlns="http://www.w3.org/1998/Math/MathML"><lambda><bvar><ci> x </ci></bvar>'
     form = '<functionDefinition id="f{}">' + math + "{}</lambda></math></functionDefinition>"
     out = [form.format(0, "<apply><sin/><ci> x </ci></apply>")]
@@ -63,7 +63,7 @@ def doubling(times: int) -> str:
     return f"<listOfFunctionDefinitions>{''.join(out)}</listOfFunctionDefinitions>"
 
 
-#: File, what the error says, and the text.
+#: File, expected message, and text.
 HOSTILE: dict[str, tuple[str, Callable[[], str]]] = {
     "tower.jl": ("too many digits", lambda: JULIA.format(rate="9^9^9^9*x(t)")),
     "power.jl": ("too many digits", lambda: JULIA.format(rate="2^10000000000*x(t)")),
@@ -143,7 +143,7 @@ def test_devices_without_an_end_are_refused() -> None:
     for ask in (obsdeg.analyze, obsdeg.simulate, obsdeg.load, obsdeg.Scheme.read, obsdeg.Model.read):
         with pytest.raises(ValueError, match="/dev/zero: found more than 50000000 characters"):
             ask("/dev/zero")
-    # the memory of this process has not grown by what a device gives
+    # the device's endless output did not grow the memory of this process
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 2_000_000
 
 
@@ -180,7 +180,7 @@ def test_texts_of_sympy_are_read_and_never_run(tmp_path: Path) -> None:
 
 
 def test_parts_in_common_are_counted_as_often_as_they_stand() -> None:
-    """40 times a sum with its own square: 2**40 operations of 40 objects."""
+    """40 nested sums of a term with its own square: 2**40 operations of 40 objects."""
     x = sympy.Symbol("x")
     doubled, nested = x, x
     for _ in range(40):
@@ -195,7 +195,7 @@ def test_parts_in_common_are_counted_as_often_as_they_stand() -> None:
 
 def test_powers_that_are_not_evaluated_are_held() -> None:
     x = sympy.Symbol("x")
-    # SymPy makes the number where it may: nothing here is evaluated
+    # SymPy would evaluate the number; here nothing is evaluated
     power = sympy.Pow(2, 10**9, evaluate=False)
     nested = sympy.Pow(sympy.Pow(3, 10**5, evaluate=False), 10**5, evaluate=False)
     for expression in (power, sympy.Mul(power, x, evaluate=False), sympy.Add(nested, x, evaluate=False)):
@@ -229,7 +229,7 @@ def test_what_is_quoted_does_not_steer_a_terminal(tmp_path: Path) -> None:
 
 
 def test_a_system_of_too_many_equations_is_refused(tmp_path: Path) -> None:
-    """More equations than the program takes states are counted before one of them is read."""
+    """More equations than the program accepts states are counted before any is read."""
     file = tmp_path / "chain.jl"
     chain = [f" x{i}'(t) = x{i + 1}(t)," for i in range(20_000)]
     file.write_text("\n".join(["ode = @ODEmodel(", *chain, " x20000'(t) = x0(t),", " y(t) = x0(t)", ")"]))

@@ -1,4 +1,4 @@
-"""Which quantities of a model to measure."""
+"""Quantities of a model to measure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def chain() -> obsdeg.Model:
 
 
 def degree(outputs: tuple[str, ...]) -> int | None:
-    """The largest degree where these are the outputs, by the verdicts."""
+    """Largest degree with these outputs, by the verdicts."""
     text = CHAIN.replace('y = "c"', "\n".join(f'o{i} = "{o}"' for i, o in enumerate(outputs)))
     degrees = [q.degree for q in obsdeg.analyze(obsdeg.Model.from_text(text), solutions=False)]
     return None if None in degrees else max(d for d in degrees if d is not None)

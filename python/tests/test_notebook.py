@@ -1,4 +1,4 @@
-"""The walk-through: runs from its first cell to its last, prints what it shows, and its code has types."""
+"""The walk-through notebook runs completely, its output is as shown, and its code passes the type checker."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from conftest import ROOT
 nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
 NOTEBOOK = ROOT / "python" / "notebooks" / "walk-through.ipynb"
-#: A picture in a page, and what is left of a figure in a text.
+#: A picture in a page, and the text that replaces a figure.
 PICTURE = r'<img alt="plot" src="[^"]*">|<Figure size [^>]*>'
 
 
 def printed(notebook: Any) -> list[dict[str, str]]:
-    """What each cell of code prints or shows, by kind."""
+    """Output of each code cell, by kind."""
     shown = []
     for cell in notebook.cells:
         kinds: dict[str, str] = {}
@@ -45,7 +45,7 @@ def test_it_runs_and_shows_what_it_shows() -> None:
         nbformat.write(notebook, NOTEBOOK)
         return
     for source, shown, now in zip([c.source for c in notebook.cells if c.cell_type == "code"], before, after, strict=True):
-        # tables of pandas and pictures of matplotlib have the style of their versions
+        # tables of pandas and pictures of matplotlib depend on their versions
         now = {k: re.sub(PICTURE, "", v) for k, v in now.items() if k != "image/png"}
         shown = {k: re.sub(PICTURE, "", v) for k, v in shown.items() if k != "image/png"}
         kinds = [k for k in now if k != "text/html" or "dataframe" not in now[k]]

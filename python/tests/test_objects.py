@@ -1,4 +1,4 @@
-"""Schemes, models and answers as objects: made of what Python has, checked, named, and unchanging."""
+"""Schemes, models and answers as objects: made from Python values, checked, named, and immutable."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_schemes_know_their_parts() -> None:
     assert scheme.positions == ("NUE", (180, 0, Decimal("22.5")), ("alpha", 0, 0))
     assert scheme.angles == ((0.0, 0.0, 0.0), (180.0, 0.0, 22.5), ("alpha", 0.0, 0.0))
     assert obsdeg.Scheme(PAIR).carry == "platform" and obsdeg.Scheme(PAIR).latitude is None
-    # the old name of the positions, and those of a scheme as positions of another
+    # the old name of the positions, and positions of a scheme as those of another
     assert obsdeg.Scheme(angles=PAIR) == obsdeg.Scheme(PAIR) == obsdeg.Scheme(obsdeg.Scheme(PAIR).positions)
     with pytest.raises(TypeError, match="both positions and angles"):
         obsdeg.Scheme(PAIR, angles=PAIR)
@@ -40,7 +40,8 @@ def test_schemes_know_their_parts() -> None:
         obsdeg.Scheme(carry="reset")
 
 
-#: Rows are the directions of X_p, Y_p, Z_p in North, Up, East: C_c^n = Mx(alpha) My(beta) Mz(gamma), written out by hand.
+#: Rows are the directions of X_p, Y_p, Z_p in North, Up, East: C_c^n = Mx(alpha) My(beta) Mz(gamma), written
+#: out by hand.
 def matrix(alpha: float, beta: float, gamma: float) -> list[list[float]]:
     from math import cos, radians, sin
 
@@ -84,7 +85,7 @@ def test_replacing_a_key_is_writing_it() -> None:
     assert text != bench.text
     asked = dict(solutions=False)
     assert obsdeg.analyze(changed, **asked).to_dict() == obsdeg.analyze(obsdeg.Scheme.from_text(text), **asked).to_dict()
-    # nothing changes nothing: names, dwells, requirements and noise of every example
+    # an empty change keeps names, dwells, requirements and noise of every example
     for file in sorted(Path("examples").glob("*/scheme.toml")):
         if not file.parent.name.startswith("wrong-"):
             scheme = obsdeg.Scheme.read(file)
@@ -188,7 +189,7 @@ def test_answers_are_read_from_their_json() -> None:
         with pytest.raises(ValueError, match="read from JSON; expected one of the engine"):
             again.text()
     for answer in answers[:2]:
-        # the main table is that of the engine; texts of empty cells differ
+        # the main table equals that of the engine; texts of empty cells differ
         own, again = answer.to_frame(), obsdeg.Answer.from_json(answer.json()).to_frame()
         for column in own:
             theirs = [x if isinstance(x, (int, float, str)) else None for x in again[column]] if column in again else [None] * len(own)
@@ -236,7 +237,7 @@ def test_where_rounding_is_said() -> None:
     answer = obsdeg.analyze([(third, 0, 0)], latitude=100 * third, solutions=False)
     said = "Rounded before it was judged: alpha of position 1: 1/3 taken as 0.333333333 and 1 more"
     assert said in repr(answer) and str(answer).endswith(f"{said}\n") and said in answer._repr_html_()
-    # the bytes of the command line stay what they are
+    # the bytes of the command line do not change
     assert said not in answer.text() and said not in answer.json()
     assert pickle.loads(pickle.dumps(answer)).rounded == answer.rounded
     assert obsdeg.analyze([(0.123456, 0, 0)], digits=2, solutions=False).rounded[0].taken == "0.12"
@@ -274,10 +275,10 @@ def test_models_of_dictionaries() -> None:
     decay = obsdeg.Model(states={"x": "-a*b*x"}, parameters={"a": "", "b": "1/h"}, outputs={"y": "x"})
     assert obsdeg.analyze(decay).json() == obsdeg.analyze(obsdeg.Model(MODEL)).json()
     assert decay.states == {"x": "-a*b*x"} and decay.outputs == {"y": "x"} and decay.parameters == ("a", "b")
-    # names that are nothing else are the parameters, in their order
+    # names without another meaning are the parameters, in order of appearance
     named = obsdeg.Model(states={"x": "-k_1*x + 1e3*sin(w*t)*c + q/pi", "q": "s0"}, outputs={"y": "abs (x)"}, starts={"x": "x0"}, constants={"c": 2})
     assert named.parameters == ("k_1", "w", "x0", "s0")
-    # rates, starts, inputs, constants and numbers of every kind, against a file that was written by hand
+    # rates, starts, inputs, constants and numbers of every kind, against a file written by hand
     full = obsdeg.Model(
         name="full",
         states={"x": "-k*x + u + w", "z": {"equation": "c*x - q*z", "unit": "mg"}},
@@ -323,7 +324,7 @@ def test_check_refuses_what_the_engine_refuses() -> None:
     refused = 0
     for file in sorted(Path("examples").glob("*/*.toml")):
         if file.stem == "division-by-zero":
-            # of no text, but of every point at which the model is judged
+            # the message concerns all points at which the model is judged, not a text
             continue
         is_model = file.parent.name == "wrong-models" or "[[position]]" not in file.read_text(encoding="utf-8")
         text = (obsdeg.Model if is_model else obsdeg.Scheme).read(file)
@@ -381,11 +382,11 @@ def test_exporters_take_models() -> None:
 
 
 def test_analyze_gives_the_changes_per_unit() -> None:
-    """Changes per unit are there where they are asked for: 1 ug of K0 is a tilt of 1e-6 rad in the psi of a position."""
+    """Changes per unit exist only on request: 1 ug of K0 is a tilt of 1e-6 rad in psi of a position."""
     asked = obsdeg.analyze([(0, 0, 0), (180, 0, 0)], carry="reset", sensitivities=True).sensitivities
     assert asked is not None
     k0 = next(t for t in asked.effects.terms if t.name == "K0_X")
     psi = next(s for s in k0.sensitivities if s.unknown == "psi_z@1")
-    # Z1 = psi_z + K0_X: the tilt takes the whole of it, in deg per ug
+    # Z1 = psi_z + K0_X: the tilt cancels all of it, in deg per ug
     assert abs(abs(psi.per_unit) / math.degrees(1e-6) - 1) < 1e-9
     assert obsdeg.analyze([(0, 0, 0), (180, 0, 0)]).sensitivities is None

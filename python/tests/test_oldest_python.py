@@ -1,4 +1,4 @@
-"""What the package needs is in the oldest Python that it is said to run on."""
+"""The package uses only names of the oldest Python that it supports."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-#: Modules of the standard library that came after Python 3.10.
+#: Modules of the standard library added after Python 3.10.
 LATER = {"tomllib": (3, 11), "wsgiref.types": (3, 11), "compression": (3, 14), "concurrent.interpreters": (3, 14), "annotationlib": (3, 14)}
-#: Names that came after Python 3.10, in modules that were there.
+#: Names added after Python 3.10 in older modules.
 LATER_NAMES = {
     "typing": {"Self", "Never", "Unpack", "TypeVarTuple", "LiteralString", "Required", "NotRequired", "assert_never", "assert_type", "reveal_type", "override"},
     "datetime": {"UTC"},
@@ -29,7 +29,7 @@ FILES = sorted((ROOT / "python" / "obsdeg").rglob("*.py"))
 
 
 class Later(ast.NodeVisitor):
-    """Imports of what Python 3.10 lacks, outside of what is run with later versions or read by type checkers alone."""
+    """Imports that Python 3.10 lacks, except those only for later versions or type checkers."""
 
     def __init__(self) -> None:
         self.found: list[str] = []
@@ -59,7 +59,7 @@ class Later(ast.NodeVisitor):
 
 
 def later(text: str) -> list[str]:
-    # match, walrus and the like are read as Python 3.10 has them; except* and type parameters are refused
+    # match, walrus and the like are read as in Python 3.10; except* and type parameters are refused
     visitor = Later()
     visitor.visit(ast.parse(text, feature_version=(3, 10)))
     return visitor.found
@@ -80,7 +80,7 @@ def test_what_is_later_is_found() -> None:
 
 
 def as_python_3_10(script: str, *, tomli: bool) -> subprocess.CompletedProcess[str]:
-    """A script where the version is 3.10, `tomllib` is missing, and `tomli` has what that has or is missing too."""
+    """Script under a simulated Python 3.10 without `tomllib`; `tomli` replaces it or is missing too."""
     head = f"import sys, tomllib\nsys.modules['tomli'] = tomllib if {tomli} else None\nsys.modules['tomllib'] = None\nsys.version_info = (3, 10, 13, 'final', 0)\n"
     return subprocess.run([sys.executable, "-c", head + script], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
 

@@ -1,4 +1,4 @@
-"""The package against the program: the same bytes; answers as Python has them; what is wrong; interrupts."""
+"""The package against the program: equal bytes, Python answers, errors, interrupts."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_answers_are_pickled_and_copied() -> None:
     for again in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer), copy.copy(answer)):
         assert again == answer
         assert again.degrees == answer.degrees
-        # what the JSON does not hold is asked for again
+        # the engine is asked again for parts that the JSON does not contain
         assert again._repr_html_() == answer._repr_html_()
         assert again.files() == answer.files()
     scheme = obsdeg.Scheme(PAPER, latitude=28.2)
@@ -163,7 +163,7 @@ def test_problems_have_their_place() -> None:
         obsdeg.analyze("nowhere.toml")
     with pytest.raises(obsdeg.ProblemError, match="nowhere.csv"):
         obsdeg.calibrate("examples/influenza/model.toml", "nowhere.csv")
-    # names of options as Python has them
+    # option names have Python's form
     with pytest.raises(obsdeg.ProblemError, match="within 200"):
         obsdeg.design(5, within=200)
 
@@ -179,7 +179,7 @@ def test_progress_ends_a_search_with_the_best_so_far() -> None:
     found = obsdeg.design(9, carry="inertial", restarts=100_000, progress=enough)
     assert len(heard) >= 3 and heard[0][0] == "searching"
     assert found.winner().text.count("[[position]]") == 9
-    # a hundred thousand restarts take minutes
+    # a hundred thousand restarts would take minutes
     assert time.monotonic() - began < 60
     with pytest.raises(ZeroDivisionError):
         obsdeg.design(9, carry="inertial", restarts=100_000, progress=lambda *_: 1 // 0)
@@ -215,7 +215,7 @@ def test_other_threads_go_on() -> None:
     took = time.monotonic() - began
     done.set()
     thread.join()
-    # with the lock held none would have come
+    # with the lock of the interpreter held there would be none
     assert ticks > 20 * min(took, 1), (ticks, took)
 
 

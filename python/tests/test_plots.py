@@ -1,4 +1,4 @@
-"""Pictures hold the numbers of their answers, and notebooks show them."""
+"""Pictures contain the numbers of their answers, and notebooks show them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def in_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def points(axes: Any) -> dict[str, list[tuple[float, float]]]:
-    """What is drawn, by its label in the legend."""
+    """Drawn points by label in the legend."""
     return {line.get_label(): list(zip(line.get_xdata(), line.get_ydata(), strict=True)) for line in axes.lines}
 
 
@@ -42,7 +42,7 @@ def test_a_run_has_its_sigmas_and_histories(monkeypatch: pytest.MonkeyPatch) -> 
     assert drawn["required"] == [(0.05, i) for i, q in enumerate(rows) if q["name"].startswith("D_F")]
     assert names(axes) == [f"{q['name']} [{q['unit']}]" for q in rows]
     series = run.series()
-    # made once
+    # the series is made once
     monkeypatch.setattr(type(run), "files", lambda self: pytest.fail("drawn again"))
     panels = run.plot("D_FX", "psi_x")
     assert [p.get_ylabel() for p in panels] == ["D_FX [deg/h]", "psi_x [deg]"]
@@ -72,7 +72,7 @@ def test_searches_calibrations_and_cross_checks() -> None:
     assert names(sigmas)[3].startswith("D_FX = 1.301 \u00b1 0.0027 deg/h")
     model = obsdeg.calibrate("examples/influenza/model.toml", "examples/influenza/data.csv")
     measured = model.plot()[0]
-    # the noise was estimated from the residuals: two degrees of freedom are gone
+    # the noise was estimated from the residuals, with two degrees of freedom less
     of = [r for _, r in points(measured)["in_bed"]]
     assert len(of) == 14 and sum(r * r for r in of) == pytest.approx(model.chi_square, rel=1e-6)
     crossed = obsdeg.crosscheck(PAIR, carry="inertial", runs=5)
@@ -99,7 +99,7 @@ def test_pages_of_notebooks_have_figures(tmp_path: Path) -> None:
             image = re.search(r'<img alt="plot" src="data:image/png;base64,([^"]+)">', page)
             assert image and base64.b64decode(image[1]).startswith(b"\x89PNG")
         assert answer._repr_html_() == page
-    # no figure of pyplot is left behind by them
+    # they leave no figure of pyplot open
     from matplotlib import pyplot
 
     before = len(pyplot.get_fignums())

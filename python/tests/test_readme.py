@@ -20,7 +20,7 @@ PAGES = ["README.md", "python/README.md", "book/src/python.md"]
 def test_pages_print_what_they_show(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
-    # a block ends with its fence, which is no part of what is printed
+    # the fence at the end of a block is not part of the output
     text = (ROOT / page).read_text(encoding="utf-8").replace("\n```", "\n\n```")
     tested = doctest.DocTestParser().get_doctest(text, {}, page, page, 0)
     assert len(tested.examples) >= 2

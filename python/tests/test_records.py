@@ -1,4 +1,4 @@
-"""Records as arrays and frames say what the same record says as a file."""
+"""A record as arrays or frames gives the same answer as its file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def frame() -> Any:
 
 @pytest.fixture(scope="module")
 def own() -> obsdeg.Calibration:
-    """The answer on the file."""
+    """Answer for the file."""
     found = obsdeg.calibrate(obsdeg.Scheme.read(ROOT / SCHEME), ROOT / RECORD)
     assert isinstance(found, obsdeg.Calibration)
     return found
@@ -42,7 +42,7 @@ def same(found: Any, own: obsdeg.Calibration) -> None:
 
 
 def read(given: tuple[str, bytes | None]) -> Any:
-    """What a record says, read by pandas."""
+    """Content of a record, read by pandas."""
     assert given[1] is not None
     return pandas.read_csv(io.BytesIO(given[1]))
 
@@ -50,7 +50,7 @@ def read(given: tuple[str, bytes | None]) -> Any:
 def test_arrays_of_numpy(frame: Any, own: obsdeg.Calibration) -> None:
     scheme = obsdeg.Scheme.read(SCHEME)
     t, f, position = (frame[c].to_numpy() for c in ("t [s]", FORCES, "position"))
-    # numbers of positions are those of their names
+    # numbers of positions in place of their names
     numbers = frame["position"].str[1:].astype(float)
     same(obsdeg.calibrate(scheme, t=t, f=f, position=numbers), own)
     names = ["p1", "p2", "p3", "p4", "p5", "p6"]
@@ -64,7 +64,7 @@ def test_arrays_of_numpy(frame: Any, own: obsdeg.Calibration) -> None:
     ):
         assert given and read(given).equals(frame)
     spans = arrays(pandas.to_timedelta(frame["t [s]"], unit="s"), f, position, None)
-    # spans of time are exact to a microsecond
+    # time spans are exact to a microsecond
     assert spans and list(read(spans)["t [s]"]) == pytest.approx(list(t), abs=1e-6)
 
 
@@ -73,7 +73,7 @@ def test_frames_and_streams(frame: Any, own: obsdeg.Calibration) -> None:
     table = pyarrow.Table.from_pandas(frame, preserve_index=False)
 
     class Stream:
-        """A frame of a library that nobody knows."""
+        """Frame of an unknown library."""
 
         def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
             return table.__arrow_c_stream__(requested_schema)
@@ -113,7 +113,7 @@ def test_missing_samples_are_reported(frame: Any) -> None:
     found = obsdeg.calibrate(SCHEME, f=f, **asked)
     assert isinstance(found, obsdeg.Calibration)
     assert {c.column: c.count for c in found.records[0].empty_cells} == {"fx [g]": 1, "fz [g]": 3}
-    # as cells that are empty in a file
+    # equivalent to empty cells in a file
     holes = frame.assign(**dict(zip(FORCES, f.T, strict=True)))
     masked = arrays(asked["t"], numpy.ma.masked_invalid(f), asked["position"], None)
     assert masked and read(masked).equals(holes) and b",," in (masked[1] or b"")

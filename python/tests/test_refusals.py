@@ -1,4 +1,4 @@
-"""What is not what was meant is refused where it is given, with what was expected."""
+"""Wrong values are refused where they are given, with the expected ones."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_positions_without_end() -> None:
             obsdeg.analyze(angles=positions)
         with pytest.raises(ValueError, match="found more than 1000 positions; expected at most 1000"):
             obsdeg.Scheme(positions)
-    # the number that the engine allows
+    # the largest number that the engine accepts
     assert len(obsdeg.Scheme([(0, 0, 0)] * 1000)) == 1000
 
 
@@ -49,7 +49,7 @@ def test_numbers_of_numpy() -> None:
     plain = obsdeg.analyze(angles=PAIR, seed=5, measured_azimuth=True)
     theirs = obsdeg.analyze(angles=numpy.array(PAIR), seed=numpy.int64(5), measured_azimuth=numpy.bool_(True))
     assert plain.json() == theirs.json()
-    # the reason is that of this number, which a half or 45 has not
+    # the reason names this number; 0.5 and 45 are exact
     with pytest.raises(TypeError, match="float32: it holds 30.1000003"):
         obsdeg.analyze(angles=[(numpy.float32(30.1), 0, 0)])
 

@@ -1,4 +1,4 @@
-"""Maps from a solution to another, by SymPy: outputs of both have the same derivatives at a rational point."""
+"""Maps between solutions, checked by SymPy: outputs of both have the same derivatives at a rational point."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import sympy
 import obsdeg
 
 MODELS = Path(__file__).resolve().parents[2] / "tests" / "data" / "models"
-#: Derivatives that are compared.
+#: Number of compared derivatives.
 ORDERS = 5
 DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
 
 def mapped(words: str) -> dict[str, str]:
-    """What takes the place of every name that changes: of ``replace a by b``, ``swap a and b``, ``negate a``."""
+    """Replacement of every name that changes: of ``replace a by b``, ``swap a and b``, ``negate a``."""
     verb, rest = words.split(" ", 1)
     if verb == "negate":
         return {name: f"-{name}" for name in rest.split(", ")}

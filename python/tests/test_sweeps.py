@@ -1,4 +1,4 @@
-"""Sweeps as tidy tables: what each task says is what it says when it is asked alone."""
+"""Sweeps as tidy tables: each task has the same result as alone."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ def test_a_folder_is_read_as_the_same_table(tmp_path: Path) -> None:
     keys = ["x", "latitude", "terms", "name", "status", "degree", "rank", "error"]
     plain = [frame[keys].astype(object).where(frame[keys].notna(), None) for frame in (rows, own)]
     mine, theirs = (sorted(map(repr, of.itertuples(index=False, name=None))) for of in plain)
-    # whole numbers beside others are floats in one and not in the other
+    # whole numbers beside others are floats in only one of the two
     assert [re.sub(r"\b(\d+)\.0\b", r"\1", m) for m in mine] == [re.sub(r"\b(\d+)\.0\b", r"\1", t) for t in theirs]
     assert rows["x"].dtype == float and rows["latitude"].dtype == float
-    # nothing is asked again, models and tags among it
+    # no task is judged again, including models and tags
     files = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")}
     campaign.sweep(tmp_path, tasks, errors="record", executor=lambda: ThreadPoolExecutor(1))
     assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")} == files

@@ -1,4 +1,4 @@
-"""Ten tasks of someone new, each in the lines that one would write; and the walk-through of 40 lines."""
+"""Ten tasks of a new user in a few lines each, and the walk-through of 40 lines."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def test_1_analyze_as_a_frame() -> None:
 
 
 def test_2_a_sweep() -> None:
-    # SWEEP=10000 asks ten thousand; a hundred every day
+    # SWEEP=10000 judges ten thousand tasks; a hundred every day
     count = int(os.environ.get("SWEEP", "100"))
     numpy = pytest.importorskip("numpy")
     angles = numpy.random.default_rng(1).uniform(-180, 180, (count, 2, 3))
     rows = campaign.table(dict(angles=a, terms="F", carry="inertial") for a in angles)
-    # two attitudes at random determine psi and three drifts
+    # two random attitudes determine psi and three drifts
     assert len(rows) == 6 * count and (rows["status"] == "observable").all()
 
 
@@ -71,7 +71,7 @@ def test_8_export(tmp_path: Path) -> None:
 
 
 def test_9_an_interrupt() -> None:
-    # ended as soon as there is a best so far
+    # interrupted as soon as there is a first scheme
     found = obsdeg.design(9, carry="inertial", restarts=100_000, progress=lambda what, done, total, examined, best: best is None)
     assert len(found.winner()) == 9 and found.search is not None and found.search.interrupted
 
@@ -90,6 +90,6 @@ def test_the_walk_through_of_40_lines() -> None:
     degrees, verdict, *drifts = done.stdout.splitlines()
     assert "'D_FY': 2" in degrees and verdict == "the model explains the record"
     for line in drifts:
-        # the truth is that of the script, within four sigma
+        # the truth of the script, within four sigma
         name, _, estimate, _, sigma, _, _, true = line.replace(",", "").split()
         assert abs(float(estimate) - float(true)) < 4 * float(sigma) < 0.01, name

@@ -1,4 +1,5 @@
-"""Answers have the types that they say: their classes are those of the program's schemas, and every value of the examples is of its type."""
+"""Answers match their types: their classes are those of the program's schemas, and every value of the
+examples has its type."""
 
 from __future__ import annotations
 
@@ -75,7 +76,7 @@ def answers() -> Iterator[obsdeg.Answer]:
 
 
 def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Iterator[str]:
-    """Where a value is not of its type; the keys that were seen of each class."""
+    """Place of a value with a wrong type; collects the keys of each class."""
     origin, inside = get_origin(hint), get_args(hint)
     if isinstance(hint, type) and (issubclass(hint, Record) or hint in KINDS.values()):
         if not isinstance(value, dict):
@@ -111,7 +112,7 @@ def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Itera
         yield f"{path} = {value!r:.60} is no {hint}"
 
 
-#: What the answers above leave out, of the classes that they have.
+#: Keys that the answers above omit, by class.
 RARE = {
     "ConditionsReport.accelerometer_bias", "Design.gimbals", "Geometry.accelerometers", "MeasurementReport.accelerometer_bias", "MeasurementReport.gyro_noise",
     "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor", "SearchReport.ranked",
@@ -124,7 +125,7 @@ def test_every_value_of_the_examples_is_of_its_type() -> None:
     kinds = set()
     for answer in answers():
         of = answer.to_dict()
-        # the class that was promised is that of the JSON
+        # the promised class is that of the JSON
         assert type(answer) is KINDS[of["schema"]]
         kinds.add(type(answer))
         mistakes += wrong(of, type(answer), of["schema"], seen)
@@ -140,17 +141,17 @@ def test_attributes_are_objects_of_their_types() -> None:
     assert (type(first).__name__, first.name, first.degree) == ("Quantity", "psi_x", 0)
     assert first.degree == first["degree"] == first.to_dict()["degree"] == dict(first)["degree"]
     assert isinstance(answer.positions[0].angles_deg, tuple)
-    # what the JSON leaves out
+    # a key that the JSON omits
     assert answer.geometry.accelerometers is None
     assert type(answer.geometry.X).__name__ == "GyroAxes" and answer.geometry.X.I == "+x"
     system = obsdeg.analyze("examples/sir/model.toml")
     assert isinstance(system, obsdeg.SystemAnalysis) and type(system.quantities[0]).__name__ == "SystemQuantity"
     found = obsdeg.calibrate("examples/hudson-bay/model.toml", "examples/hudson-bay/data.csv", starts=2)
     assert [type(f).__name__ for f in found.findings] == [f"SystemFinding{f.kind.title().replace('_', '')}" for f in found.findings]
-    # words of Python
+    # keywords of Python
     crosschecked = obsdeg.crosscheck(angles=PAPER, runs=20)
     assert crosschecked.ranking.pass_ is crosschecked.ranking["pass"]
-    # models of the same kind of several files
+    # several files of models of one kind
     several = obsdeg.analyze(FIVE, "examples/sir/model.toml", solutions=False)
     assert [type(a) for a in several] == [obsdeg.Analysis, obsdeg.SystemAnalysis]
     assert several[0].degrees == obsdeg.analyze(FIVE, solutions=False).degrees
@@ -158,7 +159,7 @@ def test_attributes_are_objects_of_their_types() -> None:
 
 
 def said(command: str) -> set[str]:
-    """The options that a command says it has."""
+    """Options in the signature of a command."""
     with pytest.raises(obsdeg.ProblemError) as wrong:
         obsdeg._obsdeg.answer(command, '{"no such option": 1}')
     return set(wrong.value.message.split("expected one of ")[1].split(", "))
@@ -170,12 +171,12 @@ def test_options_are_those_of_the_commands(command: str) -> None:
     files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume"}
     named = {"positions", "candidates", "part"} if command == "design" else set()
     if command == "design":
-        # those of `measure`, which asks the same command about a model
+        # `measure` uses the same command with a model
         named |= {"measure", "own_outputs", *options.Measure.__annotations__}
     assert mine | named == said(command) - files
 
 
-#: Words that are refused, one for each option that has words: the error says which there are.
+#: Refused words, one for each option with a fixed list: the message lists the accepted ones.
 WORDS = {
     "carry": "analyze",
     "axes": "analyze",

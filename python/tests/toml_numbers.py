@@ -1,4 +1,4 @@
-"""Numbers of a model file, by a reader that shares nothing with the importers: for tests of what they write.
+"""Numbers of a model file by a reader that is independent of the importers, for tests of their output.
 
 Formulas are evaluated by Python itself in decimals of 40 digits (mpmath).
 """
@@ -23,7 +23,7 @@ Number = Any
 
 
 class _Names(dict[str, Any]):
-    """Names of a formula: numbers, functions, and definitions that are evaluated when they are asked for."""
+    """Names of a formula: numbers, functions, and definitions, which are evaluated at first use."""
 
     def __init__(self, numbers: Mapping[str, Number], formulas: Mapping[str, str]) -> None:
         super().__init__(numbers)
@@ -37,7 +37,7 @@ class _Names(dict[str, Any]):
 
 
 def value(text: str | float, names: dict[str, Any]) -> Number:
-    """The value of a formula."""
+    """Value of a formula."""
     python = _NUMBER.sub(r"mpf('\1')", str(text)).replace("^", "**")
     return eval(python, {"__builtins__": {}, "mpf": mpmath.mpf}, names)
 
@@ -57,7 +57,7 @@ class Numbers:
         self.segments = max(len(self.file.get("segment", [])), 1)
 
     def names(self, values: Mapping[str, Number], experiment: int = 0, segment: int = 0, time: Number = 0) -> _Names:
-        """All names, given states, parameters and inputs."""
+        """All names: states with a given start, parameters and inputs."""
         constants: dict[str, str] = {n: c["value"] if isinstance(c, dict) else c for n, c in self.file.get("constants", {}).items()}
         if "experiment" in self.file:
             constants |= self.file["experiment"][experiment].get("constants", {})
@@ -69,14 +69,14 @@ class Numbers:
         return _Names({**known, "t": mpmath.mpf(time), **values}, self.file.get("definitions", {}))
 
     def rates(self, names: _Names) -> dict[str, Number]:
-        """The derivative of every state."""
+        """Derivative of every state."""
         return {n: value(s["equation"], names) for n, s in self.states.items()}
 
     def outputs(self, names: _Names) -> dict[str, Number]:
-        """The outputs."""
+        """Values of the outputs."""
         texts = {n: y["expression"] if isinstance(y, dict) else y for n, y in self.file["outputs"].items()}
         return {n: value(y, names) for n, y in texts.items()}
 
     def starts(self, names: _Names) -> dict[str, Number]:
-        """The starts that are given."""
+        """Given starts."""
         return {n: value(s["initial"], names) for n, s in self.states.items() if s.get("initial", "known") != "known"}

@@ -1,8 +1,8 @@
-"""Writes the pages of the API, from the docstrings.
+"""Writes the pages of the API from the docstrings.
 
     python python/tools/write_api.py [FOLDER]
 
-FOLDER is `target/api` where none is named; `index.html` is its first page.
+FOLDER is `target/api` by default; `index.html` is its first page.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ MODULES = [
 
 
 def written(folder: Path) -> None:
-    """The pages."""
+    """Writes the pages into a folder."""
     pdoc.render.configure(docformat="google", show_source=False)
     with warnings.catch_warnings():
-        # options that several commands share are each command's own there
+        # options that several commands share appear in each command
         warnings.simplefilter("ignore")
         pdoc.pdoc(*MODULES, output_directory=folder)
 

@@ -1,4 +1,5 @@
-"""Writes `python/obsdeg/shapes.py`: the answers as typed classes, from the JSON Schemas that the program prints.
+"""Writes `python/obsdeg/shapes.py`: the answers as typed classes, from the JSON Schemas that the program
+prints.
 
     python python/tools/write_shapes.py [PROGRAM]
 """
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-#: The answers; where two schemas have a type of one name, it is that of the earlier.
+#: Schemas of answers; the first schema with a type of some name defines it.
 SCHEMAS = [
     "analysis",
     "system",
@@ -45,12 +46,12 @@ Schema = dict[str, Any]
 
 
 def camel(word: str) -> str:
-    """`not_settled` as a part of the name of a class."""
+    """Name of a class from words such as `not_settled`."""
     return "".join(w[:1].upper() + w[1:] for w in word.replace("-", "_").split("_"))
 
 
 def doc(text: str, indent: str) -> list[str]:
-    """A description as a docstring."""
+    """Description as a docstring."""
     text = " ".join(text.split()).replace("\\", "\\\\").replace('"', "'") or "As in the JSON."
     lines = textwrap.wrap(text, 140 - len(indent) - 6)
     if len(lines) == 1:
@@ -59,7 +60,7 @@ def doc(text: str, indent: str) -> list[str]:
 
 
 class Writer:
-    """The classes, in an order in which each stands behind those it has."""
+    """Classes in an order in which each follows those that it uses."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -67,12 +68,12 @@ class Writer:
         self.names: dict[str, str] = {}
 
     def schema(self, kind: str, schema: Schema) -> None:
-        """The types of an answer, and it."""
+        """Defines the types of an answer."""
         title, defs = schema["title"], schema.get("$defs", {})
         self.names = {}
 
         def whole(value: Any) -> Any:
-            """With the types that are named inside, so that equal texts are equal types."""
+            """Schema with referenced types inserted, so that equal texts are equal types."""
             if isinstance(value, dict):
                 if "$ref" in value:
                     name = value["$ref"].rsplit("/", 1)[1]
@@ -105,7 +106,7 @@ class Writer:
         self.fields(title, "Shape", schema, f"The JSON of `obsdeg schema {kind}`.")
 
     def define(self, name: str, schema: Schema) -> None:
-        """A type of its own."""
+        """Defines a type with a name."""
         variants = schema.get("oneOf") or schema.get("anyOf")
         if schema.get("type") == "object":
             self.fields(name, "Record", schema)
@@ -127,7 +128,7 @@ class Writer:
             self.alias(name, [self.type(schema)], schema.get("description", ""))
 
     def alias(self, name: str, types: list[str], about: str) -> None:
-        """A name for a type."""
+        """Defines a name for a type."""
         joined = types[0] if len(types) == 1 else f"Union[{', '.join(types)}]"
         if len(joined) + len(name) > 130:
             inside = ",\n    ".join(joined[joined.index("[") + 1 : -1].split(", "))
@@ -135,7 +136,7 @@ class Writer:
         self.lines += ["", f"{name} = {joined}", *doc(about, "")]
 
     def fields(self, name: str, base: str, schema: Schema, about: str = "") -> None:
-        """A class of an object."""
+        """Defines the class of an object."""
         self.lines += ["", "", f"class {name}({base}):", *doc(schema.get("description") or about, "    "), ""]
         if base == "Record":
             self.lines += ["    __slots__ = ()", ""]
@@ -151,7 +152,7 @@ class Writer:
             self.lines.pop()
 
     def type(self, of: Schema) -> str:
-        """A type as Python writes it."""
+        """Type in the notation of Python."""
         if "$ref" in of:
             return self.names[of["$ref"].rsplit("/", 1)[1]]
         if "const" in of:
@@ -177,12 +178,12 @@ class Writer:
         return known[str(kind)]
 
 
-#: The names of the answers themselves.
+#: Names of the answers themselves.
 TITLES: set[str] = set()
 
 
 def written(program: str) -> str:
-    """The module."""
+    """Text of the module."""
     schemas = {}
     for kind in SCHEMAS:
         done = subprocess.run([program, "schema", kind], capture_output=True, text=True, check=True)

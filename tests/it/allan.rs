@@ -1,4 +1,5 @@
-//! `obsdeg allan`: noise from a static record, against allantools and against what the record was made of.
+//! `obsdeg allan`: noise coefficients of a static record, against allantools and against the values with
+//! which the record was simulated.
 
 use crate::program::{json, refused, run, scratch, stdout};
 
@@ -23,8 +24,8 @@ fn deviations_are_those_of_allantools() {
     assert_eq!(lines, 20);
 }
 
-/// Coefficients are those of the README of the data within four sigma; flicker noise, which there is none of,
-/// is not resolved.
+/// Coefficients agree with the README of the data within four sigma. The record has no flicker noise, and
+/// none is resolved.
 #[test]
 fn coefficients_are_those_of_the_record() {
     let found = json(&["allan", RECORD, "--format", "json"]);
@@ -49,13 +50,13 @@ fn coefficients_are_those_of_the_record() {
     }
 }
 
-/// The table that it prints is one that schemes take.
+/// The printed table is accepted by schemes.
 #[test]
 fn the_table_is_one_of_a_scheme() {
     let found = json(&["allan", RECORD, "--format", "json"]);
     let table = found["simulation_table"].as_str().expect("a table");
     assert!(table.contains("angle_random_walk_deg_sqrt_h = [0.0"), "{table}");
-    // 2e-5 g, by 4096 samples: 1/sqrt(2 4096) of itself (1 sigma)
+    // 2e-5 g from 4096 samples: relative sigma 1/sqrt(2 4096)
     let key = table.lines().find_map(|l| l.strip_prefix("accelerometer_noise_g = ")).expect("the key");
     let noise: f64 = key.parse().expect("a number");
     assert!((noise / 2e-5 - 1.0).abs() < 4.0 / 8192f64.sqrt(), "{table}");
@@ -80,7 +81,7 @@ fn what_is_wrong_is_named() {
     let rows: String = (0..500).map(|k| format!("{k},2\n")).collect();
     std::fs::write(&path, format!("t [s],wx [deg/h]\n{rows}")).expect("written");
     refused(&["allan", &path], &["all samples are 2"]);
-    // a line is no noise, and the answer says so
+    // a straight line is not noise, and the answer says so
     let rows: String = (0..2000).map(|k| format!("{k},{}\n", f64::from(k) + f64::from(k).sin())).collect();
     std::fs::write(&path, format!("t [s],wx [deg/h]\n{rows}")).expect("written");
     let output = run(&["allan", &path]);

@@ -1,11 +1,11 @@
-//! The book and the README do what they say: every command in them runs, and prints what is shown.
+//! The commands in the book and in the README run and print what the text shows.
 //!
-//! A block of `console` shows commands (`$ ...`) and what they print on stdout, a line `...` stands for any
-//! lines; a block of `sh` is a script that must succeed. Before a block `<!-- file NAME -->` makes it a file
-//! of that name, `<!-- exit code N -->` says that its commands end so, and their errors are shown behind what
-//! they print. Commands run one after the other, in a folder of their own with the examples in it; blocks of
-//! `pycon` are run by `python/tests/test_readme.py`. `UPDATE_BOOK=1` writes into the texts what is printed:
-//! between two `...` the lines that are most like those that are there.
+//! A `console` block shows commands (`$ ...`) and their output on stdout. A line `...` stands for any lines.
+//! A `sh` block is a script that must succeed. The comment `<!-- file NAME -->` before a block writes the
+//! block to that file. The comment `<!-- exit code N -->` states the exit code of the block's commands; their
+//! stderr is then shown after their stdout. Commands run one after the other in a folder of their own that
+//! contains the examples. `python/tests/test_readme.py` runs the `pycon` blocks. `UPDATE_BOOK=1` writes the
+//! printed output into the texts; between two lines `...` it takes the most similar printed lines.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,8 +17,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A block between fences: what stands behind the first fence, the comment before it, the first of its lines
-/// (counted from 0), and these.
+/// Code block between fences: info string behind the first fence, comment before it, number of the first line
+/// (from 0) and lines.
 #[derive(Debug, Default)]
 struct Block<'a> {
     info: &'a str,
@@ -52,7 +52,7 @@ fn same(shown: &str, printed: &str) -> bool {
     shown.trim_end() == printed.trim_end() || rule(shown) && rule(printed)
 }
 
-/// True if what is shown is what was printed; `...` stands for any lines.
+/// True if the shown lines match the printed ones; `...` matches any number of lines.
 fn agree(shown: &[&str], printed: &[&str]) -> bool {
     match shown.split_first() {
         None => printed.is_empty(),
@@ -63,7 +63,7 @@ fn agree(shown: &[&str], printed: &[&str]) -> bool {
     }
 }
 
-/// How much of two lines is the same, word by word: 0 to 1.
+/// Fraction of words that two lines share, from 0 to 1.
 fn likeness(a: &str, b: &str) -> f64 {
     let (mut ours, theirs): (Vec<&str>, Vec<&str>) =
         (a.split_whitespace().collect(), b.split_whitespace().collect());
@@ -77,8 +77,8 @@ fn likeness(a: &str, b: &str) -> f64 {
     if same(a, b) || all == 0 { 1.0 } else { f64::from(common) / all as f64 }
 }
 
-/// What is shown, renewed: of every run of lines that is shown the run of as many printed lines that is most
-/// like it, in their order.
+/// Shown lines with the printed text in their place. Each run of shown lines is replaced by the most similar
+/// run of as many printed lines, in order.
 fn renewed(shown: &[&str], printed: &[&str]) -> Vec<String> {
     if !shown.contains(&"...") {
         return printed.iter().map(|l| l.trim_end().to_string()).collect();
@@ -93,7 +93,7 @@ fn renewed(shown: &[&str], printed: &[&str]) -> Vec<String> {
             out.push("...".to_string());
         }
         from = (best + run.len()).min(printed.len());
-        // a rule is as long as it was
+        // a horizontal rule keeps its length
         let lines = run.iter().zip(&printed[best..from]);
         out.extend(lines.map(|(old, new)| if same(old, new) { *old } else { new.trim_end() }.to_string()));
     }
@@ -125,19 +125,19 @@ fn what_is_left_out_is_any_lines_and_nothing_else() {
     }
 }
 
-/// The folder in which the commands of one text run.
-struct Desk {
+/// Folder in which the commands of one text run.
+struct CommandFolder {
     folder: tempfile::TempDir,
 }
 
-impl Desk {
+impl CommandFolder {
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         symlink(root().join("examples"), folder.path().join("examples")).expect("a link");
         Self { folder }
     }
 
-    /// What a command prints, its errors behind that where `code` is not 0.
+    /// Stdout of a command, followed by its stderr if `code` is not 0. Error: another exit code.
     fn run(&self, script: &str, code: i32) -> Result<String, String> {
         let program = Path::new(env!("CARGO_BIN_EXE_obsdeg")).parent().expect("a folder");
         let path = std::env::var_os("PATH").unwrap_or_default();
@@ -164,7 +164,7 @@ impl Desk {
     }
 }
 
-/// A command as it is run here: the program is built, and what only builds is not run.
+/// Command as the test runs it, with the program already built; `None` for a command that only builds.
 fn as_run(command: &str) -> Option<String> {
     match command.strip_prefix("cargo run --release -- ") {
         Some(rest) => Some(format!("obsdeg {rest}")),
@@ -172,12 +172,12 @@ fn as_run(command: &str) -> Option<String> {
     }
 }
 
-/// Runs the commands of a text; what does not agree, and the text as it would.
+/// Runs the commands of a text. Returns the mismatches and the text with the printed output in place.
 fn held(name: &str, text: &str) -> (Vec<String>, String) {
-    let desk = Desk::new();
+    let desk = CommandFolder::new();
     let mut wrong = Vec::new();
     let mut lines: Vec<String> = text.lines().map(String::from).collect();
-    // from the last, so that places hold
+    // applied from the last to the first, so that line numbers stay valid
     let mut exchanges: Vec<(usize, usize, Vec<String>)> = Vec::new();
     for block in blocks(text) {
         let place = |n: usize| format!("{name}:{}", block.start + n + 1);
@@ -235,7 +235,7 @@ fn chapters() -> Vec<PathBuf> {
     out
 }
 
-/// With the symbolic engine, whose expressions are shown.
+/// The shown expressions need the symbolic engine.
 #[cfg(feature = "symbolica")]
 #[test]
 fn every_command_runs_and_prints_what_is_shown() {
@@ -260,7 +260,7 @@ fn every_command_runs_and_prints_what_is_shown() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
 
-/// What is wrong on purpose is seen, and mended where that can be done.
+/// Deliberate errors in a text are found, and corrected where possible.
 #[test]
 fn a_text_that_is_wrong_is_told() {
     let of = |text: &str| held("here", text);
@@ -281,21 +281,21 @@ fn a_text_that_is_wrong_is_told() {
     assert!(of("```sh\nobsdeg --version\nfalse\ntrue\n```\n").0.len() == 1);
 }
 
-/// The picture of the first page is the one that its command draws.
+/// The picture on the first page is identical to the one that its command draws.
 #[test]
 fn the_picture_is_the_one_that_is_drawn() {
-    let desk = Desk::new();
+    let desk = CommandFolder::new();
     desk.run("obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 -o drawn", 0).expect("drawn");
     let drawn = fs::read_to_string(desk.folder.path().join("drawn/slopes.svg")).expect("readable");
     let shown = root().join("book/src/slopes.svg");
     if std::env::var_os("UPDATE_BOOK").is_some() {
         fs::write(&shown, &drawn).expect("written");
     }
-    // no dump of a picture
+    // a plain assertion: `assert_eq` would print the whole picture
     assert!(fs::read_to_string(&shown).expect("readable") == drawn, "UPDATE_BOOK=1 draws it again");
 }
 
-/// Every chapter stands in the summary, once, and only chapters do.
+/// The summary lists every chapter exactly once and nothing else.
 #[test]
 fn the_summary_lists_the_chapters() {
     let summary = fs::read_to_string(root().join("book/src/SUMMARY.md")).expect("readable");

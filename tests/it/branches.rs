@@ -1,4 +1,4 @@
-//! Sentences on the time and on branches: where verdicts are said to hold they do.
+//! Sentences on the time and on branches: verdicts hold where they are said to hold.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::language::{Names, evaluate_f64, parse_with};
@@ -9,7 +9,7 @@ fn judged(text: &str) -> SystemAnalysis {
     analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// As it is printed, in one line.
+/// The answer as printed, in one line.
 fn printed(a: &SystemAnalysis) -> String {
     let text = obsdeg_report::written(a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
     text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
@@ -19,13 +19,14 @@ fn value(text: &str, t: f64) -> f64 {
     evaluate_f64(&parse_with(text, Names::Plain).expect("an expression"), &|_| t)
 }
 
-/// x' = a + b u(t): b moves the output while u is not zero, alone while it changes. At times on the side that
-/// is said, and not on the other, this is the verdict.
+/// x' = a + b u(t): b affects the output while u is not zero, and is separable from a while u changes. The
+/// verdict holds at times on the printed side and not on the other side.
 #[test]
 fn verdicts_hold_on_the_side_that_is_said() {
     let model = |input: &str, time: &str| {
         format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\n\
+             x='a + b*u'\n[outputs]\ny='x'"
         )
     };
     let times = [-9.3, -4.0, -1.7, 0.4, 2.2, 5.1, 8.3, 9.9];
@@ -57,7 +58,8 @@ fn verdicts_hold_on_the_side_that_is_said() {
                 (_, true) => [Status::Inseparable; 2],
                 _ => [Status::Observable; 2],
             };
-            // where the time is given what never moves the output is not seen up to the bound
+            // at a given time, an unknown that never affects the output has the status "not seen up to the
+            // bound"
             let status = |n: &str| match a.quantities.iter().find(|q| q.name == n).expect("it").status {
                 Status::NotSeen if expected[1] == Status::NotExcited => Status::NotExcited,
                 Status::NotSeen => Status::Inseparable,
@@ -69,14 +71,14 @@ fn verdicts_hold_on_the_side_that_is_said() {
         }
         assert!(sides[0] > 0 && sides[1] > 0);
     }
-    // without a branch none is named
+    // a model without branches names none
     let a = judged(&model("t^2", "time = 'generic'"));
     assert!(a.branch_sides.is_empty() && a.branches.is_empty());
     assert!(printed(&a).contains("(verdicts of almost every time)"));
 }
 
-/// Of unknowns, known inputs and later segments the sides are said as well; an argument that is given has
-/// none.
+/// Sides are printed for arguments of unknowns, of known inputs and of later segments too. An argument with a
+/// given value has no side.
 #[test]
 fn sides_of_all_arguments_are_said() {
     let a = judged("name='m'\nparameters=['a']\n[states]\nx='-a*abs(x)'\n[outputs]\ny='x*sign(a - 9)'");
@@ -86,7 +88,8 @@ fn sides_of_all_arguments_are_said() {
     let text = printed(&a);
     assert!(text.contains("of one branch, where x > 0, a - 9 < 0 (chosen by unknowns near one"), "{text}");
     let a = judged(
-        "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\ne=0\n[[segment]]\n\
+        "name='m'\nparameters=['a']\n[states]\nx='a*sign(c)'\n[outputs]\ny='x + a*sign(t - 2)*e'\n[constants]\nc=2\n\
+         e=0\n[[segment]]\n\
          [[segment]]\nconstants={e='1'}",
     );
     let said: Vec<&str> = a.branch_sides.iter().map(|s| s.condition.as_str()).collect();
@@ -99,8 +102,8 @@ fn judged_with(text: &str, seed: u64) -> SystemAnalysis {
     analyze_system(&model, options).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// Later segments begin later: nothing is seen that only times before the start show (b moves v until t = 4
-/// alone), and what is passed stays passed.
+/// Later segments begin later. A parameter that affects the output only before the start is not observable (b
+/// moves v only until t = 4), and a point in time that has passed stays passed.
 #[test]
 fn later_segments_begin_later() {
     let segments = "[[segment]]\n[[segment]]\n[[segment]]";
@@ -108,7 +111,8 @@ fn later_segments_begin_later() {
         for (time, rank) in [("5", 1), ("0", 2)] {
             let a = judged_with(
                 &format!(
-                    "name='m'\ntime={time}\nparameters=['b']\n[states]\nv='b*(abs(t - 4) - t + 4)'\n[outputs]\ny='v'\n{segments}"
+                    "name='m'\ntime={time}\nparameters=['b']\n[states]\nv='b*(abs(t - 4) - t + 4)'\n[outputs]\ny='v'\n\
+                     {segments}"
                 ),
                 seed,
             );
@@ -117,7 +121,8 @@ fn later_segments_begin_later() {
         for shift in ["1", "2", "3/2"] {
             let a = judged_with(
                 &format!(
-                    "name='m'\ntime='generic'\nparameters=['a', 'b']\n[states]\nx='a + b*sign(t - {shift})'\n[outputs]\ny='x'\n{segments}"
+                    "name='m'\ntime='generic'\nparameters=['a', 'b']\n[states]\nx='a + b*sign(t - {shift})'\n\
+                     [outputs]\ny='x'\n{segments}"
                 ),
                 seed,
             );
@@ -125,16 +130,16 @@ fn later_segments_begin_later() {
             assert!(!said.contains("at the other"), "{shift} {seed}: {said}");
             let before = said.split("> 0").skip(1).any(|later| later.contains("< 0"));
             assert!(!before, "{shift} {seed}: {said}");
-            // two sides of the sign tell a from b, one does not
+            // a and b are distinguished by both signs, not by one
             let both = said.contains("> 0") && said.contains("< 0");
             assert_eq!(a.rank, if both { 3 } else { 2 }, "{shift} {seed}: {said}");
         }
     }
 }
 
-/// Symmetries, combinations and remedies are those of the side on which the verdicts hold. By hand, for p >
-/// q: y = 2 b (p - q) + p q, where one of b, p, q tells the others; for p < q: y = p q without b. And for x'
-/// = a + b |x - y|: y and a move together.
+/// Symmetries, combinations and remedies belong to the side on which the verdicts hold. By hand, for p > q: y
+/// = 2 b (p - q) + p q, where one of b, p, q determines the other two. For p < q: y = p q without b. For x' =
+/// a + b |x - y|: y and a are indistinguishable.
 #[test]
 fn all_that_is_said_is_of_one_side() {
     let mut seen = std::collections::BTreeSet::new();
@@ -167,7 +172,8 @@ fn all_that_is_said_is_of_one_side() {
     assert_eq!(seen.len(), 2, "both sides: {seen:?}");
 }
 
-/// Functions that are not defined at the start because of its time name the key that chooses another.
+/// A function that is undefined at the start because of its time: the message names the key that chooses
+/// another time.
 #[test]
 fn a_time_that_can_not_be_is_named() {
     for (input, time, named) in [
@@ -179,7 +185,8 @@ fn a_time_that_can_not_be_is_named() {
         ("log(-1 - t^2)", "time = 'generic'", false),
     ] {
         let text = format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='{input}'}}}}\n[states]\n\
+             x='a + b*u'\n[outputs]\ny='x'"
         );
         let model = model_file::read(&text).expect("a model");
         let said = analyze_system(&model, SystemOptions::default()).expect_err(input).to_string();
@@ -192,12 +199,13 @@ fn a_time_that_can_not_be_is_named() {
     }
 }
 
-/// The section on the system defines every name in a solution that is no unknown and no output, inputs of
-/// single experiments too.
+/// The section on the system defines every name in a solution that is neither an unknown nor an output,
+/// inputs of single experiments included.
 #[test]
 fn solutions_rest_on_what_is_printed() {
     let a = judged(
-        "name='m'\nparameters=['a', 'b']\ntime=2\nknown_inputs={u={function='t^2'}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'",
+        "name='m'\nparameters=['a', 'b']\ntime=2\nknown_inputs={u={function='t^2'}}\n[states]\nx='a + b*u'\n\
+         [outputs]\ny='x'",
     );
     assert!(a.equations.contains(&"u = t^2".to_string()), "{:?}", a.equations);
     assert!(printed(&a).contains("The system u = t^2"), "{}", printed(&a));
@@ -219,7 +227,8 @@ fn solutions_rest_on_what_is_printed() {
     let found = evaluate_f64(&parse_with(&text, Names::Plain).expect("an expression"), &known);
     assert!((found - 1.3).abs() < 1e-12, "{solution}: {found}");
     let a = judged(
-        "name='m'\nparameters=['a']\nknown_inputs={u={function='t'}}\n[states]\nx='a*u'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\n\
+        "name='m'\nparameters=['a']\nknown_inputs={u={function='t'}}\n[states]\nx='a*u'\n[outputs]\ny='x'\n\
+         [[experiment]]\n[[experiment]]\n\
          known_inputs={u={function='t^3'}}",
     );
     for line in ["u in experiment 1 = t", "u in experiment 2 = t^3"] {
@@ -227,8 +236,8 @@ fn solutions_rest_on_what_is_printed() {
     }
 }
 
-/// A power with an exponent beyond all limits is refused as that, and no logarithm is named that nobody
-/// wrote.
+/// A power with too large an exponent is refused as a power: the message mentions no logarithm, since the
+/// model has none.
 #[test]
 fn powers_are_refused_as_powers() {
     let refused = |output: &str| {
@@ -252,7 +261,7 @@ fn powers_are_refused_as_powers() {
     }
 }
 
-/// The side that known starts decide is not that of "unknowns near one".
+/// A side that follows from known starts is not attributed to "unknowns near one".
 #[test]
 fn known_starts_decide_sides() {
     for (start, side, said) in [

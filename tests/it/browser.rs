@@ -1,4 +1,4 @@
-//! A headless Chromium by its debugging protocol.
+//! A headless Chromium, driven by its debugging protocol.
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// A browser with one page.
+/// Browser with one page.
 pub(crate) struct Browser {
     child: Child,
     socket: WebSocket<TcpStream>,
     session: Option<String>,
     next: u64,
-    /// What the page did: console, exceptions, requests.
+    /// Events of the page: console messages, exceptions, requests.
     pub(crate) events: Vec<Value>,
     _profile: tempfile::TempDir,
 }
@@ -28,7 +28,7 @@ impl Drop for Browser {
 }
 
 impl Browser {
-    /// The browser of this machine; `None` where there is none.
+    /// Starts the installed browser; `None` if there is none.
     pub(crate) fn start() -> Option<Self> {
         let names = ["chromium", "chromium-browser", "google-chrome"];
         let folders = std::env::var_os("PATH")?;
@@ -51,7 +51,7 @@ impl Browser {
             .map_while(Result::ok)
             .find_map(|l| Some(l.split_once("DevTools listening on ")?.1.trim().to_string()))
             .expect("the browser listens");
-        // whatever else it says must not fill the pipe
+        // further output is read, so that it does not fill the pipe
         std::thread::spawn(move || lines.for_each(drop));
         let address = url.strip_prefix("ws://").and_then(|u| u.split('/').next()).expect("an address");
         let stream = TcpStream::connect(address).expect("a connection");
@@ -68,7 +68,7 @@ impl Browser {
         Some(out)
     }
 
-    /// One command, and its answer.
+    /// Sends one command and returns its answer.
     pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.next += 1;
         let id = self.next;
@@ -95,7 +95,7 @@ impl Browser {
         }
     }
 
-    /// The value of an expression in the page.
+    /// Value of an expression in the page.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", parameters);
@@ -103,7 +103,7 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Opens a file in a window of this size, and waits until it is drawn.
+    /// Opens a file in a window of this size (pixels) and waits until it is drawn.
     pub(crate) fn open(&mut self, file: &Path, width: u32, height: u32) {
         self.size(width, height);
         self.call("Page.navigate", json!({ "url": format!("file://{}", file.display()) }));
@@ -120,13 +120,13 @@ impl Browser {
         self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))");
     }
 
-    /// Another size of the window.
+    /// Changes the size of the window (pixels).
     pub(crate) fn size(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// Moves the mouse to the middle of an element, and presses it if asked.
+    /// Moves the mouse to the middle of an element, and clicks it if `click`.
     pub(crate) fn mouse(&mut self, selector: &str, click: bool) {
         let place = self.value(&format!(
             "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center'}}); \

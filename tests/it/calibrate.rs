@@ -57,7 +57,7 @@ fn a_day_at_the_bench() {
     assert_eq!(csv.lines().count(), 16);
     assert!(csv.starts_with("name,unit,status,degree,determined,estimate,sigma,sigma_rescaled,"), "{csv}");
     assert_eq!(stdout(&run(&["calibrate", SCHEME, RECORD, "--format", "csv"])), csv);
-    // a row is what the JSON has of an unknown
+    // a row has the values that the JSON has of this unknown
     let row: Vec<&str> = csv.lines().nth(4).expect("a row").split(',').collect();
     let of = |key: &str| found["quantities"][3][key].clone();
     assert_eq!((row[0], row[2], row[3]), ("D_FX", "observable", "1"));
@@ -74,7 +74,7 @@ fn a_day_at_the_bench() {
     }
     let residuals = fs::read_to_string(format!("{at}/residuals.csv")).expect("written");
     assert_eq!(residuals.lines().count(), 601);
-    // a second run with what the first says before: sigmas are smaller by about the root of two
+    // a second run with the first calibration as prior: sigmas are smaller by about the square root of two
     let prior = format!("{at}/calibration.json");
     let other = folder.path().join("other.csv");
     fs::write(&other, another(&fs::read_to_string(crate_root(RECORD)).expect("the record")))
@@ -89,7 +89,7 @@ fn a_day_at_the_bench() {
             - found["quantities"][k]["estimate"].as_f64().expect("a number");
         assert!(moved.abs() < 1e-3 * sigma(u), "{u}");
     }
-    // the first says nothing twice, and other files are no calibration
+    // the first record does not count twice, and other files are refused as calibrations
     for (record, prior, message) in [
         (RECORD, prior.as_str(), "which the calibration before rests on; expected records of different runs"),
         (
@@ -107,13 +107,14 @@ fn a_day_at_the_bench() {
     assert!(stderr(&output).contains("expected records of different runs"), "{}", stderr(&output));
 }
 
-/// The record of another run that says the same: one number is another by its last digit.
+/// Record of another run with the same content: one number differs in its last digit.
 fn another(text: &str) -> String {
     assert!(text.contains("-0.5758776999999999"));
     text.replacen("-0.5758776999999999", "-0.5758777", 1)
 }
 
-/// A review has the calibration beside what the scheme promised, in every format; what is none is refused.
+/// A review shows the calibration beside the predictions for the scheme, in every format. Files that are no
+/// calibration are refused.
 #[test]
 fn a_review_of_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -134,8 +135,8 @@ fn a_review_of_the_run() {
             assert!(text.contains(words), "{file}: {words}");
         }
     }
-    // the small angles are those of what was estimated: rates of the axes of 3.2, 4.1 and 3.2 deg/h at most
-    // (with all terms of one sign) for 3942 s
+    // the small angles follow from the estimates: rates about the axes of at most 3.2, 4.1 and 3.2 deg/h (all
+    // terms of one sign) for 3942 s
     let largest = |more: &[&str]| -> f64 {
         let to = path("d.md");
         let line = [&["report", SCHEME, "--runs", "2", "-o", &to, "-q", "--force"], more].concat();
@@ -147,7 +148,7 @@ fn a_review_of_the_run() {
     let (stated, estimated) = (largest(&[]), largest(&["--calibration", &at]));
     let bound = (3.2f64 * 3.2 + 4.1 * 4.1 + 3.2 * 3.2).sqrt() * 3942.0 / 3600.0 + 0.1;
     assert!((0.5..bound / 2.0).contains(&estimated) && stated > bound, "{stated} {estimated} {bound}");
-    // what the picture has is what the file has
+    // the picture has the values of the file
     let v: Value =
         serde_json::from_str(&fs::read_to_string(format!("{at}/calibration.json")).expect("written"))
             .expect("JSON");
@@ -172,7 +173,7 @@ fn a_review_of_the_run() {
         "{}",
         stderr(&output)
     );
-    // of another scheme, or of a model
+    // a calibration of another scheme, or of a model
     let other = fs::read_to_string(crate_root(SCHEME)).expect("the scheme");
     fs::write(path("other.toml"), other.replace("[60, 80, 15]", "[61, 80, 15]")).expect("written");
     let model = path("model");
@@ -197,14 +198,14 @@ fn a_review_of_the_run() {
     assert!(!folder.path().join("no.html").exists());
 }
 
-/// The same record as Parquet, on stdin, and twice.
+/// The same record as CSV, as Parquet, on stdin, and twice.
 #[test]
 fn the_same_from_everywhere() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("record.parquet");
     let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
     fs::write(&path, parquet(&text)).expect("written");
-    // numbers of CSV and of Parquet are the same, so are bytes of an answer
+    // CSV and Parquet give the same numbers, the same input gives the same bytes
     let estimates = |v: &Value| -> Vec<f64> {
         let all = v["covariance"]["estimates"].as_array().expect("estimates");
         all.iter().map(|x| x.as_f64().expect("a number")).collect()
@@ -225,8 +226,8 @@ fn the_same_from_everywhere() {
     let piped: Value =
         serde_json::from_slice(&child.wait_with_output().expect("it ends").stdout).expect("JSON");
     assert_eq!(estimates(&csv), estimates(&piped));
-    // a record and one that says the same: coefficients as before, with sigmas smaller by the root of two,
-    // and a psi for each (what fits badly by chance fits as badly twice: there is a check that fails)
+    // a record and its copy: coefficients as before, sigmas smaller by the square root of two, and one psi
+    // for each record (a bad fit by chance counts twice, so one check fails)
     fs::write(&path, parquet(&another(&text))).expect("written");
     let twice = run(&["calibrate", SCHEME, RECORD, &name, "--format", "json"]);
     let twice: Value = serde_json::from_slice(&twice.stdout).expect("JSON");
@@ -258,12 +259,12 @@ pub(crate) fn crate_root(path: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// A record in CSV as Parquet: numbers and labels.
+/// Converts a record from CSV to Parquet: numbers and labels.
 fn parquet(text: &str) -> Vec<u8> {
     compressed(text, Compression::UNCOMPRESSED)
 }
 
-/// The same by a codec.
+/// Converts a record from CSV to Parquet with a codec.
 fn compressed(text: &str, codec: Compression) -> Vec<u8> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let headers: Vec<String> = reader.headers().expect("a header").iter().map(String::from).collect();
@@ -294,7 +295,7 @@ fn compressed(text: &str, codec: Compression) -> Vec<u8> {
     writer.into_inner().expect("closed")
 }
 
-/// How a record is read is shown before anything is estimated, also where an estimate would not be.
+/// The interpretation of a record is shown before any estimate, even where the estimate would fail.
 #[test]
 fn how_a_record_is_read() {
     let found = json(&["calibrate", SCHEME, RECORD, "--dry-run", "--format", "json"]);
@@ -318,7 +319,7 @@ fn how_a_record_is_read() {
         .filter_map(|p| p["position"].as_str())
         .collect();
     assert_eq!(names, ["p1", "p2", "p3", "p4", "p5", "p6"]);
-    // in German, late, with a gap, a code and an empty cell
+    // German number format, a late start, a gap, an error code and an empty cell
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("record.csv");
     let text = fs::read_to_string(crate_root(RECORD)).expect("the record");
@@ -359,7 +360,7 @@ fn how_a_record_is_read() {
     );
 }
 
-/// Every codec is read.
+/// Every codec of Parquet is read.
 #[test]
 fn codecs_of_parquet() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -381,7 +382,7 @@ fn codecs_of_parquet() {
         assert!(bytes.len() != parquet(&text).len(), "{codec:?}");
         assert_eq!(stdout(&of(&bytes)), right, "{codec:?}");
     }
-    // zstd, which the crate that wrote these has no pure codec for: by pyarrow
+    // zstd files come from pyarrow, since the crate that writes the others has no pure Rust codec for it
     for version in ["1", "2"] {
         let name = format!("tests/data/parquet/bench-day-{version}.parquet");
         let bytes = fs::read(crate_root(&name)).expect("the record");
@@ -389,7 +390,7 @@ fn codecs_of_parquet() {
     }
 }
 
-/// Files in the place of others are told by name, with the command in the right order.
+/// A file given in the place of another is named in the message, with the command in the right order.
 #[test]
 fn files_in_the_place_of_others() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -453,7 +454,7 @@ fn files_in_the_place_of_others() {
     }
 }
 
-/// A bad record is refused with its place, and nothing is written.
+/// A bad record is refused with line and column, and nothing is written.
 #[test]
 fn bad_records_are_refused_with_their_place() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -479,7 +480,7 @@ fn bad_records_are_refused_with_their_place() {
         (with(1, "p7"), "bad.csv: line 3, column `position`: no position is called `p7`; expected p1, p2"),
         (with(1, "p2"), "bad.csv: line 4, column `position`: found `p1`, expected p3 (the scheme's"),
         (right.replace(",p6,", ",,"), "bad.csv: the position p6 of the scheme has no samples"),
-        // other axes, and signs of what gravity pulls instead of what holds against it
+        // swapped axes, and the sign of gravity instead of the sign of the specific force
         (
             right.replace("fx [g],fy [g]", "fy [g],fx [g]"),
             "no position of the scheme; with fy, fx, fz in the place of fx, fy, fz every position is where",
@@ -501,7 +502,7 @@ fn bad_records_are_refused_with_their_place() {
     }
     File::create(&path).expect("made");
     assert_eq!(run(&["calibrate", SCHEME, &path.display().to_string()]).status.code(), Some(2));
-    // a record that the model does not explain is one that can be read
+    // a record that contradicts the model is still a readable record
     let output = run(&["calibrate", SCHEME, RECORD, "--noise", "3e-6"]);
     assert_eq!(output.status.code(), Some(1));
     let text = stdout(&output);
@@ -511,7 +512,7 @@ fn bad_records_are_refused_with_their_place() {
     );
 }
 
-/// Rates that do not fit are put down to the clock where the times of positions say so too.
+/// Rates that do not fit are attributed to the clock only if the times of the positions confirm it.
 #[test]
 fn a_clock_is_blamed_where_times_say_so_too() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -535,7 +536,7 @@ fn a_clock_is_blamed_where_times_say_so_too() {
     let clock = said(&[&file.display().to_string()]);
     assert!(clock.contains("the clock: positions begin and end as by a clock that is 1.9"), "{clock}");
     assert!(clock.contains("those that the earth rate tells by more"), "{clock}");
-    // a right clock, and another latitude or rate of turns than was
+    // a correct clock with a wrong latitude or a wrong slew rate
     for wrong in [["--latitude", "49"], ["--slew-rate", "3"]] {
         let rates = said(&[RECORD, wrong[0], wrong[1]]);
         assert!(

@@ -1,5 +1,5 @@
-//! From command to command: what `design` says of a scheme, `compare`, `simulate`, `report` and the engine of
-//! the page say of its file.
+//! Agreement between commands: `compare`, `simulate`, `report` and the engine of the page confirm what
+//! `design` states of a scheme, from its file.
 
 use std::path::Path;
 
@@ -10,28 +10,28 @@ use serde_json::{Value, json as object};
 use crate::program::{json, run, stdout};
 
 /// A linear congruential generator (Knuth's MMIX constants).
-struct Draw(u64);
+struct Random(u64);
 
-impl Draw {
-    /// A number below `n`.
+impl Random {
+    /// Random number below `n`.
     fn below(&mut self, n: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) % n
     }
 
-    /// One of several.
+    /// Random element of a list.
     fn of<T: Copy>(&mut self, all: &[T]) -> T {
         all[self.below(all.len() as u64) as usize]
     }
 
-    /// True with a probability in percent.
+    /// True with the given probability, in percent.
     fn percent(&mut self, probability: u64) -> bool {
         self.below(100) < probability
     }
 }
 
-/// A random design task, as the options of a command line.
-fn task(draw: &mut Draw) -> Vec<String> {
+/// Random design task, as options of a command line.
+fn task(draw: &mut Random) -> Vec<String> {
     let carry = draw.of(&["platform", "inertial", "reset"]);
     let positions = if carry == "reset" { 6 + draw.below(2) } else { 5 + draw.below(2) };
     let mut out: Vec<String> =
@@ -79,7 +79,7 @@ fn task(draw: &mut Draw) -> Vec<String> {
     out
 }
 
-/// True if two numbers are equal but for rounding; null is no number.
+/// True if two numbers are equal up to rounding; false if one of them is null.
 fn same(a: &Value, b: &Value) -> bool {
     match (a.as_f64(), b.as_f64()) {
         (Some(a), Some(b)) => (a - b).abs() <= 1e-6 * a.abs().max(b.abs()),
@@ -87,7 +87,7 @@ fn same(a: &Value, b: &Value) -> bool {
     }
 }
 
-/// What becomes of the requirements, but for the last digits of the margin.
+/// Outcome of the requirements, and the worst margin without its last digits.
 fn decided(r: &Value) -> (Value, f64) {
     let mut out = r.clone();
     let margin = out["worst"]["margin"].as_f64().unwrap_or(0.0);
@@ -103,15 +103,15 @@ fn agree(task: &str, of: &str, found: &Value, other: &Value) {
     assert!((x - y).abs() <= 1e-6 * x.abs(), "{task}: margin {x}, {of} {y}");
 }
 
-/// One task through the whole chain.
+/// Checks one task with every command.
 fn holds(seed: u64, with_report: bool) {
-    let options = task(&mut Draw(seed));
+    let options = task(&mut Random(seed));
     let name = options.join(" ");
     let folder = tempfile::tempdir().expect("a folder");
     let written = folder.path().join("w").display().to_string();
     let arguments: Vec<&str> = options.iter().map(String::as_str).chain(["-o", &written]).collect();
     let output = run(&arguments);
-    // no scheme may do: said, and nothing is written
+    // no scheme may meet the task: the message says so, and nothing is written
     if !output.status.success() {
         return assert!(!Path::new(&written).exists(), "{name}");
     }
@@ -120,7 +120,7 @@ fn holds(seed: u64, with_report: bool) {
     let file = format!("{written}/winner.toml");
     let compared = &json(&["compare", &file, "--format", "json"])["schemes"][0];
     agree(&name, "compare", first, compared);
-    // with --observable the worst is that of what is asked for
+    // with --observable the worst sigma is that of the required unknowns
     if !name.contains("--observable") {
         assert!(
             same(&first["worst_sigma_dph"], &compared["worst"]["sigma_dph"]),
@@ -142,14 +142,14 @@ fn holds(seed: u64, with_report: bool) {
         assert_eq!(q["name"], p["name"], "{name}");
         assert!(same(&q["predicted_sigma"], &p["sigma"]), "{name}: {q} {p}");
     }
-    // the page, whose engine takes the text
+    // the engine of the page reads the same text
     let text = std::fs::read_to_string(&file).expect("the winner");
     let asked = object!({ "sources": [{ "name": "winner.toml", "text": text }] });
     let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true })
         .expect("an answer");
     let page: Value = serde_json::from_str(&page.text).expect("JSON");
     assert_eq!(&page["schemes"][0], compared, "{name}");
-    // again from the file: the search of its own positions has its conditions
+    // a search that reads the file uses its positions and conditions
     let stated = first["requirements"]["stated"].as_u64() > Some(0);
     let code = run(&["compare", &file, "--require-met"]).status.code();
     let expected = match (stated, compared["meets_requirements"] == true) {
@@ -180,7 +180,7 @@ fn what_design_says_every_command_repeats() {
     (1..=4).for_each(|seed| holds(seed, seed == 1));
 }
 
-/// The same of 200 tasks: some minutes.
+/// All commands on 200 tasks: some minutes.
 #[test]
 #[ignore = "full length: .ci/run release"]
 fn what_design_says_every_command_repeats_in_200_tasks() {
@@ -188,12 +188,14 @@ fn what_design_says_every_command_repeats_in_200_tasks() {
 }
 
 /// Sigmas at the end with random drift and a prior, by normal equations of all samples with one more unknown
-/// for every step's drift: no filter.
+/// for the drift of each step. No filter takes part.
 #[test]
 fn predicted_sigmas_are_those_of_least_squares() {
-    let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\naccelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
+    let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\n\
+                  accelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
                   priors = { D_F = 20, D_I = 10, D_O = 10, D_S = 10, psi = 0.2 }\n[requirements]\npsi = 0.1\nD_F = 19\n\
-                  [[position]]\nangles_deg = [10, 25, 40]\n[[position]]\nangles_deg = [130, -50, 70]\n[[position]]\nangles_deg = [-95, 33, -160]\n";
+                  [[position]]\nangles_deg = [10, 25, 40]\n[[position]]\nangles_deg = [130, -50, 70]\n[[position]]\n\
+                  angles_deg = [-95, 33, -160]\n";
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scheme.toml");
     std::fs::write(&file, scheme).expect("a file");
@@ -213,7 +215,7 @@ fn predicted_sigmas_are_those_of_least_squares() {
     assert_eq!(answer["schemes"][0]["meets_requirements"], met);
 }
 
-/// The same scheme by hand: psi' = -[w x] psi + C E D + n in n, Z1 = psi_z, Z3 = -psi_x, steps of 0.1 s, n
+/// Reference computation: psi' = -[w x] psi + C E D + n in n, Z1 = psi_z, Z3 = -psi_x, steps of 0.1 s, n
 /// constant over 10 s.
 fn by_normal_equations() -> Vec<f64> {
     const STEPS: usize = 6;
@@ -231,7 +233,7 @@ fn by_normal_equations() -> Vec<f64> {
         mx * my * mz
     };
     let first = attitude(&positions[0]);
-    // psi^n as a functional of psi in c of the first position, the coefficients and every step's drift
+    // psi^n as a functional of psi in c of the first position, the coefficients and the drift of each step
     let mut psi = DMatrix::zeros(3, n);
     psi.view_mut((0, 0), (3, 3)).copy_from(&first);
     let mut information = DMatrix::<f64>::zeros(n, n);
@@ -251,7 +253,7 @@ fn by_normal_equations() -> Vec<f64> {
         let rows = [[1.0, gx, -gz, gy], [1.0, gy, -gz, -gx], [1.0, gz, gx, gy]];
         let order = |gyro: usize, term: usize| 3 * term + gyro;
         for (gyro, row) in rows.iter().enumerate() {
-            // the order of (22), (23), (27), (28): I, O, S behind F
+            // order of (22), (23), (27), (28): I, O, S after F
             row.iter().enumerate().for_each(|(term, x)| e[(gyro, order(gyro, term))] = *x);
         }
         for step in 0..STEPS {

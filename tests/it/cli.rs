@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::program::{json, obsdeg, refused, run, scratch, stderr, stdout};
 
-/// Solutions hold the sine of 25 degrees.
+/// Scheme with solutions that contain the sine of 25 degrees.
 const CONSTANT: [&str; 5] = ["analyze", "--angles", "25,0,0", "--angles", "NUE"];
 const P1P2: [&str; 5] = ["analyze", "--angles", "0,0,0", "--angles", "180,0,0"];
 
@@ -37,7 +37,7 @@ fn the_main_job_as_json() {
     assert!(a["certainty"]["error_bound"].as_f64().expect("a number") < 1e-20);
 }
 
-/// The paper's case word by word, with and without the symbolic engine.
+/// Verbatim output of the paper's case, with and without the symbolic engine.
 #[test]
 fn the_main_job_as_text() {
     for format in ["table", "markdown", "csv", "latex"] {
@@ -47,7 +47,7 @@ fn the_main_job_as_text() {
     }
 }
 
-/// Solutions in rational numbers and square roots need no symbolic engine, and none is started for them.
+/// Solutions in rational numbers and square roots do not start the symbolic engine.
 #[test]
 fn solutions_of_the_fields_wait_for_no_engine() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -67,8 +67,8 @@ fn solutions_of_the_fields_wait_for_no_engine() {
     assert_eq!(a["notes"], serde_json::json!([]));
 }
 
-/// Where they hold sines and cosines, decimals stand for them when the engine is not to be had: a limit of no
-/// work stops it before its first answer.
+/// Solutions with sines and cosines are printed with decimals if the engine is not available. A work limit of
+/// zero stops the engine before its first answer.
 #[test]
 fn without_the_engine_solutions_are_decimals_and_it_is_said() {
     let refused = json(&[&CONSTANT[..], &["--format", "json", "--symbolic-limit", "0"]].concat());
@@ -116,11 +116,11 @@ fn solutions_off_never_starts_the_engine() {
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
 }
 
-/// Where the dwell makes something else of a degree, or nothing, the row says so in every format.
+/// A row states in every format where the dwell changes a degree or leaves an unknown undetermined.
 #[test]
 fn rows_say_what_the_dwell_makes_of_a_degree() {
     let pole = ["--angles", "0,0,0", "--angles", "0,90,0", "--angles", "45,0,0", "--latitude", "90"];
-    // four generic positions: psi has degree 0, accuracy order 1
+    // four generic positions: psi has degree 0 and accuracy order 1
     let four =
         ["--angles", "10,25,40", "--angles", "130,-50,70", "--angles", "-95,33,-160", "--angles", "60,80,15"];
     for (scheme, unknown, latex, expected) in [
@@ -135,7 +135,7 @@ fn rows_say_what_the_dwell_makes_of_a_degree() {
             let row = text.lines().map(str::trim_start).find(|l| l.starts_with(begins));
             let row = row.unwrap_or_else(|| panic!("no row {begins}: {text}")).to_string();
             assert!(row.contains(cell), "{format}: {row}");
-            // what is the same with dwell says nothing of it
+            // a row whose degree does not change with dwell says nothing of it
             let other = text.lines().find(|l| l.contains("psi_x") || l.contains("psi_{x}")).expect("psi_x");
             assert!(!other.contains("not determined"), "{other}");
         };
@@ -143,7 +143,7 @@ fn rows_say_what_the_dwell_makes_of_a_degree() {
         row("markdown", &format!("| `{unknown}` |"), &format!("| {expected} |"));
         row("latex", latex, &format!("& {expected} &"));
     }
-    // where all agree there is no such column; where orders are not computed nothing is said
+    // the column is missing where all orders equal the degrees, and where orders are not computed
     let same = stdout(&run(&["analyze", "--angles", "0,0,0", "--angles", "180,0,0", "--solutions", "off"]));
     let turning =
         stdout(&run(&["analyze", "--scheme", "examples/tumbling/scheme.toml", "--solutions", "off"]));
@@ -191,7 +191,7 @@ fn bad_input_is_refused_by_name() {
     refused(&["frobnicate"], &["unrecognized subcommand"]);
 }
 
-/// The slips of a first scheme file and of a first model are told by name.
+/// Common mistakes in a first scheme file and in a first model are named.
 #[test]
 fn slips_of_a_first_file() {
     let (folder, _) = scratch();
@@ -218,7 +218,7 @@ fn slips_of_a_first_file() {
     let model =
         |equation: &str| format!("parameters = ['a']\n[states]\nx = \"{equation}\"\n[outputs]\ny = 'x'\n");
     for (text, expected) in [
-        // a name is missed last: it hides nothing
+        // a missing name is reported last, so that it hides no other error
         (model("-a*x"), "the key `name` is missing"),
         (model("-a*x +"), "the equation of x: expected"),
         (model("-a*y"), "`y` is"),
@@ -231,7 +231,7 @@ fn slips_of_a_first_file() {
     }
 }
 
-/// No random drift needs no unit.
+/// Zero drift noise needs no unit.
 #[test]
 fn no_drift_noise() {
     let run =
@@ -244,7 +244,7 @@ fn no_drift_noise() {
     );
 }
 
-/// The whole file is checked by every command that reads it.
+/// Every command that reads a scheme file checks the whole file.
 #[test]
 fn every_command_checks_the_whole_scheme_file() {
     let (folder, _) = scratch();
@@ -302,7 +302,7 @@ fn a_file_of_the_other_kind_is_named() {
     }
 }
 
-/// Ranges of numbers are those of the help.
+/// The help states the accepted ranges of numbers.
 #[test]
 fn the_help_states_the_ranges() {
     use obsdeg_core::model::ranges;
@@ -377,7 +377,7 @@ fn files_are_written_whole_and_replaced_only_on_demand() {
     assert_eq!(std::fs::read(&file).expect("kept"), b"mine");
     assert!(write_to(&file, &["--force"]).status.success());
     assert_eq!(std::fs::read(&file).expect("replaced"), first);
-    // bad input writes nothing, and no temporary file is left
+    // bad input writes nothing and leaves no temporary file
     let missing = folder.path().join("other.json");
     assert_eq!(write_to(&missing, &["--latitude", "91"]).status.code(), Some(2));
     let unwritable = folder.path().join("no/such/folder/x.json");
@@ -406,7 +406,7 @@ fn the_paper_is_audited() {
         (find("(20)"), find("(21)"), find("conclusion 2")),
         ("agree".into(), "disagree".into(), "agree".into())
     );
-    // what is not covered is listed in every format, as often as in JSON
+    // every format lists the limitations, as many as the JSON
     let lines = a["lines"].as_array().expect("a list");
     let open = lines.iter().filter(|l| l["finding"] == "not_covered").count();
     assert!(open > 0);
@@ -435,7 +435,7 @@ fn help_shows_examples_and_exit_codes() {
     assert!(!stdout(&run(&["--help"])).contains("symbolic-worker"));
 }
 
-/// Solutions and degenerate angles that only the symbolic engine gives.
+/// Solutions and degenerate angles that only the symbolic engine finds.
 #[cfg(feature = "symbolica")]
 #[test]
 fn generic_angles_with_the_engine() {
@@ -449,7 +449,7 @@ fn generic_angles_with_the_engine() {
     insta::assert_snapshot!("radicals", stdout(&run(&arguments)));
 }
 
-/// The licence notice of the engine goes to stderr, and --quiet keeps it away.
+/// The licence notice of the engine goes to stderr; --quiet suppresses it.
 #[cfg(feature = "symbolica")]
 #[test]
 fn the_banner_stays_off_stdout() {
@@ -460,7 +460,7 @@ fn the_banner_stays_off_stdout() {
     assert!(quiet.stderr.is_empty());
 }
 
-/// One of several answers needed the engine: its notice is said, whatever came after.
+/// The notice is printed if one of several answers needed the engine, whichever came last.
 #[cfg(feature = "symbolica")]
 #[test]
 fn the_banner_is_kept_among_several() {
@@ -472,7 +472,7 @@ fn the_banner_is_kept_among_several() {
     assert!(stderr(&run(&["analyze", scheme])).is_empty());
 }
 
-/// The positions of every scheme as pictures, in a folder of their own.
+/// The positions of every scheme are drawn, each scheme in a folder of its own.
 #[test]
 fn positions_are_drawn() {
     let (folder, _) = scratch();
@@ -487,14 +487,14 @@ fn positions_are_drawn() {
     assert!(run(&[&["analyze"], &several[..], &to].concat()).status.success());
     assert!(at.join("pole-positions.svg").is_file() && at.join("six-positions-positions.svg").is_file());
     refused(&[&["analyze", "examples/sir/model.toml"], &to[2..]].concat(), &["--figures is about schemes"]);
-    // nothing is drawn of what cannot be judged
+    // a scheme that cannot be judged gets no pictures
     let none = folder.path().join("none");
     let to = ["--combination", "D_QQ", "--figures", none.to_str().expect("UTF-8")];
     refused(&[&P1P2[..], &to].concat(), &["D_QQ"]);
     assert!(!none.exists());
 }
 
-/// A scheme on the command line and the same scheme in a file are one scheme.
+/// A scheme given by options and the same scheme in a file give the same answer.
 #[test]
 fn angles_and_a_file_mean_the_same() {
     let (folder, _) = scratch();
@@ -529,7 +529,7 @@ rotation = { about = "Z_p", angle_deg = -120 }
     }
 }
 
-/// Any system: verdicts in every format, a run with its figures, and orders that are asked for.
+/// Models from files: verdicts in every format, a run with its figures, and selected orders.
 #[test]
 fn models_from_files() {
     let model = "examples/lotka-volterra/model.toml";
@@ -557,8 +557,8 @@ fn models_from_files() {
     refused(&["analyze"], &["--angles", "FILE"]);
 }
 
-/// What is said of one unknown counts before what is said of its family, in whatever order; what concerns no
-/// unknown is refused.
+/// A setting for one unknown takes precedence over a setting for its family, in any order. A setting that
+/// concerns no unknown is refused.
 #[test]
 fn options_by_name_and_by_family() {
     const FIVE: &str = "examples/five-positions/scheme.toml";
@@ -598,7 +598,7 @@ fn options_by_name_and_by_family() {
     assert!(run(&["analyze", "--scheme", &path, "--solutions", "off"]).status.success());
 }
 
-/// Under reset carry every position has a psi of its own: each is held against the one psi of the other
+/// Under reset carry every position has a psi of its own: each is compared with the single psi of the other
 /// carries.
 #[test]
 fn psi_under_the_other_carries() {
@@ -613,7 +613,7 @@ fn psi_under_the_other_carries() {
     };
     let inseparable = ["psi_x@1", "psi_y@1", "psi_y@2", "psi_z@2"];
     assert_eq!(differing(&two, "reset"), inseparable);
-    // and the other way round; what reset says by itself
+    // the opposite comparison, then the verdicts under reset carry alone
     let reset = [&two[..], &["--carry", "reset"]].concat();
     assert_eq!(differing(&reset, "platform"), inseparable);
     let own = json(&reset);
@@ -625,7 +625,7 @@ fn psi_under_the_other_carries() {
     assert_eq!(unseen, inseparable);
 }
 
-/// The exact verdict is one of repositioning at once: a file whose slews take time is told so.
+/// The exact verdict assumes instantaneous repositioning: a note says so if the slews of the file take time.
 #[test]
 fn slews_of_a_file_are_not_part_of_the_verdict() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Whoever asks in JSON gets what the command line prints, byte for byte.
+//! Requests in JSON return what the command line prints, byte for byte.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ fn source(file: &str) -> Value {
     json!({ "name": file, "text": fs::read_to_string(root().join(file)).expect("readable") })
 }
 
-/// What the command line prints, its message, and whether it is content.
+/// Stdout and stderr of the command line, and true if it succeeds.
 fn printed(arguments: &[&str]) -> (String, String, bool) {
     let done = Command::new(env!("CARGO_BIN_EXE_obsdeg"))
         .args(arguments)
@@ -54,7 +54,7 @@ fn same(command: &str, request: &Value, arguments: &[&str]) {
         Err(problem) => {
             assert_eq!(text, "", "{arguments:?}: {problem}");
             let message = problem.message.lines().next().unwrap_or_default();
-            // options are --in-kebab-case there and in_snake_case here
+            // option names are --in-kebab-case on the command line and in_snake_case in JSON
             let plain = |text: &str| text.replace("--", "").replace('-', "_");
             assert!(plain(&said).contains(&plain(message)), "{arguments:?}: `{message}` is not in {said}");
         }
@@ -71,7 +71,7 @@ fn every_example_is_judged_the_same() {
 
 #[test]
 fn every_example_runs_the_same() {
-    // of the others a run is a matter of seconds each
+    // a run of the other examples takes seconds each
     for file in examples().iter().filter(|f| !f.contains("slam") && !f.contains("self-calibration")) {
         same(
             "simulate",
@@ -114,7 +114,10 @@ fn options_are_the_same() {
         json!({ "solutions": false, "measured_azimuth": true }),
         &["--solutions", "off", "--measured-azimuth"],
     );
-    let run = json!({ "requirement": { "D": 0.05 }, "prior": ["D_F=30"], "step": 20, "rate_random_walk": "0.001,0.002,0.003", "drift_noise": "0.001 deg/sqrt(h)" });
+    let run = json!({
+        "requirement": { "D": 0.05 }, "prior": ["D_F=30"], "step": 20, "rate_random_walk": "0.001,0.002,0.003",
+        "drift_noise": "0.001 deg/sqrt(h)"
+    });
     ask(
         "simulate",
         run,
@@ -139,7 +142,10 @@ fn options_are_the_same() {
     ask("crosscheck", json!({ "filter_drop": "p9" }), &["--filter-drop", "p9"]);
     same(
         "design",
-        &json!({ "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "immune": { "K0": 500 }, "keep": 3, "restarts": 5 }),
+        &json!({
+            "positions": 4, "carry": "inertial", "max_degree": ["D_F=1"], "immune": { "K0": 500 }, "keep": 3,
+            "restarts": 5
+        }),
         &[
             "design",
             "--positions",
@@ -231,10 +237,12 @@ fn wrong_requests_are_named() {
     assert_eq!((place.name.as_str(), place.line_and_column().0), ("a.toml", 3));
 }
 
-/// The documented way to read an option set back: what is written is read as the same.
+/// Option sets survive the documented way to write and read them.
 #[test]
 fn options_are_read_back() {
-    let asked = json!({ "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"] });
+    let asked = json!({
+        "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"]
+    });
     let options: obsdeg_commands::Simulate = serde_json::from_value(asked).expect("options");
     let written = serde_json::to_string(&options).expect("text");
     let again: obsdeg_commands::Simulate = serde_json::from_str(&written).expect("options");

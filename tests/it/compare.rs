@@ -1,4 +1,4 @@
-//! Schemes side by side: what is predicted is what the filter does, and what each position is for.
+//! Comparison of schemes: predicted sigmas are those of the filter, and each position has a stated purpose.
 
 use std::process::Output;
 
@@ -25,7 +25,7 @@ fn review(scheme: &Scheme) -> ComparedScheme {
     compare(&[entry], 1).expect("compared").schemes.remove(0)
 }
 
-/// The information of the batch against a filter with a prior that says nothing and no drift noise.
+/// The information of all samples, against a filter with an uninformative prior and no drift noise.
 #[test]
 fn the_predicted_sigma_is_that_of_a_filter() {
     for (attitudes, carry) in [
@@ -43,7 +43,7 @@ fn the_predicted_sigma_is_that_of_a_filter() {
         };
         let (filter, _) = simulate(&scheme, &quiet, 1).expect("simulated");
         for (q, f) in review(&scheme).quantities.iter().zip(&filter.quantities) {
-            // psi of the filter is that of the end
+            // psi of the filter refers to the end of the run
             if q.name.starts_with("D_") {
                 let sigma = q.sigma.expect("observable");
                 assert!((sigma / f.sigma - 1.0).abs() < 1e-4, "{} {carry}: {sigma} {}", q.name, f.sigma);
@@ -54,7 +54,7 @@ fn the_predicted_sigma_is_that_of_a_filter() {
 
 #[test]
 fn what_each_position_is_for() {
-    // five positions are the fewest under inertial carry, so none can go; of six, any one can
+    // five positions are the minimum under inertial carry, so none can be dropped; of six, any one can
     let five = review(&scheme(&S6[..5], Carry::Inertial));
     assert!(five.drop_one.iter().all(|d| !d.lost.is_empty() && d.worst.is_none()));
     assert!(five.quantities.iter().all(|q| q.carried_by.len() == 5));
@@ -65,7 +65,7 @@ fn what_each_position_is_for() {
             .iter()
             .all(|d| d.lost.is_empty() && d.worst.as_ref().is_some_and(|w| w.sigma_dph > worst))
     );
-    // the paper's: D_FX is told from D_SX by the second position; D_OX is not excited at either
+    // the paper's case: the second position distinguishes D_FX from D_SX; D_OX is excited at neither
     let paper = review(&scheme(&["0,0,0", "180,0,0"], Carry::Platform));
     let of = |name: &str| paper.quantities.iter().find(|q| q.name == name).expect("an unknown");
     assert_eq!(of("D_FX").carried_by, ["p1", "p2"]);
@@ -84,16 +84,17 @@ fn sensitivity_says_what_the_assumptions_are_worth() {
         |condition: &str| six.sensitivity.iter().find(|s| s.condition == condition).expect("a condition");
     let sigma = |condition: &str| at(condition).worst.as_ref().map(|w| w.sigma_dph);
     let here = six.worst.as_ref().map(|w| w.sigma_dph);
-    // eps_y is seen through wN: worse towards the pole, lost at it
+    // eps_y is observed through wN: its sigma grows towards the pole, where eps_y is not observable
     assert!(sigma("latitude 30 deg") > here && sigma("latitude 75 deg") > sigma("latitude 30 deg"));
     assert_eq!((at("latitude 90 deg").worst.as_ref(), at("latitude 90 deg").rank[0] < 15), (None, true));
-    // order 2: twice the dwell is 2^2.5 times better, a little less as the earth turns
+    // order 2: twice the dwell gains a factor of 2^2.5, slightly less because the earth turns
     let gain = sigma("dwell x 0.5").expect("there") / here.expect("there");
     assert!((4.5..6.5).contains(&gain), "{gain}");
     assert_eq!(at("reset carry").rank, [30, 30]);
 }
 
-/// Every unknown with a requirement counts, psi of every position too; what is not observable misses it.
+/// Every unknown with a requirement counts, psi of every position included. An unobservable unknown misses
+/// its requirement.
 #[test]
 fn requirements_are_those_of_all_unknowns() {
     let missed = |r: &ComparedScheme| -> Vec<(String, Miss)> {
@@ -111,13 +112,13 @@ fn requirements_are_those_of_all_unknowns() {
     assert_eq!(missed(&five), psi(&["psi_x", "psi_y", "psi_z"]));
     assert_eq!((five.requirements.stated, five.requirements.met), (15, 12));
     assert!(!five.meets_requirements && five.worst.as_ref().is_some_and(|w| w.sigma_dph < 0.1));
-    // none stated: none judged
+    // without stated requirements none is judged
     let nothing = review(&scheme(&S6[..5], Carry::Inertial));
     assert_eq!(
         (nothing.requirements.stated, nothing.meets_requirements, missed(&nothing)),
         (0, false, vec![])
     );
-    // under reset carry each position has a psi of its own, and a requirement may name one of them
+    // under reset carry each position has a psi of its own, which a requirement may name
     let of_position = |name: &str| Conditions {
         requirements: vec![Assignment { name: name.into(), value: 1e-3 }],
         ..Conditions::default()
@@ -130,7 +131,7 @@ fn requirements_are_those_of_all_unknowns() {
     let six = reset("psi_y@4");
     assert_eq!((six.requirements.stated, missed(&six)), (1, psi(&["psi_y@4"])));
     assert_eq!(reset("psi").requirements.stated, 18);
-    // one decision: what is met is what has a margin of at least one, by the numbers of the table
+    // one decision: a requirement is met if its margin in the table is at least one
     let paper = under(scheme(&["0,0,0", "180,0,0"], Carry::Platform), &[("D", 0.1), ("psi", 0.01)]);
     for r in [&five, &six, &paper] {
         let asked = r.quantities.iter().filter(|q| q.requirement.is_some());
@@ -147,8 +148,8 @@ fn requirements_are_those_of_all_unknowns() {
     assert_eq!(said.collect::<Vec<_>>(), unseen);
 }
 
-/// The excitation of a rotating segment is the root mean square over its arc: by integrals of squares of
-/// sines.
+/// The excitation in a rotating segment is the root mean square over its arc. Reference: integrals of squares
+/// of sines.
 #[test]
 fn excitation_of_an_arc() {
     let turning = |angle: &str, terms: &str| {
@@ -160,7 +161,8 @@ fn excitation_of_an_arc() {
     let at_first = |r: &ComparedScheme, name: &str| {
         r.quantities.iter().find(|q| q.name == name).expect("a coefficient").excitation[0]
     };
-    // about X_p, horizontal: g goes round in Y_p, Z_p, from -Y_p; gyro Y has I = +y, gyro Z I = +z
+    // about X_p, horizontal: g turns in the plane Y_p, Z_p, starting at -Y_p; gyro Y has I = +y, gyro Z I =
+    // +z
     for angle in ["360", "90", "-135", "30", "7200"] {
         let a = angle.parse::<f64>().expect("degrees").to_radians();
         let half = (2.0 * a).sin() / (4.0 * a);
@@ -171,10 +173,10 @@ fn excitation_of_an_arc() {
         near(at_first(&r, "D_IX"), 0.0);
         near(at_first(&r, "D_IY"), 0.5 + half);
         near(at_first(&r, "D_IZ"), 0.5 - half);
-        // the mean of sin^4
+        // mean of sin^4
         near(at_first(&r, "D_IIZ"), 3.0 / 8.0 - half + (4.0 * a).sin() / (32.0 * a));
     }
-    // the tumble: whatever is observable is excited somewhere
+    // the tumble: every observable coefficient is excited in some segment
     let json = json(&["compare", "examples/tumbling/scheme.toml", "--format", "json"]);
     let coefficients = json["schemes"][0]["quantities"].as_array().expect("a list").iter();
     for q in coefficients.filter(|q| q["unit"] != "deg" && q["status"] == "observable") {
@@ -183,7 +185,7 @@ fn excitation_of_an_arc() {
     }
 }
 
-/// Observability and requirements are two questions: what can go for one cannot for the other.
+/// Positions that can be dropped without loss of observability need not be droppable within the requirements.
 #[test]
 fn positions_that_can_go() {
     let six = scheme(&S6, Carry::Inertial);
@@ -194,7 +196,7 @@ fn positions_that_can_go() {
         let entry = Entry { name: "it".into(), scheme: six.clone(), conditions };
         compare(&[entry], 1).expect("compared").schemes.remove(0)
     };
-    // by the worst sigma without each, which drop-one knows
+    // by the worst sigma without each position, as drop-one states it
     let all = of(1e3);
     let mut without: Vec<f64> =
         all.drop_one.iter().filter_map(|d| Some(d.worst.as_ref()?.sigma_dph)).collect();
@@ -221,7 +223,8 @@ fn positions_that_can_go() {
     );
 }
 
-/// A table says what it compares: other carries without the slews, and schemes that have different tasks.
+/// The table states what it compares: schemes under other carries (without slews), and schemes with different
+/// tasks.
 #[test]
 fn what_is_not_alike_is_said() {
     let twelve = "examples/twelve-positions/scheme.toml";
@@ -249,7 +252,8 @@ fn what_is_not_alike_is_said() {
     assert_eq!(json["schemes"][0]["sensitivity"][9]["condition"], "platform carry, no slews");
 }
 
-/// What the sigmas rest on is in the answer and in the table; what the dwell takes away has no sigma.
+/// The answer and the table state the conditions of the sigmas. An unknown that the dwell makes undetermined
+/// has no sigma.
 #[test]
 fn conditions_and_dwell() {
     let run = printed;
@@ -303,9 +307,8 @@ fn files_are_named_and_wrong_ones_refused() {
     }
 }
 
-/// What samples with slews determine without a prior, to the strict: the sigmas are from an independent
-/// computation of 70 digits; what is coupled by 6e-7 to what is not determined has none, however small that
-/// is.
+/// Sigmas with slews and without a prior agree with an independent computation in 70 digits. An unknown
+/// coupled by only 6e-7 to an undetermined one has no sigma.
 #[test]
 fn sigmas_with_slews_are_those_without_a_prior() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -320,7 +323,8 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     };
     let slow = sigmas(
         "slow.toml",
-        "carry = \"inertial\"\nlatitude_deg = 89.9\n[simulation]\nslew_rate_deg_s = 0.01\n[[position]]\nattitude = \"EDN\"\n\
+        "carry = \"inertial\"\nlatitude_deg = 89.9\n[simulation]\nslew_rate_deg_s = 0.01\n[[position]]\n\
+         attitude = \"EDN\"\n\
          [[position]]\nangles_deg = [-177.94, 102.12, 115.37]\n[[position]]\nangles_deg = [-177.94, 102.12, -176.94]\n",
     );
     for (name, sigma) in
@@ -337,16 +341,16 @@ fn sigmas_with_slews_are_those_without_a_prior() {
     assert_eq!((coupled["D_SY"], coupled["D_IX"]), (None, None));
 }
 
-/// Where the paper's drifts break the small-angle model, sigmas of full attitudes stand beside the predicted
-/// ones: for D_FX the 0.03 deg/h that an independent extended filter had, not 0.0003; at a thousandth of the
-/// drifts there are none.
+/// If the paper's drifts break the small-angle model, sigmas of the filter with full attitudes stand
+/// beside the predicted ones. An independent extended filter found 0.03 deg/h for D_FX, not 0.0003. At a
+/// thousandth of the drifts the column is missing.
 #[test]
 fn sigmas_at_the_schemes_own_drifts() {
     let compared = |conditions: Conditions| {
         let entry = Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions };
         compare(&[entry], 1).expect("compared").schemes.remove(0)
     };
-    // the drifts of the paper are no scheme's own, unless a scheme states them
+    // the paper's drifts count as a scheme's own only if the scheme states them
     let drift = |name: &str, value| Assignment { name: name.into(), value };
     let stated = vec![drift("D_FX", 11.0), drift("D_FY", 12.0), drift("D_FZ", 13.0)];
     let own = Conditions { values: [Conditions::default().values, stated].concat(), ..Conditions::default() };

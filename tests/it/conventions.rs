@@ -1,5 +1,4 @@
-//! What users of other programs expect of a command line: how files are named, formats, ASCII, the manual,
-//! words that are completed.
+//! Conventions of command lines: names of files, formats, ASCII output, the manual, completions.
 
 use std::path::Path;
 
@@ -9,7 +8,7 @@ use crate::program::{json, obsdeg, refused, run, scratch, stderr, stdout};
 
 const P1P2: [&str; 5] = ["analyze", "--angles", "0,0,0", "--angles", "180,0,0"];
 
-/// Files are told apart by what they say, whatever command reads them; `-` is stdin, and stdout.
+/// Every command recognises the kind of a file by its content; `-` is stdin and stdout.
 #[test]
 fn one_way_to_name_files() {
     let (scheme, model) = ("examples/pole/scheme.toml", "examples/sir/model.toml");
@@ -23,7 +22,7 @@ fn one_way_to_name_files() {
         .stdin(std::fs::File::open(Path::new(env!("CARGO_MANIFEST_DIR")).join(scheme)).expect("it is there"));
     assert_eq!(String::from_utf8_lossy(&piped.output().expect("it runs").stdout), alone(scheme));
     refused(&["analyze", "-", scheme, "-"], &["- is given twice"]);
-    // several: one after another
+    // several files are judged one after another
     let both = plain(&[&["analyze", scheme, model], &off[..]].concat());
     let (a, b) = (alone(scheme), alone(model));
     let lines =
@@ -34,7 +33,7 @@ fn one_way_to_name_files() {
     let list = json(&[&["analyze", scheme, model, "--format", "json"], &off[..]].concat());
     let one = json(&[&["analyze", model, "--format", "json"], &off[..]].concat());
     assert_eq!((&list[1]["file"], &list[1]["answer"]), (&Value::from(model), &one));
-    // options of the one kind beside a file of the other
+    // options of schemes with a model, and the reverse
     refused(&["analyze", model, "--carry", "inertial"], &["--carry is about schemes", model]);
     refused(&["analyze", scheme, "--order", "3"], &["--order is about models", scheme]);
     refused(&["analyze", "--angles", "NUE", "--order", "3"], &["--order is about models"]);
@@ -42,7 +41,7 @@ fn one_way_to_name_files() {
     refused(&["report", model, "-o", "x.html", "--carry", "reset"], &["--carry is about schemes"]);
     refused(&["calibrate", scheme], &["no record"]);
     refused(&["design", scheme, scheme], &["unexpected argument"]);
-    // the options of kinds everywhere
+    // options that every kind accepts
     let compared = plain(&["compare", scheme, "examples/six-positions/scheme.toml"]);
     assert_eq!(plain(&["compare", scheme, "--scheme", "examples/six-positions/scheme.toml"]), compared);
     refused(&["compare", "--scheme", model], &["is a model file; expected a scheme file"]);
@@ -54,7 +53,7 @@ fn one_way_to_name_files() {
         let at = folder.path().join(name);
         let to = ["--runs", "2", "-q", "-o", at.to_str().expect("UTF-8")];
         assert!(run(&[&["report"], arguments, &to].concat()).status.success());
-        // the command that it says it was made by
+        // the file names the command that wrote it
         let text = std::fs::read_to_string(at).expect("written");
         text.replace("--scheme ", "").replace("--model ", "")
     };
@@ -66,7 +65,8 @@ fn one_way_to_name_files() {
     );
 }
 
-/// The format follows the ending, `--format` wins, and CSV is one of the lists of the JSON.
+/// The format follows the file extension, `--format` takes precedence, and CSV is one of the lists of the
+/// JSON.
 #[test]
 fn formats_follow_the_ending() {
     let (folder, _) = scratch();
@@ -84,7 +84,7 @@ fn formats_follow_the_ending() {
     assert!(run(&[&P1P2[..], &["-o", &path, "--format", "json"]].concat()).status.success());
     assert!(std::fs::read_to_string(&path).expect("written").starts_with('{'));
     refused(&[&P1P2[..], &["-o", &at("c.html")]].concat(), &["no format for .html", "obsdeg report"]);
-    // no other ending is passed over, whether there might be a folder or not
+    // an unknown extension is an error, even where a folder would be accepted
     refused(&[&P1P2[..], &["-o", &at("c.xlsx")]].concat(), &["no format for .xlsx", ".csv", "--format"]);
     refused(
         &[&["simulate"], &P1P2[1..], &["-o", &at("c.xlsx")]].concat(),
@@ -100,13 +100,13 @@ fn formats_follow_the_ending() {
     refused(&[&P1P2[..], &["--table", "x"]].concat(), &["error: no table `x`", "quantities", "combinations"]);
     refused(&[&P1P2[..], &["--table", "x", "--format", "json"]].concat(), &["--table x is about CSV"]);
     refused(&["simulate", "--angles", "NUE", "-o", "-"], &["-o - is stdout; expected a folder"]);
-    // where there may be a folder, an ending says that there is not
+    // where a folder would be accepted, a file extension means a file
     let path = at("run.json");
     assert!(run(&["simulate", "--angles", "NUE", "-o", &path]).status.success());
     let alone = stdout(&run(&["simulate", "--angles", "NUE", "--format", "json"]));
     assert_eq!(std::fs::read_to_string(&path).expect("written"), alone);
     refused(&["simulate", "--angles", "NUE", "-o", &path], &["run.json exists; --force"]);
-    // a list with nothing in it is no error
+    // an empty list is no error
     let none = [
         "calibrate",
         "examples/bench-day/scheme.toml",
@@ -117,7 +117,7 @@ fn formats_follow_the_ending() {
     assert_eq!(stdout(&run(&none)), "");
 }
 
-/// Nothing but ASCII where that is asked for, and where the locale has nothing else.
+/// Output is ASCII on request, and where the locale supports nothing else.
 #[test]
 fn tables_in_ascii() {
     let off = [&P1P2[..], &["--solutions", "off"]].concat();
@@ -136,7 +136,7 @@ fn tables_in_ascii() {
     assert_eq!(of("LC_ALL", "de_DE.ISO-8859-1"), asked);
     assert_eq!(of("LANG", "C.UTF-8"), usual);
     assert_eq!(of("LANG", ""), usual);
-    // messages too
+    // messages are ASCII too
     let strange = |arguments: &[&str]| stderr(&run(&[&["analyze", "\u{e9}.toml"], arguments].concat()));
     assert!(strange(&[]).contains("\u{e9}.toml"));
     assert!(strange(&["--ascii"]).contains("\\u{e9}.toml"));
@@ -144,12 +144,12 @@ fn tables_in_ascii() {
     assert!(wrong.is_ascii() && wrong.contains("[possible values: platform, inertial, reset]"), "{wrong}");
 }
 
-/// Completions, and the pages of the manual.
+/// Completions and manual pages.
 #[test]
 fn completions_and_manual() {
     for shell in ["bash", "zsh", "fish"] {
         let script = stdout(&run(&["completions", shell]));
-        // pages of the manual, and words that are not all there is
+        // candidate words that are not exhaustive, and the names of manual pages
         for words in ["cardinal", "grid", "crosscheck"] {
             assert!(script.contains(words), "{shell}: {words}");
         }
@@ -163,7 +163,7 @@ fn completions_and_manual() {
     assert!(manual.contains(".TH obsdeg") && manual.contains("obsdeg\\-analyze"), "{manual}");
     assert!(!manual.contains("obsdeg\\-help") && manual.contains("obsdeg\\-man"), "{manual}");
     let page = stdout(&run(&["man", "analyze"]));
-    // an example a line, not filled
+    // one example per line, not filled
     let example = ".SH EXAMPLES\n.nf\n  obsdeg analyze \\-\\-angles 0,0,0 \\-\\-angles 180,0,0 ";
     assert!(page.contains(example) && page.contains("\n  obsdeg analyze model.toml "), "{page}");
     assert!(page.contains(".TH obsdeg-analyze") && page.contains(".SH \"EXIT STATUS\""), "{page}");
@@ -177,7 +177,7 @@ fn completions_and_manual() {
     refused(&["man", "nothing"], &["possible values: analyze, simulate"]);
 }
 
-/// A whole number that is none, or is out of range, is told with the range and what was found.
+/// An invalid or out-of-range whole number is refused with the range and the value given.
 #[test]
 fn whole_numbers() {
     let seeds = ["analyze", "simulate", "crosscheck", "calibrate", "compare", "design", "report", "paper"];
@@ -190,14 +190,14 @@ fn whole_numbers() {
     refused(&[&P1P2[..], &["--order", "99999999999999999999"]].concat(), &["0 to 1000, found 9999"]);
 }
 
-/// Wrong inputs of every kind: the place, what was expected, what was found, what to do instead.
+/// Wrong inputs of every kind: the message gives the place, the expected and the found input, and advice.
 #[test]
 fn wrong_inputs_are_told_with_a_hint() {
     let (folder, _) = scratch();
     let at = |name: &str| folder.path().join(name).display().to_string();
     std::fs::write(at("file.txt"), "text").expect("written");
     let scheme = "examples/pole/scheme.toml";
-    // a number with an exponent is a number
+    // a number with an exponent is accepted as a number
     refused(&["simulate", scheme, "--noise", "-1e-5"], &["--noise", "'-1e-5'", "expected 1e-15 to 1000 g"]);
     refused(&["simulate", scheme, "--noise", "--step", "5"], &["--noise", "'--step'", "expected 1e-15"]);
     // folders and files
@@ -205,7 +205,7 @@ fn wrong_inputs_are_told_with_a_hint() {
     for command in [&["man", "-o"][..], &[&["analyze", scheme, "--figures"][..]].concat()] {
         refused(&[command, &[&at("file.txt")]].concat(), &["file.txt is a file; expected a folder"]);
     }
-    // a name that nothing declares, and one that is cut short
+    // an undeclared name, and an incomplete name
     let undeclared = at("undeclared.toml");
     std::fs::write(&undeclared, "[states]\nx='-k*x'\n[outputs]\ny='x'\n").expect("written");
     let said =
@@ -214,18 +214,18 @@ fn wrong_inputs_are_told_with_a_hint() {
     let short = at("short.toml");
     std::fs::write(&short, "latitud = 48\n[[position]]\nangles_deg=[0,0,0]\n").expect("written");
     refused(&["analyze", &short], &["unknown key `latitud`; did you mean `latitude_deg`?"]);
-    // what another command wrote
+    // output of another command as input
     let part = ["design", "--positions", "5", "--merge", scheme];
     refused(&part, &["scheme.toml: it is no part", "expected the file that `obsdeg design --part` wrote"]);
     let calibration = ["report", scheme, "-o", &at("x.html"), "--calibration", scheme];
     refused(&calibration, &["scheme.toml: no JSON; expected what `obsdeg calibrate -o` wrote"]);
-    // options of other commands, and files without one
+    // options of other commands, and file options without a file name
     refused(&["schema", "model", "-o", "x"], &["-o is an option of `obsdeg analyze`"]);
     refused(&[scheme], &["a scheme or model is judged by `obsdeg analyze examples/pole/scheme.toml`"]);
     assert!(!stderr(&run(&["schema", "--kind", "model"])).contains("-- --kind"));
 }
 
-/// What `--axes` is about is said where there are no terms, and of a model.
+/// The message on `--axes` explains the option where there are no terms, and for a model.
 #[test]
 fn axes_without_terms() {
     refused(&[&P1P2[..], &["--axes", "body"]].concat(), &["--axes body does nothing here", "--terms"]);

@@ -1,5 +1,6 @@
-//! Two engines, one verdict: what is judged in prime fields is judged again in real numbers of many digits,
-//! which share the graph and the staircase but no arithmetic, no elimination and no values of functions.
+//! Two engines, one verdict: models judged in prime fields are judged again in real numbers of many digits.
+//! The engines share the graph and the observability filtration, but not arithmetic, elimination or values of
+//! functions.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -9,7 +10,7 @@ use obsdeg_core::system::{
 };
 use obsdeg_exact::SplitMix64;
 
-/// Everything that two judgements must have in common.
+/// Compares everything that two judgements must have in common.
 fn same(a: &Judgement, b: &Judgement) -> Result<(), String> {
     let of = |j: &Judgement| {
         (j.findings.degrees.clone(), j.findings.asked.clone(), j.findings.partners.clone(), j.rests_on_bound)
@@ -18,22 +19,23 @@ fn same(a: &Judgement, b: &Judgement) -> Result<(), String> {
     if a == b { Ok(()) } else { Err(format!("{a:?}\n{b:?}")) }
 }
 
-/// What came of a model.
+/// Numbers of models by outcome.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Count {
     agree: usize,
-    /// Digits decide nothing, and say so.
+    /// Number of models that real numbers leave undecided, as their message says.
     undecided: usize,
-    /// Neither has a value for it.
+    /// Number of models that both engines refuse.
     refused: usize,
-    /// Of those that agree: not everything is observable; a chain was not followed to a proven end.
+    /// Number of models with equal verdicts that are not fully observable. `open` counts those whose chain
+    /// has no proven end.
     deficient: usize,
     open: usize,
-    /// Judged in prime fields by the one and in digits by the other.
+    /// Number of models that one engine judges in prime fields and the other in real numbers.
     apart: usize,
 }
 
-/// Judges a model by both.
+/// Judges a model with both engines and counts the outcome.
 fn hold(model: &SystemModel, text: &str, order: Option<usize>, count: &mut Count) {
     let compiled = model.compile().unwrap_or_else(|e| panic!("{e}\n{text}"));
     let fields = judge_compiled(model, &compiled, 3, order);
@@ -54,14 +56,14 @@ fn hold(model: &SystemModel, text: &str, order: Option<usize>, count: &mut Count
     }
 }
 
-/// Draws models: polynomials and quotients in states, parameters, inputs, constants of given value, with
-/// known starts, segments, jumps and experiments now and then.
-struct Draw {
+/// Generator of models: polynomials and quotients in states, parameters, inputs and constants of given value;
+/// some with known starts, segments, jumps and experiments.
+struct ModelGenerator {
     rng: SplitMix64,
     functions: bool,
 }
 
-impl Draw {
+impl ModelGenerator {
     fn below(&mut self, n: u64) -> u64 {
         self.rng.below(n)
     }
@@ -146,7 +148,7 @@ impl Draw {
 fn random_models(functions: bool, seeds: std::ops::Range<u64>) -> Count {
     let mut count = Count::default();
     for seed in seeds {
-        let text = Draw { rng: SplitMix64::of(seed, "random models", &[""; 0]), functions }.model();
+        let text = ModelGenerator { rng: SplitMix64::of(seed, "random models", &[""; 0]), functions }.model();
         let model = model_file::read(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
         hold(&model, &text, Some(12), &mut count);
     }
@@ -167,8 +169,8 @@ fn a_thousand_random_rational_models_in_both_engines() {
     assert_eq!((count.agree, count.apart), (1000, 1000), "{count:?}");
 }
 
-/// Functions of arguments that are independent are judged in prime fields: by true values they must be what
-/// they are there.
+/// Functions of independent arguments are judged in prime fields. With true values the verdicts must be the
+/// same.
 #[test]
 fn random_function_models_in_both_engines() {
     let count = random_models(true, 0..60);
@@ -183,7 +185,7 @@ fn a_thousand_random_function_models_in_both_engines() {
     assert_eq!((count.agree, count.refused, count.apart), (986, 14, 386), "{count:?}");
 }
 
-/// The reference models, as far as a few seconds go; all of them with the ignored test.
+/// Judges the reference models of at most `largest` states and parameters.
 fn references(largest: usize) -> Count {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
     let mut files: Vec<PathBuf> =

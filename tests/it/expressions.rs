@@ -1,4 +1,5 @@
-//! Solving expressions of models, tried: derivatives of the outputs by power series that are computed here.
+//! Solving expressions of models, tried with derivatives of the outputs from power series that this test
+//! computes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,12 +12,12 @@ use obsdeg_exact::SplitMix64;
 
 use crate::models::models;
 
-/// A prime of 61 bits, which is none of the program's.
+/// Prime of 61 bits that the program does not use.
 const P: u128 = (1 << 61) - 1;
-/// Coefficients of a series: more than any derivative in an expression.
+/// Number of coefficients of a series, above the order of any derivative in an expression.
 const ORDERS: usize = 22;
 
-/// A power series modulo `P`, up to the coefficient that is computed last.
+/// Power series modulo `P`, up to the last computed coefficient.
 type Series = Vec<u128>;
 
 fn power(mut x: u128, mut e: u128) -> u128 {
@@ -39,7 +40,7 @@ fn product(a: &Series, b: &Series) -> Series {
     (0..a.len()).map(|k| (0..=k).fold(0, |sum, j| (sum + a[j] * b[k - j]) % P)).collect()
 }
 
-/// `a / b`.
+/// Quotient `a / b`.
 fn quotient(a: &Series, b: &Series) -> Series {
     let first = inverse(b[0]);
     let mut out = Series::new();
@@ -50,7 +51,7 @@ fn quotient(a: &Series, b: &Series) -> Series {
     out
 }
 
-/// The series of an expression; `None` where it holds a function, or a name without a value.
+/// Series of an expression; `None` if it contains a function or a name without a value.
 fn series(e: &Expression, at: &BTreeMap<String, Series>, length: usize) -> Option<Series> {
     let number = |x: u128| (0..length).map(|k| if k == 0 { x % P } else { 0 }).collect::<Series>();
     let mut all: Vec<Series> = Vec::new();
@@ -81,7 +82,7 @@ fn series(e: &Expression, at: &BTreeMap<String, Series>, length: usize) -> Optio
     all.pop()
 }
 
-/// Series of all names of a model at a random point, its outputs included; `None` where it has functions.
+/// Series of all names of a model at a random point, outputs included; `None` if the model has functions.
 fn drawn(model: &SystemModel, a: &SystemAnalysis, rng: &mut SplitMix64) -> Option<BTreeMap<String, Series>> {
     let mut any = || u128::from(rng.next_u64()) % P;
     let constant = |x: u128| (0..ORDERS).map(|k| if k == 0 { x } else { 0 }).collect::<Series>();
@@ -112,10 +113,10 @@ fn drawn(model: &SystemModel, a: &SystemAnalysis, rng: &mut SplitMix64) -> Optio
         let (left, right) = line.split_once(" = ")?;
         lines.push((left.into(), parse_with(right, Names::Plain).ok()?));
     }
-    // definitions come before what uses them
+    // definitions are listed before their uses
     let is_output = |name: &str| model.outputs.iter().any(|o| o.0.name == name);
     lines.sort_by_key(|(left, _)| left.ends_with('\'') || is_output(left));
-    // one more coefficient of every state at a time
+    // each pass adds one coefficient to every state
     for k in 0..ORDERS {
         let mut next = at.clone();
         for (left, e) in &lines {
@@ -138,7 +139,7 @@ fn drawn(model: &SystemModel, a: &SystemAnalysis, rng: &mut SplitMix64) -> Optio
     Some(at)
 }
 
-/// The text with `y''` and `y^(4)` as names `y_d2` and `y_d4`, and those names with their values.
+/// The text with `y''` and `y^(4)` written as `y_d2` and `y_d4`, and the values of these names.
 fn with_derivatives(text: &str, at: &BTreeMap<String, Series>) -> (String, BTreeMap<String, Series>) {
     let (mut out, mut values) = (String::new(), BTreeMap::new());
     let mut rest = text;
@@ -168,7 +169,8 @@ fn with_derivatives(text: &str, at: &BTreeMap<String, Series>) -> (String, BTree
     (out, values)
 }
 
-/// Expressions of a model that were tried: each gives its unknown, and none rests on itself.
+/// Tries the expressions of a model and returns their number. Each gives the value of its unknown, and none
+/// rests on itself.
 fn tried(name: &str, model: &SystemModel, seed: u64) -> usize {
     let a = analyze_system(model, SystemOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
     let solved = || a.quantities.iter().filter_map(|q| Some((&q.name, q.solution.as_ref()?)));
@@ -207,7 +209,7 @@ fn tried(name: &str, model: &SystemModel, seed: u64) -> usize {
     count
 }
 
-/// The reference models, `step` by `step`, and all examples.
+/// Tries the expressions of every `step`th reference model and returns their number.
 fn all_tried(step: usize) -> usize {
     let mut count = 0;
     for (name, _, text) in models().into_iter().step_by(step) {
@@ -240,7 +242,7 @@ fn expressions_of_models_solve_and_do_not_rest_on_themselves() {
     assert!(examples > 10, "{examples}");
 }
 
-/// Seconds: `cargo test --test it -- --ignored expressions::`.
+/// All reference models, in seconds: `cargo test --test it -- --ignored expressions::`.
 #[test]
 #[ignore = "seconds"]
 fn expressions_of_all_reference_models() {

@@ -1,4 +1,4 @@
-//! Files that are read and written, and interrupts, on the real system.
+//! Reading and writing of files, and interrupts, on the real system.
 
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
@@ -8,9 +8,10 @@ use std::process::{Command, Output, Stdio};
 
 use crate::program::{obsdeg, run, stderr};
 
-const SCHEME: &str = "[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n";
+const SCHEME: &str = "[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\n\
+                      dwell_s = 100\n";
 
-/// A shell command with `$0` for the program.
+/// Runs a shell command in which `$0` is the program.
 fn shell(script: &str) -> Output {
     let mut command = Command::new("/bin/sh");
     command.args(["-c", script, env!("CARGO_BIN_EXE_obsdeg")]).output().expect("it runs")
@@ -23,7 +24,7 @@ fn folder() -> (tempfile::TempDir, impl Fn(&str) -> String) {
     (folder, move |name: &str| path.join(name).display().to_string())
 }
 
-/// All files and folders below, without the temporary folder itself.
+/// All files and folders below a folder, without the folder itself.
 fn below(folder: &Path) -> Vec<PathBuf> {
     let mut out = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
@@ -36,7 +37,7 @@ fn below(folder: &Path) -> Vec<PathBuf> {
     out
 }
 
-/// What the user's umask leaves, for every command that writes.
+/// Every command that writes creates files with the permissions of the user's umask.
 #[test]
 fn files_have_the_usual_permissions() {
     let (folder, at) = folder();
@@ -66,15 +67,14 @@ fn files_have_the_usual_permissions() {
         let mode = fs::metadata(&path).expect("there").mode() & 0o777;
         assert_eq!(mode, if path.is_dir() { 0o750 } else { 0o640 }, "{}", path.display());
     }
-    // what is replaced keeps its own
+    // a replaced file keeps its permissions
     let private = at("p.txt");
     fs::set_permissions(&private, fs::Permissions::from_mode(0o600)).expect("set");
     assert!(run(&["paper", "-o", &private, "--force"]).status.success());
     assert_eq!(fs::metadata(&private).expect("there").mode() & 0o777, 0o600);
 }
 
-/// A device, a pipe, a folder: refused, with --force too, and still there; a link to a file leads to the
-/// file.
+/// Devices, pipes and folders are not replaced, not even with --force. A link to a file is followed.
 #[test]
 fn only_files_are_replaced() {
     let (_folder, at) = folder();
@@ -102,7 +102,7 @@ fn only_files_are_replaced() {
         assert!(fs::symlink_metadata(at(link)).expect("there").is_symlink());
     }
     assert!(!Path::new(&at("nowhere")).exists());
-    // a folder of results takes the place of no folder either
+    // a folder of results does not replace a folder either
     fs::create_dir_all(at("run/summary.json")).expect("made");
     let scheme = at("scheme.toml");
     let output = run(&["simulate", "--scheme", &scheme, "-q", "-o", &at("run"), "--force"]);
@@ -119,7 +119,7 @@ fn only_files_are_replaced() {
     assert_eq!(fs::read_dir(at("elsewhere")).expect("a folder").count(), 1);
 }
 
-/// Pipes and devices are read up to the limit of files; a pipe without a writer does not hold up.
+/// Pipes and devices are read up to the size limit of files. A pipe without a writer does not block.
 #[test]
 fn input_from_anywhere_is_limited() {
     let (_folder, at) = folder();
@@ -152,14 +152,15 @@ fn input_from_anywhere_is_limited() {
         let output = shell(&script.replace("SCHEME", &at("scheme.toml")).replace("PIPE", &at("pipe")));
         assert_eq!(output.stdout, file.stdout, "{script}: {}", stderr(&output));
     }
-    // a report reads what it is given once
+    // a report reads its input once
     let script =
         format!("cat {} | \"$0\" report -q --runs 2 -o {} /dev/stdin", at("scheme.toml"), at("review.html"));
     let output = shell(&script);
     assert!(output.status.success(), "{}", stderr(&output));
 }
 
-/// A file is a scheme or a model by what it says: JSON from a pipe has no ending, and an ending may be wrong.
+/// The content decides whether a file is a scheme or a model: JSON from a pipe has no extension, and an
+/// extension may be wrong.
 #[test]
 fn a_file_is_what_it_says() {
     let (_folder, at) = folder();
@@ -194,8 +195,7 @@ fn a_file_is_what_it_says() {
     assert!(stderr(&other).contains("is a scheme file; expected a model file"), "{}", stderr(&other));
 }
 
-/// An interrupted command says nothing that it has not found: no evidence, no file, the exit code of an
-/// interrupt.
+/// An interrupted command prints no evidence, writes no file and ends with the exit code of an interrupt.
 #[test]
 fn an_interrupt_ends_with_its_code() {
     let (folder, at) = folder();
@@ -206,12 +206,12 @@ fn an_interrupt_ends_with_its_code() {
     ] {
         let child =
             obsdeg(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
-        // whatever it is doing by then
+        // at any point of its work
         std::thread::sleep(std::time::Duration::from_millis(700));
         let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
         assert!(sent.success());
         let output = child.wait_with_output().expect("it ends");
-        // 130, or ended by the signal before it listened
+        // exit code 130, or the signal itself before the program handles it
         let code = output.status.code().or(output.status.signal().map(|s| 128 + s));
         assert_eq!(
             (code, output.stdout.as_slice()),
@@ -223,12 +223,12 @@ fn an_interrupt_ends_with_its_code() {
     assert_eq!(below(folder.path()).len(), 1);
 }
 
-/// A model of one state, whose figures take little time.
+/// Model of one state, with figures that are drawn quickly.
 const SMALL: &str = "name = 'm'\n[states]\nx = '-x'\n[outputs]\ny = 'x'\n[simulation]\nduration = 5\nstep = 0.5\n\
                      values = { x = 1 }\npriors = { x = 0.5 }\nnoise = { y = 0.1 }\n";
 
-/// Runs that are interrupted at random times leave what was there, or the whole folder, and nothing else: of
-/// ten runs one draws the figures of a scheme, the others those of a small model.
+/// Runs that are interrupted at random times leave the previous state or the complete folder, and no other
+/// file. One run in ten draws the figures of a scheme, the others those of a small model.
 #[expect(clippy::print_stderr, reason = "what was measured")]
 fn interruptions_leave_nothing(count: u64) {
     let (_folder, at) = folder();
@@ -257,17 +257,17 @@ fn interruptions_leave_nothing(count: u64) {
             .stderr(Stdio::null())
             .spawn()
             .expect("it starts");
-        // most of them while files are written
+        // in most runs while files are written
         let part = 0.5 + 0.6 * random.below(1000) as f64 / 1000.0;
         std::thread::sleep(whole[kind].0.mul_f64(part));
-        // Ctrl-C, and the signals of a system that ends a program or of a terminal that is closed
+        // Ctrl-C, and the signals for the end of a program and for a closed terminal
         let signal = ["-INT", "-TERM", "-HUP"][i as usize % 3];
         Command::new("kill").args([signal, &child.id().to_string()]).output().expect("kill");
         interrupted += u64::from(!child.wait().expect("it ends").success());
         let names = names_in(&at(""));
         let hidden: Vec<&String> = names.iter().filter(|name| name.starts_with('.')).collect();
         assert!(hidden.is_empty(), "{i}: {hidden:?}");
-        // a folder that is there is whole
+        // an existing folder is complete
         if names.contains(&to) {
             let files = [&to, &whole[kind].1].map(|name| names_in(&at(name)).len());
             assert_eq!(files[0], files[1], "{i}");
@@ -288,7 +288,7 @@ fn three_hundred_interruptions_leave_no_litter() {
     interruptions_leave_nothing(300);
 }
 
-/// A limit on the size of files (SIGXFSZ) ends in a message, with nothing left.
+/// A limit on the size of files (SIGXFSZ) leads to a message and leaves no file.
 #[test]
 fn a_limit_on_files_leaves_no_litter() {
     let (folder, at) = folder();

@@ -1,5 +1,5 @@
-//! The matrices of the front door against the verdicts: ranks of H F^k S_i by singular values, without the
-//! engine.
+//! The matrices of the library `obsdeg` against the verdicts: ranks of H F^k S_i by singular values, without
+//! the engine.
 
 use nalgebra::DMatrix;
 use obsdeg::error::MatricesError;
@@ -10,8 +10,7 @@ fn scheme(angles: &[[i32; 3]], carry: Carry) -> Scheme {
     Scheme { carry, ..Scheme::of_angles(angles.iter().map(|a| a.map(Angle::from_degrees))) }
 }
 
-/// The rank of all Z^(k) of orders up to `orders`, with time in units of 1/w_ie, so that every entry is of
-/// order 1.
+/// Rank of all Z^(k) of orders up to `orders`. Time is in units of 1/w_ie, so that every entry is of order 1.
 fn rank(scheme: &Scheme, orders: u32) -> usize {
     let [w_n, w_u] = earth_rates(41.0);
     let w = w_n.hypot(w_u);
@@ -58,7 +57,8 @@ fn shapes_names_and_refusals() {
         m.unknowns.iter().filter(|n| n.starts_with("psi_x")).collect::<Vec<_>>(),
         ["psi_x@1", "psi_x@2"]
     );
-    // at the equator omega_ie is north: psi_y' has + wN psi_z and psi_z' has - wN psi_y, nothing else but eps
+    // at the equator omega_ie points north: psi_y' contains + wN psi_z, psi_z' contains - wN psi_y, and
+    // otherwise only eps
     assert_eq!((m.f[(1, 2)], m.f[(2, 1)], m.f[(0, 2)], m.f[(0, 3)]), (7.292115e-5, -7.292115e-5, 0.0, 1.0));
 
     let generic = read_scheme("[[position]]\nangles_deg = [\"a\", 0, 0]\nname = 'p'").expect("a scheme");

@@ -1,5 +1,5 @@
-//! Models with functions: true values, at given points, in related arguments, in every segment its own. What
-//! is expected is written down by hand.
+//! Models with functions: given values, related arguments, and different values in every segment. Expected
+//! verdicts are derived by hand.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
@@ -14,8 +14,8 @@ fn judged(text: &str) -> Judgement {
     judge(&model, 7, None).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// `name 2, other -`: degrees, `-` for what no output sees, `~` for what is not told from others, `?` for
-/// what is not seen.
+/// Verdicts as `name 2, other -`: a degree, `-` if no output depends on the unknown, `~` if it is
+/// indistinguishable from others, `?` if it is not resolved up to the bound.
 fn verdicts(text: &str) -> String {
     let j = judged(text);
     let one = |c: usize| {
@@ -31,13 +31,13 @@ fn verdicts(text: &str) -> String {
     (0..j.layout.unknowns.len()).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// A model of one output over constant states, with constants and segments.
+/// Model of one output over constant states, with constants and segments.
 fn still(states: &str, output: &str, rest: &str) -> String {
     let equations: String = states.split(' ').map(|s| format!("{s}='0'\n")).collect();
     format!("name='m'\n[states]\n{equations}[outputs]\ny='{output}'\n{rest}")
 }
 
-/// Segments with a known angle of their own.
+/// Model with a known angle for each segment.
 fn at_angles(output: &str, angles: &[&str]) -> String {
     let segments: String = angles.iter().map(|a| format!("[[segment]]\nconstants={{a='{a}'}}\n")).collect();
     still("s b", output, &format!("[constants]\na=0\n{segments}"))
@@ -45,24 +45,24 @@ fn at_angles(output: &str, angles: &[&str]) -> String {
 
 #[test]
 fn every_segment_has_values_of_its_own() {
-    // a tumble test: scale factor and bias from three known angles, or two
+    // tumble test: scale factor and bias from one, two or three known angles
     let tumble = |angles: &[&str]| verdicts(&at_angles("s*9.81*sin(a) + b", angles));
     assert_eq!(tumble(&["0", "0.5", "1.5"]), "s 0, b 0");
     assert_eq!(tumble(&["0.5", "1.5"]), "s 0, b 0");
     assert_eq!(tumble(&["0"]), "s -, b 0");
     assert_eq!(tumble(&["0.5"]), "s ~, b ~");
     assert_eq!(tumble(&["0.5", "0.5"]), "s ~, b ~");
-    // the same sine
+    // angles with the same sine
     assert_eq!(tumble(&["0.5", "pi - 0.5"]), "s ~, b ~");
     assert_eq!(tumble(&["30*deg", "150*deg"]), "s ~, b ~");
-    // two headings; a whole turn is none, but its decimals are not a whole turn
+    // two headings; a full turn adds nothing, but its decimals are not a full turn
     let heading = |angles: &[&str]| verdicts(&at_angles("s*cos(a) + b", angles));
     assert_eq!(heading(&["0", "3.14159265"]), "s 0, b 0");
     assert_eq!(heading(&["0", "2*pi"]), "s ~, b ~");
     assert_eq!(heading(&["0", "360*deg"]), "s ~, b ~");
     assert_eq!(heading(&["0", "6.283"]), "s 0, b 0");
     assert_eq!(heading(&["0", "pi"]), "s 0, b 0");
-    // experiments: constants are shared, starts are not
+    // experiments share constants, but not starts
     let two =
         "name='m'\nexperiments=2\nparameters=['p']\n[states]\nx='0'\n[outputs]\ny='sin(p)*cos(x)'\nz='x'";
     assert_eq!(verdicts(two), "x@1 0, x@2 0, p 0");
@@ -82,7 +82,7 @@ fn definite_values_are_what_they_are() {
     assert_eq!(with("z*(sqrt(c) - 2) + x", "c=4"), "z -, x 0");
     assert_eq!(with("z*(c^0.5 - sqrt(2)) + x", "c=2"), "z -, x 0");
     assert_eq!(with("z*(8^(1/3) - c) + x", "c=2"), "z -, x 0");
-    // at the ends of their ranges, where they have no derivative that anything needs
+    // functions at the ends of their ranges, where no verdict needs their derivative
     assert_eq!(with("z*(asin(c) - pi/2) + x", "c=1"), "z -, x 0");
     assert_eq!(with("z*acos(c) + x", "c=1"), "z -, x 0");
     assert_eq!(with("z*(acos(c) - pi) + x", "c=-1"), "z -, x 0");
@@ -99,18 +99,20 @@ fn definite_values_are_what_they_are() {
 fn starts_are_the_given_ones() {
     let pendulum = |rate: &str| {
         verdicts(&format!(
-            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial=0}}\nw={{equation='-k*sin(th)', initial={rate}}}\n[outputs]\ny='th'"
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial=0}}\n\
+             w={{equation='-k*sin(th)', initial={rate}}}\n[outputs]\ny='th'"
         ))
     };
-    // at rest nothing moves; pushed, th''' = -k w
+    // at rest the output is constant; with an initial rate th''' = -k w
     assert_eq!(pendulum("0"), "k -");
     assert_eq!(pendulum("1"), "k 3");
-    let upside_down = "name='m'\nparameters=['k']\n[states]\nth={equation='w', initial='pi'}\nw={equation='-k*sin(th)', initial=0}\n[outputs]\ny='th'";
+    let upside_down = "name='m'\nparameters=['k']\n[states]\nth={equation='w', initial='pi'}\n\
+                       w={equation='-k*sin(th)', initial=0}\n[outputs]\ny='th'";
     assert_eq!(verdicts(upside_down), "k -");
-    // from anywhere: y'' = -k sin y
+    // from a generic start: y'' = -k sin y
     let free = "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'";
     assert_eq!(verdicts(free), "th 0, w 1, k 2");
-    // the order of a power of the time
+    // order of a power of the time
     let power = |n: usize| {
         format!("name='m'\nparameters=['p']\n[states]\nx={{equation='1', initial=0}}\n[outputs]\ny='p*x^{n}'")
     };
@@ -118,14 +120,15 @@ fn starts_are_the_given_ones() {
     assert_eq!(verdicts(&power(80)), "p ?");
     let timed = "name='m'\nparameters=['p']\n[states]\nx='0'\n[outputs]\ny='p*t^3 + x'";
     assert_eq!(verdicts(timed), "x 0, p 3");
-    let input = "name='m'\nparameters=['p']\nknown_inputs={u={function='1 - cos(t)'}}\n[states]\nx='0'\n[outputs]\ny='p*u + x'";
+    let input = "name='m'\nparameters=['p']\nknown_inputs={u={function='1 - cos(t)'}}\n[states]\nx='0'\n[outputs]\n\
+                 y='p*u + x'";
     assert_eq!(verdicts(input), "x 0, p 2");
-    // the end is proven where the rank is that of a generic point
+    // the end of the chain is proven where the rank is that of a generic point
     let never = judged(
         "name='m'\nparameters=['p', 'q']\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='(p + q)*x^20'",
     );
     assert!(!never.rests_on_bound && never.findings.degrees.rank() == 1);
-    // known, but generic
+    // known start with a generic value
     let known =
         "name='m'\nparameters=['k']\n[states]\nx={equation='-k*exp(x)', initial='known'}\n[outputs]\ny='x'";
     assert_eq!(verdicts(known), "k 1");
@@ -133,10 +136,11 @@ fn starts_are_the_given_ones() {
 
 #[test]
 fn jumps_to_special_values_are_special() {
-    // the output of the first segment says nothing; after the jump x' = 1 + a x^2 starts at 0
+    // the output of the first segment is constant; after the jump x' = 1 + a x^2 starts at 0
     let jump = |to: &str| {
         format!(
-            "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={{c='1'}}\ncarry={{x='{to}'}}"
+            "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n\
+             [[segment]]\nconstants={{c='1'}}\ncarry={{x='{to}'}}"
         )
     };
     assert_eq!(verdicts(&jump("0")), "x -, a 3");
@@ -147,7 +151,7 @@ fn jumps_to_special_values_are_special() {
     assert_eq!(verdicts(&jump("cos(0)")), "x -, a 1");
 }
 
-/// Expressions that are constant, whatever x, q and w are near one.
+/// Expressions that are constant for all x, q and w near one.
 const IDENTITIES: [&str; 29] = [
     "sin(asin(x/2)) - x/2",
     "asin(sin(x)) - x",
@@ -180,7 +184,7 @@ const IDENTITIES: [&str; 29] = [
     "x^0 + q^0",
 ];
 
-/// What is constant moves nothing: however its arguments are related.
+/// A constant expression affects no output, however its arguments are related.
 #[test]
 fn related_values_are_related() {
     for zero in IDENTITIES {
@@ -191,14 +195,14 @@ fn related_values_are_related() {
         assert_eq!(found.findings.degrees.rank(), 1, "{zero}: {:?}", found.findings.degrees);
         assert_eq!(found.findings.degrees.degree[3], Some(0), "{zero}");
     }
-    // and what is not constant is seen
+    // expressions that are not constant affect the output
     for different in ["sin(asin(x/2)) - x", "sqrt(exp(x)) - exp(x/3)", "sin(x + 3.14159265) + sin(x)"] {
         let text = format!("name='m'\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + ({different})'");
         assert_eq!(verdicts(&text), "x ~, z ~", "{different}");
     }
 }
 
-/// No seed refuses a root, however many there are.
+/// No seed leads to a refusal of roots, whatever their number.
 #[test]
 fn roots_are_never_refused() {
     let beacons: String =
@@ -217,7 +221,7 @@ fn roots_are_never_refused() {
     );
 }
 
-/// Where a model is defined is found; where it is nowhere, the place is named.
+/// A point of the model's domain is found. If the domain is empty, the message names the place.
 #[test]
 fn points_lie_where_the_model_is_defined() {
     for inside in [
@@ -268,8 +272,7 @@ fn points_lie_where_the_model_is_defined() {
     );
 }
 
-/// A definite value against the same model with the value written in by hand: the same verdicts, orders and
-/// ranks.
+/// A constant with a given value gives the verdicts, orders and ranks of the model with the value written in.
 #[test]
 fn substituted_by_hand() {
     for (functions, by_hand) in [
@@ -290,7 +293,7 @@ fn substituted_by_hand() {
     }
 }
 
-/// Terms over x, q, w as text, and the same written differently.
+/// Terms over x, q, w as text, each with an equivalent spelling.
 fn terms() -> impl Strategy<Value = (String, String)> {
     let leaf = prop_oneof![
         Just(("x".to_string(), "x".to_string())),
@@ -304,14 +307,14 @@ fn terms() -> impl Strategy<Value = (String, String)> {
                 .prop_map(|(a, b)| { (format!("({} + {})", a.0, b.0), format!("({} + {})", b.1, a.1)) }),
             (inner.clone(), inner.clone())
                 .prop_map(|(a, b)| (format!("({}*{})", a.0, b.0), format!("({}*{})", a.1, b.1))),
-            // sum rules
+            // addition theorems
             (inner.clone(), inner.clone()).prop_map(|(a, b)| (
                 format!("sin({} + {})", a.0, b.0),
                 format!("(sin({0})*cos({1}) + cos({0})*sin({1}))", a.1, b.1)
             )),
             // shifted angles
             inner.clone().prop_map(|a| (format!("cos({})", a.0), format!("sin({} + pi/2)", a.1))),
-            // products under roots and logarithms, of what is positive
+            // products under roots and logarithms, with positive factors
             (inner.clone(), inner.clone()).prop_map(|(a, b)| (
                 format!("log((1 + {}^2)*(2 + {}^2))", a.0, b.0),
                 format!("(log(1 + {}^2) + log(2 + {}^2))", a.1, b.1)
@@ -330,7 +333,7 @@ fn terms() -> impl Strategy<Value = (String, String)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Two ways to write the same model give the same verdicts, orders and ranks.
+    /// Two spellings of the same model give the same verdicts, orders and ranks.
     #[test]
     fn identities_change_nothing(f in terms(), g in terms(), h in terms()) {
         let model = |f: &str, g: &str, h: &str| {
@@ -338,7 +341,7 @@ proptest! {
         };
         let one = model_file::read(&model(&f.0, &g.0, &h.0)).and_then(|m| judge(&m, 3, None));
         let other = model_file::read(&model(&f.1, &g.1, &h.1)).and_then(|m| judge(&m, 3, None));
-        // towers of exponentials are beyond any number of digits: then it says so
+        // towers of exponentials exceed any number of digits, and the message says so
         if let (Ok(one), Ok(other)) = (&one, &other) {
             prop_assert_eq!(&one.findings.degrees, &other.findings.degrees, "{} {} {}", f.0, g.0, h.0);
         }
@@ -347,7 +350,7 @@ proptest! {
 
 #[test]
 fn certainty_names_what_it_rests_on() {
-    // two functions that depend on each other
+    // two dependent functions
     let SystemCertainty::Digits(d) = judged(&still("x", "sin(x) + sin(x + 1)", "")).certainty else {
         panic!("related functions are judged in digits")
     };
@@ -356,8 +359,8 @@ fn certainty_names_what_it_rests_on() {
     assert!(matches!(judged(&still("x", "x^2", "")).certainty, SystemCertainty::Primes(_)));
 }
 
-/// Which models prime fields may judge: those whose functions have independent values. Each of the others has
-/// a relation, a special value or a branch, which random values would miss.
+/// Prime fields judge only models whose functions have independent values. Each of the other models has a
+/// relation, a special value or a branch that random values would miss.
 #[test]
 fn only_independent_functions_are_judged_in_prime_fields() {
     let by_primes = |states: &str, output: &str, rest: &str| {
@@ -372,7 +375,7 @@ fn only_independent_functions_are_judged_in_prime_fields() {
         "pi*x + sin(x + pi)",
         "tanh(x) + exp(x) + atan(x)",
         "sin(1.5*x)*q",
-        // by addition theorems
+        // dependent by addition theorems only
         "exp(x) + exp(2*x)",
         "exp(x + q) + exp(x)*exp(q)",
         "sin(x) + sin(x + pi/2)",
@@ -402,7 +405,7 @@ fn only_independent_functions_are_judged_in_prime_fields() {
     ] {
         assert!(!by_primes("x q w", related, ""), "{related}");
     }
-    // what is given, what changes, the time, experiments
+    // given values, values that change, the time, experiments
     assert!(by_primes("x q", "sin(c*x)", "[constants]\nc=2\n"));
     assert!(!by_primes("x q", "x*sin(c)", "[constants]\nc=2\n"));
     assert!(by_primes("x q", "sin(c*x)", "[constants]\nc=0\n"));
@@ -423,17 +426,18 @@ fn only_independent_functions_are_judged_in_prime_fields() {
         judged("name='m'\nexperiments=2\n[states]\nx='0'\n[outputs]\ny='exp(x)'").certainty,
         SystemCertainty::Digits(_)
     ));
-    // no real point: neither field nor digits
+    // no real point: both engines refuse
     let nowhere = model_file::read(&still("x q", "x + log(-1 - x^2)", "")).expect("a model");
     assert!(judge(&nowhere, 1, None).is_err());
 }
 
-/// An exponent that is a constant of known value is the number that it stands for: no logarithm of its base.
+/// A constant of known value as exponent acts as its number, without a logarithm of the base.
 #[test]
 fn exponents_may_be_constants() {
     let power = |start: &str, exponent: &str, rest: &str| {
         format!(
-            "name='m'\nparameters=['p']\n{rest}\n[states]\nx={{equation='1', initial='{start}'}}\n[outputs]\ny='p*x^{exponent}'"
+            "name='m'\nparameters=['p']\n{rest}\n[states]\nx={{equation='1', initial='{start}'}}\n[outputs]\n\
+             y='p*x^{exponent}'"
         )
     };
     let constant = |start: &str, exponent: &str, n: &str| {
@@ -444,7 +448,7 @@ fn exponents_may_be_constants() {
     {
         assert_eq!(constant(start, "n", n), format!("p {degree}"), "{start} {n}");
     }
-    // made of several, and half of one; a root is none of what is negative
+    // exponents from several constants, exponents one half and less; the root of a negative number is refused
     assert_eq!(constant("0", "m", "2"), "p 3");
     assert_eq!(constant("0", "(2*n - 1)", "2"), "p 3");
     assert_eq!(constant("4", "n", "1/2"), "p 0");
@@ -454,7 +458,7 @@ fn exponents_may_be_constants() {
         judge(&refused, 1, None).expect_err("no root").to_string(),
         "the output y: sqrt is not defined here at any of 2000 points that were tried"
     );
-    // the same as the number by hand, and rational
+    // the same as the number written in, and rational
     let free = |exponent: &str, rest: &str| {
         judged(&format!(
             "name='m'\nparameters=['p']\n{rest}\n[states]\nx='-p*x^{exponent}'\n[outputs]\ny='x^2'"
@@ -463,16 +467,19 @@ fn exponents_may_be_constants() {
     let (by_name, by_hand) = (free("n", "[constants]\nn=3"), free("3", ""));
     assert_eq!(by_name.findings.degrees, by_hand.findings.degrees);
     assert!(by_name.fields.is_some() && free("n", "[constants]\nn='generic'").fields.is_none());
-    // each experiment has its own; what a segment changes has none
-    let own = "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nn=2\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^n'\n[[experiment]]\n[[experiment]]\nconstants={n=4}\n";
+    // exponents may differ between experiments; an exponent that a segment changes is not replaced by its
+    // number
+    let own = "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nn=2\n[states]\nx={equation='1', initial=0}\n\
+               [outputs]\ny='p*x^n'\n[[experiment]]\n[[experiment]]\nconstants={n=4}\n";
     assert_eq!(verdicts(own), "p 2");
     let later = own.replace("[constants]\nn=2", "[constants]\nn=5");
     assert_eq!(verdicts(&later), "p 4");
-    let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n[[segment]]\nconstants={n=2}\n";
+    let segment = "name='m'\n[constants]\nn=1\n[states]\nx='0'\nz='0'\n[outputs]\ny='z + x^n'\n[[segment]]\n\
+                   [[segment]]\nconstants={n=2}\n";
     assert_eq!(verdicts(segment), "x 0, z 0");
 }
 
-/// A model with numbers for a filter: what it has no values for gets some near one.
+/// Model with numbers for a filter; unknowns without a value get one near 1.
 fn with_numbers(text: &str, duration: f64) -> String {
     let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
     let mut values = String::new();
@@ -483,11 +490,12 @@ fn with_numbers(text: &str, duration: f64) -> String {
     }
     let noise: String = model.outputs.iter().map(|o| format!("{}=0.01\n", o.0.name)).collect();
     format!(
-        "{text}\n[simulation]\nduration={duration}\nstep=0.01\n[simulation.values]\n{values}\n[simulation.noise]\n{noise}"
+        "{text}\n[simulation]\nduration={duration}\nstep=0.01\n[simulation.values]\n{values}\n[simulation.noise]\n\
+         {noise}"
     )
 }
 
-/// The samples of a filter say the same of every named case, or that they do not show it.
+/// The samples of a filter confirm every named case, or do not resolve it.
 #[test]
 fn the_information_agrees_on_every_named_case() {
     let tumble = |angles: &[&str]| at_angles("s*9.81*sin(a) + b", angles);
@@ -495,7 +503,8 @@ fn the_information_agrees_on_every_named_case() {
     let constant = |output: &str, c: &str| still("z x", output, &format!("[constants]\nc={c}\n"));
     let pendulum = |th: &str, w: &str| {
         format!(
-            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial='{th}'}}\nw={{equation='-k*sin(th)', initial='{w}'}}\n[outputs]\ny='th'"
+            "name='m'\nparameters=['k']\n[states]\nth={{equation='w', initial='{th}'}}\n\
+             w={{equation='-k*sin(th)', initial='{w}'}}\n[outputs]\ny='th'"
         )
     };
     let beacons: String =
@@ -519,7 +528,8 @@ fn the_information_agrees_on_every_named_case() {
         pendulum("0", "1"),
         pendulum("pi", "0"),
         "name='m'\nparameters=['k']\n[states]\nth='w'\nw='-k*sin(th)'\n[outputs]\ny='th'".into(),
-        "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n[[segment]]\nconstants={c='1'}\ncarry={x='0'}".into(),
+        "name='m'\nparameters=['a']\n[constants]\nc=0\n[states]\nx='1 + a*x^2'\n[outputs]\ny='c*x'\n[[segment]]\n\
+         [[segment]]\nconstants={c='1'}\ncarry={x='0'}".into(),
         "name='m'\nparameters=['p']\n[states]\nx={equation='1', initial=0}\n[outputs]\ny='p*x^20'".into(),
         still("x", "sqrt(2)*x", ""),
         format!("name='m'\n[states]\nx='vx'\ny='vy'\nvx='0'\nvy='0'\n[outputs]\n{beacons}"),
@@ -545,7 +555,7 @@ fn the_information_agrees_on_every_named_case() {
     assert!(checks > 3 * cases.len(), "{checks}");
 }
 
-/// What a sceptic might try, each truth by hand from the first derivatives of the output.
+/// Difficult cases, each derived by hand from the first derivatives of the output.
 #[test]
 fn held_out_models() {
     let c = |output: &str, value: &str| still("z x", output, &format!("[constants]\nc='{value}'\n"));
@@ -567,7 +577,8 @@ fn held_out_models() {
             &format!("{{equation='-9.81/l*sin(th) - d*w', initial={w}}}"),
         )
     };
-    let arrhenius = "name='m'\nexperiments=2\nparameters=['A', 'E']\n[constants]\nT=300\n[states]\nx='-A*exp(-E/T)*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\nconstants={T=350}\n";
+    let arrhenius = "name='m'\nexperiments=2\nparameters=['A', 'E']\n[constants]\nT=300\n[states]\n\
+                     x='-A*exp(-E/T)*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\nconstants={T=350}\n";
     let cases: Vec<(String, &str)> = vec![
         // given values
         (c("z*tan(c) + x", "0"), "z -, x 0"),
@@ -590,14 +601,22 @@ fn held_out_models() {
         (swing("0", "0"), "l -, d -"),
         (swing("0", "1"), "l 3, d 2"),
         (pendulum("'w'", "'-9.81/l*sin(th) - d*w'"), "th 0, w 1, l 3, d 3"),
-        // the time
+        // dependence on the time
         (model("'k'", "x='0'", "y='x*exp(-k*t)'", ""), "x 0, k 1"),
         (still("a w phi", "a*sin(w*t + phi)", ""), "a 2, w 2, phi 2"),
         (still("a w", "a*sin(w*t)", ""), "a 3, w 3"),
         (still("a w", "a*cos(w*t)", ""), "a 0, w 2"),
-        (model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='sin(t)'}}\n"), "p 2"),
         (
-            model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='exp(t) - 1 - t'}}\n"),
+            model("'p'", "x={equation='p*u', initial=0}", "y='x'", "known_inputs={u={function='sin(t)'}}\n"),
+            "p 2",
+        ),
+        (
+            model(
+                "'p'",
+                "x={equation='p*u', initial=0}",
+                "y='x'",
+                "known_inputs={u={function='exp(t) - 1 - t'}}\n",
+            ),
             "p 3",
         ),
         // related values
@@ -628,7 +647,9 @@ fn held_out_models() {
         (arrhenius.into(), "x@1 0, x@2 0, A 1, E 1"),
         (arrhenius.replace("350", "300"), "x@1 0, x@2 0, A ~, E ~"),
         (
-            "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nc=0\n[states]\nx='0'\n[outputs]\ny='p*sin(c) + x'\n[[experiment]]\n[[experiment]]\nconstants={c='pi/2'}\n".into(),
+            "name='m'\nexperiments=2\nparameters=['p']\n[constants]\nc=0\n[states]\nx='0'\n[outputs]\n\
+             y='p*sin(c) + x'\n[[experiment]]\n[[experiment]]\nconstants={c='pi/2'}\n"
+                .into(),
             "x@1 0, x@2 ~, p ~",
         ),
     ];
@@ -640,7 +661,7 @@ fn held_out_models() {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
 }
 
-/// The answer says on which branch it stands, and where solutions come from.
+/// The answer names the branches of its verdicts and the basis of each number of solutions.
 #[test]
 fn the_answer_says_what_it_leaves_open() {
     let analysis = |text: &str| {
@@ -661,7 +682,7 @@ fn the_answer_says_what_it_leaves_open() {
     assert_eq!((plain.independent_functions, plain.error_bound.is_some()), (Some(2), true));
 }
 
-/// Constraints in models with functions: a pendulum on a circle, by its bearing.
+/// Constraints in models with functions: a pendulum on a circle, observed by its bearing.
 #[test]
 fn constraints_beside_functions() {
     let circle = |constraint: &str, output: &str| {
@@ -669,15 +690,15 @@ fn constraints_beside_functions() {
             "name='m'\n{constraint}[states]\nx='-w*y'\ny='w*x'\nw='0'\n[outputs]\nz='{output}'"
         ))
     };
-    // free: the bearing says nothing of the radius
+    // without a constraint the bearing does not determine the radius
     assert_eq!(circle("", "atan2(y, x)"), "x ~, y ~, w 1");
     assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "atan2(y, x)"), "x 0, y 0, w 1");
     assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "exp(x)"), "x 0, y 0, w 1");
-    // the radius is known before: the output adds nothing
+    // the constraint gives the radius, so the output adds nothing
     assert_eq!(circle("constraints=['x^2 + y^2 = 2']\n", "log(x^2 + y^2)"), "x ~, y ~, w -");
     let two = "constraints=['x^2 + y^2 = 2', 'x = y']\n";
     assert_eq!(circle(two, "sin(w*x)"), "x 0, y 0, w 0");
-    // what no point holds
+    // a constraint without real points
     let none = model_file::read(
         "name='m'\nconstraints=['x^2 + y^2 = -1']\n[states]\nx='0'\ny='0'\n[outputs]\nz='exp(x)'",
     )

@@ -1,5 +1,5 @@
-//! Command lines drawn from the grammar of the program: each is done, refused as bad input or fails a check;
-//! none meets a defect.
+//! Random command lines from the grammar of the program: each succeeds, is refused as bad input or fails a
+//! check. None reveals a defect.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,17 +11,21 @@ use obsdeg_exact::SplitMix64;
 
 use crate::program::{obsdeg, run, stdout};
 
-/// Command lines of each command.
+/// Number of random command lines per command.
 const DRAWN: usize = 16;
 
-const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n[requirements]\nD_F = 0.1\n\
-    [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\nangles_deg = [180, 0, 90]\n";
-const TURNING: &str = "name = 't'\nlatitude_deg = 45\n[[position]]\nangles_deg = [10, 20, 30]\nrotation = { about = 'X_p', angle_deg = 90 }\n\
+const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n\
+                      [requirements]\nD_F = 0.1\n\
+    [[position]]\nname = 'p1'\nangles_deg = [0, 0, 0]\ndwell_s = 300\n[[position]]\nname = 'p2'\n\
+    angles_deg = [180, 0, 90]\n";
+const TURNING: &str = "name = 't'\nlatitude_deg = 45\n[[position]]\nangles_deg = [10, 20, 30]\n\
+                       rotation = { about = 'X_p', angle_deg = 90 }\n\
     [[position]]\nangles_deg = [0, 40, 0]\n";
-const MODEL: &str = "name = 'm'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n[simulation]\nduration = 10\nstep = 0.5\n\
+const MODEL: &str = "name = 'm'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n[simulation]\n\
+                     duration = 10\nstep = 0.5\n\
     values = { x = 1, k = 0.5 }\npriors = { x = 0.1, k = 0.1 }\nnoise = { y = 0.01 }\n";
 
-/// What may stand behind an option: fair values, extremes, what is none.
+/// Values of an option: plausible ones first, then extreme and invalid ones; `None` for a flag.
 fn values(option: &str) -> Option<&'static [&'static str]> {
     let number: &[&str] =
         &["1", "0.5", "30", "0", "-5", "1e-300", "1e200", "nan", "inf", "1e-6", "1e6", "x", "0,5"];
@@ -190,7 +194,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
 const OF_MODELS: [&str; 9] =
     ["cost", "own-outputs", "order", "work-limit", "keep", "observable", "max-degree", "seed", "format"];
 
-/// What stands without an option.
+/// Arguments without an option name.
 fn operands(command: &str) -> &'static [&'static str] {
     match command {
         "analyze" | "simulate" | "crosscheck" => &["s.toml", "m.toml", "none.toml"],
@@ -211,11 +215,11 @@ fn done(folder: &Path, arguments: &[String]) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"))
 }
 
-/// The long options of a command, as its help lists them, and whether they take a value.
+/// Long options of a command as its help lists them; true if the option takes a value.
 fn options(command: &str) -> BTreeMap<String, bool> {
     let help = stdout(&run(&[command, "--help"]));
     let line = |l: &str| {
-        // texts that go on are further in, or not at all
+        // continued texts are indented further, or not at all
         let indent = l.len() - l.trim_start().len();
         let l = l.trim_start();
         if !(1..8).contains(&indent) {
@@ -251,12 +255,12 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         let threads: Vec<_> = commands.into_iter().enumerate().map(draw).collect();
         threads.into_iter().map(|t| t.join().expect("no defect")).collect::<Vec<_>>()
     });
-    // of every command some lines are done, and some are refused
+    // of every command some lines succeed and some are refused
     assert!(codes.iter().all(|of| of.get(&0).is_some_and(|n| *n > 1)), "{codes:?}");
     assert!(codes.iter().any(|of| of.contains_key(&2)), "{codes:?}");
 }
 
-/// A folder with the files of the command lines.
+/// Creates a folder with the files of the command lines.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let record = record();
@@ -269,7 +273,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// A record of a gyro and an accelerometer at rest: noise of uniform numbers.
+/// Record of a gyro and an accelerometer at rest, with uniformly distributed noise.
 fn noise() -> String {
     let mut rng = SplitMix64::new(3);
     let mut next = || (rng.below(1 << 20) as f64) / f64::from(1 << 20) - 0.5;
@@ -278,7 +282,7 @@ fn noise() -> String {
     format!("t [s],wx [deg/h],fx [g]\n{lines}")
 }
 
-/// A certificate of two positions.
+/// Certificate of a scheme with two positions.
 fn certificate() -> &'static str {
     static TEXT: OnceLock<String> = OnceLock::new();
     TEXT.get_or_init(|| {
@@ -291,10 +295,10 @@ fn certificate() -> &'static str {
     })
 }
 
-/// A record of s.toml, of no errors but noise.
+/// Record of s.toml with noise as the only error.
 fn record() -> String {
     let mut rng = SplitMix64::new(5);
-    // nearly normal: the sum of twelve
+    // approximately normal: sum of twelve uniform numbers
     let mut noise =
         || (0..12).map(|_| (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64).sum::<f64>() - 6.0;
     let mut line = |t: usize| {
@@ -305,7 +309,7 @@ fn record() -> String {
     format!("t [s],position,Z1 [g],Z3 [g]\n{lines}")
 }
 
-/// Beside a model an option is about models too, or is refused: none is passed over.
+/// With a model, an option either concerns models or is refused; no option is ignored.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
     const TAKEN: [&str; 16] = [
@@ -348,14 +352,14 @@ fn a_model_refuses_what_is_about_schemes() {
     }
 }
 
-/// The exit codes of command lines of one command.
+/// Number of command lines of one command by exit code.
 fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     let mut rng = SplitMix64::new(0x6772_616d ^ stream << 40);
     let options = options(command);
     let fair = ["man", "schema", "completions", "licences", "verify"].contains(&command);
     assert!(fair || options.len() > 3, "{command}: {options:?}");
     let mut codes = BTreeMap::new();
-    // of a design most lines are refused
+    // most lines of `design` are refused
     let drawn = if command == "design" { 2 * DRAWN } else { DRAWN };
     for _ in 0..if fair { 4 } else { drawn } {
         let folder = folder();
@@ -369,16 +373,16 @@ fn draws(stream: u64, command: &str) -> BTreeMap<i32, usize> {
     codes
 }
 
-/// One of a list, mostly of its first third, which are fair.
+/// Random element of a list, mostly from its first third, which holds plausible values.
 fn pick(rng: &mut SplitMix64, from: &[&str]) -> String {
     let n = if rng.below(15) == 0 { from.len() } else { from.len().div_ceil(3) };
     from[rng.below(n as u64) as usize].to_string()
 }
 
-/// A command line: what the command cannot do without, then some of its options.
+/// Random command line: the required options of the command, then some others.
 fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -> Vec<String> {
     let mut out = vec![command.to_string()];
-    // of designs some are about the outputs of a model
+    // one `design` in four selects outputs of a model
     let of_model = command == "design" && rng.below(4) == 0;
     let of_next = command == "design" && rng.below(6) == 0;
     let always: &[&str] = match command {
@@ -394,7 +398,7 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
         ["help", "part", "merge"].contains(name) || always.contains(name) || schemes
     };
     let some = options.keys().map(String::as_str).filter(|name| !left_out(name));
-    // of many options as many at once as of few
+    // the expected number of options does not grow with their list
     let one_of = (options.len() as u64 / 3).max(10);
     let some: Vec<&str> = some.filter(|_| rng.below(one_of) == 0).collect();
     for name in always.iter().copied().chain(some) {

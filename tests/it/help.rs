@@ -1,10 +1,10 @@
-//! Help and messages: `-h` in lines, `--help` at length, where models of other tools are read, colours.
+//! Help and messages: `-h` in lines, `--help` in full, models of other tools, colours.
 
 use obsdeg_core::system::WorkLimit;
 
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
-/// The commands, with the most lines that `-h` may have.
+/// The commands, each with the largest number of lines of its `-h`.
 const COMMANDS: [(&str, usize); 14] = [
     ("analyze", 51),
     ("simulate", 65),
@@ -22,8 +22,8 @@ const COMMANDS: [(&str, usize); 14] = [
     ("schema", 10),
 ];
 
-/// Every option has one line of `-h`, without its range, inputs before all others; `--help` names as many
-/// options, and has ranges and words.
+/// `-h` has one line per option, without ranges, with inputs first. `--help` lists the same number of
+/// options, with ranges and words.
 #[test]
 fn help_is_in_lines() {
     let text = |arguments: &[&str]| {
@@ -61,7 +61,7 @@ fn help_is_in_lines() {
     let place = |of: &str| lines.iter().position(|l| l.trim_start().starts_with(of)).expect("a line");
     assert!(place("[SCHEME]") < place("--positions") && place("--positions") < place("--carry"));
     assert!(place("--candidates") < place("--carry"));
-    // what they do without one
+    // latitude of these commands if none is given
     for command in ["simulate", "crosscheck"] {
         for help in ["-h", "--help"] {
             let text = text(&[command, help]);
@@ -77,14 +77,14 @@ fn help_is_in_lines() {
             "{text}"
         );
     }
-    // verdicts of a report are generic without one
+    // verdicts of a report are generic without a latitude
     assert!(text(&["report", "-h"]).contains("28.2 for numbers"));
-    // a held engine is named on stderr, quiet or not (tests/symbolic.rs)
+    // a busy engine is reported on stderr even with --quiet (tests/symbolic.rs)
     assert!(text(&["analyze", "-h"]).contains("nothing on stderr but errors and what is missing"));
 }
 
-/// A model of another tool: the Python package reads it, and the line to type is there; a file of that name
-/// with a model of obsdeg is read.
+/// A model of another tool is refused with the command line of the Python package that reads it. A file with
+/// such a name and a model of obsdeg is read.
 #[test]
 fn models_of_other_tools_are_named() {
     let (folder, _) = scratch();
@@ -114,7 +114,7 @@ fn models_of_other_tools_are_named() {
     assert!(!message.contains("seems to be"), "{message}");
 }
 
-/// What the program says itself has the colours of what clap says, where there are any.
+/// Messages of the program have the colours of clap's messages on a terminal with colours.
 #[test]
 fn messages_have_colours_on_a_terminal() {
     let said = |arguments: &[&str], variable: &str| {

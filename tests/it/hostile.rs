@@ -1,5 +1,5 @@
-//! Texts from hostile files, paths and arguments: whatever they hold, in every format and on the terminal
-//! they are text.
+//! Texts from hostile files, paths and arguments are printed as plain text in every format and on the
+//! terminal.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,12 @@ use serde_json::Value;
 
 use crate::program::obsdeg;
 
-/// Colour, bell, backspace, end of text, window title, C1, the other direction of writing; what markup and
-/// spreadsheets act on.
-const NASTY: &str = "\u{1b}[31m\u{7}\u{8}\u{0}\u{1b}]0;t\u{7}\u{9b}2J\u{85}\u{202e}\u{2066}\u{200f}\u{2028}\u{7f}\u{ffff}`<b>|$^{}\\\"'&%#_*[x](y)";
+/// Colour, bell, backspace, end of text, window title, C1 controls, reversed writing direction, and
+/// characters with a meaning in markup and spreadsheets.
+const NASTY: &str = "\u{1b}[31m\u{7}\u{8}\u{0}\u{1b}]0;\
+                     t\u{7}\u{9b}2J\u{85}\u{202e}\u{2066}\u{200f}\u{2028}\u{7f}\u{ffff}`<b>|$^{}\\\"'&%#_*[x](y)";
 
-/// The same in a string of TOML or JSON.
+/// The hostile text in a string of TOML or JSON.
 fn escaped() -> String {
     let hidden = |c: char| c.is_control() || c > '\u{7f}' || "\"\\".contains(c);
     NASTY
@@ -23,11 +24,11 @@ fn escaped() -> String {
         .collect()
 }
 
-/// What no terminal and no page may get.
+/// Asserts that a text has no character that terminals or pages must not receive.
 fn assert_text(text: &str, about: &str) {
     for (i, line) in text.lines().enumerate() {
         let raw = |c: char| c.is_control() || "\u{202e}\u{2066}\u{200f}\u{2028}\u{ffff}".contains(c);
-        // tabs stand in scripts of ours
+        // tabs occur in our own scripts
         let found = line.chars().find(|&c| c != '\t' && raw(c));
         assert_eq!(found, None, "{about}, line {}: {line:?}", i + 1);
     }
@@ -42,12 +43,16 @@ impl Files {
         let folder = tempfile::tempdir().expect("a folder");
         let text = escaped();
         let scheme = format!(
-            "name = \"={text}\"\ndescription = \"{text}\"\n[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n[[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n"
+            "name = \"={text}\"\ndescription = \"{text}\"\n[[position]]\nangles_deg = [0, 0, 0]\ndwell_s = 100\n\
+             [[position]]\nangles_deg = [180, 0, 0]\ndwell_s = 100\n"
         );
         let model = format!(
-            "name = \"={text}\"\ndescription = \"{text}\"\n[states]\nx = {{ equation = \"-k*x\", unit = \"=cmd|' /C calc'!A0\", description = \"{text}\" }}\n\
-             [parameters]\nk = {{ unit = \"{text}\" }}\n[outputs]\ny = {{ expression = \"x\", unit = \"@SUM(1)\", description = \"-{text}\" }}\n\
-             [simulation]\nduration = 10\nstep = 0.1\nvalues = {{ x = 1, k = 0.5 }}\npriors = {{ x = 0.1, k = 0.1 }}\nnoise = {{ y = 0.01 }}\n"
+            "name = \"={text}\"\ndescription = \"{text}\"\n[states]\nx = {{ equation = \"-k*x\", unit = \"=cmd|' /C \
+             calc'!A0\", description = \"{text}\" }}\n\
+             [parameters]\nk = {{ unit = \"{text}\" }}\n[outputs]\ny = {{ expression = \"x\", unit = \"@SUM(1)\", \
+             description = \"-{text}\" }}\n\
+             [simulation]\nduration = 10\nstep = 0.1\nvalues = {{ x = 1, k = 0.5 }}\npriors = {{ x = 0.1, k = 0.1 }}\n\
+             noise = {{ y = 0.01 }}\n"
         );
         let files = Self { folder };
         fs::write(files.path("scheme.toml"), scheme).expect("written");
@@ -59,7 +64,7 @@ impl Files {
         self.folder.path().join(name)
     }
 
-    /// A command in the folder, its output checked.
+    /// Runs a command in the folder and checks its output.
     fn run(&self, arguments: &[&str]) -> Output {
         let output = obsdeg(arguments).current_dir(self.folder.path()).output().expect("it runs");
         let about = format!("{arguments:?}");
@@ -72,13 +77,13 @@ impl Files {
 
     fn done(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
-        // a short run of two positions may miss what it checks
+        // a short run of two positions may fail its checks
         assert!(output.status.code().is_some_and(|code| code < 2), "{arguments:?}: {output:?}");
         String::from_utf8(output.stdout).expect("UTF-8")
     }
 }
 
-/// Every text file below a folder is text, every picture is one.
+/// Asserts that every text file below a folder is plain text; returns the number of files.
 fn assert_files(folder: &Path) -> usize {
     let mut n = 0;
     for entry in fs::read_dir(folder).expect("a folder") {
@@ -112,7 +117,7 @@ fn results_in_every_format() {
             match format {
                 "json" => {
                     let json: Value = serde_json::from_str(&text).expect("JSON");
-                    // verbatim, once it is read
+                    // JSON contains the text verbatim
                     if command.contains(&"analyze") && command.contains(&"--model") {
                         assert_eq!(json["name"], format!("={NASTY}"));
                         assert_eq!(json["quantities"][1]["unit"], NASTY);
@@ -184,7 +189,7 @@ fn messages() {
         }
     }
     let argument = NASTY.replace('\0', "");
-    // no slash: a name of a file
+    // without a slash: a file name
     let path = format!("{}.toml", argument.replace('/', ""));
     for arguments in [
         &["analyze", "--angles", &argument][..],
@@ -205,7 +210,7 @@ fn messages() {
     let renamed = fs::read_to_string(files.path(&path)).expect("readable").replacen("name", "nmae", 1);
     fs::write(files.path(&path), &renamed).expect("written");
     assert_eq!(files.run(&["analyze", "--scheme", &path]).status.code(), Some(2));
-    // a scheme without a name is called after its file
+    // a scheme without a name is named after its file
     let unnamed = renamed.split_once("description").expect("there").1;
     fs::write(files.path(&path), format!("description{unnamed}")).expect("written");
     for format in Format::ALL.map(|(_, name)| name) {

@@ -23,14 +23,15 @@ fn number(n: Option<&NumberOfSolutions>) -> Option<usize> {
     }
 }
 
-/// The number of solutions by name, of those that are decided.
+/// Number of solutions of each decided unknown, by name.
 fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
     let of = |q| number(Option::as_ref(q));
     a.quantities.iter().filter_map(|q| Some((q.name.as_str(), of(&q.number_of_solutions)?))).collect()
 }
 
-/// Systems with numbers that Groebner bases of another program gave (`tests/data/identifiability/oracle.py`):
-/// how many unknowns are decided, and how many are not. What is decided must agree.
+/// Compares numbers of solutions with Groebner bases of another program
+/// (`tests/data/identifiability/oracle.py`). Returns the numbers of decided and undecided unknowns. All
+/// decided numbers must agree.
 fn held_against_groebner_bases(chosen: impl Fn(usize) -> bool) -> (usize, usize) {
     let text = include_str!("../data/identifiability/counts.json");
     let systems: Value = serde_json::from_str(text).expect("JSON");
@@ -72,16 +73,17 @@ fn numbers_are_those_of_groebner_bases_of_all_systems() {
     assert!(decided > 380 && open * 20 <= decided, "{decided}, {open}");
 }
 
-/// A system, the numbers of solutions of its unknowns, and the maps between these.
+/// System, numbers of solutions of its unknowns, and maps between the solutions.
 type Case<'a> = (&'a str, &'a [(&'a str, usize)], &'a [&'a str]);
 
-/// Several solutions where starts are known, constraints hold, or states jump; numbers and maps by hand.
+/// Several solutions with known starts, constraints or jumps; numbers and maps by hand.
 #[test]
 fn several_solutions_where_points_are_special() {
     let cases: [Case<'_>; 11] = [
-        // q and -q are one attitude
+        // q and -q are the same attitude
         (
-            "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\ny='R(q)'",
+            "constraints=['norm(q) = 1']\n[known_inputs]\n'w[3]'='generic'\n[states]\n'q[4]'='qdot(q, w)'\n[outputs]\n\
+             y='R(q)'",
             &[("q[1]", 2), ("q[2]", 2), ("q[3]", 2), ("q[4]", 2)],
             &["negate q[1], q[2], q[3], q[4]"],
         ),
@@ -91,13 +93,15 @@ fn several_solutions_where_points_are_special() {
             &["negate v[3]"],
         ),
         (
-            "constraints=['m1^2 + m2^2 + m3^2 = 4']\n[known_inputs]\nw='generic'\n[states]\nm1='w*m2'\nm2='-w*m1'\nm3=0\n[outputs]\ny1='m1'\ny2='m2'",
+            "constraints=['m1^2 + m2^2 + m3^2 = 4']\n[known_inputs]\nw='generic'\n[states]\nm1='w*m2'\nm2='-w*m1'\n\
+             m3=0\n[outputs]\ny1='m1'\ny2='m2'",
             &[("m1", 1), ("m2", 1), ("m3", 2)],
             &["negate m3"],
         ),
         // a heading as cosine and sine, and the speed along it
         (
-            "parameters=['v']\nconstraints=['c^2 + s^2 = 1']\n[known_inputs]\nw='generic'\n[states]\nx='v*c'\nc='-w*s'\ns='w*c'\n[outputs]\ny='x'",
+            "parameters=['v']\nconstraints=['c^2 + s^2 = 1']\n[known_inputs]\nw='generic'\n[states]\nx='v*c'\n\
+             c='-w*s'\ns='w*c'\n[outputs]\ny='x'",
             &[("c", 2), ("s", 2), ("v", 2), ("x", 1)],
             &["negate c, s, v"],
         ),
@@ -107,35 +111,41 @@ fn several_solutions_where_points_are_special() {
             &["negate a"],
         ),
         (
-            "parameters=['a']\n[states]\nx={equation='a^2*x', initial=1}\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + 1'}",
+            "parameters=['a']\n[states]\nx={equation='a^2*x', initial=1}\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\n\
+             carry={x='x + 1'}",
             &[("a", 2)],
             &["negate a"],
         ),
         (
-            "parameters=['b']\n[constants]\nc=1\n[states]\nx={equation='c*b*z', initial=0}\nz={equation='b*x', initial=1}\n[outputs]\ny='z'\n[[segment]]\n[[segment]]\nconstants={c=-1}",
+            "parameters=['b']\n[constants]\nc=1\n[states]\nx={equation='c*b*z', initial=0}\n\
+             z={equation='b*x', initial=1}\n[outputs]\ny='z'\n[[segment]]\n[[segment]]\nconstants={c=-1}",
             &[("b", 2)],
             &["negate x, b"],
         ),
-        // absorption and elimination change places, and the volume with them: y = D ka/(V (ka - ke)) (e^(-ke
-        // t) - e^(-ka t))
+        // absorption and elimination are exchangeable, with another volume: y = D ka/(V (ka - ke)) (e^(-ke t)
+        // - e^(-ka t))
         (
-            "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\nx2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
+            "parameters=['ka', 'ke', 'V']\n[states]\nx1={equation='-ka*x1', initial=10}\n\
+             x2={equation='ka*x1 - ke*x2', initial=0}\n[outputs]\ny='x2/V'",
             &[("V", 2), ("ka", 2), ("ke", 2)],
             &["replace ka by ke, ke by ka, V by V*ke/ka"],
         ),
         (
-            "parameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\n[outputs]\ny='x1 + x2'",
+            "parameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\n\
+             [outputs]\ny='x1 + x2'",
             &[("k1", 2), ("k2", 2)],
             &["swap x1 and x2, k1 and k2"],
         ),
-        // the rates of three decays in any order: each is one of three
+        // the rates of three decays are exchangeable: each has three values
         (
-            "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
+            "parameters=['k1', 'k2', 'k3']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
+             x2={equation='-k2*x2', initial=1}\nx3={equation='-k3*x3', initial=1}\n[outputs]\ny='x1 + x2 + x3'",
             &[("k1", 3), ("k2", 3), ("k3", 3)],
             &["swap x1 and x2, k1 and k2", "swap x1 and x3, k1 and k3", "swap x2 and x3, k2 and k3"],
         ),
         (
-            "parameters=['r1', 'r2']\n[states]\nx1={equation='r1*x1*(1 - x1 - x2)', initial='0.25'}\nx2={equation='r2*x2*(1 - x1 - x2)', initial='0.25'}\n[outputs]\ny='x1 + x2'",
+            "parameters=['r1', 'r2']\n[states]\nx1={equation='r1*x1*(1 - x1 - x2)', initial='0.25'}\n\
+             x2={equation='r2*x2*(1 - x1 - x2)', initial='0.25'}\n[outputs]\ny='x1 + x2'",
             &[("r1", 2), ("r2", 2)],
             &["swap x1 and x2, r1 and r2"],
         ),
@@ -145,18 +155,21 @@ fn several_solutions_where_points_are_special() {
         assert_eq!(numbers(&a), expected.iter().copied().collect(), "{text}");
         assert_eq!(a.solution_maps, maps, "{text}");
     }
-    // by different starts the decays are told from each other
-    let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\nx2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
+    // different starts distinguish the decays
+    let one = "name='m'\nparameters=['k1', 'k2']\n[states]\nx1={equation='-k1*x1', initial=1}\n\
+               x2={equation='-k2*x2', initial=2}\n[outputs]\ny='x1 + x2'";
     assert_eq!(numbers(&analyzed(one)), BTreeMap::from([("k1", 1), ("k2", 1)]));
 }
 
-/// A known start is a number that no map changes: the sign of its state stays, and no number of solutions
-/// rests on a change of it. By hand: the fifth derivative of the first shows p x(0), lower ones p^2 alone.
+/// Maps do not change a known start: the sign of its state stays, and no number of solutions rests on
+/// changing it. By hand: the fifth derivative of the first model contains p x(0), lower ones only p^2.
 #[test]
 fn known_starts_are_not_mapped() {
     let cases: [(&str, &[&str]); 5] = [
         (
-            "parameters=['p']\n[states]\nw={equation='p^2 + w^2', initial=0}\nx={equation='x^3', initial='known'}\nz1={equation='z2', initial=0}\nz2={equation='z3', initial=0}\nz3={equation='z4', initial=0}\nz4={equation='z5', initial=0}\nz5={equation='p*x', initial=0}\n[outputs]\ny='w + z1'",
+            "parameters=['p']\n[states]\nw={equation='p^2 + w^2', initial=0}\nx={equation='x^3', initial='known'}\n\
+             z1={equation='z2', initial=0}\nz2={equation='z3', initial=0}\nz3={equation='z4', initial=0}\n\
+             z4={equation='z5', initial=0}\nz5={equation='p*x', initial=0}\n[outputs]\ny='w + z1'",
             &[],
         ),
         (
@@ -164,7 +177,8 @@ fn known_starts_are_not_mapped() {
             &["negate b"],
         ),
         (
-            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='b^3*x', initial=0}\n[outputs]\ny='z'",
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='b^3*x', initial=0}\n\
+             [outputs]\ny='z'",
             &[],
         ),
         (
@@ -172,7 +186,8 @@ fn known_starts_are_not_mapped() {
             &["negate k"],
         ),
         (
-            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\nz={equation='-b*z', initial='known'}\n[outputs]\ny='x + z'",
+            "parameters=['a', 'b']\n[states]\nx={equation='-a*x', initial='known'}\n\
+             z={equation='-b*z', initial='known'}\n[outputs]\ny='x + z'",
             &[],
         ),
     ];
@@ -183,11 +198,12 @@ fn known_starts_are_not_mapped() {
     }
 }
 
-/// The words of each unknown follow from verdict and number.
+/// The identifiability of each unknown follows from its verdict and its number of solutions.
 #[test]
 fn words_of_identifiability() {
     let a = analyzed(
-        "name='m'\nparameters=['a', 'b', 'c', 'd']\n[states]\nx='a^2 + b*c'\n[outputs]\ny='x + 0*d'\nz='b^3*c^3'\nw='a^2'",
+        "name='m'\nparameters=['a', 'b', 'c', 'd']\n[states]\nx='a^2 + b*c'\n[outputs]\ny='x + 0*d'\nz='b^3*c^3'\n\
+         w='a^2'",
     );
     let of = |name: &str| {
         let q = a.quantities.iter().find(|q| q.name == name).expect("an unknown");
@@ -198,19 +214,19 @@ fn words_of_identifiability() {
     assert_eq!(of("b"), (Identifiability::NotIdentifiable, "not identifiable".into()));
     assert_eq!(of("d"), (Identifiability::NotIdentifiable, "not identifiable".into()));
     let function = |text: &str| a.invariants.iter().find(|c| c.expression == text).expect("a function");
-    // x' - a^2 is b c itself: one value
+    // x' - a^2 equals b c: one value
     assert_eq!(number(function("b*c").number_of_solutions.as_ref()), Some(1));
 }
 
-/// By hand: functions beyond those of scalings, with the number of their values.
+/// Functions beyond scalings, with their numbers of values, by hand.
 #[test]
 fn functions_by_hand() {
-    // only a/b and its square are seen through y' and z: f = a*b has two values, with its square once seen
+    // only the square of f = a*b is observed: f has two values
     let a = analyzed("name='m'\nparameters=['a', 'b']\n[states]\nx='-x'\n[outputs]\ny='x'\nz='(a*b)^2 + 1'");
     let [f] = &a.invariants[..] else { panic!("{:?}", a.invariants) };
     assert_eq!((f.expression.as_str(), f.degree), ("a*b", Some(0)));
     assert_eq!(number(f.number_of_solutions.as_ref()), Some(2));
-    // S, E, U, I of an epidemic with unknown transmission, whose confirmation is asking for them
+    // combinations of S, E, U, I in an epidemic with unknown transmission
     let (_, _, text) = models().into_iter().find(|m| m.0 == "seuir").expect("the model");
     let model = json::read(&text).expect("a model");
     let found = analyze_system(&model, SystemOptions::default()).expect("judged");
@@ -223,8 +239,9 @@ fn functions_by_hand() {
     assert_eq!(listed, [six("N*w/beta"), six("S*w"), six("E*w"), six("w*(U + I)")]);
 }
 
-/// Of all reference models: as many functions as the rank is more than the number of observable unknowns, or
-/// the answer says how many are missing; and each is observable with the same degree where it is asked for.
+/// All reference models: the rank equals the number of observable unknowns and functions, or the answer
+/// states the number of missing functions. Each function is observable with the same degree when requested as
+/// a combination.
 #[test]
 fn functions_are_complete_or_said_to_be_missing() {
     let (mut incomplete, mut missing, mut asked) = (Vec::new(), 0, 0);
@@ -239,7 +256,7 @@ fn functions_are_complete_or_said_to_be_missing() {
             let observable = a.quantities.iter().filter(|q| q.degree.is_some()).count();
             assert_eq!(observable + a.invariants.len(), a.rank, "{name}");
         }
-        // asking for those that are short and whose names may stand in a formula
+        // models with few functions, whose names are valid in a formula
         if a.invariants.is_empty() || a.invariants.len() > 8 {
             continue;
         }
@@ -256,8 +273,8 @@ fn functions_are_complete_or_said_to_be_missing() {
     assert!(asked > 100, "{asked}");
 }
 
-/// Reduced models of all reference models that have one: judged again they are fully observable, with the
-/// rank.
+/// Reduced versions of all reference models that are not fully observable: judged again they are fully
+/// observable, with the same rank.
 #[test]
 fn reduced_models_are_fully_observable() {
     let (mut made, mut refused) = (0, 0);

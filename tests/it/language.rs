@@ -1,4 +1,4 @@
-//! What modellers write: vectors, matrices, quaternions, definitions in any order.
+//! Notation of models: vectors, matrices, quaternions, definitions in any order.
 
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use obsdeg_core::language::{Components, Shape, Shapes, evaluate_f64, parse_components};
@@ -11,7 +11,7 @@ fn shapes() -> Shapes {
     all.into_iter().map(|(name, rows, columns)| (name.to_string(), Shape { rows, columns })).collect()
 }
 
-/// The values of all entries, where `v[i]` and `M[i,j]` are drawn from `numbers`.
+/// Values of all entries of a text; `v[i]` and `M[i,j]` take values from `numbers`.
 fn values(text: &str, numbers: &[f64]) -> DMatrix<f64> {
     let Components { shape, entries } = parse_components(text, &shapes()).expect(text);
     let at = |name: &str| number(name, numbers);
@@ -34,7 +34,7 @@ fn given(name: &str, numbers: &[f64]) -> DMatrix<f64> {
 }
 
 proptest! {
-    /// Every operation against nalgebra.
+    /// Every operation agrees with nalgebra.
     #[test]
     fn operations_are_those_of_linear_algebra(numbers in prop::collection::vec(-3.0f64..3.0, 97)) {
         let m = |name: &str| given(name, &numbers);
@@ -76,7 +76,10 @@ proptest! {
         ] {
             let found = values(text, &numbers);
             prop_assert_eq!(found.shape(), expected.shape(), "{}", text);
-            prop_assert!((&found - &expected).amax() < 1e-12 * (1.0 + expected.amax()), "{} {} {}", text, found, expected);
+            prop_assert!(
+                (&found - &expected).amax() < 1e-12 * (1.0 + expected.amax()),
+                "{} {} {}", text, found, expected
+            );
         }
     }
 }
@@ -89,8 +92,7 @@ fn judged(text: &str) -> Judgement {
     judge(&read(text), 3, None).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// A rigid body with a biased gyro that sees two landmarks, in vectors and by hand in scalars: the same
-/// system.
+/// A rigid body with a biased gyro that observes two landmarks, written in vectors and by hand in scalars.
 #[test]
 fn vectors_are_their_components() {
     let vectors = r#"
@@ -125,7 +127,8 @@ z = "h"
     };
     let (f, g) = (["f1", "f2", "f3"], ["0", "0", "(-9.81)"]);
     let scalars = format!(
-        "name='s'\nparameters=['b1','b2','b3']\nknown_inputs={{{}}}\ncombinations=['q1^2+q2^2+q3^2+q4^2','2*b1','2*b2','2*b3']\n\
+        "name='s'\nparameters=['b1','b2','b3']\nknown_inputs={{{}}}\n\
+         combinations=['q1^2+q2^2+q3^2+q4^2','2*b1','2*b2','2*b3']\n\
          [constants]\n{}\n[states]\n\
          q1='(-q2*(w1-b1) - q3*(w2-b2) - q4*(w3-b3))/2'\nq2='(q1*(w1-b1) + q3*(w3-b3) - q4*(w2-b2))/2'\n\
          q3='(q1*(w2-b2) + q4*(w1-b1) - q2*(w3-b3))/2'\nq4='(q1*(w3-b3) + q2*(w2-b2) - q3*(w1-b1))/2'\n\
@@ -151,7 +154,7 @@ z = "h"
     assert_eq!(combinations, ["dot(q, q)", "(2*b)[1]", "(2*b)[2]", "(2*b)[3]"]);
 }
 
-/// What reads as one thing, read twice.
+/// Different spellings of the same model.
 #[test]
 fn other_words_for_the_same_model() {
     let model = |text: &str| {
@@ -162,8 +165,10 @@ fn other_words_for_the_same_model() {
     let first =
         model("parameters=['k']\n[states]\n'x[2]'='v'\n'v[2]'='-k*x'\n'c[2]'=0\n[outputs]\ny='x + c'");
     for other in [
-        "[parameters]\nk={}\n[states]\n'x[2]'={equation='v'}\n'v[2]'=['-k*x[1]', '-k*x[2]']\n'c[2]'=[0, 0]\n[outputs]\n'y[2]'='x + c'",
-        "[parameters]\nk={}\n[definitions]\nz='x + w'\nw='c'\n[states]\n'x[2]'='v'\n'v[2]'='-K*x'\n'c[2]'='[0, 0]'\n[outputs]\ny={expression='z'}\n[constants]\nE=[[1, 0], [0, 1]]\n[definitions.K]\n",
+        "[parameters]\nk={}\n[states]\n'x[2]'={equation='v'}\n'v[2]'=['-k*x[1]', '-k*x[2]']\n'c[2]'=[0, 0]\n\
+         [outputs]\n'y[2]'='x + c'",
+        "[parameters]\nk={}\n[definitions]\nz='x + w'\nw='c'\n[states]\n'x[2]'='v'\n'v[2]'='-K*x'\n'c[2]'='[0, 0]'\n\
+         [outputs]\ny={expression='z'}\n[constants]\nE=[[1, 0], [0, 1]]\n[definitions.K]\n",
     ] {
         let other = match other.strip_suffix("[definitions.K]\n") {
             Some(rest) => rest.replace("w='c'", "w='c'\nK='k*E'"),
@@ -175,19 +180,22 @@ fn other_words_for_the_same_model() {
     // starts, jumps and constants of a segment
     let known = model("[states]\n'x[2]'={equation='s*x', initial='known'}\ns=0\n[outputs]\ny='x[2]'");
     assert_eq!(known.0, ["s"]);
-    let jump = "[constants]\ng=[0, 0, 1]\n[states]\n'x[3]'='cross(g, x)'\n[outputs]\ny='x[1]'\n[[segment]]\n[[segment]]\nconstants={g=[1, 0, 0]}\ncarry={x='2*x'}";
-    let by_hand = "[constants]\na=0\nb=1\n[states]\nx1='-b*x2'\nx2='b*x1 - a*x3'\nx3='a*x2'\n[outputs]\ny='x1'\n[[segment]]\n[[segment]]\nconstants={a=1, b=0}\ncarry={x1='2*x1', x2='2*x2', x3='2*x3'}";
+    let jump = "[constants]\ng=[0, 0, 1]\n[states]\n'x[3]'='cross(g, x)'\n[outputs]\ny='x[1]'\n[[segment]]\n\
+                [[segment]]\nconstants={g=[1, 0, 0]}\ncarry={x='2*x'}";
+    let by_hand = "[constants]\na=0\nb=1\n[states]\nx1='-b*x2'\nx2='b*x1 - a*x3'\nx3='a*x2'\n[outputs]\ny='x1'\n\
+                   [[segment]]\n[[segment]]\nconstants={a=1, b=0}\ncarry={x1='2*x1', x2='2*x2', x3='2*x3'}";
     assert_eq!(model(jump).1, model(by_hand).1);
 }
 
-/// Names that functions of vectors have too stay names.
+/// Names of vector functions may be used for other quantities.
 #[test]
 fn names_of_functions_of_vectors_are_free() {
     let j = judged(
-        "name='r'\nparameters=['dot']\n[states]\nR='-dot*R'\n'q[4]'=0\n[definitions]\nskew='R*R'\n[outputs]\ny='skew + R'\nz='R(q)*[1, 0, 0]'",
+        "name='r'\nparameters=['dot']\n[states]\nR='-dot*R'\n'q[4]'=0\n[definitions]\nskew='R*R'\n[outputs]\n\
+         y='skew + R'\nz='R(q)*[1, 0, 0]'",
     );
     assert_eq!(j.findings.degrees.degree[0], Some(0));
-    // `R = "R(q)"` is no circle
+    // `R = "R(q)"` is not circular
     let j = judged("name='r'\n[states]\n'q[4]'=0\n[definitions]\nR='R(q)'\n[outputs]\ny='R*[1, 0, 0]'");
     assert_eq!(j.findings.degrees.rank(), 3);
 }
@@ -365,9 +373,9 @@ fn what_does_not_fit_is_named_with_its_place() {
         assert!(e.what == what && e.message.contains(message), "{text}: {e}");
         assert!(!place.is_empty() || e.what == "`sin[1]`", "{text}: {e}");
     }
-    // vectors are not the platform's
+    // the language of schemes has no vectors
     assert!(obsdeg_core::language::parse("[1, 2]").is_err());
-    // deep and large
+    // deep nesting and large texts
     let deep = format!("{}1", "[".repeat(1_000_000));
     assert!(parse_components(&deep, &shapes()).expect_err("deep").to_string().contains("nested"));
     let large = format!("{states}[outputs]\ny = '{}M'", "M*".repeat(20_000));
@@ -379,26 +387,28 @@ fn degrees(j: &Judgement) -> Vec<(String, Option<usize>)> {
     names.zip(j.findings.degrees.degree.iter().copied()).collect()
 }
 
-/// On a constraint the verdicts are those of the same system in fewer unknowns.
+/// Verdicts under a constraint equal those of the same system with fewer unknowns.
 #[test]
 fn constraints_against_coordinates_of_their_own() {
-    // a rotation by two numbers on a circle, and by the tangent of its half: rank 2 of 3 and 1 of 2
+    // a rotation by two numbers on a circle, and by the tangent of the half angle: rank 2 of 3 and 1 of 2
     let circle = judged(
-        "name='c'\nconstraints=['c^2 + s^2 = 1']\nparameters=['k']\n[states]\nc='-s*k'\ns='c*k'\nz='c'\n[outputs]\ny='z'",
+        "name='c'\nconstraints=['c^2 + s^2 = 1']\nparameters=['k']\n[states]\nc='-s*k'\ns='c*k'\nz='c'\n[outputs]\n\
+         y='z'",
     );
     let half = judged(
         "name='h'\nparameters=['k']\n[states]\nt='(1 + t^2)*k/2'\nz='(1-t^2)/(1+t^2)'\n[outputs]\ny='z'",
     );
     assert!(circle.layout.closed && half.layout.closed);
     let profile = |j: &Judgement| j.findings.degrees.rank_profile.clone();
-    // the circle is one row more, at every order
+    // the circle adds one row at every order
     assert_eq!(profile(&circle), profile(&half).iter().map(|r| r + 1).collect::<Vec<_>>());
     assert_eq!(
         degrees(&circle),
         [("c", 1), ("s", 1), ("z", 0), ("k", 2)].map(|(n, d)| (n.to_string(), Some(d)))
     );
     assert_eq!(degrees(&half), [("t", 1), ("z", 0), ("k", 2)].map(|(n, d)| (n.to_string(), Some(d))));
-    // without it s and k take c'' = -k^2 c, one more; and a constraint on what is asked decides it alone
+    // without it s and k need one order more, c'' = -k^2 c; a constraint on a queried unknown decides it
+    // alone
     let open = judged("name='c'\nparameters=['k']\n[states]\nc='-s*k'\ns='c*k'\nz='c'\n[outputs]\ny='z'");
     assert_eq!(
         degrees(&open),
@@ -410,13 +420,14 @@ fn constraints_against_coordinates_of_their_own() {
     assert_eq!(degrees(&line), [("x", 0), ("y", 0)].map(|(n, d)| (n.to_string(), Some(d))));
 }
 
-/// A gyro and gravity: with |q| = 1 only yaw is open, and the rank counts the constraint; a turn matrix
-/// instead of the quaternion and the small-angle count agree.
+/// A gyro and gravity: with |q| = 1 only yaw is not observable, and the rank counts the constraint. A
+/// rotation matrix in place of the quaternion and the count with small angles agree.
 #[test]
 fn attitudes_on_their_constraint() {
     let attitude = |constraints: &str, state: &str, turned: &str, b: &str| {
         judged(&format!(
-            "name='a'\nparameters=['b[3]']\nconstraints={constraints}\nknown_inputs={{'w[3]'='generic'}}\n[definitions]\nr='w - b'\n\
+            "name='a'\nparameters=['b[3]']\nconstraints={constraints}\nknown_inputs={{'w[3]'='generic'}}\n\
+             [definitions]\nr='w - b'\n\
              [states]\n{state}\n[outputs]\ny='{turned}*{b}'"
         ))
     };
@@ -428,7 +439,7 @@ fn attitudes_on_their_constraint() {
     {
         let quaternion = attitude(text, "'q[4]'='qdot(q, r)'", "transpose(R(q))", "[0, 0, 9.81]");
         let d = &quaternion.findings.degrees;
-        // one of yaw is open: of 3 + 3 directions 5 are seen
+        // yaw is not observable: rank 5 of 3 + 3 directions
         assert_eq!(
             (d.rank(), quaternion.layout.unknowns.len(), quaternion.layout.closed),
             (6, 7, true),
@@ -437,7 +448,7 @@ fn attitudes_on_their_constraint() {
         assert_eq!(d.rank_profile[..3], [3, 5, 6], "{name}");
         assert!((4..7).all(|c| d.degree[c].is_some()) && (0..4).all(|c| d.degree[c].is_none()));
     }
-    // without the constraint its length is seen by the size of gravity, a derivative of which there is none
+    // without the constraint |q| is observable through the size of gravity, by an output and by no derivative
     let free = attitude("[]", "'q[4]'='qdot(q, r)'", "transpose(R(q))", "[0, 0, 9.81]");
     assert_eq!((free.findings.degrees.rank(), free.findings.degrees.rank_profile[0]), (6, 3));
     let m = matrix("[0, 0, 9.81]");
@@ -445,14 +456,15 @@ fn attitudes_on_their_constraint() {
     assert_eq!(m.findings.degrees.rank_profile[..3], [6 + 2, 6 + 4, 6 + 5]);
 }
 
-/// A constraint that the motion leaves is a special start: the first order that adds nothing is not the end.
+/// The motion leaves a constraint that is not invariant: such a start is special, and the first order that
+/// adds nothing is not the end.
 #[test]
 fn a_constraint_that_is_left_is_a_special_start() {
     let trap = |start: &str| judged(&format!("name='t'\nparameters=['a']\n{start}\n[outputs]\ny='x'"));
     let given = trap("[states]\nx={equation='1 + a*x^2', initial=0}");
     let held = trap("constraints=['x = 0']\n[states]\nx='1 + a*x^2'");
     assert_eq!((held.layout.closed, given.layout.closed), (false, false));
-    // x itself is known by the constraint
+    // the constraint determines x
     assert_eq!(degrees(&held), [("x".to_string(), Some(0)), ("a".to_string(), degrees(&given)[0].1)]);
     assert_eq!(degrees(&given)[0].1, Some(3));
 }
@@ -474,7 +486,8 @@ fn constraints_that_cannot_hold_are_named() {
         ("['x = 1', 'x^2 = 2']", "no real point was found at which it holds"),
     ] {
         let text = format!(
-            "name='c'\nconstraints={constraints}\nknown_inputs={{u='generic'}}\n[constants]\nk='generic'\n[states]\nx='u*k'\nz={{equation=0, initial=1}}\n'p[2]'=0\n[outputs]\ny='x + z'"
+            "name='c'\nconstraints={constraints}\nknown_inputs={{u='generic'}}\n[constants]\nk='generic'\n[states]\n\
+             x='u*k'\nz={{equation=0, initial=1}}\n'p[2]'=0\n[outputs]\ny='x + z'"
         );
         let e = model_file::read(&text).and_then(|m| judge(&m, 1, None)).expect_err(constraints);
         assert!(e.message.contains(message) && e.what.starts_with("the constraint"), "{constraints}: {e}");
@@ -482,24 +495,29 @@ fn constraints_that_cannot_hold_are_named() {
     }
 }
 
-/// Experiments with constants and inputs of their own against one system in which each has states of its own.
+/// Experiments with different constants and inputs equal one system with separate states for each.
 #[test]
 fn experiments_of_their_own() {
     let several = judged(
-        "name='s'\nparameters=['k', 'b']\nknown_inputs={u='generic', 'z[2]'='generic'}\n[constants]\nm='2*d'\nd=1\n[definitions]\nforce='b*u*m'\n\
-         [states]\nx='-k*x + force + z[1]*z[2]'\n[outputs]\ny='d*x'\n[[experiment]]\nconstants={d=3}\nknown_inputs={u={function='t + d'}, z='constant'}\n\
-         [[experiment]]\nknown_inputs={u='constant'}\n[[experiment]]\nconstants={d='1/2'}\nknown_inputs={z={function=['t', 'd']}}\n",
+        "name='s'\nparameters=['k', 'b']\nknown_inputs={u='generic', 'z[2]'='generic'}\n[constants]\nm='2*d'\nd=1\n\
+         [definitions]\nforce='b*u*m'\n\
+         [states]\nx='-k*x + force + z[1]*z[2]'\n[outputs]\ny='d*x'\n[[experiment]]\nconstants={d=3}\n\
+         known_inputs={u={function='t + d'}, z='constant'}\n\
+         [[experiment]]\nknown_inputs={u='constant'}\n[[experiment]]\nconstants={d='1/2'}\n\
+         known_inputs={z={function=['t', 'd']}}\n",
     );
     let one = judged(
-        "name='o'\nparameters=['k', 'b']\nknown_inputs={u2='constant', u3='generic', z1='constant', z2='generic', z3='generic'}\n\
-         [states]\nx1='-k*x1 + b*(t + 3)*6 + z1'\nx2='-k*x2 + b*u2*2 + z2'\nx3='-k*x3 + b*u3 + t/2'\n[outputs]\ny1='3*x1'\ny2='x2'\ny3='x3/2'\n",
+        "name='o'\nparameters=['k', 'b']\nknown_inputs={u2='constant', u3='generic', z1='constant', z2='generic', \
+         z3='generic'}\n\
+         [states]\nx1='-k*x1 + b*(t + 3)*6 + z1'\nx2='-k*x2 + b*u2*2 + z2'\nx3='-k*x3 + b*u3 + t/2'\n[outputs]\n\
+         y1='3*x1'\ny2='x2'\ny3='x3/2'\n",
     );
     let names: Vec<String> = degrees(&several).into_iter().map(|d| d.0).collect();
     assert_eq!(names, ["x@1", "x@2", "x@3", "k", "b"]);
     let plain = |j: &Judgement| j.findings.degrees.degree.clone();
     assert_eq!(plain(&several), plain(&one));
     assert_eq!(several.findings.degrees.rank_profile[..2], one.findings.degrees.rank_profile[..2]);
-    // what tells them apart is that they differ
+    // the experiments distinguish the unknowns because they differ
     let doses = |own: &str| {
         judged(&format!(
             "name='d'\nparameters=['a', 'b']\n[constants]\nd=1\n[states]\nx='a + b*d'\n[outputs]\ny='x'\n{own}"
@@ -517,7 +535,8 @@ fn experiments_that_are_wrong_are_named() {
         let text = format!("name='d'\n{own}");
         model_file::read(&text).and_then(|m| judge(&m, 1, None)).expect_err(own).to_string()
     };
-    let rest = "parameters=['a']\nknown_inputs={u='generic'}\n[constants]\nd=1\ne='2*d'\n[states]\nx='a + u*d'\n[outputs]\ny='x'\n";
+    let rest = "parameters=['a']\nknown_inputs={u='generic'}\n[constants]\nd=1\ne='2*d'\n[states]\nx='a + u*d'\n\
+                [outputs]\ny='x'\n";
     for (own, message) in [
         ("[[experiment]]\nconstants={c=1}", "the constant c of experiment 1: `c` is no known constant"),
         (
@@ -548,14 +567,16 @@ fn experiments_that_are_wrong_are_named() {
     assert!(many.contains("21 [[experiment]]; expected at most 20"), "{many}");
 }
 
-/// The information of several experiments, with segments, confirms the verdicts; inputs that are the same
-/// where they should differ refute them.
+/// The information of several experiments with segments confirms the verdicts. Equal inputs in place of
+/// different ones refute them.
 #[test]
 fn evidence_of_several_experiments() {
     let text = |second: &str| {
         format!(
-            "name='e'\nparameters=['a', 'b']\nknown_inputs={{u='constant'}}\n[states]\nx='-a*x + b*u'\nc='-c'\n[outputs]\ny='x'\nz='c'\n[[experiment]]\n[[experiment]]\n\
-             [simulation]\nduration=2\nstep=0.05\nnoise={{y=0.01, z=0.01}}\nvalues={{x=1, 'x@2'=0.3, c=0.1, 'c@2'=-0.2, a=0.7, b=1.5}}\ninputs={{u='1', 'u@2'='{second}'}}\n"
+            "name='e'\nparameters=['a', 'b']\nknown_inputs={{u='constant'}}\n[states]\nx='-a*x + b*u'\nc='-c'\n\
+             [outputs]\ny='x'\nz='c'\n[[experiment]]\n[[experiment]]\n\
+             [simulation]\nduration=2\nstep=0.05\nnoise={{y=0.01, z=0.01}}\n\
+             values={{x=1, 'x@2'=0.3, c=0.1, 'c@2'=-0.2, a=0.7, b=1.5}}\ninputs={{u='1', 'u@2'='{second}'}}\n"
         )
     };
     let model = |second: &str| read(&text(second));
@@ -565,7 +586,7 @@ fn evidence_of_several_experiments() {
     assert!(run.consistency.consistent, "{run:?}");
     assert_eq!(traces.names, ["x@1", "c@1", "x@2", "c@2", "a", "b"]);
     assert_eq!((traces.time.len(), traces.time.last().copied()), (81, Some(4.0)));
-    // a state of the other experiment stands still
+    // states of the other experiment are constant
     let x2 = &traces.series[2].truth;
     assert!(x2[..=40].iter().all(|x| *x == 0.3) && x2[80] != 0.3);
     for estimate in run.quantities.iter().filter(|e| e.is_determined()) {
@@ -574,7 +595,7 @@ fn evidence_of_several_experiments() {
             "{estimate:?}"
         );
     }
-    // segments within experiments: the time of each begins anew
+    // in each experiment the time of the segments starts anew
     let jumps = text("3").replace(
         "[[experiment]]\n[[experiment]]\n",
         "[[experiment]]\n[[experiment]]\n[[segment]]\n[[segment]]\ncarry={x='2*x'}\n",
@@ -582,13 +603,13 @@ fn evidence_of_several_experiments() {
     let e = crosscheck_system(&read(&jumps), 1).expect("evidence");
     assert!(e.passed && e.checks > 5, "{e:?}");
     assert_eq!(simulate_system(&read(&jumps), 1).expect("a run").1.position.last(), Some(&3));
-    // one start and one input twice: nothing new
+    // two equal starts and inputs add nothing
     let twice = text("1").replace("'x@2'=0.3", "'x@2'=1").replace("'c@2'=-0.2", "'c@2'=0.1");
     let refuted = crosscheck_system(&read(&twice), 1).expect("evidence");
     assert!(!refuted.passed, "{refuted:?}");
 }
 
-/// A unit quaternion in filter and information: consistent, of the exact rank, and values off the sphere are
+/// A unit quaternion in filter and information: consistent and with the exact rank. Values off the sphere are
 /// refused.
 #[test]
 fn evidence_on_constraints() {
@@ -609,7 +630,7 @@ fn evidence_on_constraints() {
         error.contains("the constraint norm(q) = 1: the values under [simulation.values] miss it by 1.1e-1"),
         "{error}"
     );
-    // without the constraint its norm is an unknown more
+    // without the constraint the norm is one more unknown
     let free = text.replace("constraints = [\"norm(q) = 1\"]\n", "");
     assert_ne!(free, text);
     let e = crosscheck_system(&read(&free), 1).expect("evidence");

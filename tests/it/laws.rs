@@ -1,4 +1,4 @@
-//! Laws that hold for every scheme, on random ones.
+//! Laws that hold for every scheme, on random schemes.
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::{Degrees, DerivativeRows, Status, climb, judge, staircase};
@@ -19,13 +19,13 @@ fn judged(s: Scheme) -> (Vec<String>, Degrees) {
     (platform.names().to_vec(), degrees)
 }
 
-/// Verdicts of the coefficients, in model order.
+/// Degrees of the coefficients, in the order of the model.
 fn coefficients(s: Scheme) -> Vec<Option<usize>> {
     let (names, d) = judged(s);
     names.iter().zip(d.degree).filter(|(n, _)| n.starts_with("D_")).map(|(_, d)| d).collect()
 }
 
-/// Angles that are special (multiples of 90 and 30) half of the time.
+/// Random attitudes; half of them have special angles (multiples of 90 and 30).
 fn attitudes(most: usize) -> impl Strategy<Value = Vec<Attitude>> {
     let angle =
         || prop_oneof![(-2i32..3).prop_map(|k| 90 * k), (-6i32..7).prop_map(|k| 30 * k), -180i32..180];
@@ -62,7 +62,7 @@ proptest! {
         for carry in [Carry::Platform, Carry::Inertial] {
             prop_assert_eq!(judged(scheme(&list, carry)), judged(scheme(&repeated, carry)));
         }
-        // under reset it brings its own psi, and the coefficients stay as they are
+        // under reset carry it adds its own psi, and the coefficients do not change
         prop_assert_eq!(coefficients(scheme(&list, Carry::Reset)), coefficients(scheme(&repeated, Carry::Reset)));
     }
 
@@ -94,8 +94,8 @@ proptest! {
     fn the_azimuth_origin_does_not_matter_at_a_pole(
         tilts in prop::collection::vec((-180i32..180, -180i32..180), 1..6), carry in carry(), turn in 1i32..360
     ) {
-        // at a pole there is no North; with alpha = 0, C_c^n = My(beta) Mz(gamma), and beta -> beta + turn
-        // turns the whole scheme about Up
+        // a pole has no North; with alpha = 0, C_c^n = My(beta) Mz(gamma), and beta -> beta + turn turns the
+        // whole scheme about Up
         let pole = |s: Scheme| Scheme { latitude: "90".parse().ok(), ..s };
         let at = |shift: i32| -> Vec<Attitude> { tilts.iter().map(|&(b, c)| (0, b + shift, c)).collect() };
         prop_assert_eq!(judged(pole(scheme(&at(0), carry))), judged(pole(scheme(&at(turn), carry))));
@@ -124,7 +124,7 @@ proptest! {
     }
 }
 
-/// Derivative rows with every column times a constant: other units.
+/// Derivative rows with scaled columns, as in other units.
 struct Scaled<R> {
     inner: R,
     scale: Vec<u64>,
@@ -155,8 +155,8 @@ fn four_hundred_positions_and_duplicates_are_fine() {
     assert_eq!(d.rank(), 15);
 }
 
-/// Primes are printed, so anybody can write a combination that they divide: it has other primes, and is not
-/// taken for nothing. D_FZ is not told from psi_y.
+/// Printed primes allow a combination with coefficients that they divide: such a combination gets other
+/// primes and is not taken for zero. D_FZ is indistinguishable from psi_y.
 #[test]
 fn nobody_aims_at_the_primes_of_a_scheme() {
     let with = |combination: &str| {
@@ -186,6 +186,6 @@ fn nobody_aims_at_the_primes_of_a_scheme() {
     seen.sort_unstable();
     seen.dedup();
     assert_eq!(seen.len(), 6);
-    // what is linear at a point that was fixed
+    // linear at one fixed point only
     assert!(asked("D_FX + D_FX*(D_FX - 1)*(D_FX - 1071274)").is_err());
 }

@@ -1,6 +1,6 @@
-//! Packages of others in every build: the table of licences against the graphs that cargo resolves and the
-//! texts in the sources. `UPDATE_LICENCES=1 cargo test --test it licences::` writes the table, the texts for
-//! the wheel and the workbench and the wheel's SBOM again (`cargo fetch` first: all platforms are read).
+//! Third-party packages in every build: the table of licences against the graphs that cargo resolves and the
+//! texts in the sources. `UPDATE_LICENCES=1 cargo test --test it licences::` renews the table, the texts for
+//! the wheel and the workbench, and the wheel's SBOM. It needs `cargo fetch` for all platforms first.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -20,7 +20,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Builds as the table names them, and what cargo is asked.
+/// Names of the builds in the table, and cargo's options for each.
 const BUILDS: [(&str, &[&str]); 5] = [
     ("program", &["-p", "obsdeg", "--no-default-features"]),
     ("symbolica", &["-p", "obsdeg", "--no-default-features", "--features", "symbolica"]),
@@ -29,7 +29,7 @@ const BUILDS: [(&str, &[&str]); 5] = [
     ("workbench", &["-p", "obsdeg-web", "-p", "obsdeg-unpack"]),
 ];
 
-/// The triple of a platform.
+/// Target triple of a platform.
 fn triple(platform: &str) -> &'static str {
     match platform {
         "linux-x86_64" => "x86_64-unknown-linux-gnu",
@@ -56,10 +56,10 @@ fn cargo(arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// A crate by name and version.
+/// Name and version of a crate.
 type Crate = (String, String);
 
-/// What is linked into a build: the crates, and for each (ours too) those that it needs.
+/// Crates that are linked into a build, each (obsdeg's own too) with its dependencies.
 fn graph(asked: &[&str], triple: &str) -> Result<BTreeMap<Crate, BTreeSet<Crate>>, String> {
     let form = ["-e", "normal,no-proc-macro", "--prefix", "depth", "-f", " {p}", "--target", triple];
     let tree = cargo(&[&["tree"], asked, &form].concat())?;
@@ -84,7 +84,7 @@ fn is_ours((name, _): &Crate) -> bool {
     name == "obsdeg" || name.starts_with("obsdeg-")
 }
 
-/// A crate as its manifest describes it.
+/// Data of a crate's manifest.
 struct Source {
     folder: PathBuf,
     licence: String,
@@ -99,7 +99,7 @@ fn sources(with: &[&str]) -> Result<BTreeMap<Crate, Source>, String> {
         let folder = Path::new(&text(&p["manifest_path"])).with_file_name("");
         let licence = match (p["name"].as_str(), p["license"].as_str()) {
             (_, Some(licence)) => licence.replace('/', " OR ").replace("MPL-2.0+", "MPL-2.0"),
-            // files of their own instead of an expression: book/src/licences.md
+            // licence files of its own instead of an expression: book/src/licences.md
             (Some("symbolica"), None) => "LicenseRef-Symbolica".into(),
             (Some("cobyla"), None) => "MIT".into(),
             (name, None) => panic!("{name:?} names no licence"),
@@ -115,8 +115,8 @@ fn sources(with: &[&str]) -> Result<BTreeMap<Crate, Source>, String> {
     Ok(metadata["packages"].as_array().expect("a list").iter().map(source).collect())
 }
 
-/// Texts of crates whose packages hold none: from their repositories, or the standard text of a licence that
-/// they may be used under.
+/// Licence texts of crates whose packages have none: from their repositories, or the standard text of an
+/// applicable licence.
 fn without_text(name: &str, licence: &str) -> &'static [&'static str] {
     match name {
         "alloc-stdlib" => &["licenses/alloc-stdlib-License.txt"],
@@ -131,7 +131,7 @@ fn without_text(name: &str, licence: &str) -> &'static [&'static str] {
     }
 }
 
-/// What a package says of its licence.
+/// Licence texts in a package.
 fn texts(name: &str, source: &Source) -> Vec<String> {
     let named = Regex::new(r"(?i)^(licen[cs]e|copying|notice|copyright|unlicense|ofl)").expect("a pattern");
     let entries = fs::read_dir(&source.folder).unwrap_or_else(|e| panic!("{}: {e}", source.folder.display()));
@@ -150,7 +150,8 @@ fn texts(name: &str, source: &Source) -> Vec<String> {
     files.iter().map(|path| String::from_utf8_lossy(&read(path)).replace("\r\n", "\n")).collect()
 }
 
-/// What is no crate: name, version, licence, address, texts, and the crate whose builds hold it.
+/// Third-party files that are no crates: name, version, licence, address, texts, and the crate whose builds
+/// contain them.
 const ASSETS: [[&str; 6]; 4] = [
     [
         "DejaVu Sans (font)",
@@ -186,7 +187,7 @@ const ASSETS: [[&str; 6]; 4] = [
     ],
 ];
 
-/// The table, from the graphs of all builds on all platforms.
+/// Table of licences from the graphs of all builds on all platforms.
 fn table() -> ThirdParty {
     let with_pdf = sources(&["--features", "pdf"]).expect("all crates are downloaded: cargo fetch");
     let mut held: BTreeMap<Crate, (BTreeSet<&str>, BTreeSet<&str>)> = BTreeMap::new();
@@ -212,7 +213,7 @@ fn table() -> ThirdParty {
     let mut written: Vec<String> = Vec::new();
     let mut add = |all: Vec<String>| -> Vec<usize> {
         let index = |text: String| {
-            // the same words are the same text
+            // texts with equal words are the same text
             let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
             *known.entry(words).or_insert_with(|| {
                 written.push(text);
@@ -224,7 +225,7 @@ fn table() -> ThirdParty {
         indices
     };
     let in_order = |builds: &BTreeSet<&str>| -> Vec<String> {
-        // what the program has without features it has with them
+        // the program with features contains everything that it contains without
         let more = |b: &&str| !(builds.contains("program") && (*b == "symbolica" || *b == "pdf"));
         BUILDS.iter().map(|b| b.0).filter(|b| builds.contains(b)).filter(more).map(String::from).collect()
     };
@@ -256,7 +257,7 @@ fn table() -> ThirdParty {
             texts: add(texts(&id.0, source)),
         });
     }
-    // alike beside alike, which deflates best
+    // similar texts stand side by side, which compresses best
     let mut order: Vec<usize> = (0..written.len()).collect();
     order.sort_by_key(|&i| written[i].split_whitespace().collect::<String>().to_lowercase());
     for package in &mut out.packages {
@@ -266,7 +267,7 @@ fn table() -> ThirdParty {
     }
     out.texts = order.iter().map(|&i| written[i].clone()).collect();
     out.packages.sort_by_key(|p| (p.name.to_lowercase(), p.version.clone()));
-    // builds and platforms apart say the same as together
+    // the table reproduces the crates of every build on every platform
     for (build, platform, expected) in cells {
         let parts = if build == "symbolica" || build == "pdf" { vec!["program", build] } else { vec![build] };
         let expected: BTreeSet<Crate> = expected.into_iter().filter(|id| !is_ours(id)).collect();
@@ -275,13 +276,13 @@ fn table() -> ThirdParty {
     out
 }
 
-/// The crates of a table.
+/// Crates of a table.
 fn crates_of(table: &ThirdParty) -> BTreeSet<Crate> {
     let is_crate = |p: &&Package| ASSETS.iter().all(|a| a[0] != p.name);
     table.packages.iter().filter(is_crate).map(|p| (p.name.clone(), p.version.clone())).collect()
 }
 
-/// The packages of the wheel as a bill of materials (CycloneDX 1.5).
+/// Packages of the wheel as a bill of materials (CycloneDX 1.5).
 fn sbom(table: &ThirdParty) -> Value {
     let lock: toml::Table =
         fs::read_to_string(root().join("Cargo.lock")).expect("a lock").parse().expect("TOML");
@@ -314,7 +315,7 @@ fn sbom(table: &ThirdParty) -> Value {
         }
         out
     };
-    // what needs what, on any platform; crates of obsdeg are one component
+    // dependencies on any platform; the crates of obsdeg are one component
     let us = format!("pkg:pypi/obsdeg@{}", env!("CARGO_PKG_VERSION"));
     let name = |id: &Crate| if is_ours(id) { us.clone() } else { reference(&id.0, &id.1) };
     let mut needs: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -339,7 +340,7 @@ fn sbom(table: &ThirdParty) -> Value {
     })
 }
 
-/// What is written: files below `licenses`.
+/// Generated files below `licenses`, by name.
 fn written(table: &ThirdParty) -> Vec<(&'static str, Vec<u8>)> {
     let json = serde_json::to_vec(table).expect("JSON");
     let page = |what: &str, build: &str| {
@@ -359,14 +360,15 @@ fn written(table: &ThirdParty) -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// The table that the program reads.
+/// Table of licences that the program reads.
 fn read() -> ThirdParty {
     let packed = fs::read(root().join("licenses/third-party.z")).expect("a table");
     let json = miniz_oxide::inflate::decompress_to_vec_zlib(&packed).expect("deflated");
     serde_json::from_slice(&json).expect("a table")
 }
 
-/// All files again, byte for byte. Needs the crates of all platforms and features: `cargo fetch`.
+/// Generates all files and compares every byte. Needs the crates of all platforms and features: `cargo
+/// fetch`.
 fn renewed() {
     for (name, bytes) in written(&table()) {
         let path = root().join("licenses").join(name);
@@ -398,7 +400,7 @@ fn the_table_is_that_of_the_graphs() {
         if build != "workbench" && !PLATFORMS.contains(&platform.as_str()) {
             continue;
         }
-        // of the page and of the typesetter there may be no crates here
+        // crates of the page and of the typesetter may be missing on this machine
         let graph = match graph(asked, triple(&platform)) {
             Err(e) if ["pdf", "workbench"].contains(&build) => {
                 eprintln!("skipped: {build}: {e}");
@@ -429,7 +431,7 @@ fn the_table_is_that_of_the_graphs() {
     assert!(read > 200, "{read}");
 }
 
-/// The wheel is under free licences without conditions on the source of what uses it, and says so.
+/// The metadata of the wheel state its licences: all are free and set no conditions on the source of users.
 #[test]
 fn the_wheel_holds_what_its_files_say() {
     let table = read().of(&["wheel"], "");
@@ -450,7 +452,7 @@ fn the_wheel_holds_what_its_files_say() {
     let held: Vec<_> =
         table.packages.iter().map(|p| (p.name.clone(), Value::from(p.version.as_str()))).collect();
     assert_eq!(listed, held);
-    // every reference is that of a component
+    // every reference points to a component
     let of = |v: &Value, key: &str| v[key].as_str().expect("a reference").to_string();
     let mut known: BTreeSet<String> =
         bill["components"].as_array().expect("a list").iter().map(|c| of(c, "bom-ref")).collect();

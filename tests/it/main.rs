@@ -1,5 +1,5 @@
-//! Everything that is tested from outside, in one binary: compiled once, linked once, its tests side by side.
-//! The tests of the symbolic worker are apart: they hold the lock for which others would wait.
+//! All external tests in one binary: compiled once, linked once, and run in parallel. The tests of the
+//! symbolic worker are a separate binary, because they hold the lock of the engine.
 
 mod allan;
 #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! Published systems with known verdicts: the engine for any system against all of them.
+//! The engine for any system against published systems with known verdicts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simulate_system};
 use serde_json::Value;
 
-/// The reference models: name, JSON, text.
+/// Reference models: name, JSON value, JSON text.
 pub(crate) fn models() -> Vec<(String, Value, String)> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
@@ -36,13 +36,13 @@ fn names(value: &Value) -> Vec<String> {
     value.as_array().into_iter().flatten().filter_map(|v| Some(v.as_str()?.to_string())).collect()
 }
 
-/// Degrees by name; of an unknown input that of the signal itself.
+/// Degrees by name; for an unknown input the degree of the signal itself.
 fn degrees(j: &Judgement) -> BTreeMap<String, Option<usize>> {
     let of = |(u, d): (&Unknown, &Option<usize>)| (u.derivative == 0).then(|| (u.name.clone(), *d));
     j.layout.unknowns.iter().zip(&j.findings.degrees.degree).filter_map(of).collect()
 }
 
-/// What differs from the reference.
+/// Differences between a verdict and the reference.
 fn mismatches(reference: &Value, text: &str) -> Vec<String> {
     let mut out = Vec::new();
     let model = match json::read(text) {
@@ -115,7 +115,7 @@ fn judged(text: &str) -> Judgement {
     judge(&model, 7, None).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// `(name, degree)` in the order of the model.
+/// Degree of an unknown; `None` if it is not observable.
 fn degree_of(j: &Judgement, name: &str) -> Option<usize> {
     degrees(j)[name]
 }
@@ -143,8 +143,7 @@ fn the_platform_is_one_of_them() {
     assert_eq!(model.findings.asked, [Verdict { status: Status::Observable, degree: Some(1) }]);
 }
 
-/// A reader of JSON that holds numbers as doubles keeps 53 bits of them: primes are text, of a scheme and of
-/// a model.
+/// Primes are texts in the JSON of schemes and models, since readers with doubles keep only 53 bits.
 #[test]
 fn primes_are_text() {
     let text = "name = \"decay\"\n[states]\nx = \"-p*x\"\n[parameters]\np = {}\n[outputs]\nz = \"x\"\n";
@@ -160,7 +159,7 @@ fn primes_are_text() {
     }
 }
 
-/// A known start is a special point: rank may grow after it has stood still.
+/// A known start is a special point: the rank may grow after orders without growth.
 #[test]
 fn stagnation_is_no_end_at_a_known_start() {
     let trap = |power: usize| {
@@ -171,19 +170,19 @@ fn stagnation_is_no_end_at_a_known_start() {
     let found = trap(2);
     assert_eq!((degree_of(&found, "a"), found.layout.closed, found.rests_on_bound), (Some(3), false, false));
     assert_eq!(found.findings.degrees.rank_profile, [0, 0, 0, 1]);
-    // an order far beyond the number of unknowns
+    // an order far above the number of unknowns
     assert_eq!((degree_of(&trap(20), "a"), trap(20).rests_on_bound), (Some(21), false));
-    // beyond the bound nothing is claimed
+    // no claim beyond the bound
     let late = trap(90);
     assert!(degree_of(&late, "a").is_none() && late.rests_on_bound);
     let a = late.layout.unknowns.iter().position(|u| u.name == "a").expect("a");
     assert_eq!(late.verdict_on(a).status, Status::NotSeen);
-    // with a generic start the first stagnation is the end
+    // with a generic start the first order without growth is the end
     let open = judged("name='open'\nparameters=['a']\n[states]\nx='1+a*x^2'\n[outputs]\ny='x'");
     assert_eq!((open.layout.closed, open.findings.degrees.rank_profile), (true, vec![1, 2]));
 }
 
-/// Identities between functions hold exactly, at every order: what cancels moves no output.
+/// Identities between functions hold exactly at every order: cancelled terms affect no output.
 #[test]
 fn identities_of_functions_cancel() {
     for identity in [
@@ -221,7 +220,7 @@ fn identities_of_functions_cancel() {
         assert_eq!(degree_of(&found, "z"), Some(0), "{identity}");
         assert_eq!(found.findings.degrees.rank(), 1, "{identity}: {:?}", found.findings.degrees);
     }
-    // and what does not cancel is seen
+    // terms that do not cancel affect the output
     for different in ["sin(x)^2 - cos(x)^2", "exp(x) - x", "sqrt(x) + x", "asin(x) - acos(x)", "x^q"] {
         let text = format!(
             "name='no identity'\n[states]\nx='w*x + q'\nq='x - w'\nw='0'\nz='-z'\n[outputs]\ny='z + ({different})'"
@@ -233,7 +232,7 @@ fn identities_of_functions_cancel() {
 /// Functions against the same system written with polynomials and one more known state.
 #[test]
 fn functions_give_the_orders_that_can_be_seen() {
-    // the exponent of a power law, Torricelli's outflow, Michaelis-Menten-Hill, an Arrhenius law
+    // exponent of a power law, Torricelli's outflow, Michaelis-Menten-Hill, an Arrhenius law
     for (equation, parameters, expected) in [
         ("-k*x^n", "['k', 'n']", vec![("x", Some(0)), ("k", Some(2)), ("n", Some(2))]),
         ("-k*sqrt(x)", "['k']", vec![("x", Some(0)), ("k", Some(1))]),
@@ -259,7 +258,7 @@ fn inputs_constants_and_experiments() {
             "name='i'\nparameters=['a', 'b']\n{inputs}\n[states]\nx='{equation}'\n[outputs]\ny='x'"
         ))
     };
-    // a constant input of known value hides b behind a, a generic one does not
+    // with a constant input of known value b is indistinguishable from a, with a generic one it is not
     let generic = with("known_inputs={u='generic'}", "a + b*u");
     assert_eq!((degree_of(&generic, "a"), degree_of(&generic, "b")), (Some(2), Some(2)));
     let constant = with("known_inputs={u='constant'}", "a + b*u");
@@ -268,18 +267,19 @@ fn inputs_constants_and_experiments() {
     assert_eq!(degree_of(&ramp, "b"), Some(2));
     let known = with("known_inputs={u={function='exp(-t)'}}", "a + b*u");
     assert_eq!(degree_of(&known, "b"), Some(2));
-    // an arbitrary unknown input takes everything with it, an unknown ramp does not
+    // an arbitrary unknown input leaves the rest unobservable, an unknown ramp does not
     let arbitrary = with("unknown_inputs={w='arbitrary'}", "a*x + w");
     assert_eq!((degree_of(&arbitrary, "a"), arbitrary.rests_on_bound), (None, true));
     let ramp = with("unknown_inputs={w={polynomial=1}}", "a*x + w");
     assert_eq!((degree_of(&ramp, "a"), degree_of(&ramp, "w")), (Some(3), Some(3)));
-    // two experiments with constant inputs of their own tell a from b
+    // two experiments with different constant inputs distinguish a from b
     let twice = with("experiments=2\nknown_inputs={u='constant'}", "a + b*u");
     assert_eq!((degree_of(&twice, "a"), degree_of(&twice, "b")), (Some(1), Some(1)));
     assert_eq!(degree_of(&twice, "x@2"), Some(0));
-    // a jump of the state that is known
+    // known jump of the state
     let jump = judged(
-        "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\ncarry={x='x + a*z'}",
+        "name='jump'\nparameters=['a']\n[states]\nx='0'\nz='0'\n[outputs]\ny='x'\n[[segment]]\n[[segment]]\n\
+         carry={x='x + a*z'}",
     );
     assert_eq!((degree_of(&jump, "a"), jump.findings.degrees.rank()), (None, 2));
 }
@@ -287,7 +287,8 @@ fn inputs_constants_and_experiments() {
 /// The same system from JSON and from TOML.
 #[test]
 fn both_layouts_say_the_same() {
-    let toml = "name='s'\nparameters=['p1', 'p2']\nknown_inputs={u='generic'}\n[states]\nx1='-p1*x1 + u'\nx2='p2*x1 - x2'\n[outputs]\ny='x2'";
+    let toml = "name='s'\nparameters=['p1', 'p2']\nknown_inputs={u='generic'}\n[states]\nx1='-p1*x1 + u'\n\
+                x2='p2*x1 - x2'\n[outputs]\ny='x2'";
     let json = r#"{"name": "s", "states": ["x1", "x2"], "params": ["p1", "p2"], "known_inputs": ["u"],
         "equations": {"x1": "-p1*x1 + u", "x2": "p2*x1 - x2"}, "outputs": {"y": "x2"}}"#;
     let of_json = judge(&json::read(json).expect("a model"), 7, None).expect("judged");
@@ -295,7 +296,7 @@ fn both_layouts_say_the_same() {
     assert_eq!((of_json.layout, of_json.findings.degrees), (of_toml.layout, of_toml.findings.degrees));
 }
 
-/// Ten megabytes of anything are refused, or read, in order.
+/// Texts of ten megabytes are refused, or read, without harm.
 #[test]
 fn monsters_do_no_harm() {
     let model = |equation: &str| {
@@ -309,7 +310,7 @@ fn monsters_do_no_harm() {
     let long = model(&format!("{}x", "a*x + ".repeat(200_000)));
     let error = model_file::read(&long).and_then(|m| judge(&m, 1, None)).expect_err("too many operations");
     assert!(error.to_string().contains("operations"), "{error}");
-    // 8 MB that would take 2 GB are refused before they are read
+    // 8 MB that would need 2 GB are refused before parsing
     let longer = model(&format!("{}x", "x+".repeat(4_000_000)));
     let error = model_file::read(&longer).expect_err("too many signs");
     assert_eq!(error.to_string(), "the model file: more than 400000 signs + - * / ^");
@@ -329,11 +330,12 @@ fn monsters_do_no_harm() {
         .and_then(|m| judge(&m, 1, None))
         .expect_err("too many");
     assert!(error.to_string().contains("200000 states"), "{error}");
-    let experiments = r#"{"name": "e", "experiments": 1000000000, "states": ["x"], "equations": {"x": "x"}, "outputs": {"y": "x"}}"#;
+    let experiments = "{\"name\": \"e\", \"experiments\": 1000000000, \"states\": [\"x\"], \
+                       \"equations\": {\"x\": \"x\"}, \"outputs\": {\"y\": \"x\"}}";
     assert!(json::read(experiments).expect_err("too many").to_string().contains("1 to 20"));
     for nested in ["sin(x + ", "exp(2*", "log(x + ", "sqrt(1 + "] {
         let text = model(&format!("{}x{}", nested.repeat(150), ")".repeat(150)));
-        // judged or refused, but no panic
+        // judged or refused, without a panic
         let _ = model_file::read(&text).and_then(|m| judge(&m, 1, None));
     }
 }
@@ -343,7 +345,7 @@ fn example(name: &str) -> obsdeg_core::system::SystemModel {
     model_file::read(&std::fs::read_to_string(file).expect("readable")).expect("a model")
 }
 
-/// The Jacobians of the filter are those of its functions, for every function there is.
+/// The Jacobians of the filter match finite differences for every function.
 #[test]
 fn jacobians_against_differences() {
     let all = model_file::read(
@@ -376,14 +378,13 @@ fn jacobians_against_differences() {
     }
 }
 
-/// What starts forget is a direction that a linearised filter believes to know to any precision: no figure of
-/// the run rests on it.
+/// A linearised filter believes that it knows a forgotten start to any precision. No figure of the run rests
+/// on such a direction.
 #[test]
 fn a_filter_is_not_asked_what_it_cannot_know() {
     let of = |name: &str| simulate_system(&example(name), 1).expect("a run").0.consistency;
     let forgotten = of("two-compartment");
-    // seven states, of which the fast mode of the start is a function of the rates; all seven together give
-    // 1e39
+    // seven states; the fast mode of the start is a function of the rates; NEES over all seven would be 1e39
     assert_eq!(forgotten.unresolved_directions, 1);
     assert!(forgotten.nees > forgotten.nees_limit && forgotten.nees < 1e12, "{forgotten:?}");
     let (_, limit) = chi_square_band(6.0, 1.0, 0.999);
@@ -393,8 +394,8 @@ fn a_filter_is_not_asked_what_it_cannot_know() {
     }
 }
 
-/// A constraint is known, so that no error along its gradient is judged: with it a run is as consistent as
-/// without it, and has a degree of freedom less, however narrow priors are.
+/// Errors along the gradient of a constraint are not judged, since the constraint is known. The run is as
+/// consistent as without it, with one degree of freedom less, for narrow priors too.
 #[test]
 fn what_a_constraint_holds_is_not_judged() {
     const RUNS: u64 = 12;
@@ -426,7 +427,7 @@ fn what_a_constraint_holds_is_not_judged() {
 }
 
 /// Slopes, prior inflation and null vectors of the information confirm the exact verdicts on every example
-/// that has numbers.
+/// with numbers.
 #[test]
 fn the_information_confirms_the_verdicts() {
     let mut slopes = 0;
@@ -442,7 +443,7 @@ fn the_information_confirms_the_verdicts() {
     ] {
         let e = crosscheck_system(&example(name), 1).expect("evidence");
         assert!(e.passed && e.checks > 3, "{name}: {e:?}");
-        // every direction that no output sees is printed, and the samples do not see it either
+        // every unobservable direction is printed, and the samples do not resolve it either
         assert_eq!(e.symmetries.len() + usize::from(name == "sir"), e.defect.predicted, "{name}");
         assert!(e.symmetries.iter().all(|s| s.seen.measured.is_some_and(|x| x < 1e-9)), "{name}: {e:?}");
         for q in &e.quantities {
@@ -452,9 +453,9 @@ fn the_information_confirms_the_verdicts() {
             slopes += 1;
         }
     }
-    // degrees 0 to 4 are among them
+    // degrees from 0 to 4
     assert!(slopes >= 15, "{slopes}");
-    // the verdict is one for generic inputs: a robot that stands still sees less, and the check says so
+    // verdicts hold for generic inputs: a robot at rest determines less, and the check says so
     let text = std::fs::read_to_string(
         PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("examples/unicycle-range/model.toml"),
     );
@@ -463,7 +464,7 @@ fn the_information_confirms_the_verdicts() {
     assert!(!refuted.passed && (refuted.defect.predicted, refuted.defect.measured) == (1, 2), "{refuted:?}");
 }
 
-/// With jumps no slope is measured: what the other evidence says is not said of the degrees.
+/// With jumps no slope is measured, and the degrees are not called confirmed by other evidence.
 #[test]
 fn what_is_not_measured_is_no_agreement() {
     let orders = |e: &SystemEvidence| (e.orders.measured, e.orders.of);
@@ -482,23 +483,26 @@ fn what_is_not_measured_is_no_agreement() {
     assert!(e.quantities.iter().all(|q| q.slope.outcome == Agreement::Agrees));
 }
 
-/// A pendulum that starts at rest: its slopes go up and down with the horizon until rounding hides them. Two
+/// A pendulum that starts at rest: the slopes rise and fall with the horizon until rounding dominates. Two
 /// horizons that agree by chance refute nothing.
 #[test]
 fn slopes_that_do_not_settle_are_not_measured() {
     for (theta, input) in [("0.5", "sin(t)"), ("1", "0.5*cos(3*t)")] {
         let text = format!(
-            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\ntheta='omega'\n\
-             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\nstep=0.01\n\
-             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, o=0.1}}"
+            "name='pendulum'\nparameters=['k', 'c', 'b', 's', 'o']\nknown_inputs={{u='generic'}}\n[states]\n\
+             theta='omega'\n\
+             omega='-k*sin(theta) - c*omega + b*u'\n[outputs]\ny='s*cos(theta) + o'\n[simulation]\nduration=10\n\
+             step=0.01\n\
+             noise={{y=1e-3}}\ninputs={{u='{input}'}}\nvalues={{theta={theta}, omega=0, k=20, c=0.3, b=1, s=1.2, \
+             o=0.1}}"
         );
         let e = crosscheck_system(&model_file::read(&text).expect("a model"), 1).expect("evidence");
         assert!(e.passed && (e.orders.measured, e.orders.of) == (0, 7), "{e:?}");
     }
 }
 
-/// The filter of a model: consistent where everything is observable; where a direction is not, a filter that
-/// is linearised anew takes up information that is not there, and the run says whose.
+/// The filter of a model is consistent if all unknowns are observable. A relinearised filter gains false
+/// information along unobservable directions, and the run names the unknowns.
 #[test]
 fn filters_of_models() {
     let (run, traces) = simulate_system(&example("two-position-alignment"), 1).expect("a run");
@@ -507,7 +511,7 @@ fn filters_of_models() {
         assert!(e.sigma < e.prior_sigma && e.error_over_sigma.abs() < 4.0, "{e:?}");
     }
     assert_eq!((traces.time.len(), traces.series.len()), (1201, 10));
-    // half way round nothing tells phE from bN, afterwards both are known
+    // phE and bN are indistinguishable in the first half, and known afterwards
     let sigma = |name: &str, k: usize| {
         traces.series[traces.names.iter().position(|n| n == name).expect("a state")].sigma[k]
     };
@@ -516,17 +520,17 @@ fn filters_of_models() {
     let beyond: Vec<&str> =
         prey.quantities.iter().filter(|e| e.error_over_sigma.abs() > 4.0).map(|e| e.name.as_str()).collect();
     assert_eq!((beyond, prey.consistency.consistent), (vec!["x2", "b"], false));
-    // the product that is observable comes out all the same
+    // the observable product is estimated correctly
     let of = |name: &str| prey.quantities.iter().find(|e| e.name == name).expect("an unknown");
     let product = of("b").estimate * of("x2").estimate / (of("b").truth * of("x2").truth);
     assert!((product - 1.0).abs() < 0.03, "{product}");
-    // the same seed, the same run; what is missing is named
+    // the same seed gives the same run; a missing value is named
     assert_eq!(simulate_system(&example("lotka-volterra"), 1).expect("a run").0, prey);
     let error = simulate_system(&example("platform-as-model"), 1).map(|r| r.0).expect_err("no numbers");
     assert!(error.to_string().contains("no value; expected one under [simulation.values]"), "{error}");
 }
 
-/// Solving expressions against derivatives taken by hand (chain rule, in floating point), and by the whole
+/// Solving expressions against derivatives by hand (chain rule, in floating point), and through the whole
 /// program.
 #[cfg(feature = "symbolica")]
 #[test]
@@ -541,7 +545,7 @@ fn solving_expressions() {
         )
     };
     let at = |text: &str, values: &[(&str, f64)]| {
-        // `y''` is no name to the parser
+        // the parser does not accept `y''`
         let text = text.replace("'''", "_3").replace("''", "_2").replace('\'', "_1");
         let parsed = parse_with(&text, Names::Plain).expect("an expression");
         evaluate_f64(&parsed, &|name| {
@@ -563,7 +567,8 @@ fn solving_expressions() {
     // an input: y' = -(p/V) y + u/V, so that y'' and u' solve for both
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("m.toml");
-    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"x\"\n";
+    let text = "name = \"m\"\n[states]\nx = \"-p*x/V + u/V\"\n[parameters]\np = {}\nV = {}\n[known_inputs]\n\
+                u = \"generic\"\n[outputs]\ny = \"x\"\n";
     std::fs::write(&file, text).expect("written");
     let (clearance, _) = solved(&file.display().to_string());
     let (x, p, v, u, u1) = (0.7, 0.4, 2.5, 1.3, -0.6);
@@ -574,13 +579,13 @@ fn solving_expressions() {
         let found = at(&clearance[name], &values);
         assert!((found - truth).abs() < 1e-9, "{name} = {}: {found}", clearance[name]);
     }
-    // what has no expression says why
+    // the note says why an unknown has no expression
     let (none, note) = solved("examples/bearing-only/model.toml");
     assert!(none.is_empty() && note.as_str().is_some_and(|n| n.contains("without functions")), "{note}");
 }
 
-/// 1/x grows by 2k in time and y = s1/(1/x + s2), so that 1/x and s2 can be shifted against each other; a
-/// number of three digits in a direction comes out as itself.
+/// 1/x grows by 2k in time and y = s1/(1/x + s2), so 1/x and s2 can be shifted against each other. A
+/// three-digit number in a direction is recovered exactly.
 #[test]
 fn directions_that_are_polynomials() {
     let read = |states: &str, parameters: &str, y: &str| {
@@ -598,11 +603,10 @@ fn directions_that_are_polynomials() {
     assert_eq!(tilt, ["add c to phi; subtract 981/100 c from b"]);
 }
 
-/// Primes are printed, so anybody can write a model in which they divide a factor: that model has other
-/// primes.
+/// Printed primes allow a model in which they divide a factor: such a model gets other primes.
 #[test]
 fn nobody_aims_at_the_primes() {
-    // those of seed 1, when they did not depend on the input
+    // the primes of seed 1 from a version in which they did not depend on the input
     let mut product = "1806122528306898383*1665232801720708243".to_string();
     let mut seen: Vec<u64> = Vec::new();
     for _ in 0..4 {
@@ -618,14 +622,15 @@ fn nobody_aims_at_the_primes() {
     assert_eq!(seen.len(), 8);
 }
 
-/// Whatever moves a verdict takes part in the choice of primes, nothing else does.
+/// The choice of primes depends on everything that affects a verdict, and on nothing else.
 #[test]
 fn the_input_chooses_the_primes() {
     let first = |text: &str| {
         let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
         model.random(1, "verdicts").next_u64()
     };
-    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n[constants]\nc=2\n\
+    let plain = "name='m'\nparameters=['a', 'b']\nknown_inputs={u='generic'}\nunknown_inputs={w='arbitrary'}\n\
+                 [constants]\nc=2\n\
                  [states]\nx='-a*x + u'\ny={equation='c*x + w', initial=1}\n[outputs]\nz='b*y'\n";
     let words = plain.replace("name='m'", "name='another'\ndescription='words'");
     assert_eq!(first(plain), first(&words));
@@ -657,9 +662,9 @@ fn the_input_chooses_the_primes() {
 }
 
 /// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys
-/// `(D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u` with K = k1 + w1 and u = b x1 x4, which are
-/// known. So c, w2 and K are the roots of one polynomial, in any order; what is on the right can be had with
-/// each. Integrated numerically, all six orders give the same outputs.
+/// `(D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u` with K = k1 + w1 and the known u = b x1 x4. So c, w2 and K are the roots of one
+/// polynomial, in any order, and the right side is attainable with each order. Numerical integration with all
+/// six orders gives the same outputs.
 #[test]
 fn three_solutions_that_give_the_same_outputs() {
     let (_, _, text) = models().into_iter().find(|m| m.0 == "hiv_latent").expect("a reference");
@@ -706,7 +711,7 @@ fn three_solutions_that_give_the_same_outputs() {
         let other = outputs(c, w2, k);
         assert!(first.iter().zip(&other).all(|(x, y)| (x - y).abs() < 1e-8), "{c} {w2} {k}");
     }
-    // and one that is no root is seen
+    // another value of c changes the outputs
     let wrong = outputs(0.5, q, r);
     assert!(first.iter().zip(&wrong).any(|(x, y)| (x - y).abs() > 1e-3));
 }

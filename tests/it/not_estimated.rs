@@ -1,5 +1,5 @@
-//! What a scheme does not estimate: budgets in reports and files, against numbers computed by hand from their
-//! lines.
+//! Errors that a scheme does not estimate: budgets in reports and files, against numbers computed by hand
+//! from their lines.
 
 use scraper::Html;
 
@@ -8,8 +8,8 @@ use crate::report::{report, table, texts};
 
 const BENCH: &str = "examples/bench-errors/scheme.toml";
 
-/// The scheme of the datasheet has the noise that `allan` finds in the record beside it, and what its README
-/// says of it is so: sigmas meet every requirement, totals do not, by the bias.
+/// The scheme from a datasheet uses the noise that `allan` finds in the record beside it. The statement of
+/// its README holds: the sigmas meet every requirement, the totals do not, because of the bias.
 #[test]
 fn a_record_at_rest_and_a_datasheet_make_a_bench() {
     let folder = "examples/bench-datasheet";
@@ -20,7 +20,7 @@ fn a_record_at_rest_and_a_datasheet_make_a_bench() {
     assert!(key(table).is_some());
     assert_eq!(key(table), key(&scheme));
     let noise: f64 = number(key(table).expect("the key").split_once(" = ").expect("a value").1);
-    // 5 ug by 2400 samples of three sensors, the largest of them: four sigma
+    // 5 ug from 2400 samples of three sensors, the largest of the three: four sigma
     assert!((noise / 5e-6 - 1.0).abs() < 4.0 / (2.0 * 2400f64).sqrt(), "{noise}");
     let answer = json(&["compare", &format!("{folder}/scheme.toml"), "--format", "json"]);
     let all = answer["schemes"][0]["quantities"].as_array().expect("quantities");
@@ -38,27 +38,27 @@ fn a_record_at_rest_and_a_datasheet_make_a_bench() {
     let with = json(&[&["simulate", "--scheme", &format!("{folder}/scheme.toml")][..], &terms].concat());
     let margin = with["requirements"]["worst"]["margin"].as_f64().expect("a number");
     assert!((1.0 / margin - 10.0).abs() < 1.0, "{margin}");
-    // the table has the totals that its margins are of
+    // the table shows the totals on which the margins rest
     let printed = stdout(&run(&["compare", &format!("{folder}/scheme.toml")]));
     let row = printed.lines().find(|l| l.trim_start().starts_with("D_IZ ")).expect("a row");
     assert!(row.contains("7.143") && row.contains("0.01400"), "{row}");
     assert!(printed.contains("margin: required over total"), "{printed}");
 }
 
-/// Numbers of a text with a unit behind them: `1.5 deg/h`.
+/// First number of a text that continues with a unit: `1.5 deg/h`.
 fn number(text: &str) -> f64 {
     let first = text.split(' ').next().unwrap_or_default();
     first.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
-/// Every coefficient has a budget in the report: lines with the largest first, their squares add up to that
-/// of the total, and the total is the one of the JSON. The picture has a bar for each.
+/// The report has a budget for every coefficient: the largest line first, squares that add up to the square
+/// of the total, and the total of the JSON. The picture has a bar for each coefficient.
 #[test]
 fn the_report_has_a_budget_of_every_coefficient() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);
     assert!(texts(&page, "h2").iter().any(|t| t == "What is not estimated"));
-    // longer dwells do not lower what the bench adds: the action is one that was tried with it
+    // longer dwells do not lower the part of the bench: the recommended action was tried with the bench
     let front = texts(&page, "section.front").concat();
     assert!(front.contains("Estimate K0,M6 too") && !front.contains("Dwell "), "{front}");
     let answer = json(&["simulate", "--scheme", BENCH, "--format", "json", "-q"]);
@@ -79,7 +79,7 @@ fn the_report_has_a_budget_of_every_coefficient() {
         let named = lines.iter().filter(|r| r[1] != "-").map(|r| number(&r[4]));
         assert!(named.clone().zip(named.skip(1)).all(|(a, b)| a >= b), "{name}: {rows:?}");
         for r in lines.iter().filter(|r| r[1] == "B") {
-            // the size that the file states, times the sensitivity
+            // size stated in the file, times sensitivity
             let stated = if r[0].starts_with("K0") {
                 20.0
             } else if r[0].starts_with("M_") {
@@ -99,8 +99,8 @@ fn the_report_has_a_budget_of_every_coefficient() {
     }
 }
 
-/// `budget.csv` has a row per line of every budget, with the numbers of the JSON; so has the table of
-/// `--format csv`, under the name of the unknown.
+/// `budget.csv` has one row for each line of every budget, with the numbers of the JSON. The table of
+/// `--format csv` has the same, under the name of the unknown.
 #[test]
 fn budgets_are_files_of_rows() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -132,8 +132,8 @@ fn budgets_are_files_of_rows() {
     assert_eq!(rows(&printed.stdout, ["omitted.budgets.name", "source", "contribution"]), expected);
 }
 
-/// Scheme of [`record_of_two_positions`]: under platform carry everything is determined, but for what is
-/// alike at both positions.
+/// Scheme of [`record_of_two_positions`]: under platform carry everything is determined except errors that
+/// are equal at both positions.
 const TWO: &str = "name = 'two'\ncarry = 'platform'\nlatitude_deg = 28.2\nterms = ['F']\n[simulation]\ndwell_s = 1000\n\
                    step_s = 10\naccelerometer_noise_g = 1e-6\ndrift_noise = '0'\n[[position]]\nname = 'p1'\n\
                    attitude = 'NUE'\n[[position]]\nname = 'p2'\nattitude = 'SUW'\n";
@@ -144,8 +144,8 @@ fn earth_rate() -> [f64; 2] {
     [15.041_067 * cos, 15.041_067 * sin]
 }
 
-/// Z1 and Z3 at NUE, then SUW (a half turn about Up) at 28.2 deg N, 1000 s each, by Runge and Kutta, with
-/// noise of 1e-6 g: D_F of the gyros in deg/h, D_IY in deg/h/g (g along Y is -1 at both), a zero of
+/// Record of Z1 and Z3 at NUE, then SUW (half turn about Up) at 28.2 deg N, 1000 s each, by Runge and Kutta,
+/// with noise of 1e-6 g. D_F of the gyros in deg/h, D_IY in deg/h/g (g along Y is -1 at both), zero of
 /// accelerometer Z in ug.
 fn record_of_two_positions(d_f: [f64; 3], d_iy: f64, k0_z_ug: f64) -> String {
     let dph = (1f64 / 3600.0).to_radians();
@@ -161,7 +161,7 @@ fn record_of_two_positions(d_f: [f64; 3], d_iy: f64, k0_z_ug: f64) -> String {
     let mut psi = [1e-4, -2e-4, 1.5e-4];
     let mut text = String::from("t [s],position,Z1 [g],Z3 [g]\n");
     for (p, level) in [("p1", 1.0), ("p2", -1.0)] {
-        // X and Z point North and East, then South and West; psi goes on in platform axes
+        // X and Z point North and East, then South and West; psi is carried in platform axes
         let in_n = |v: [f64; 3]| [level * v[0], v[1], level * v[2]];
         let eps = in_n(drift);
         let slope =
@@ -184,8 +184,8 @@ fn record_of_two_positions(d_f: [f64; 3], d_iy: f64, k0_z_ug: f64) -> String {
     text
 }
 
-/// A record with an error that it can not show is called consistent; the sentence names the error and what it
-/// does, and the estimate is off by just that.
+/// A record with an error that it cannot reveal is called consistent. The sentence names the error and its
+/// effect, and the estimate is off by that effect.
 #[test]
 fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -204,7 +204,8 @@ fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
         let own = answer["quantities"].as_array().expect("a list").iter().find(|q| q["name"] == of);
         (table, own.expect(of)["estimate"].as_f64().expect("an estimate"))
     };
-    // by hand: g along Y is -1 at both; a zero of Z looks like psi_x, which turns into psi_z by wU psi_x
+    // by hand: g along Y is -1 at both positions; a zero of Z acts like psi_x, which turns into psi_z by wU
+    // psi_x
     let w_u = earth_rate()[1];
     for (name, unit, of, [d_iy, k0_z], size, by_hand) in [
         ("D_IY", "deg/h/g", "D_FY", [0.005, 0.0], 0.005, -1.0),
@@ -212,7 +213,13 @@ fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
     ] {
         let (_, without) = calibrated(of, 0.0, 0.0);
         let (table, estimate) = calibrated(of, d_iy, k0_z);
-        assert!(table.contains("consistent: the model and its sigmas explain the record, as far as it can tell; silent here: "), "{table}");
+        assert!(
+            table.contains(
+                "consistent: the model and its sigmas explain the record, as far as it can tell; \
+                                silent here: "
+            ),
+            "{table}"
+        );
         let said = format!("{name} (changes {of} by ");
         let behind = table.split(&said).nth(1).unwrap_or_else(|| panic!("no {said}: {table}"));
         let (per_unit, rest) = behind.split_once(' ').expect("a number");
@@ -228,8 +235,8 @@ fn a_silent_error_moves_the_estimate_by_what_the_sentence_says() {
     }
 }
 
-/// No answer says met where the bench uses up the margin: the prediction, the run and every unknown of it,
-/// and a calibration. A zero of 3000 ug changes D_FZ by `wU 3e-3` there, by hand: 0.02132 deg/h.
+/// No answer says "met" where the bench uses up the margin: neither the prediction, nor the run and its
+/// unknowns, nor a calibration. A zero of 3000 ug changes D_FZ by `wU 3e-3`, by hand 0.02132 deg/h.
 #[test]
 fn nothing_is_met_that_the_bench_uses_up() {
     let answer = json(&["simulate", "--scheme", BENCH, "--format", "json", "-q"]);
@@ -239,7 +246,7 @@ fn nothing_is_met_that_the_bench_uses_up() {
     };
     let missed = texts(&answer["requirements"]["missed"]);
     assert!(missed.len() > 3 && missed.len() < 12, "{missed:?}");
-    // sigmas of the run are the predicted ones within a percent here
+    // the sigmas of the run are within a percent of the predicted ones
     assert_eq!(texts(&answer["run"]["requirements"]["missed"]), missed);
     assert_eq!(answer["run"]["requirements"]["with_bench"], true);
     for q in
@@ -271,7 +278,7 @@ fn nothing_is_met_that_the_bench_uses_up() {
             "{bench} {of}"
         );
         assert_eq!(of["with_bench"].as_bool().unwrap_or(false), !bench.is_empty(), "{of}");
-        // options say the same beside a scheme that states none
+        // options have the same effect on a scheme without a bench
         let plain = folder.path().join("plain.toml").display().to_string();
         std::fs::write(&plain, TWO).expect("written");
         let required_by = format!("D_FZ={required}");
@@ -310,9 +317,8 @@ const FIVE: [&str; 14] = [
     "28.2",
 ];
 
-/// The bench of a run counts by the weights of the run. By hand (dense least squares with the noise and the
-/// priors of the run, in numpy): sigma of D_FY 8.298e-4 deg/h, total 0.004360, where the predicted weights
-/// give 0.00582.
+/// The bench of a run uses the weights of the run. By hand (dense least squares with noise and priors of the
+/// run, in numpy): sigma of D_FY 8.298e-4 deg/h, total 0.004360; the predicted weights give 0.00582.
 #[test]
 fn the_bench_of_a_run_counts_by_its_own_weights() {
     let arguments =
@@ -320,7 +326,7 @@ fn the_bench_of_a_run_counts_by_its_own_weights() {
     let answer = json(&[&["simulate"], &FIVE[..], &arguments[..]].concat());
     let margin = answer["run"]["requirements"]["worst"]["margin"].as_f64().expect("a margin");
     assert!((margin - 0.005 / 0.004360).abs() < 2e-3, "{margin}");
-    // what is stated of the run is what the prediction counts with
+    // conditions stated for the run count in the prediction
     let mut stated = vec!["--drift-noise".to_string(), "0.01 deg/h".into()];
     for q in answer["quantities"].as_array().expect("a list") {
         let [name, prior] = [&q["name"], &q["prior_sigma"]];
@@ -333,8 +339,8 @@ fn the_bench_of_a_run_counts_by_its_own_weights() {
     assert!((run / predicted - 1.0).abs() < 1e-6, "{run} {predicted}");
 }
 
-/// Two values of one name in one option are refused with both of them; the family and one of its axes, and an
-/// option beside a file, are not in conflict.
+/// Two values of one name in one option are refused, and the message shows both. A family and one of its
+/// axes, or an option and the file, do not conflict.
 #[test]
 fn one_name_has_one_value() {
     for (option, twice) in [
@@ -361,7 +367,7 @@ fn one_name_has_one_value() {
     assert_eq!(sizes("K0_Y=7,K0=21,K0=21"), [21.0, 7.0, 21.0]);
 }
 
-/// A size that has no computed effect is refused, one of an unknown is said to count nothing, and a
+/// A size without a computed effect is refused, a size of an unknown is said to have no effect, and a
 /// cross-check says that it has no bench.
 #[test]
 fn sizes_that_count_nothing_are_said() {
@@ -401,8 +407,8 @@ fn sizes_that_count_nothing_are_said() {
     }
 }
 
-/// `analyze --sensitivities` has the changes per unit of the reference table (normal equations with a Taylor
-/// step, and expm with QR; four digits), at the conditions that it states; without the option there are none,
+/// `analyze --sensitivities` gives the changes per unit of the reference table (normal equations with a
+/// Taylor step, and expm with QR; four digits) at the stated conditions. Without the option there are none;
 /// for a model it is refused.
 #[test]
 fn analyze_gives_the_changes_per_unit() {
@@ -437,8 +443,8 @@ fn analyze_gives_the_changes_per_unit() {
     assert!(refused.contains("--sensitivities"), "{refused}");
 }
 
-/// What a bench does not state has its limits beside it: families that it states, zero too, have none, and
-/// the requirement is met just below the limit that is printed and missed just above it.
+/// Families that the bench does not state get limits beside it; families that it states, zero included, get
+/// none. The requirement is met just below the printed limit and missed just above it.
 #[test]
 fn a_partial_bench_leaves_limits_of_the_rest() {
     let asked = |bench: &str| {
@@ -462,9 +468,9 @@ fn a_partial_bench_leaves_limits_of_the_rest() {
     assert!(!sentence(1.02 * limit).contains(met), "{}", sentence(1.02 * limit));
 }
 
-/// A report says up to which size of errors its requirements are met, where no bench is stated; schemes with
-/// different benches are not compared; with a bench the table of unknowns has the totals that its margins are
-/// of.
+/// A report without a bench states the sizes of errors up to which the requirements are met. Schemes with
+/// different benches are not compared. With a bench the table of unknowns shows the totals on which the
+/// margins rest.
 #[test]
 fn a_report_says_what_its_met_rests_on() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -483,7 +489,7 @@ fn a_report_says_what_its_met_rests_on() {
     let page = Html::parse_document(&report(folder.path(), "both.html", &[BENCH, &path]).1);
     let front = texts(&page, "section.front").concat();
     assert!(front.contains("the schemes differ in bench") && !front.contains("the only one that"), "{front}");
-    // every margin of the picture and the table of margins is of the total: below one is missed
+    // margins in the picture and in the table are those of the total: a margin below one is missed
     let body = texts(&page, "table td, svg text").join("\n");
     assert!(body.contains("0.1158 MISSED") && !body.contains("0.1158 met"), "{body}");
     let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);

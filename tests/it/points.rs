@@ -1,10 +1,9 @@
-//! Sentences on constraints: those that are refused have no usable real point, and those that are judged have
-//! one.
+//! Sentences on constraints: refused constraints have no usable real point, judged ones have one.
 
 use obsdeg_core::language::{Names, evaluate_f64, parse_with};
 use obsdeg_core::system::{ModelError, SystemAnalysis, SystemOptions, analyze_system, model_file};
 
-/// The answer on a model of states x and y that do not move, of which y is the output, or why there is none.
+/// Answer on a model with constant states x and y, outputs y and a, and the given constraints, or the error.
 fn judged(constraints: &[&str], rest: &str, seed: u64) -> Result<SystemAnalysis, ModelError> {
     let list: Vec<String> = constraints.iter().map(|c| format!("'{c}'")).collect();
     let text = format!(
@@ -23,7 +22,7 @@ fn refusal(constraints: &[&str], rest: &str) -> String {
     }
 }
 
-/// The difference of the sides of an equation in x, y and a.
+/// Difference of the two sides of an equation in x, y and a.
 fn difference(constraint: &str) -> impl Fn([f64; 3]) -> f64 + use<> {
     let (left, right) = constraint.split_once(" = ").expect("an equation");
     let text = format!("({}) - ({right})", left.replace("norm([x, y])", "sqrt(x^2 + y^2)"));
@@ -44,8 +43,8 @@ fn grid() -> impl Iterator<Item = [f64; 3]> {
     line().flat_map(move |x| line().flat_map(move |y| line().map(move |a| [x, y, a])))
 }
 
-/// Where signs of the sides contradict there is no real point, which a grid of points confirms; a sign that
-/// agrees is no reason.
+/// Sides with contradicting signs have no real point, and a grid of points confirms it. Sides with agreeing
+/// signs are no reason for a refusal.
 #[test]
 fn sides_of_other_signs_are_refused() {
     for constraint in [
@@ -77,11 +76,11 @@ fn sides_of_other_signs_are_refused() {
     }
     let said = refusal(&["sqrt(x) = -y^2"], "");
     assert!(said.contains("holds only where both sides are zero"), "{said}");
-    // a root of an expression that may be of either sign
+    // a root equals an expression that may have either sign
     assert_eq!(judged(&["sqrt(x) = a"], "", 1).expect("judged").rank, 3);
 }
 
-/// Constraints that have real points are judged whatever the seed: their points by hand.
+/// Constraints with real points are judged for every seed; their points are known by hand.
 #[test]
 fn points_are_found_whatever_the_seed() {
     let golden = [(3.0 + 5f64.sqrt()) / 2.0, (3.0 - 5f64.sqrt()) / 2.0];
@@ -101,15 +100,15 @@ fn points_are_found_whatever_the_seed() {
         }
         for seed in 1..=5 {
             let a = judged(constraints, "", seed).unwrap_or_else(|e| panic!("{constraints:?}, {seed}: {e}"));
-            // y and a are outputs; x follows from a constraint that holds it
+            // y and a are outputs; x follows from a constraint
             let x = a.quantities.iter().find(|q| q.name == "x").expect("x");
             assert_eq!((a.rank, x.degree), (3, Some(0)), "{constraints:?} {seed}");
         }
     }
 }
 
-/// Of several parts of which one alone has real points the verdicts are those of that one: x = 1 says x, x^2
-/// + y^2 = 0 says neither.
+/// A product with one factor that has real points gets the verdicts of that factor: x = 1 determines x, x^2 +
+/// y^2 = 0 would determine neither.
 #[test]
 fn verdicts_are_those_of_real_points() {
     for seed in 1..=8 {
@@ -123,8 +122,8 @@ fn verdicts_are_those_of_real_points() {
     }
 }
 
-/// An unknown that a constraint alone holds is counted like any other: R^2 = 4 has two values, S and I as
-/// many as without it.
+/// An unknown that only a constraint determines: with R^2 = 4 its number of solutions is undecided, with R =
+/// 2 it is one. S and I have as many as without the constraint.
 #[test]
 fn what_constraints_alone_hold_is_counted() {
     use obsdeg_core::system::NumberOfSolutions as Number;
@@ -146,11 +145,11 @@ fn what_constraints_alone_hold_is_counted() {
     assert_eq!(r, Some(Number::Counted(1)));
 }
 
-/// Where no point was found the number of starts is said, and a point that the file gives is used: in prime
+/// If no point is found, the message states the number of starts. A point given in the file is used, in prime
 /// fields and in many digits.
 #[test]
 fn tries_are_said_and_given_points_used() {
-    // positive, which no rule of signs shows
+    // positive everywhere, which the signs of the terms do not show
     let said = refusal(&["x^2 + y^2 + x*y + 1 = 0"], "");
     assert!(said.contains("no real point was found") && said.contains("from 200 starts"), "{said}");
     assert!(said.contains("give it under [simulation.values]"), "{said}");
@@ -168,8 +167,8 @@ fn tries_are_said_and_given_points_used() {
     assert!(a.digits.is_some() && a.rank == 2, "{:?}", a.rank_profile);
 }
 
-/// Expanded squares plus a positive number have no real point: far away, where large terms cancel, none is
-/// taken for one.
+/// Expanded squares plus a positive number have no real point. Points far away, where large terms cancel, are
+/// not accepted.
 #[test]
 fn sums_of_expanded_squares_have_no_point() {
     for (constraint, squares) in [
@@ -192,7 +191,7 @@ fn sums_of_expanded_squares_have_no_point() {
     }
 }
 
-/// Constraints that hold in several ways are judged in one, and the answer says so.
+/// Constraints with several solution branches are judged on one of them, and the answer says so.
 #[test]
 fn one_of_several_ways_is_named() {
     for (constraint, named) in [("x^2 - y^2 = 0", true), ("x*y = 0", false), ("x + y = 1", false)] {
@@ -203,9 +202,9 @@ fn one_of_several_ways_is_named() {
     }
 }
 
-/// Symmetries, combinations and remedies are those of the way in which the constraint holds where the
-/// verdicts are judged. By hand: x^2 = y^2 z^2 with s = x - y z moves nothing along x = y z, by two scalings,
-/// and x/(y z) is 1 there; (x - y)(x + y - z) = 0 with s = (x - y)(1 + z) leaves z alone free along x = y.
+/// Symmetries, combinations and remedies belong to the branch of the constraint on which the verdicts are
+/// judged. By hand: with x^2 = y^2 z^2 and s = x - y z, two scalings along x = y z affect nothing, and x/(y
+/// z) is 1 there. With (x - y)(x + y - z) = 0 and s = (x - y)(1 + z), only z is free along x = y.
 #[test]
 fn all_that_is_said_is_of_one_way() {
     let answer = |constraint: &str, outputs: &str, seed: u64| {
@@ -240,8 +239,8 @@ fn all_that_is_said_is_of_one_way() {
     assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
 }
 
-/// Constraints whose gradients depend on each other where they hold say less than they seem to: the points
-/// are these alone, so that a verdict from gradients would be wrong.
+/// Constraints with dependent gradients at their points are refused, since a verdict from the gradients would
+/// be wrong.
 #[test]
 fn dependent_gradients_are_refused() {
     for (constraints, point) in [
@@ -271,8 +270,8 @@ fn dependent_gradients_are_refused() {
             _ => panic!("{constraints:?}"),
         }
     }
-    // one that follows from the others is no such constraint, nor is one of several parts that is met
-    // elsewhere
+    // redundant constraints are accepted, and so is a product that vanishes elsewhere with independent
+    // gradients
     for constraints in [&["x = 1", "y = 2", "x + y = 3"][..], &["x^2 = 1", "x = 1"], &["x^2*(y - 2) = 0"]] {
         for seed in 1..=4 {
             let a = judged(constraints, "", seed).unwrap_or_else(|e| panic!("{constraints:?}: {e}"));
@@ -281,8 +280,9 @@ fn dependent_gradients_are_refused() {
     }
 }
 
-/// A product is zero where one of its factors is: the one that is taken does not depend on the seed, is that
-/// of the given values, is said, and verdicts are those of the model with the factor in its place.
+/// A product vanishes where one of its factors vanishes. The chosen factor does not depend on the seed,
+/// follows the given values and is named. Verdicts are those of the model with the factor in place of the
+/// product.
 #[test]
 fn products_are_judged_by_the_factor_that_is_named() {
     let point = |x: f64, y: f64| format!("[simulation]\nvalues={{x={x}, y={y}}}");
@@ -319,7 +319,7 @@ fn products_are_judged_by_the_factor_that_is_named() {
     }
 }
 
-/// The order of constraints decides nothing: of those that touch at their points any may come first. By hand:
+/// The order of constraints does not matter: those that touch at their points may come in any order. By hand:
 /// x = y = 1/sqrt(2), or with both signs changed.
 #[test]
 fn constraints_are_met_in_any_order() {
@@ -330,7 +330,7 @@ fn constraints_are_met_in_any_order() {
     }
 }
 
-/// Given values that hold a constraint exactly, where its gradient vanishes, are not asked to come nearer.
+/// Given values that meet a constraint exactly at a vanishing gradient: the message names the gradient.
 #[test]
 fn a_vanishing_gradient_at_given_values_is_said() {
     for (constraint, x, y) in [
@@ -342,8 +342,8 @@ fn a_vanishing_gradient_at_given_values_is_said() {
     }
 }
 
-/// The factor that is taken leaves most free, is one at which the outputs are defined, and is one alone for
-/// all experiments; a quotient of unknowns, and a product that a zero makes of everything, is none.
+/// The chosen factor leaves the most unknowns free, allows the outputs to be defined, and is the same for all
+/// experiments. A quotient of unknowns is not split into factors.
 #[test]
 fn factors_are_taken_that_can_be() {
     let answer = |text: &str| {
@@ -355,7 +355,8 @@ fn factors_are_taken_that_can_be() {
         a.constraint_factors.iter().map(|f| f.factor.clone()).collect()
     };
     let three = "parameters=['x', 'y', 'z']\n[outputs]\n";
-    // the set of both is y = 0, or that of the shorter product: rank of the one constraint and of the output
+    // both products vanish at y = 0, or at the factor of the shorter one; rank of this constraint and of the
+    // output
     for (constraints, output, factors, rank) in [
         ("'x*y = 0', 'y*(x - 1) = 0'", "s='z'", &["y", "y"][..], 2),
         ("'x*y = 0', 'y*x*z = 0'", "s='z'", &["y", "y"], 2),
@@ -371,7 +372,8 @@ fn factors_are_taken_that_can_be() {
             "{constraints}"
         );
     }
-    let runs = "constraints=['x*(y - 1) = 0']\nexperiments=2\n[states]\nx='0'\ny='0'\n[outputs]\ns='x + y'\n[simulation.values]\n";
+    let runs = "constraints=['x*(y - 1) = 0']\nexperiments=2\n[states]\nx='0'\ny='0'\n[outputs]\ns='x + y'\n\
+                [simulation.values]\n";
     for (values, factors) in
         [("'x@1'=0\n'y@1'=2\n'x@2'=3\n'y@2'=1", &[][..]), ("'x@1'=0\n'y@1'=2\n'x@2'=0\n'y@2'=5", &["x"])]
     {
@@ -379,8 +381,9 @@ fn factors_are_taken_that_can_be() {
     }
 }
 
-/// Given values choose the way in which a sum holds. By hand: x*y = x*z at x = 0 leaves y free and
-/// unseen by z, at y = z it leaves x; x^2 = y^2 with x + y seen is of rank 1 at x = -y.
+/// Given values choose the branch of a constraint that is a sum. By hand: x*y = x*z at x = 0 leaves y free,
+/// which z does not determine; at y = z it leaves x free. x^2 = y^2 with x + y as output has rank 1 at x =
+/// -y.
 #[test]
 fn given_values_choose_the_way() {
     for (constraint, output, values, rank, observable) in [
@@ -393,7 +396,8 @@ fn given_values_choose_the_way() {
     ] {
         for seed in 1..=6 {
             let text = format!(
-                "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\ns='{output}'\n[simulation]\nvalues={{{values}}}"
+                "name='m'\nconstraints=['{constraint}']\nparameters=['x', 'y', 'z']\n[outputs]\ns='{output}'\n\
+                 [simulation]\nvalues={{{values}}}"
             );
             let model = model_file::read(&text).expect("a model");
             let options = SystemOptions { seed, solutions: false, ..SystemOptions::default() };

@@ -1,4 +1,4 @@
-//! The program as a process, in the root of the repository.
+//! Runs of the program as a process, in the root of the repository.
 
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
@@ -8,7 +8,7 @@ use serde_json::Value;
 pub(crate) fn obsdeg(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).stdin(Stdio::null());
-    // whatever the locale of whoever tests
+    // independent of the locale of the machine
     command.env_remove("LC_ALL").env_remove("LC_CTYPE").env("LANG", "C.UTF-8");
     command
 }
@@ -25,14 +25,15 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).expect("UTF-8")
 }
 
-/// What a command that succeeds prints as JSON.
+/// Parsed JSON output of a command that succeeds.
 pub(crate) fn json(arguments: &[&str]) -> Value {
     let output = run(arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// Runs a command that is refused with a message that has all these parts, and nothing on stdout.
+/// Asserts that a command is refused with a message that contains all given parts, and prints nothing on
+/// stdout.
 pub(crate) fn refused(arguments: &[&str], expected: &[&str]) {
     let output = run(arguments);
     let message = stderr(&output);

@@ -1,4 +1,4 @@
-//! Records that nobody here made, against the results of other programs and of the literature.
+//! Published records against the results of other programs and of the literature.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::calibrate::crate_root;
 use crate::program::{json, run, stderr};
 
-/// The unknown or combination of this name: estimate and sigma as the fit has it.
+/// Estimate and sigma of an unknown or combination, as the fit gives them.
 fn found(v: &Value, name: &str) -> [f64; 2] {
     let all = v["quantities"]
         .as_array()
@@ -25,7 +25,7 @@ fn model(name: &str, more: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-/// Small series of the literature, with what was published of them.
+/// Small series from the literature, with the published results.
 #[test]
 fn series_of_the_literature() {
     // J. D. Murray, Mathematical Biology (1989), 19.1: r = 2.18e-3 / d, rho = 202, a = 0.44 / d
@@ -45,7 +45,7 @@ fn series_of_the_literature() {
             && (found(&theo, "ka")[1] / ka - 0.1728).abs() < 5e-4
     );
     assert_eq!(theo["degrees_of_freedom"], 8);
-    // absorption and elimination may change places
+    // absorption and elimination are exchangeable
     let others = theo["others"].as_array().expect("others");
     let other = |k: usize| others[0]["values"][k].as_f64().expect("a number");
     assert!(
@@ -70,7 +70,7 @@ fn series_of_the_literature() {
     }
 }
 
-/// A packed record of the examples, unpacked.
+/// Unpacks a compressed record of the examples.
 fn unpacked(record: &str, folder: &std::path::Path) -> String {
     let path = folder.join("record.csv");
     let unpacked = std::process::Command::new("gzip").arg("-dc").arg(crate_root(record)).output();
@@ -78,7 +78,7 @@ fn unpacked(record: &str, folder: &std::path::Path) -> String {
     path.display().to_string()
 }
 
-/// Checks estimates against others, in sigma as the fit has it.
+/// Asserts that estimates agree with others within `most` sigma of the fit.
 fn agrees(found_in: &Value, others: &[(&str, f64)], most: f64) {
     for &(name, other) in others {
         let [x, s] = found(found_in, name);
@@ -86,7 +86,7 @@ fn agrees(found_in: &Value, others: &[(&str, f64)], most: f64) {
     }
 }
 
-/// A record that nobody here made: the length of the specific force at 38 attitudes that nobody knows.
+/// A published record: the magnitude of the specific force at 38 unknown attitudes.
 #[test]
 fn a_record_by_hand() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -104,8 +104,8 @@ fn a_record_by_hand() {
     assert!((left / 1e-3 - 1.0).abs() < 0.15 && (expected / 3e-4 - 1.0).abs() < 0.15, "{left} {expected}");
     assert_eq!(v["findings"].as_array().map(Vec::len), Some(1), "{}", v["findings"]);
     assert_eq!(v["findings"][0]["kind"], "noise");
-    // least squares with equal weights, by another program; then what is published with the method, of its
-    // own program on this record
+    // least squares with equal weights by another program; then the published results of the method's own
+    // program for this record
     let plain = [33123.9, 33275.1, 32364.5, 414.42, 412.03, 414.62, 0.0034, -0.0092, 0.0214];
     let published =
         [33124.2, 33275.2, 32364.4, 414.459, 412.01, 414.649, 0.003_359_3, -0.008_906_39, 0.021_334_1];
@@ -113,7 +113,7 @@ fn a_record_by_hand() {
     for others in [plain, published] {
         agrees(&v, &names.into_iter().zip(others).collect::<Vec<_>>(), 4.0);
     }
-    // other columns, and what is no input
+    // other columns, and files that are no records
     let text = fs::read_to_string(crate_root(model)).expect("the model");
     let other = folder.path().join("other.toml");
     for (from, to, message) in [
@@ -134,8 +134,8 @@ fn a_record_by_hand() {
     }
 }
 
-/// Then its gyros, by the turns between: `cargo test --release --test it -- --ignored gyros_by_hand` (a
-/// minute in debug).
+/// The gyros of the same record, from the turns between attitudes: `cargo test --release --test it --
+/// --ignored gyros_by_hand` (a minute in debug).
 #[test]
 #[ignore = "a minute"]
 fn gyros_by_hand() {
@@ -162,20 +162,20 @@ fn gyros_by_hand() {
     agrees(&v, &published, 2.0);
 }
 
-/// Prey alone are counted: the predators' number and what each eats are told only as a product, and the
-/// profile of either is flat.
+/// Only prey are counted: the number of predators and their consumption rate are determined only as a
+/// product, and the profile of each is flat.
 #[test]
 fn a_profile_is_flat_where_the_verdict_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     let run_at = folder.path().join("run").display().to_string();
     let file = "examples/lotka-volterra/model.toml";
     assert!(run(&["simulate", "--model", file, "-o", &run_at, "-q"]).status.success());
-    // the prey by the equations themselves, with steps a thousandth as long as a unit of time
+    // integration of the equations with small steps
     let (mut x, mut text) = ([10.0, 5.0], String::from("t [a],y\n"));
     let rate = |x: &[f64; 2]| [1.1 * x[0] - 0.4 * x[0] * x[1], -0.4 * x[1] + 0.1 * x[0] * x[1]];
     for k in 0..=4000 {
         if k % 100 == 0 {
-            // errors of a tenth that have no mean
+            // errors of a tenth with zero mean
             let noise = 0.1 * ((k as f64 * 0.7133).sin() + (k as f64 * 1.319).cos());
             text += &format!("{},{}\n", k as f64 * 5e-3, x[0] + noise);
         }
@@ -208,8 +208,8 @@ fn a_profile_is_flat_where_the_verdict_says_so() {
     assert!((4.0..16.0).contains(&rise), "three sigma are nine: {rise}");
 }
 
-/// Counts per g of imucal 2.6.0 on the whole session (`FerrarisCalibration`, K_a R_a times 9.81), and its
-/// biases in counts.
+/// Sensitivities in counts per g from imucal 2.6.0 on the whole session (`FerrarisCalibration`, K_a R_a times
+/// 9.81), and its biases in counts.
 const IMUCAL: [(&str, f64); 9] = [
     ("kxx", 2045.6541),
     ("kxy", 14.5705),
@@ -222,8 +222,8 @@ const IMUCAL: [(&str, f64); 9] = [
     ("kzz", 2106.4340),
 ];
 
-/// The linear map is that of imucal to a hundredth of a count per g; biases, which it takes from two
-/// positions each, within a third of what six allow.
+/// The linear map agrees with imucal within a hundredth of a count per g. The biases, which imucal takes from
+/// two positions each, agree within a third of the uncertainty of six positions.
 #[test]
 fn accelerometers_are_those_of_imucal() {
     let found = json(&[
@@ -249,7 +249,7 @@ fn accelerometers_are_those_of_imucal() {
     assert_eq!(found["consistent"], true);
 }
 
-/// What the authors' program prints for its record (Example.ipynb of mikoff/imu-calib), to four decimals.
+/// Output of the authors' program for its record (Example.ipynb of mikoff/imu-calib), to four decimals.
 const IMU_CALIB: [(&str, f64); 9] = [
     ("sx", 0.0036),
     ("sy", 0.0032),
@@ -262,7 +262,7 @@ const IMU_CALIB: [(&str, f64); 9] = [
     ("bz", 0.3444),
 ];
 
-/// Raw counts of a MEMS unit at 23 attitudes that nobody knows. The reference takes the same samples, so both
+/// Raw counts of a MEMS unit at 23 unknown attitudes. The reference uses the same samples, so the results
 /// differ by less than the noise allows: two sigma.
 #[test]
 fn accelerometers_are_those_of_imu_calib() {

@@ -1,4 +1,4 @@
-//! The reference verdicts: rank profiles and degrees that were derived independently of this program.
+//! Reference verdicts: rank profiles and degrees that were derived independently of this program.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ fn degree(a: &Analysis, name: &str) -> Option<usize> {
     a.quantities.iter().find(|q| q.name == name).expect("an unknown").degree
 }
 
-/// Degrees of all unknowns whose name satisfies the filter.
+/// Degrees of all unknowns whose names satisfy a filter.
 fn degrees(a: &Analysis, which: impl Fn(&str) -> bool) -> Vec<Option<usize>> {
     a.quantities.iter().filter(|q| which(&q.name)).map(|q| q.degree).collect()
 }
@@ -71,8 +71,9 @@ fn single_position_at_pole_and_equator_and_with_azimuth() {
     assert_eq!((azimuth.rank, degree(&azimuth, "eps_y^n")), (6, Some(1)));
 }
 
-/// Whom an unknown is not told from depends on the directions that Z does not see, on no choice of them. At
-/// -90, 0, 0 (D_FY, psi_z) and (D_OY, psi_z) cannot be seen, so D_FY = 1, D_OY = -+1 cannot either.
+/// The unknowns from which an unknown is indistinguishable depend on the unobservable directions, not on the
+/// choice of a basis. At -90, 0, 0 (D_FY, psi_z) and (D_OY, psi_z) are not observable, hence D_FY = 1, D_OY =
+/// -+1 is not either.
 #[test]
 fn whom_an_unknown_is_not_told_from() {
     let partners = |s: &Scheme| -> BTreeMap<String, BTreeSet<String>> {
@@ -86,7 +87,8 @@ fn whom_an_unknown_is_not_told_from() {
     assert!(found["D_OY"].is_superset(&set(&["D_FY", "psi_z"])), "{found:?}");
     single.measured_azimuth = true;
     assert!(partners(&single)["D_FY"].contains("D_OY"));
-    // the pole, and schemes of all kinds: mutual, and whoever shares a printed direction is named
+    // the pole, and schemes of all kinds: the relation is mutual and includes the unknowns of every printed
+    // direction
     let cardinals = ["0,0,0", "180,0,0", "0,-90,90", "90,180,-90", "0,90,0"];
     let mut schemes: Vec<Scheme> = Carry::ALL
         .iter()
@@ -212,7 +214,7 @@ fn fewest_positions() {
     }
 }
 
-/// Accuracy orders that were derived from information matrices (log-log slopes) independently.
+/// Accuracy orders derived independently from information matrices (log-log slopes).
 #[test]
 fn accuracy_orders() {
     let orders = |n: usize, carry| {
@@ -235,7 +237,7 @@ fn accuracy_orders() {
         let a = judged(&scheme(&["0,0,0", "180,0,0"], carry));
         assert!(a.quantities.iter().all(|q| q.accuracy_order == q.degree), "{carry}");
     }
-    // the dwells need not be equal
+    // unequal dwells have the same orders
     let mut uneven = scheme(&S6, Carry::Platform);
     for (position, dwell) in uneven.positions.iter_mut().zip(["1000", "333.25", "7", "500", "250.5", "80"]) {
         position.dwell = Some(dwell.parse().expect("a dwell"));
@@ -244,7 +246,8 @@ fn accuracy_orders() {
     assert!(a.quantities.iter().filter(|q| input(&q.name)).all(|q| q.accuracy_order == Some(1)));
 }
 
-/// At a pole the drift about the vertical moves the azimuth unseen; the next position shows how far.
+/// At a pole the drift about the vertical changes the azimuth without an effect on Z; the next position
+/// reveals it.
 #[test]
 fn dwell_shows_more_than_derivatives_at_a_pole() {
     let tilted =

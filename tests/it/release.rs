@@ -1,5 +1,5 @@
-//! What a release needs besides a program that works: texts whose links lead somewhere, crates that can be
-//! packaged, one version.
+//! Requirements of a release besides a working program: texts with valid links, crates that can be packaged,
+//! one version.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,14 +16,14 @@ fn read(path: impl AsRef<Path>) -> String {
     fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// The folders of all crates, that of the program first.
+/// Folders of all crates, with that of the program first.
 fn crates() -> Vec<PathBuf> {
     let manifest: toml::Table = read("Cargo.toml").parse().expect("TOML");
     let members = manifest["workspace"]["members"].as_array().expect("a list").iter();
     std::iter::once(PathBuf::new()).chain(members.map(|m| m.as_str().expect("a folder").into())).collect()
 }
 
-/// Texts for readers, beside code.
+/// Text files for readers, below a folder.
 fn texts(folder: &Path) -> Vec<PathBuf> {
     let mut out = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
@@ -38,13 +38,13 @@ fn texts(folder: &Path) -> Vec<PathBuf> {
     out
 }
 
-/// Text without blocks of code and code in lines.
+/// Text without code blocks and inline code.
 fn prose(text: &str) -> String {
     let outside: Vec<&str> = text.split("\n```").step_by(2).collect();
     Regex::new(r"`[^`\n]*`").expect("a pattern").replace_all(&outside.join("\n"), "code").into_owned()
 }
 
-/// The anchors of a text's headings.
+/// Anchors of the headings of a text.
 fn anchors(text: &str) -> BTreeSet<String> {
     let headings = text.split("\n```").step_by(2).flat_map(str::lines).filter(|l| l.starts_with('#'));
     let anchor = |line: &str| {
@@ -75,7 +75,7 @@ fn links_lead_somewhere() {
             let told = format!("{}: {target}", path.display());
             assert!(leads.exists(), "{told} leads nowhere");
             assert!(anchor.is_empty() || anchors(&read(&leads)).contains(anchor), "{told}: no such heading");
-            // what a book links to outside is not in it
+            // the book contains links to files outside it
             let book = root().join("book/src");
             assert!(
                 !path.starts_with(&book) || file.is_empty() || !file.contains('/'),
@@ -95,7 +95,7 @@ fn crates_can_be_packaged() {
     for folder in crates() {
         let manifest: toml::Table = read(folder.join("Cargo.toml")).parse().expect("TOML");
         let package = manifest["package"].as_table().expect("a package");
-        // parts of a page
+        // parts of the page
         if package.get("publish").is_some_and(|p| p.as_bool() == Some(false)) {
             continue;
         }
@@ -116,7 +116,7 @@ fn crates_can_be_packaged() {
         for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
             assert_eq!(read(folder.join(licence)), read(licence), "{}", folder.display());
         }
-        // a library has examples of its own; what is a module of Python has none in Rust
+        // each published library has examples; the Python module has none in Rust
         if package.get("publish").and_then(toml::Value::as_bool) == Some(false) {
             continue;
         }
@@ -143,7 +143,7 @@ fn there_is_one_version() {
     assert!(read("CITATION.cff").lines().any(|l| l == format!("version: {version}")));
 }
 
-/// What a reader of the first page must find, on lines that fit a window.
+/// Required contents of the first page, in lines that fit a window.
 #[test]
 fn the_first_page() {
     let readme = read("README.md");
@@ -156,14 +156,14 @@ fn the_first_page() {
     assert!(long.is_empty(), "{long:#?}");
 }
 
-/// Sources of Rust below a folder.
+/// Rust source files below a folder.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
     let below = |path: PathBuf| if path.is_dir() { sources(&path) } else { vec![path] };
     entries.flat_map(below).filter(|p| p.extension().is_some_and(|e| e == "rs")).collect()
 }
 
-/// Tests that are too long for every day stand in CONTRIBUTING.md, and those of the release run there.
+/// Long tests are listed in CONTRIBUTING.md, and the release gate runs those that it lists for a release.
 #[test]
 fn long_tests_are_listed() {
     let ignored = Regex::new(r"\n *#\[ignore = [^\n]*\n *(?:#\[[^\n]*\n *)*fn (\w+)").expect("a pattern");
@@ -179,7 +179,7 @@ fn long_tests_are_listed() {
     let rows: Vec<(&str, &str)> =
         row.captures_iter(&list).map(|c| c.extract()).map(|(_, [name, place])| (name, place)).collect();
     assert_eq!(rows.iter().map(|(name, _)| *name).collect::<BTreeSet<_>>(), found);
-    // the gate names a test, or the module that it stands in
+    // the gate names a test, or its module
     let module = |name: &str| {
         let file = texts.iter().position(|t| t.contains(&format!("fn {name}("))).expect("a test");
         let file =

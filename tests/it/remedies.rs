@@ -1,4 +1,4 @@
-//! What is said to resolve an unknown does: every change is made in the text of the scheme or model, and
+//! Remedies resolve the unknowns that they name: every change is made in the text of the scheme or model, and
 //! judged from there.
 
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::models::models;
 
-/// Verdicts are drawn from another seed than the remedies.
+/// Seed of the verdicts, different from that of the remedies.
 const SEED: u64 = 7;
 
 pub(crate) type Degrees = Vec<(String, Option<usize>)>;
@@ -22,7 +22,7 @@ pub(crate) fn degree(all: &Degrees, name: &str) -> Option<usize> {
     all.iter().find(|q| q.0 == name).and_then(|q| q.1)
 }
 
-/// What is wrong with a remedy, by the verdicts before it and after it.
+/// Errors of a remedy, by the verdicts before and after it.
 fn wrong(remedy: &Remedy, before: &Degrees, after: &Degrees) -> Vec<String> {
     let mut out = Vec::new();
     for r in &remedy.resolves {
@@ -33,7 +33,7 @@ fn wrong(remedy: &Remedy, before: &Degrees, after: &Degrees) -> Vec<String> {
     }
     let lost = before.iter().filter(|q| q.1.is_some() && after.iter().any(|a| a.0 == q.0 && a.1.is_none()));
     let lost: BTreeSet<&String> = lost.map(|q| &q.0).collect();
-    // psi of a position under reset carry stands for psi
+    // psi of a position under reset carry is part of psi
     let said: BTreeSet<&String> = remedy.loses.iter().filter(|name| !name.contains('@')).collect();
     if lost != said {
         out.push(format!("loses {lost:?}, not {said:?}: {:?}", remedy.changes));
@@ -41,7 +41,7 @@ fn wrong(remedy: &Remedy, before: &Degrees, after: &Degrees) -> Vec<String> {
     out
 }
 
-/// Every unobservable unknown has a remedy or is said to have none.
+/// Unobservable unknowns that neither have a remedy nor are said to have none.
 fn complete(remedies: &Remedies, before: &Degrees) -> Vec<String> {
     let resolved =
         |name: &String| remedies.remedies.iter().any(|r| r.resolves.iter().any(|x| x.name == *name));
@@ -51,7 +51,7 @@ fn complete(remedies: &Remedies, before: &Degrees) -> Vec<String> {
         .collect()
 }
 
-/// Gaussian elimination of its own: whether a unit vector is in the span of rows.
+/// Row space by a separate Gaussian elimination, to test for unit vectors.
 struct Span {
     field: Field,
     rows: Vec<(usize, Vec<u64>)>,
@@ -87,7 +87,7 @@ fn unit(field: &Field, column: usize, columns: usize) -> Vec<u64> {
     (0..columns).map(|c| if c == column { field.one() } else { 0 }).collect()
 }
 
-/// Degrees of a scheme where some values are known, from its derivative rows.
+/// Degrees of a scheme with some known values, from its derivative rows.
 pub(crate) fn degrees_of_scheme(scheme: &Scheme, known: &[&str]) -> Degrees {
     let platform = Platform::new(scheme.clone()).expect("a scheme");
     let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(SEED)).expect("a field");
@@ -115,7 +115,7 @@ pub(crate) fn degrees_of_scheme(scheme: &Scheme, known: &[&str]) -> Degrees {
     out
 }
 
-/// The scheme with the changes of a remedy, written and read again, and the values that are known.
+/// The scheme with the changes of a remedy, written and read again, and the names of the known values.
 pub(crate) fn changed_scheme<'a>(scheme: &Scheme, changes: &'a [Change]) -> (Scheme, Vec<&'a str>) {
     let mut text = scheme_file::write(scheme);
     let mut known = Vec::new();
@@ -150,14 +150,14 @@ fn of_remedy(scheme: &Scheme, before: &Degrees, remedy: &Remedy) -> Vec<String> 
     wrong(remedy, before, &after)
 }
 
-/// What is wrong with the remedies of a scheme.
+/// Errors of the remedies of a scheme.
 fn of_scheme(scheme: &Scheme) -> Vec<String> {
     let options = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
     let remedies = analyze(scheme, options, None).expect("an analysis").to_resolve;
     let before = judged_scheme(scheme).1;
     let mut out = complete(&remedies, &before);
     out.extend(remedies.remedies.iter().flat_map(|r| of_remedy(scheme, &before, r)));
-    // of what one attitude resolves nothing is called unresolved
+    // an unknown that one more attitude resolves must not be called unresolved
     if let (Some(name), true) =
         (remedies.unresolved.first(), remedies.not_tried.is_empty() && scheme.unknowns.to_string() != "drift")
     {
@@ -172,7 +172,7 @@ fn of_scheme(scheme: &Scheme) -> Vec<String> {
     out
 }
 
-/// A random scheme of one to four positions.
+/// Random scheme of one to four positions.
 pub(crate) fn random_scheme(rng: &mut SplitMix64) -> Scheme {
     fn pick<'a>(rng: &mut SplitMix64, list: &[&'a str]) -> &'a str {
         list[rng.below(list.len() as u64) as usize]
@@ -222,7 +222,7 @@ fn remedies_of_500_random_schemes_are_true() {
     random_schemes(500);
 }
 
-/// The JSON of a model with the changes of a remedy.
+/// JSON of a model with the changes of a remedy.
 pub(crate) fn changed_model(model: &Value, changes: &[Change]) -> String {
     let mut model = model.clone();
     let has = |model: &Value, key: &str, name: &str| {
@@ -270,7 +270,7 @@ pub(crate) fn judged_model(text: &str) -> Degrees {
     names.map(|(c, u)| (u.name.clone(), judged.verdict_on(c).degree)).collect()
 }
 
-/// Judges the remedies of every `step`th model; the number of remedies.
+/// Judges the remedies of every `step`th model and returns their number.
 fn of_models(step: usize) -> usize {
     let mut tried = 0;
     for (name, value, text) in models().into_iter().step_by(step) {
@@ -299,8 +299,8 @@ fn remedies_of_all_models_are_true() {
     assert!(of_models(1) > 300);
 }
 
-/// A search for symmetries that uses up its work leaves enough for the changes: all eight of this model are
-/// tried, and each that resolves something is true by a verdict of its own.
+/// A search for symmetries that uses up its work leaves enough for the changes. All eight of this model are
+/// tried, and a separate verdict confirms each remedy.
 #[test]
 fn a_search_for_symmetries_leaves_work_for_changes() {
     let (_, value, text) = models().into_iter().find(|m| m.0 == "seaijrc_covid").expect("a reference model");
@@ -322,9 +322,8 @@ pub(crate) fn p1_p2() -> Scheme {
         .expect("a scheme")
 }
 
-/// Remedies of the paper's two positions by hand: D_FZ - wN psi_y has degree 1, so that one of them tells the
-/// other; inertial carry tells D_FZ and loses D_SZ; without another direction of g no drift along it is
-/// excited.
+/// Remedies of the paper's two positions by hand: D_FZ - wN psi_y has degree 1, so that each of the two
+/// determines the other. Inertial carry makes D_FZ observable and D_SZ unobservable.
 #[test]
 fn remedies_of_two_positions() {
     let (remedies, _) = judged_scheme(&p1_p2());
@@ -340,8 +339,8 @@ fn remedies_of_two_positions() {
     assert_eq!(inertial.map(|r| r.loses.clone()), Some(vec!["D_SZ".to_string()]));
 }
 
-/// A remedy that is not true is found out: another degree, another unknown, an attitude that the scheme has
-/// already, another value.
+/// A wrong remedy is caught: another degree, another unknown, an attitude that the scheme already has,
+/// another value.
 #[test]
 fn a_wrong_remedy_is_caught() {
     let scheme = p1_p2();

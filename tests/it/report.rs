@@ -1,4 +1,4 @@
-//! The design review as its reader sees it: valid, complete, escaped, the same each time.
+//! The design review in all formats: valid, complete, escaped, reproducible.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use scraper::{Html, Selector};
 /// Markup of every format, in names and descriptions.
 const HOSTILE: &str = r#"<script>alert(1)</script> & "x" $a_b^c$ #let \end{document} *b* |c| `d` {{ e }} %"#;
 
-/// Writes a report and gives its text.
+/// Writes a report and returns its path and its text.
 pub(crate) fn report(folder: &Path, name: &str, inputs: &[&str]) -> (PathBuf, String) {
     let file = folder.join(name);
     let path = file.display().to_string();
@@ -20,7 +20,7 @@ pub(crate) fn report(folder: &Path, name: &str, inputs: &[&str]) -> (PathBuf, St
     (file, String::from_utf8_lossy(&text).into_owned())
 }
 
-/// Positions, up to twelve, with slews, under names that try to be markup.
+/// Writes a scheme with up to twelve positions and slews, whose names contain markup.
 pub(crate) fn hostile(folder: &Path, positions: usize) -> PathBuf {
     let attitudes = ["NUE", "NED", "SUW", "SEU", "UNW", "UEN", "DNE", "DES", "ENU", "EUS", "WND", "WUN"];
     let mut text = format!(
@@ -43,7 +43,7 @@ pub(crate) fn texts(page: &Html, selector: &str) -> Vec<String> {
     page.select(&selector).map(|e| e.text().collect::<String>().trim().to_string()).collect()
 }
 
-/// Cells of the table whose caption begins so.
+/// Cells of the table whose caption begins with the given text.
 pub(crate) fn table(page: &Html, caption: &str) -> Vec<Vec<String>> {
     let parse = |s: &str| Selector::parse(s).expect("a selector");
     let table = page
@@ -64,7 +64,7 @@ pub(crate) fn assert_unique_ids(page: &Html) {
     assert!(twice.is_empty(), "{twice:?}");
 }
 
-/// The rows of the boxes at the top: what, grade, text.
+/// Rows of the boxes at the top: name, grade, text.
 pub(crate) fn statuses(page: &Html) -> Vec<Vec<[String; 3]>> {
     let parse = |s: &str| Selector::parse(s).expect("a selector");
     let text = |e: scraper::ElementRef<'_>, s: &str| -> String {
@@ -78,17 +78,17 @@ pub(crate) fn statuses(page: &Html) -> Vec<Vec<[String; 3]>> {
     page.select(&parse("body > .front > .statuses > .status")).map(of).collect()
 }
 
-/// The box and the verdict of a page of one scheme or model say the same, and nothing further down the
-/// contrary.
+/// Asserts that the box and the verdict of a page of one scheme or model agree, and that nothing below
+/// contradicts them.
 fn assert_status(page: &Html, verdict: &str) {
     let boxes = statuses(page);
     assert_eq!(boxes.len(), 1);
     let of = |what: &str| boxes[0].iter().find(|r| r[0] == what);
     let good = |what: &str| of(what).is_none_or(|r| r[1] == "good");
     let whole: String = texts(page, "main").concat();
-    // by what the rest of the page says
+    // by the rest of the page
     let consistent = !whole.contains("the filter is NOT consistent with this truth:");
-    // drifts that nobody states limit nothing
+    // drifts that are not stated do not limit the verdict
     let valid = !whole.contains("the small-angle model does NOT hold for these drifts: a real platform");
     let prior = whole.contains("known from the prior only") || whole.contains("rests on the prior");
     let limits = |what: &str| of(what).is_some_and(|r| r[1] == "limited");
@@ -97,7 +97,7 @@ fn assert_status(page: &Html, verdict: &str) {
     let evidence = good("Filter and exact verdicts") && good("Samples and exact verdicts");
     let limited = !(consistent && valid && !prior && evidence);
     assert!(!limited || verdict.contains("Limited: "), "{verdict}");
-    // what is missed anywhere on the page leads, and is never a green ok
+    // a requirement missed anywhere on the page comes first, and is never a green ok
     let missed = whole.contains(" are NOT met, ");
     let leads = ["Requirements", "With the bench requirements"]
         .iter()
@@ -118,7 +118,7 @@ fn every_example_has_a_report() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let mut inputs: Vec<PathBuf> = (std::fs::read_dir(root).expect("a folder"))
         .map(|e| e.expect("an entry").path())
-        // without numbers, or without noise, nothing is simulated
+        // schemes without numbers or without noise are not simulated
         .filter(|p| !["generic-angles", "influenza", "theophylline"].iter().any(|name| p.ends_with(name)))
         .filter(|p| !p.display().to_string().contains("wrong-"))
         .flat_map(|p| ["scheme.toml", "model.toml"].map(|name| p.join(name)))
@@ -155,7 +155,7 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     assert!(text.len() < 2_000_000, "{} bytes", text.len());
     let page = Html::parse_document(&text);
     assert!(page.errors.is_empty(), "{:?}", page.errors);
-    // by what it was made, without where it was written
+    // the command line without its folder
     let origin = texts(&page, "li");
     assert!(origin.contains(&format!("obsdeg report --runs 20 {PAPER}")), "{origin:?}");
     if let Ok(digest) = std::process::Command::new("sha256sum").arg(PAPER).output() {
@@ -194,7 +194,7 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
     assert!(verdict.contains(". The scheme determines 5 of the 12 gyro coefficients"), "{verdict}");
     assert!(verdict.contains("no requirement is stated, so none is judged"), "{verdict}");
     assert_eq!(verdict.matches(". ").count(), 2, "three sentences: {verdict}");
-    // formulas are math, pictures are there without scripts, ids are unique, nothing is fetched
+    // formulas are MathML, pictures need no scripts, ids are unique, no network request
     assert!(texts(&page, "li math").len() >= 10);
     assert!(texts(&page, "figure svg").len() > 20);
     assert_unique_ids(&page);
@@ -243,8 +243,8 @@ fn a_verdict_leads_with_what_limits_it() {
     assert!(verdict.contains(missed) && row(&page, "Requirements")[1].contains(missed), "{verdict}");
     assert_eq!(row(&page, "Requirements")[0], "missed");
     assert_eq!(row(&page, "Observable"), ["good", "ok 12 of 12 gyro coefficients, 3 of 3 of psi"]);
-    // by prediction met; in the run, whose random drift nobody states, missed: the prediction decides, the
-    // run is said with its reason
+    // met by prediction, missed in the run, whose random drift is not stated: the prediction decides, and the
+    // run is mentioned with the reason
     let twelve = ["examples/twelve-positions/scheme.toml", "--requirement", "D=0.02"];
     let (page, _) = page_of("quiet.html", &twelve);
     let [grade, text] = row(&page, "Requirements");
@@ -254,12 +254,12 @@ fn a_verdict_leads_with_what_limits_it() {
     );
     assert!(text.contains("; in this run requirements are NOT met, "), "{text}");
     assert!(text.contains("since the run has a random drift of 0.01 deg/h (not stated)"), "{text}");
-    // a random drift that is stated counts in the prediction
+    // a stated random drift counts in the prediction
     let noisy = [&twelve[..], &["--drift-noise", "0.05 deg/h"]].concat();
     let (page, verdict) = page_of("noise.html", &noisy);
     assert!(verdict.starts_with("Requirements are NOT met, "), "{verdict}");
     assert_eq!(row(&page, "Requirements")[0], "missed");
-    // which positions suffice, in the order of the scheme, and for what
+    // sufficient positions, in the order of the scheme, and their purpose
     let few =
         texts(&page, "li").into_iter().find(|l| l.contains(" of the 12 positions (")).expect("the fewest");
     let names = few.split(['(', ')']).nth(1).expect("names");
@@ -270,7 +270,7 @@ fn a_verdict_leads_with_what_limits_it() {
             && few.ends_with("meet the requirements is another question"),
         "{few}"
     );
-    // small drifts, requirements that are met: nothing limits, and only then the filter confirms
+    // small drifts and met requirements: no limits, and only then the filter confirms
     let file = |name: &str, text: &str| -> String {
         let path = folder.path().join(name);
         std::fs::write(&path, text).expect("written");
@@ -304,7 +304,7 @@ fn a_verdict_leads_with_what_limits_it() {
         !verdict.contains("DISAGREE") && !texts(&page, "main").concat().contains("DISAGREE"),
         "{verdict}"
     );
-    // what is not taken is said first, too; and a rotating segment excites all along its arc
+    // rejected evidence is mentioned at the top too; a rotating segment excites coefficients along its arc
     let turning = file(
         "turning.toml",
         "terms = ['F', 'S']\ncarry = 'inertial'\n[[position]]\nattitude = 'NUE'\n\
@@ -324,7 +324,7 @@ fn a_verdict_leads_with_what_limits_it() {
     for sentence in [format!("None: {why}."), format!("note: {why}")] {
         assert!(main.contains(&sentence), "{sentence}: {main}");
     }
-    // a model without numbers has no run, and says why
+    // a model without numbers has no run, and the page says why
     let bare =
         file("bare.toml", "name = 'bare'\n[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\n");
     let alone = Html::parse_document(&report(folder.path(), "bare.html", &[&bare]).1);
@@ -333,15 +333,16 @@ fn a_verdict_leads_with_what_limits_it() {
         main.contains("no run or no evidence: ") && main.contains("expected one under [simulation"),
         "{main}"
     );
-    // D_SZ is not excited at the start of the turn, nor at the second position
+    // D_SZ is excited neither at the start of the turn nor at the second position
     let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
         .filter(|r| r[0].starts_with("D_"))
         .map(|r| [r[0].clone(), r[r.len() - 1].clone()])
         .collect();
     assert!(excited.iter().all(|[_, at]| at != "-"), "{excited:?}");
-    // at a pole the dwell gives what no derivative sees
+    // at a pole the dwell determines unknowns that no derivative shows
     let (page, verdict) = page_of("dwell.html", &[five, "--latitude", "90"]);
-    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, during which psi moves. \
+    let said = "The scheme determines 0 of the 12 gyro coefficients by derivatives, and 12 of them with dwell, \
+                during which psi moves. \
                 The largest predicted sigma of those is ";
     assert!(
         verdict.contains(said) && !verdict.contains("None of them") && !verdict.contains("cannot tell"),
@@ -357,7 +358,7 @@ fn a_verdict_leads_with_what_limits_it() {
         l.starts_with("with dwell, during which psi moves, these are determined nonetheless: D_FX, ")
     }));
     assert!(texts(&page, "th").contains(&"rank with dwell".to_string()));
-    // or takes away what derivatives see
+    // the dwell also makes unknowns with a degree undetermined
     let pole = file(
         "pole.toml",
         "latitude_deg = 90\n[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\n\
@@ -385,13 +386,13 @@ fn text_from_files_is_text_in_every_format() {
     assert!(title.contains(HOSTILE), "{title}");
     assert!(texts(&page, "main > details > p").iter().any(|p| p == HOSTILE));
     assert!(texts(&page, "td").iter().any(|c| c == "q_3"));
-    // several: a comparison, then parts of their own that are folded
+    // several inputs: a comparison, then a folded part for each
     let parts = texts(&page, "h2");
     assert_eq!(parts.len(), 7, "{parts:?}");
     assert_eq!(parts[0], "Comparison of the schemes");
     assert_eq!(texts(&page, "details:not([open]) > summary > h2"), parts[1..4]);
     assert!(table(&page, "Side by side").len() == 2);
-    // a box for each at the top; tables where there are no boxes
+    // a box for each input at the top; tables in formats without boxes
     let titles = texts(&page, ".status > .heading");
     let titles: Vec<&String> = titles.iter().filter(|t| *t != "Recommended action").collect();
     assert_eq!(titles, ["Comparison of 2 schemes", HOSTILE, "paper-p1-p2", "two compartments, one sampled"]);
@@ -403,13 +404,13 @@ fn text_from_files_is_text_in_every_format() {
     assert!(text.contains("\n## Status: ") && text.contains("| Small-angle model | "));
     let first =
         std::fs::read(file.with_file_name("review_figures").join("s1_staircase.svg")).expect("a picture");
-    // a second report beside it has pictures of its own, and both have all that they show
+    // a second report in the same folder has separate pictures, and both show all of theirs
     let (_, other) = report(folder.path(), "b.md", &["examples/simulated-run/scheme.toml"]);
     let shown = |text: &str| -> Vec<String> {
         let pictures = text.split("](").skip(1).filter_map(|t| t.split(')').next());
         pictures.filter(|p| p.ends_with(".svg")).map(str::to_string).collect()
     };
-    // times as people read them
+    // rounded times
     let starts: Vec<&str> = (other.split(" from ").skip(1).filter_map(|t| t.split_once(" s").map(|t| t.0)))
         .filter(|t| t.parse::<f64>().is_ok())
         .collect();
@@ -486,7 +487,7 @@ fn the_pdf_holds_every_table() {
         return;
     };
     assert!(out.status.success());
-    // hyphens and line breaks aside, every cell and heading of the page is in the PDF
+    // every cell and heading of the page is in the PDF, apart from hyphens and line breaks
     let squeezed =
         |text: &str| -> String { text.chars().filter(|c| !c.is_whitespace() && *c != '\u{ad}').collect() };
     let pages = squeezed(&String::from_utf8_lossy(&out.stdout));
@@ -500,7 +501,7 @@ fn the_pdf_holds_every_table() {
     assert!(texts(&page, "table").len() > 20);
 }
 
-/// Schemes of which no dwell determines a coefficient have no curve of sigma against time.
+/// A scheme whose coefficients no dwell determines has no curve of sigma against time.
 #[test]
 fn schemes_that_determine_nothing_have_no_front() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -514,7 +515,7 @@ fn schemes_that_determine_nothing_have_no_front() {
     assert!(text.contains("Pareto front"));
 }
 
-/// Where one solution is proven the box of a model does not say that it is local.
+/// With one proven solution the box of a model does not call it local.
 #[test]
 fn a_model_says_how_many_solutions_there_are() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! The page of a review: what it begins with, and how it works in a real browser where there is one.
+//! The page of a review: its beginning, and its behaviour in a real browser where one is installed.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::browser::Browser;
 use crate::program::{run, stderr};
 use crate::report::{MODEL, PAPER, assert_unique_ids, hostile, report, statuses, table, texts};
 
-/// The front of a review of several schemes, or of one.
+/// First box of a review of several schemes or of one, by its title.
 fn findings(page: &Html, title: &str) -> Vec<[String; 2]> {
     let all = statuses(page);
     let titles = texts(page, ".front > .statuses > .status > .heading:first-child");
@@ -19,14 +19,15 @@ fn findings(page: &Html, title: &str) -> Vec<[String; 2]> {
     all[k].iter().map(|[what, grade, text]| [what.clone(), format!("{grade}: {text}")]).collect()
 }
 
-/// What is recommended holds by the numbers of the same page, and nothing is where schemes are not like with
-/// like.
+/// The recommendation agrees with the numbers of the same page. Schemes with different tasks get no
+/// recommendation.
 #[test]
 fn several_schemes_are_compared_first() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, dwell: u32, attitudes: &[&str], more: &str| -> String {
         let mut text = format!(
-            "name = '{name}'\nterms = ['F', 'S']\ncarry = 'inertial'\nlatitude_deg = 48\n{more}\n[simulation]\ndwell_s = {dwell}\n\
+            "name = '{name}'\nterms = ['F', 'S']\ncarry = 'inertial'\nlatitude_deg = 48\n{more}\n[simulation]\n\
+             dwell_s = {dwell}\n\
              drift_scale = 1e-4\npriors = {{ D = 1e5, psi = 10 }}\n[requirements]\nD = 0.05\npsi = 1\n"
         );
         attitudes.iter().for_each(|a| text.push_str(&format!("[[position]]\nattitude = '{a}'\n")));
@@ -47,7 +48,7 @@ fn several_schemes_are_compared_first() {
         "{recommended:?}"
     );
     assert_eq!(alike[1], "good: ok same conditions, unknowns and requirements; they take 1200 to 3600 s");
-    // schemes are columns, and a margin says whether it is met as what it is held against says
+    // one column per scheme; a margin is called met exactly if sigma meets the requirement
     let matrix = table(&page, "Margins (required over predicted sigma");
     assert_eq!(texts(&page, ".front thead th"), ["long", "short", "one"]);
     let side = table(&page, "By unknown");
@@ -65,7 +66,7 @@ fn several_schemes_are_compared_first() {
     assert_eq!(texts(&page, ".front .graded.missed").iter().filter(|t| *t == "not determined").count(), {
         matrix.iter().skip(5).flatten().filter(|c| *c == "not determined").count()
     });
-    // other carries are other questions
+    // schemes under other carries are not compared
     let other = write("other", 600, &four, "measured_azimuth = true");
     let text = std::fs::read_to_string(&other).expect("a file").replace("'inertial'", "'platform'");
     std::fs::write(&other, text).expect("written");
@@ -73,7 +74,7 @@ fn several_schemes_are_compared_first() {
     let found = findings(&page, "Comparison of 2 schemes");
     assert!(found[0][1].starts_with("open: open none: schemes that differ in carry"), "{found:?}");
     assert!(found[1][1].starts_with("limited: LIMITED the schemes differ in carry"), "{found:?}");
-    // where none meets its requirements none is recommended
+    // no recommendation if no scheme meets its requirements
     let page = page_of("none.html", &[&one, &one]);
     let found = findings(&page, "Comparison of 2 schemes");
     assert!(
@@ -82,7 +83,7 @@ fn several_schemes_are_compared_first() {
     );
 }
 
-/// Angles without numbers have verdicts and no predictions, alone and beside others.
+/// Generic angles have verdicts and no predictions, alone and beside other schemes.
 #[test]
 fn generic_angles_are_reported() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -120,34 +121,37 @@ fn a_browser_shows_it() {
     let (paper, _) = report(folder.path(), "paper.html", &[PAPER]);
     let scheme = hostile(folder.path(), 12).display().to_string();
     let (long, _) = report(folder.path(), "twelve.html", &[&scheme]);
-    // formulas of dozens of terms are not cut at the edge of a sheet
+    // formulas with dozens of terms are not cut at the edge of a sheet
     let (formulas, _) = report(folder.path(), "five.html", &["examples/five-positions/scheme.toml"]);
     browser.open(&formulas, 700, 900);
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
     browser.settle();
     let cut = browser.value(
-        "(() => { const all = [...document.querySelectorAll('.formulas math')], w = document.documentElement.clientWidth; \
+        "(() => { const all = [...document.querySelectorAll('.formulas math')], \
+         w = document.documentElement.clientWidth; \
          return [all.length, all.filter(e => e.getBoundingClientRect().right > w + 1).length]; })()",
     );
     assert!(cut[0].as_u64() > Some(200) && cut[1] == json!(0), "{cut}");
-    // nor are tables, of positions with their slews neither
+    // tables are not cut either, nor positions with their slews
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
     for file in [&formulas, &long] {
         browser.open(file, 688, 900);
         browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
         browser.settle();
         let cut = browser.value(
-            "(() => { const w = document.documentElement.clientWidth; return [...document.querySelectorAll('.wide > table')] \
+            "(() => { const w = document.documentElement.clientWidth; return [...document.querySelectorAll('.wide > \
+             table')] \
              .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.innerText.slice(0, 80)); })()",
         );
         assert_eq!(cut, json!([]), "cut at the edge of a sheet");
         browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
     }
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
-    // what is folded is on paper all the same
+    // folded parts are printed on paper
     let (several, _) = report(folder.path(), "several.html", &[PAPER, MODEL]);
     browser.open(&several, 1280, 900);
-    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ contentVisibilityAuto: true }))";
+    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ \
+                   contentVisibilityAuto: true }))";
     let seen = |browser: &mut Browser, all: bool| {
         let shown = browser.value(visible);
         let shown = shown.as_array().expect("a list");
@@ -158,7 +162,7 @@ fn a_browser_shows_it() {
     browser.settle();
     seen(&mut browser, true);
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
-    // a rule that is broken for readers of screens or keys, in the light and in the dark
+    // accessibility rules for screen readers and keyboards, in light and dark mode
     let axe = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/axe/axe.min.js"));
     let axe = axe.expect("tests/data/axe/axe.min.js");
     for file in [&several, &paper] {
@@ -169,7 +173,8 @@ fn a_browser_shows_it() {
             browser.value("document.querySelectorAll('details').forEach(d => { d.open = true; })");
             browser.value(&format!("{axe};1"));
             let found = browser.value(
-                "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+                "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + \
+                 v.nodes[0].html.slice(0, 200))])",
             );
             assert!(found[0].as_u64() > Some(15) && found[1] == json!([]), "{scheme}: {found}");
         }
@@ -179,9 +184,10 @@ fn a_browser_shows_it() {
     for (file, degree_of_d_fy) in [(&paper, "2"), (&long, "1")] {
         browser.events.clear();
         browser.open(file, 1280, 900);
-        // every figure with curves has a drawing of its own, and the still one is out of the way
+        // every figure with curves has an interactive drawing, and the still picture is hidden
         let counts = browser.value(
-            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves canvas').length, \
+            "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves \
+             canvas').length, \
              [...document.querySelectorAll('figure.curves > .still')].filter(e => e.checkVisibility()).length]",
         );
         assert!(counts[0].as_u64() > Some(10) && counts[0] == counts[1] && counts[2] == json!(0), "{counts}");
@@ -190,7 +196,8 @@ fn a_browser_shows_it() {
             browser.settle();
             let beyond = browser.value(
                 "(() => { const w = document.documentElement.clientWidth; \
-                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || e.classList.contains('wide')) \
+                 const out = [...document.body.querySelectorAll('*')].filter(e => !e.closest('.wide') || \
+                 e.classList.contains('wide')) \
                  .filter(e => e.getBoundingClientRect().right > w + 1 && !e.closest('svg, .u-wrap')) \
                  .map(e => e.tagName + '.' + e.className); \
                  return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
@@ -199,7 +206,7 @@ fn a_browser_shows_it() {
         }
         browser.size(1280, 900);
         browser.settle();
-        // a curve is switched off and on, a value is read under the pointer
+        // curves can be switched off and on, and values are read under the pointer
         let series = "#s1_attitude .u-legend .u-series:nth-child(2)";
         let off = format!("document.querySelector({series:?}).classList.contains('u-off')");
         assert_eq!(browser.value(&off), json!(false));
@@ -212,10 +219,11 @@ fn a_browser_shows_it() {
             .value(&format!("document.querySelector({series:?}).querySelector('.u-value').textContent"));
         assert!(shown.as_str().is_some_and(|v| v.parse::<f64>().is_ok()), "{shown}");
         let degree = browser.value(
-            "[...document.querySelectorAll('td')].find(c => c.textContent == 'D_FY').parentElement.children[3].textContent",
+            "[...document.querySelectorAll('td')].find(c => c.textContent == \
+             'D_FY').parentElement.children[3].textContent",
         );
         assert_eq!(degree, json!(degree_of_d_fy));
-        // dark
+        // dark mode
         let paper = browser.value("getComputedStyle(document.body).backgroundColor");
         let dark = json!({ "features": [{ "name": "prefers-color-scheme", "value": "dark" }] });
         browser.call("Emulation.setEmulatedMedia", dark);
@@ -229,7 +237,7 @@ fn a_browser_shows_it() {
         );
         assert_eq!(printed, json!(true), "on paper the still pictures");
         browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
-        // no error, no request but for the page itself
+        // no error, and no request except for the page itself
         for event in &browser.events {
             let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);
             assert_ne!(method, "Runtime.exceptionThrown", "{of}");
@@ -243,7 +251,7 @@ fn a_browser_shows_it() {
     }
 }
 
-/// The recommended actions of a page, box by box.
+/// Recommended actions of a page, one list per box.
 fn actions(page: &Html) -> Vec<Vec<String>> {
     let parse = |s: &str| Selector::parse(s).expect("a selector");
     let lines = |e: scraper::ElementRef<'_>| {
@@ -252,7 +260,7 @@ fn actions(page: &Html) -> Vec<Vec<String>> {
     page.select(&parse("body > .front .status")).map(lines).collect()
 }
 
-/// The model with an unknown of it known beforehand, at a generic value.
+/// The model with one unknown set to a known generic value.
 fn knowing(model: &SystemModel, name: &str) -> SystemModel {
     let mut out = model.clone();
     if let Some(state) = out.states.iter_mut().find(|s| s.named.name == name) {
@@ -265,8 +273,8 @@ fn knowing(model: &SystemModel, name: &str) -> SystemModel {
     out
 }
 
-/// What the box of a model recommends is tried: one unknown of a group known beforehand, each in turn, makes
-/// the others observable; where no one does, that is not said.
+/// Recommendations of the box of a model are tried: with any unknown of a group known, the others become
+/// observable. A group for which one value does not suffice gets another recommendation.
 #[test]
 fn a_model_says_what_to_know_beforehand() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -308,13 +316,14 @@ fn a_model_says_what_to_know_beforehand() {
     let three = "name='three'\nparameters=['a','b','c']\n[states]\nx='-a*b*c*x'\n[outputs]\ny='x'\n";
     let all = page(&written("three.toml", three));
     assert_eq!(all[0], "To resolve a: know b and c; degree 1", "{all:?}");
-    let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\nstep=0.1\n\
+    let one = "name='one'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[simulation]\nduration=10\n\
+               step=0.1\n\
                values={x=1,k=0.5}\npriors={x=0.01,k=0.01}\nnoise={y=0.001}\n";
     let all = page(&written("one.toml", one));
     assert!(all.len() == 1 && all[0].starts_with("No action: every unknown is observable"), "{all:?}");
 }
 
-/// The box of a calibration says what to do about what speaks against it, or that there is nothing.
+/// The box of a calibration recommends an action for each doubt, or says that none is needed.
 #[test]
 fn a_calibration_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! Rotating segments: all attitudes of an arc at once.
+//! Rotating segments: all attitudes of an arc in one position.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::{Carry, Rotation, Scheme, parse_attitude};
@@ -8,7 +8,7 @@ use proptest::test_runner::{Config, RngSeed};
 
 use crate::schemes::judged;
 
-/// `NUE@X_p:360` or `10,20,30`.
+/// Scheme from texts such as `NUE@X_p:360` or `10,20,30`.
 fn scheme(parts: &[&str], carry: Carry) -> Scheme {
     let split = |part: &&str| {
         part.split_once('@').map_or((part.to_string(), None), |(a, r)| (a.into(), Some(r.to_string())))
@@ -30,7 +30,7 @@ fn degrees(a: &Analysis) -> Vec<(String, Option<usize>)> {
     out
 }
 
-/// Derived independently of the program.
+/// Reference verdicts, derived independently of the program.
 #[test]
 fn reference_verdicts() {
     let both = judged(&scheme(&["NUE@X_p:360", "NUE@Z_p:360"], Carry::Inertial));
@@ -43,8 +43,8 @@ fn reference_verdicts() {
 proptest! {
     #![proptest_config(Config { cases: 40, rng_seed: RngSeed::Fixed(2), ..Config::default() })]
 
-    /// A rotation is what many positions on its arc are when psi^n goes on between them: the stations taken
-    /// are enough, and more do not help. Each axis is started where its turn is a change of one Euler angle.
+    /// A rotation is equivalent to many positions on its arc with psi^n carried between them: the chosen
+    /// stations suffice, and more add nothing. Each axis starts where its turn changes one Euler angle.
     #[test]
     fn a_rotation_is_all_positions_of_its_arc(
         [a, b, c] in prop::array::uniform3(-170i32..170),
@@ -64,7 +64,7 @@ proptest! {
         let text = |x: [f64; 3]| format!("{},{},{}", x[0], x[1], x[2]);
         let start = start.map(f64::from);
         let rotating = format!("{}@{about}:{arc}", text(start));
-        // the first one is where psi is defined
+        // psi refers to the first position
         let positions: Vec<String> = std::iter::once(0.0)
             .chain(at)
             .map(|part| {
@@ -82,8 +82,8 @@ proptest! {
         prop_assert_eq!(degrees(&whole), degrees(&sampled));
     }
 
-    /// Where a rotation ends at the attitude of what follows, no psi jumps, so that two carries say the same;
-    /// and psi in platform axes is handed on from where the rotation ended, not from where it began.
+    /// If a rotation ends at the attitude of the next position, psi does not jump, so that two carries give
+    /// the same verdicts. psi in platform axes is carried from the end of the rotation, not from its start.
     #[test]
     fn psi_is_handed_on_where_a_rotation_ends(arc in -350i32..350, b in -80i32..80, c in -170i32..170) {
         prop_assume!(arc.abs() > 1);
@@ -95,7 +95,7 @@ proptest! {
             degrees(&judged(&scheme(&parts, Carry::Platform))),
             degrees(&judged(&scheme(&parts, Carry::Inertial)))
         );
-        // and a jump that is one differs from none in general: the rank profile of V_0 tells
+        // a jump of psi generally makes a difference, which the rank of V_0 shows
         let jump = format!("{},{b},0", 90 - arc);
         let parts = [rotating.as_str(), jump.as_str()];
         let profile = |carry| judged(&scheme(&parts, carry)).rank_profile[0];
@@ -103,8 +103,8 @@ proptest! {
     }
 }
 
-/// The filter runs through a rotation and agrees with its own covariance, against linear and exact truth;
-/// what the exact verdicts call not observable stays at the prior.
+/// The filter runs through a rotation and is consistent with its covariance, against linear and exact truth.
+/// Every sigma falls below half its prior.
 #[test]
 fn a_rotation_is_simulated() {
     let scheme = scheme(&["NUE@X_p:360", "NUE@Z_p:360"], Carry::Inertial);

@@ -1,4 +1,4 @@
-//! Sentences on runs, filters and searches, read and tried.
+//! Sentences on runs, filters and searches, compared with the runs.
 
 use obsdeg_core::system::{SystemModel, model_file};
 use obsdeg_evidence::crosscheck::Agreement;
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::program::{json, run, stdout};
 
-/// What a command prints, its lines joined.
+/// Output of a command, with its lines joined.
 fn said(arguments: &[&str]) -> String {
     stdout(&run(arguments)).split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -18,7 +18,7 @@ fn joined(text: &str) -> String {
 
 const P1_P2: [&str; 4] = ["--angles", "0,0,0", "--angles", "180,0,0"];
 
-/// The latitude of an answer without one is that of the help: none, or 28.2.
+/// The latitude of an answer without one is that of the help: none, or 28.2 deg.
 #[test]
 fn help_says_which_latitude_is_taken() {
     let help = |command: &str| {
@@ -43,7 +43,7 @@ fn help_says_which_latitude_is_taken() {
     assert!(help("analyze").contains("left out: generic"));
 }
 
-/// The drifts that are named are those of the run, the factor on them included.
+/// The drifts in sentences are those of the run, including their factor.
 #[test]
 fn drifts_are_named_with_their_factor() {
     for (scale, factor) in [("1", 1.0), ("0.001", 0.001), ("2", 2.0)] {
@@ -67,7 +67,7 @@ fn drifts_are_named_with_their_factor() {
     }
 }
 
-/// First lines name every condition that nothing states, also where it is stated for some unknowns.
+/// First lines name every condition that is not stated, also if it is stated for some unknowns.
 #[test]
 fn what_nothing_states_is_named() {
     let first = |more: &[&str]| {
@@ -100,8 +100,8 @@ fn what_nothing_states_is_named() {
     }
 }
 
-/// First lines, JSON and advice say whose sigmas are not to be trusted: single runs of such a filter are
-/// consistent.
+/// First lines, JSON and advice name the filters with untrustworthy sigmas, although single runs of such a
+/// filter are consistent.
 #[test]
 fn filters_that_are_not_to_be_trusted_are_named() {
     let first = "Do not trust the filter's sigmas, although this run is consistent";
@@ -130,8 +130,8 @@ fn filters_that_are_not_to_be_trusted_are_named() {
     assert!(consistent > 0, "a run that looks right");
 }
 
-/// A filter with full attitudes follows a platform that has them: a truth that nobody states is exact, and is
-/// named. One that is stated as linear is refused, as is such a filter that is wrong on purpose.
+/// A filter with full attitudes needs a truth with full attitudes: an unstated truth is exact, and is named.
+/// A linear truth is refused, and so is a deliberate change of such a filter.
 #[test]
 fn the_truth_is_one_that_the_filter_can_follow() {
     for (filter, expected) in [("linear", "linear"), ("extended", "exact"), ("iterated", "exact")] {
@@ -145,7 +145,7 @@ fn the_truth_is_one_that_the_filter_can_follow() {
     }
     let crosscheck = |more: &[&str]| {
         let arguments = [&["crosscheck", "-q", "--runs", "20"], &P1_P2[..], more].concat();
-        // an exit code of 1 says that evidence disagrees
+        // exit code 1: the evidence disagrees
         let output = run(&[&arguments[..], &["--format", "json"]].concat());
         serde_json::from_str::<Value>(&stdout(&output)).expect("JSON")
     };
@@ -199,11 +199,13 @@ fn read(text: &str) -> SystemModel {
     model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// From t = 0 on y = (a + b) t + a t^71/71: no derivative up to the bound shows a and b, a run does.
-const BEYOND: &str = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n[outputs]\ny='x'\n\
-                      [simulation]\nduration=1.5\nstep=0.1\nnoise={y=0.01}\nvalues={a=0.5, b=1.0, x=0.0}\npriors={a=1.0, b=1.0, x=1.0}";
+/// Model with y = (a + b) t + a t^71/71 from t = 0: no derivative up to the bound shows a and b, a run does.
+const BEYOND: &str = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n\
+                      [outputs]\ny='x'\n\
+                      [simulation]\nduration=1.5\nstep=0.1\nnoise={y=0.01}\nvalues={a=0.5, b=1.0, x=0.0}\n\
+                      priors={a=1.0, b=1.0, x=1.0}";
 
-/// What a run shows beyond the bound contradicts nothing, and is not called unseen by the run.
+/// Information beyond the bound contradicts no verdict, and the run does not call it unobservable.
 #[test]
 fn beyond_the_bound_samples_speak_for_themselves() {
     let model = read(BEYOND);
@@ -211,7 +213,7 @@ fn beyond_the_bound_samples_speak_for_themselves() {
     assert!(evidence.passed && evidence.seen_up_to == Some(60), "{evidence:?}");
     let of = |name: &str| evidence.quantities.iter().find(|q| q.name == name).expect("an unknown");
     for name in ["a", "b"] {
-        // the samples do see it
+        // the samples determine it
         assert!(of(name).inflation.measured.is_some_and(|x| x < 1.1), "{evidence:?}");
         assert_eq!(of(name).inflation.outcome, Agreement::NotResolvable);
     }
@@ -228,7 +230,7 @@ fn beyond_the_bound_samples_speak_for_themselves() {
     assert!(a.sigma < 1e-9 * a.prior_sigma, "{a:?}");
     let text = joined(&written(&run, Format::Table, Layout::default()).expect("text"));
     assert!(!text.contains("known from the prior only"), "{text}");
-    // what is proven not to be observable still is
+    // a proof of unobservability still counts
     let text = BEYOND.replace("a + b + a*u", "a + b").replace("known_inputs={u={function='t^70'}}\n", "");
     let model = read(&text);
     let evidence = obsdeg_evidence::system::crosscheck_system(&model, 1).expect("evidence");
@@ -240,7 +242,7 @@ fn beyond_the_bound_samples_speak_for_themselves() {
     assert!(text.contains("known from the prior only") || text.contains("rests on the prior"), "{text}");
 }
 
-/// A combination that no order up to the bound shows is not called unobservable.
+/// A combination that is not resolved up to the bound is not called unobservable.
 #[test]
 fn combinations_beyond_the_bound_are_not_called_unobservable() {
     use obsdeg_core::system::{SystemOptions, analyze_system};
@@ -258,7 +260,7 @@ fn combinations_beyond_the_bound_are_not_called_unobservable() {
     assert!(proven.contains("not observable") && !proven.contains("not seen"), "{proven}");
 }
 
-/// The first line of a search says what the best is the best of, and by which order.
+/// The first line of a search names the candidates and the order in which the best scheme is the best.
 #[test]
 fn the_best_is_that_of_the_candidates_in_their_order() {
     let arguments = ["design", "-q", "--positions", "2", "--observable", "D_FX", "--carry", "inertial"];
@@ -270,13 +272,13 @@ fn the_best_is_that_of_the_candidates_in_their_order() {
         text.contains("Proven best of these candidates by worst degree, then the criterion worst: "),
         "{text}"
     );
-    // other attitudes may do better: candidates that are turned by 45 degrees are
+    // other attitudes may be better: candidates turned by 45 degrees are
     let best = |answer: &Value| answer["found"][0]["value"].as_f64().expect("a number");
     let finer = json(&[&arguments[..], &["--candidates", "grid:45", "--format", "json"]].concat());
     assert!(best(&finer) <= best(&answer), "{} {}", best(&finer), best(&answer));
 }
 
-/// Where no set of cardinal attitudes was examined to the end, nothing is said of the fewest.
+/// If no set of cardinal attitudes was examined completely, nothing is said about the fewest positions.
 #[test]
 fn nothing_is_said_of_sets_that_were_not_examined() {
     use obsdeg_design::design::Minimum;

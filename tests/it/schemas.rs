@@ -1,4 +1,4 @@
-//! What the program reads and writes, held against the JSON Schemas that it prints.
+//! Inputs and outputs of the program against the JSON Schemas that it prints.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
-/// The kinds of `obsdeg schema`.
+/// Kinds of `obsdeg schema`.
 const KINDS: [&str; 21] = [
     "allan",
     "analysis",
@@ -32,7 +32,7 @@ const KINDS: [&str; 21] = [
     "walks",
 ];
 
-/// The schemas by the names that answers give themselves.
+/// Schemas by the names that answers state.
 fn schemas() -> BTreeMap<String, Value> {
     let of = |kind: &str| {
         let schema = json(&["schema", kind]);
@@ -53,7 +53,7 @@ fn published_schemas_are_what_the_program_prints() {
             std::fs::write(&file, &printed).expect("written");
         }
         let published = std::fs::read_to_string(&file).expect("a published schema");
-        // the first line that differs: a schema is too long to be shown
+        // shows only the first line that differs, since a schema is long
         let differs = published.lines().zip(printed.lines()).position(|(a, b)| a != b);
         assert!(published == printed, "{kind}: line {differs:?}; UPDATE_SCHEMAS=1 writes the file again");
     }
@@ -148,7 +148,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         stdout(&run(&[line, &["--certificate", &path, "--force"]].concat()));
         let mut value: Value =
             serde_json::from_str(&std::fs::read_to_string(&path).expect("written")).expect("JSON");
-        // what is no answer says its layout under another key
+        // files that are no answers name their layout in another key
         value["schema"] = value["layout"].clone();
         answer(&value, &line.join(" "));
     }
@@ -158,7 +158,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         .filter(|k| !seen.contains_key(*k) && !["obsdeg.scheme/1", "obsdeg.model/1"].contains(&k.as_str()))
         .collect();
     assert!(unused.is_empty(), "{unused:?}");
-    // and they refuse: a field that is missing, one of another type
+    // the schemas refuse a missing field and a field of another type
     let mut wrong = json(&["analyze", five, "--solutions", "off", "--format", "json"]);
     let analysis = &schemas["obsdeg.analysis/1"];
     wrong["rank"] = "eight".into();
@@ -167,14 +167,14 @@ fn files_and_answers_are_as_their_schemas_say() {
     assert_eq!(faults(analysis, analysis, &wrong, ""), [": rank is missing"]);
 }
 
-/// Descriptions, read as someone does who sees one of them alone in an editor's hint.
+/// Rules for descriptions that must be understood alone, as in an editor's hint.
 mod descriptions {
     use serde_json::{Map, Value};
 
     use super::KINDS;
     use crate::program::{json, run, stdout};
 
-    /// A description has at least as many characters.
+    /// Smallest number of characters of a description.
     const SHORTEST: usize = 26;
 
     /// First words that point at something instead of naming it.
@@ -183,7 +183,7 @@ mod descriptions {
         "It", "Its", "Their", "Under", "So",
     ];
 
-    /// Units, as they follow `in`.
+    /// Units that may follow `in`.
     const UNITS: [&str; 11] = [
         "s",
         "deg",
@@ -198,17 +198,17 @@ mod descriptions {
         "percent",
     ];
 
-    /// Words for units that another field or file states.
+    /// Phrases for units that another field or file states.
     const STATED: [&str; 4] = ["unit of", "units of", "in its unit", "order and units"];
 
-    /// Words for numbers without a unit.
+    /// Phrases for numbers without a unit.
     const WITHOUT: [&str; 7] =
         ["dimensionless", "number of", "number that", "line number", "index", "seed of", "probability"];
 
-    /// Words for whole numbers without a unit.
+    /// Phrases for whole numbers without a unit.
     const COUNTED: [&str; 4] = ["rank", "order", "observable degree", "worst degree"];
 
-    /// Numbers in a value.
+    /// Kind of numbers in a value.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
     enum Numbers {
         None,
@@ -216,8 +216,8 @@ mod descriptions {
         Real,
     }
 
-    /// Numbers in a value of this schema, those of its lists and tables too. Types by name have their own
-    /// descriptions.
+    /// Kind of numbers in a value of this schema, including those in its lists and tables. Types referenced
+    /// by name have separate descriptions.
     fn numbers(schema: &Value) -> Numbers {
         let types = match &schema["type"] {
             Value::Array(all) => all.iter().filter_map(Value::as_str).collect(),
@@ -306,7 +306,7 @@ mod descriptions {
         assert!(out.is_empty(), "{} faults:\n{}", out.len(), out.join("\n"));
     }
 
-    /// Descriptions that say nothing are refused, and so are keys and types without one.
+    /// Empty or pointing descriptions are refused, and so are keys and types without one.
     #[test]
     fn that_point_are_refused() {
         let (short, points, unit) =

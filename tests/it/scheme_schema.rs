@@ -1,11 +1,12 @@
-//! The JSON Schema of scheme files against the files that are shipped: the schema says no to none of them,
-//! and to those on purpose wrong that a schema can express.
+//! The JSON Schema of scheme files against the shipped files: it accepts all of them, and refuses
+//! deliberately wrong files if a schema can express the error.
 
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-/// What of a value breaks a schema, by its place; the keywords are those that the schema of scheme files has.
+/// Violations of a schema by a value, each with its place; supports the keywords of the schema of scheme
+/// files.
 fn violations(root: &Value, schema: &Value, value: &Value, at: &str, out: &mut Vec<String>) {
     let Some(keys) = schema.as_object() else { return };
     for (key, rule) in keys {
@@ -108,7 +109,7 @@ fn violations(root: &Value, schema: &Value, value: &Value, at: &str, out: &mut V
     }
 }
 
-/// TOML as JSON.
+/// Converts TOML to JSON.
 fn converted(value: toml::Value) -> Value {
     match value {
         toml::Value::String(s) => s.into(),
@@ -146,14 +147,14 @@ fn the_schema_accepts_every_shipped_scheme() {
     assert!(files.len() > 15, "{}", files.len());
     for file in files {
         let found = broken(&std::fs::read_to_string(&file).expect("readable"));
-        // what a schema can say of those that are wrong: a unit is missing
+        // the schema can express one of the errors: a missing unit
         let wrong = file.to_string_lossy().contains("wrong-noise");
         assert_eq!(found.is_empty(), !wrong, "{}: {found:?}", file.display());
     }
 }
 
-/// What the reader refuses for its kind, its range or its key, the schema refuses too; and every key that the
-/// schema has is read.
+/// The schema refuses what the reader refuses because of kind, range or key, and the reader accepts every key
+/// of the schema.
 #[test]
 fn schema_and_reader_agree() {
     use obsdeg_core::model::scheme_file::read;
@@ -196,21 +197,28 @@ fn schema_and_reader_agree() {
         assert!(!broken(&text).is_empty(), "{keys}");
     }
     let all = format!(
-        "name = \"n\"\ndescription = \"d\"\ncarry = \"inertial\"\nlatitude_deg = -3.5\nterms = [\"F\", \"I\", \"M6\"]\nframe = \"gyros\"\npath = \"one-axis\"\nmeasured_azimuth = true
+        "name = \"n\"\ndescription = \"d\"\ncarry = \"inertial\"\nlatitude_deg = -3.5\n\
+         terms = [\"F\", \"I\", \"M6\"]\nframe = \"gyros\"\npath = \"one-axis\"\nmeasured_azimuth = true
 combinations = [\"D_IX - D_IY\"]
-geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O = \"-z\", S = \"-x\" }}, Z = {{ I = \"+z\", O = \"+x\", S = \"+y\" }}, accelerometers = {{ X = \"+x\", Y = \"+y\", Z = \"+z\" }} }}
+geometry = {{ X = {{ I = \"+x\", O = \"-z\", S = \"+y\" }}, Y = {{ I = \"+y\", O = \"-z\", S = \"-x\" }}, Z = {{ I = \
+\"+z\", O = \"+x\", S = \"+y\" }}, accelerometers = {{ X = \"+x\", Y = \"+y\", Z = \"+z\" }} }}
 {position}name = \"a\"\ndwell_s = 5\nrotation = {{ about = \"N\", rate_deg_s = 1 }}
 [[position]]\nattitude = \"NUE\"\nslew = {{ rate_deg_s = 1, about = \"X_p\", angle_deg = 90 }}
-[simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\naccelerometer_noise_g = 1e-5\naccelerometer_bias_instability_ug = 1\naccelerometer_correlation_time_s = 60\nazimuth_noise_deg = 1
+[simulation]\ntruth = \"exact\"\nfilter = \"extended\"\nstep_s = 1\ndwell_s = 2\nslew_rate_deg_s = 3\n\
+accelerometer_noise_g = 1e-5\naccelerometer_bias_instability_ug = 1\naccelerometer_correlation_time_s = 60\n\
+azimuth_noise_deg = 1
 drift_noise = \"0.1 deg/sqrt(h)\"\nangle_random_walk_deg_sqrt_h = 0.001\nrate_random_walk_dph_sqrt_h = [0.1, 0, 0.1]
-bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\nestimates = {{ D = 1 }}\npriors = {{ D = 1 }}
-[requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\nstatic = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\nalpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
+bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\n\
+estimates = {{ D = 1 }}\npriors = {{ D = 1 }}
+[requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\n\
+static = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\n\
+alpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
     );
     assert_eq!(broken(&all), Vec::<String>::new());
     let all = all.replace("[0, 1]", "[-180, 180]");
     // misalignments are judged at positions
     read(&all.replace("rotation = { about = \"N\", rate_deg_s = 1 }\n", "")).expect("a scheme");
-    // no key of the schema is missing above
+    // the texts above contain every key of the schema
     let schema = schema();
     let mut keys: Vec<&String> = Vec::new();
     for object in schema["$defs"].as_object().expect("definitions").values().chain([&schema]) {

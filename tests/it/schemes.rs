@@ -1,4 +1,4 @@
-//! Schemes that several tests are about.
+//! Schemes shared by several tests.
 
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};

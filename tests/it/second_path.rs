@@ -1,5 +1,5 @@
-//! Independent paths to the same verdicts: exact rational arithmetic on the equations in platform
-//! axes, and the equations written as text in n and in platform axes.
+//! Independent paths to the same verdicts: exact rational arithmetic on the equations in platform axes, and
+//! the equations as text in n and in platform axes.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -66,7 +66,7 @@ impl Rref {
     }
 }
 
-/// C_c^n by (24), read the other way round: psi^c = (C_c^n)^T psi^n.
+/// Attitude matrix C_c^n from (24), in the reverse direction: psi^c = (C_c^n)^T psi^n.
 fn c_n(t: &[Q; 3]) -> [[Q; 3]; 3] {
     let one = q(1, 1);
     let cs = |t: &Q| {
@@ -82,14 +82,14 @@ fn c_n(t: &[Q; 3]) -> [[Q; 3]; 3] {
     ]
 }
 
-/// Rank profile and degrees by the equations in platform axes (2), (3), (6), straight from the text
-/// of the method, with 15 unknowns (psi^c, D) and the state transported by the carry.
+/// Rank profile and degrees by the equations in platform axes (2), (3), (6), directly from the text of the
+/// method, with 15 unknowns (psi^c, D) and the state transported by the carry.
 fn oracle(tangents: &[[Q; 3]], carry: Carry, w_n: &Q, w_u: &Q) -> (Vec<usize>, Vec<Option<usize>>) {
     let (profile, degree, _) = oracle_with_psi(tangents, carry, w_n, w_u);
     (profile, degree)
 }
 
-/// The same, and the degrees of psi^c at the start of every position.
+/// Rank profile and degrees, and the degrees of psi^c at the start of every position.
 #[expect(clippy::type_complexity, reason = "a name for it would be used here alone")]
 fn oracle_with_psi(
     tangents: &[[Q; 3]],
@@ -137,7 +137,7 @@ fn oracle_with_psi(
         h[1][2] = g[0].clone();
         h[2][0] = g[1].clone();
         h[2][1] = -g[0].clone();
-        // S_i
+        // map S_i
         let mut s = vec![vec![zero.clone(); n]; 15];
         for a in 0..12 {
             s[3 + a][d0 + a] = q(1, 1);
@@ -193,8 +193,8 @@ fn oracle_with_psi(
     }
 }
 
-/// What is said to differ under the other carries does, and all of it: psi at the start of a position,
-/// `psi_x@2`, is the same quantity under all carries, and only under reset carry an unknown.
+/// The reported differences under the other carries are exact and complete. psi at the start of a position,
+/// such as `psi_x@2`, is the same quantity under all carries, and an unknown only under reset carry.
 #[test]
 fn carries_are_compared_in_the_same_quantities() {
     let mut rng = SplitMix64::new(33);
@@ -261,8 +261,8 @@ fn engine(tangents: &[[(i64, i64); 3]], carry: Carry, rng: &mut SplitMix64) -> D
     staircase(&platform, &values.sample(platform.scheme(), 1)).0
 }
 
-/// 240 random schemes at rational points of the unit circle, special ones (0, 90, -90 degrees)
-/// included: rank profile and every degree agree with exact rational arithmetic.
+/// 240 random schemes at rational points of the unit circle, special angles (0, 90, -90 degrees) included:
+/// rank profile and every degree agree with exact rational arithmetic.
 #[test]
 fn rational_arithmetic_agrees_on_random_schemes() {
     let mut rng = SplitMix64::new(2017);
@@ -292,7 +292,7 @@ fn rational_arithmetic_agrees_on_random_schemes() {
 
 type Matrix = Vec<Vec<u64>>;
 
-/// Rows of the current order, dynamics, map to the unknowns.
+/// Output rows of the current order, dynamics, map to the unknowns.
 type Segment = (Matrix, Matrix, Matrix);
 
 /// Linear dynamics per segment given by dense matrices: a second source of derivative rows.
@@ -327,7 +327,7 @@ impl DerivativeRows for Matrices {
     }
 }
 
-/// Values for names while one state at a time is one.
+/// Values of names with one state equal to one and the others zero.
 struct Names<'a> {
     constants: &'a [(String, u64)],
     states: &'a [String],
@@ -472,7 +472,7 @@ fn text_equations_in_both_axes_give_the_same_verdicts() {
             let built_in = staircase(&platform, &values.sample(platform.scheme(), 1)).0;
             for in_n in [true, false] {
                 let (profile, degree) = from_text(in_n, attitudes, carry, 5);
-                // orders past the last that can add repeat the rank
+                // orders beyond the last that can add rows repeat the rank
                 assert_eq!(
                     profile[..built_in.rank_profile.len()],
                     built_in.rank_profile,

@@ -1,4 +1,4 @@
-//! Sets of outputs of a model against the verdicts on every set, one by one.
+//! Sets of outputs of a model, against separate verdicts on every set.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use obsdeg_design::sensors::{FrontSet, SensorError, SensorOptions, Sensors, sens
 use crate::models::models;
 use crate::program::{refused, run, stderr, stdout};
 
-/// Verdicts are drawn from another seed than the search.
+/// Seed of the verdicts, different from that of the search.
 const SEED: u64 = 7;
 
 type Degrees = Vec<(String, Option<usize>)>;
@@ -17,7 +17,8 @@ fn members(set: usize) -> impl Iterator<Item = usize> {
     (0..usize::BITS as usize).filter(move |c| set >> c & 1 == 1)
 }
 
-/// Degrees of the unknowns of a model that measures a set of candidates; none of a set without outputs.
+/// Degrees of the unknowns of a model with a set of candidates as outputs; all `None` for an empty set
+/// without outputs.
 fn degrees(model: &SystemModel, candidates: &[Candidate], set: usize, own: bool) -> Degrees {
     let chosen: Vec<Candidate> = members(set).map(|c| candidates[c].clone()).collect();
     let (measuring, _) = model.measuring(&chosen, own);
@@ -38,7 +39,7 @@ fn degrees(model: &SystemModel, candidates: &[Candidate], set: usize, own: bool)
     names(&measuring).into_iter().map(of).collect()
 }
 
-/// The degrees under every set, on two threads.
+/// Degrees under every set, computed on two threads.
 fn every_set(model: &SystemModel, candidates: &[Candidate], own: bool) -> Vec<Degrees> {
     let all: Vec<usize> = (0..1 << candidates.len()).collect();
     let half = |parity: usize| {
@@ -54,14 +55,14 @@ fn every_set(model: &SystemModel, candidates: &[Candidate], own: bool) -> Vec<De
     all.into_iter().filter_map(|s| found.remove(&s)).collect()
 }
 
-/// What an answer must say of every set.
-struct Oracle<'a> {
+/// Reference answers, derived from the verdicts on every set.
+struct SetOracle<'a> {
     candidates: &'a [Candidate],
     every: &'a [Degrees],
     required: Vec<usize>,
 }
 
-impl Oracle<'_> {
+impl SetOracle<'_> {
     fn cost(&self, set: usize) -> f64 {
         members(set).map(|c| self.candidates[c].cost).sum()
     }
@@ -80,7 +81,7 @@ impl Oracle<'_> {
         self.required.iter().try_fold(0, |worst, &u| Some(worst.max(self.every[set][u].1?)))
     }
 
-    /// The front by all sets: cost and degree.
+    /// Front over all sets: cost and degree.
     fn front(&self) -> Vec<(f64, usize)> {
         let mut all: Vec<(f64, usize)> =
             (0..self.every.len()).filter_map(|s| Some((self.cost(s), self.worst(s)?))).collect();
@@ -100,14 +101,14 @@ impl Oracle<'_> {
         (0..self.every.len()).filter(is).collect()
     }
 
-    /// The cheapest set for one unknown: cost and degree.
+    /// Cheapest set for one unknown: cost and degree.
     fn cheapest(&self, u: usize) -> Option<(f64, usize)> {
         let all = (0..self.every.len()).filter_map(|s| Some((self.cost(s), self.every[s][u].1?)));
         all.min_by(|a, b| a.partial_cmp(b).expect("numbers"))
     }
 
-    /// All candidates outside a group fail, and as many cheaper sets hold a candidate of each group as were
-    /// judged one by one.
+    /// True if the candidates outside each group fail, and the number of cheaper sets with a candidate of
+    /// each group equals the number of sets judged one by one.
     fn proves(&self, f: &FrontSet) -> bool {
         let groups: Vec<usize> = f.one_of_each.iter().map(|g| self.set(g)).collect();
         let all = self.every.len() - 1;
@@ -118,7 +119,7 @@ impl Oracle<'_> {
     }
 }
 
-/// What differs from all sets, one by one.
+/// Differences between the search and the verdicts on every set.
 fn differences(model: &SystemModel, candidates: &[Candidate], own: bool) -> Vec<String> {
     let options = SensorOptions {
         candidates: candidates.to_vec(),
@@ -141,8 +142,8 @@ fn compared(found: &Sensors, candidates: &[Candidate], every: &[Degrees]) -> Vec
     let whole = every.last().expect("a set");
     let name = |u: usize| whole[u].0.clone();
     let required: Vec<usize> = (0..whole.len()).filter(|&u| whole[u].1.is_some()).collect();
-    let oracle = Oracle { candidates, every, required: required.clone() };
-    // an output more never raises a degree
+    let oracle = SetOracle { candidates, every, required: required.clone() };
+    // one more output never raises a degree
     for s in 0..every.len() {
         for c in (0..candidates.len()).filter(|c| s >> c & 1 == 0) {
             for (less, more) in every[s].iter().zip(&every[s | 1 << c]) {
@@ -194,7 +195,7 @@ fn compared(found: &Sensors, candidates: &[Candidate], every: &[Degrees]) -> Vec
     out
 }
 
-/// Reference models of up to so many states, whose states are candidates.
+/// Reference models of at most `most` states, whose states are the candidates.
 fn reference(most: usize) -> Vec<SystemModel> {
     let read = |(name, _, text): (String, _, String)| {
         let model = json::read(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -216,7 +217,7 @@ fn none_differ(models: &[SystemModel]) {
     assert!(wrong.is_empty(), "{} differences\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Of reference models of up to three states a third, by all their sets.
+/// One reference model in three of those with up to three states, by all sets.
 #[test]
 fn sets_of_reference_models_are_those_of_exhaustion() {
     let few: Vec<SystemModel> = reference(3).into_iter().step_by(3).collect();
@@ -232,31 +233,37 @@ fn sets_of_all_reference_models_are_those_of_exhaustion() {
     none_differ(&all);
 }
 
-/// Models with all that rows may have: inputs, segments with jumps, experiments, known starts, constraints,
+/// Models with all features of rows: inputs, segments with jumps, experiments, known starts, constraints,
 /// functions, vectors, and candidates with costs that are expressions.
 const SPECIAL: [(&str, &str); 8] = [
     (
-        "name='input'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw={polynomial=1}\n[outputs]\ny='b'",
+        "name='input'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw={polynomial=1}\n\
+         [outputs]\ny='b'",
         "states, inputs, a + b, k",
     ),
     (
-        "name='arbitrary'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw='arbitrary'\n[outputs]\ny='b'",
+        "name='arbitrary'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw='arbitrary'\n\
+         [outputs]\ny='b'",
         "states, inputs, parameters",
     ),
     (
-        "name='segments'\nparameters=['k','m']\n[states]\na='-c*k*a'\nb='c*k*a-m*b'\n[constants]\nc='generic'\n[[segment]]\n[[segment]]\nconstants={c='-1'}\ncarry={b='a-b'}\n[outputs]\ny='b'",
+        "name='segments'\nparameters=['k','m']\n[states]\na='-c*k*a'\nb='c*k*a-m*b'\n[constants]\nc='generic'\n\
+         [[segment]]\n[[segment]]\nconstants={c='-1'}\ncarry={b='a-b'}\n[outputs]\ny='b'",
         "states, a*b, m*a",
     ),
     (
-        "name='experiments'\nparameters=['k','m']\n[states]\na='-k*a*b'\nb='k*a-m*b'\n[known_inputs]\nu='generic'\n[outputs]\ny='b'\n[[experiment]]\n[[experiment]]\nknown_inputs={u='constant'}",
+        "name='experiments'\nparameters=['k','m']\n[states]\na='-k*a*b'\nb='k*a-m*b'\n[known_inputs]\nu='generic'\n\
+         [outputs]\ny='b'\n[[experiment]]\n[[experiment]]\nknown_inputs={u='constant'}",
         "states, a*u, m*a + b",
     ),
     (
-        "name='known'\nparameters=['k','m']\n[states]\na={equation='-k*a*b', initial='2'}\nb={equation='k*a-m*b', initial='known'}\nc='m*a*c'\n[outputs]\ny='b'",
+        "name='known'\nparameters=['k','m']\n[states]\na={equation='-k*a*b', initial='2'}\n\
+         b={equation='k*a-m*b', initial='known'}\nc='m*a*c'\n[outputs]\ny='b'",
         "states, a*b",
     ),
     (
-        "name='constraint'\nconstraints=['x^2+y^2=1']\nparameters=['k']\n[states]\nx='-k*y'\ny='k*x'\nz='x*z'\n[outputs]\no='x'",
+        "name='constraint'\nconstraints=['x^2+y^2=1']\nparameters=['k']\n[states]\nx='-k*y'\ny='k*x'\nz='x*z'\n\
+         [outputs]\no='x'",
         "x, y, z, x + y",
     ),
     (
@@ -264,7 +271,9 @@ const SPECIAL: [(&str, &str); 8] = [
         "q, v, cos(q), exp(m*v)",
     ),
     (
-        "name='vector'\nparameters=['k']\n[states]\n'p[2]'='[p[2], -k*p[1]]'\nb='-b+p[1]*t'\n[outputs]\no='b'\n[candidates]\nplace={expression='p', cost=1.5}\nsum={expression='p[1]+b', cost=0.25}\nlate={expression='b*t', cost=2}",
+        "name='vector'\nparameters=['k']\n[states]\n'p[2]'='[p[2], -k*p[1]]'\nb='-b+p[1]*t'\n[outputs]\no='b'\n\
+         [candidates]\nplace={expression='p', cost=1.5}\nsum={expression='p[1]+b', cost=0.25}\n\
+         late={expression='b*t', cost=2}",
         "candidates, p[2]",
     ),
 ];
@@ -288,8 +297,8 @@ fn named(name: &str) -> SystemModel {
     json::read(&text).expect("a model")
 }
 
-/// One state of the MAPK cascade makes all 34 unknowns observable, by degree 33; two need 16, three 11, four
-/// 8; all 12 states need 3.
+/// One state of the MAPK cascade makes all 34 unknowns observable with degree 33 at most; two states need
+/// degree 16, three 11, four 8, all 12 states 3.
 #[test]
 fn states_of_the_mapk_cascade() {
     let model = named("mapk_6out");
@@ -299,12 +308,12 @@ fn states_of_the_mapk_cascade() {
     assert_eq!(front[..4], [(1, 33), (2, 16), (3, 11), (4, 8)]);
     assert_eq!((found.required.len(), found.minimal_sets), (34, Some(12)));
     assert!(found.error_bound.is_some_and(|bound| bound < 1e-12) && found.confirmed_sets > 10);
-    // the proof of the pair, by the verdicts of `analyze`: any state alone has a degree above 16
+    // proof for the pair by the verdicts of `analyze`: any single state leaves a degree above 16
     for c in 0..12 {
         let worst = degrees(&model, &options.candidates, 1 << c, false).iter().map(|q| q.1).max();
         assert!(worst.flatten() >= Some(33), "{c}: {worst:?}");
     }
-    // largest degrees and unknowns that are asked for: of one alone, what is said of it
+    // caps on degrees, and queries for one unknown alone
     let one = SensorOptions { required: vec!["a00".into()], max_degree: vec![(None, 8)], ..options };
     let found_one = sensors(&model, &one, &|_| true).expect("sets");
     let least = found.quantities.iter().find(|q| q.name == "a00").expect("an unknown");
@@ -312,9 +321,9 @@ fn states_of_the_mapk_cascade() {
     assert_eq!(found_one.least_degree, least.least_degree);
 }
 
-/// No three of the 15 states of a model of NF-kB make everything observable that all of them do (Lipniacki
-/// 2004, doi:10.1016/j.jtbi.2004.01.001, with symbols for its numbers): by the answer, and by groups each of
-/// which holds one of the states of every set that does, whose complements `analyze` judges.
+/// No three of the 15 states of a model of NF-kB (Lipniacki 2004, doi:10.1016/j.jtbi.2004.01.001, with
+/// symbols for its numbers) make all unknowns observable that all states together do. The answer proves it by
+/// groups: every sufficient set contains a state of each group, and `analyze` judges the complements.
 #[test]
 fn three_states_of_nfkb_are_not_enough() {
     let model = named("nfkb_all_symbolic");
@@ -348,7 +357,8 @@ fn three_states_of_nfkb_are_not_enough_one_by_one() {
     }
 }
 
-/// Fronts of four reference models with 20 candidates, states and sums of states, are searched to their end.
+/// Searches of the fronts of four reference models with 20 candidates (states and sums of states) run to
+/// their end.
 #[test]
 #[ignore = "a minute: fronts of reference models with 20 candidates"]
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
@@ -377,7 +387,7 @@ fn fronts_of_twenty_candidates() {
     }
 }
 
-/// What is asked for and cannot be, in words; limits that all candidates together do not reach.
+/// Requests that cannot be met are named, and so are limits that all candidates together do not reach.
 #[test]
 fn what_cannot_be_is_said() {
     let text = "name='m'\nparameters=['k','unused']\n[states]\na='-k*a'\nb='a-b'\n[outputs]\ny='b'";
@@ -401,7 +411,7 @@ fn what_cannot_be_is_said() {
 
 const SIR: &str = "examples/sir/model.toml";
 
-/// The answer as it is printed, from the names and costs of the command line.
+/// Printed answer for names and costs from the command line.
 #[test]
 fn the_table_of_a_model() {
     let printed = run(&["design", SIR, "--measure", "states, beta", "--cost", "beta=2.5", "--own-outputs"]);

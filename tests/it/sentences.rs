@@ -1,4 +1,4 @@
-//! Sentences of answers, read and tried: what they say is done to a system that is integrated here.
+//! Sentences of answers, applied to systems that this test integrates.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ fn value(e: &Expression, at: &Point) -> f64 {
     evaluate_f64(e, &|name| at.get(name).copied().unwrap_or(f64::NAN))
 }
 
-/// Equations as an answer prints them, integrated by the method of Runge and Kutta.
+/// Printed equations of an answer, integrated by the method of Runge and Kutta.
 struct Equations {
     definitions: Vec<(String, Expression)>,
     rates: Vec<(String, Expression)>,
@@ -35,7 +35,7 @@ struct Equations {
 }
 
 impl Equations {
-    /// `None` for what is not written as `x' = ...`, `d = ...` and `y = ...`.
+    /// Parses printed equations; `None` if they have another form than `x' = ...`, `d = ...` and `y = ...`.
     fn read(model: &SystemModel, printed: &[String]) -> Option<Self> {
         let inputs = model.known_inputs.iter().map(|i| i.0.name.clone()).collect();
         let mut out = Self { definitions: vec![], rates: vec![], outputs: vec![], inputs };
@@ -98,13 +98,13 @@ impl Equations {
     }
 }
 
-/// Does what a sentence says to a point, with `by` for its letter.
+/// Applies a sentence to a point, with `by` as the value of its letter.
 fn applied(sentence: &str, by: f64, x: &Point) -> Point {
     let mut out = x.clone();
     let letter =
         ["c", "s", "k", "factor", "factor_"].into_iter().find(|n| !x.contains_key(*n)).expect("a letter");
     let with = |text: &str| {
-        // `981/100 c`, `2 log(c)`
+        // for example `981/100 c`, `2 log(c)`
         let text = match text.split_once(' ') {
             Some((number, rest)) if rest.starts_with(letter) || rest.starts_with("log(") => {
                 format!("{number}*{rest}")
@@ -117,7 +117,7 @@ fn applied(sentence: &str, by: f64, x: &Point) -> Point {
     };
     let list = |names: &str| names.split(", ").map(String::from).collect::<Vec<_>>();
     if let Some(rest) = sentence.strip_prefix("move ") {
-        // the flow along polynomials
+        // flow along a polynomial direction
         let (names, speeds) = rest.split_once(" along ").expect("a direction");
         let speeds: Vec<Expression> =
             speeds.split(", ").map(|s| expression(s).unwrap_or_else(|| panic!("{s}"))).collect();
@@ -165,8 +165,8 @@ fn applied(sentence: &str, by: f64, x: &Point) -> Point {
     out
 }
 
-/// Tries every symmetry of an answer from a point: outputs and constraints stay, unknowns do not. The number
-/// of those tried.
+/// Tries every symmetry of an answer from a point: outputs and constraints do not change, and only the named
+/// unknowns do. Returns the number of symmetries; `None` if the system cannot be integrated.
 fn symmetries_hold(model: &SystemModel, a: &SystemAnalysis, start: &Point) -> Option<usize> {
     let equations = Equations::read(model, &a.equations)?;
     let expected = equations.outputs(start.clone());
@@ -191,7 +191,7 @@ fn symmetries_hold(model: &SystemModel, a: &SystemAnalysis, start: &Point) -> Op
                 assert!((side(left) - side(right)).abs() < 1e-6, "{}: {} by {by}: {c}", a.name, s.words);
             }
         }
-        // nothing is the identity
+        // the identity
         let by = if s.words.contains("multiply") || s.words.contains("divide") { 1.0 } else { 0.0 };
         if !s.words.starts_with("move") {
             let same = applied(&s.words, by, start);
@@ -202,7 +202,7 @@ fn symmetries_hold(model: &SystemModel, a: &SystemAnalysis, start: &Point) -> Op
     Some(a.symmetries.len())
 }
 
-/// A point of a model whose unknowns are about one.
+/// Point of a model with unknowns of about one.
 fn point(model: &SystemModel) -> Point {
     let states = model.states.iter().map(|s| s.named.name.clone());
     let names = states.chain(model.parameters.iter().map(|p| p.name.clone()));
@@ -218,11 +218,12 @@ fn point(model: &SystemModel) -> Point {
     out
 }
 
-const SIR: &str = "name='sir'\nparameters=['beta', 'gamma', 'k']\nconstraints=['S + I + R = 1']\n[states]\nS='-beta*S*I'\n\
+const SIR: &str = "name='sir'\nparameters=['beta', 'gamma', 'k']\nconstraints=['S + I + R = 1']\n[states]\n\
+                   S='-beta*S*I'\n\
                    I='beta*S*I - gamma*I'\nR='gamma*I'\n[outputs]\ny='k*I'";
 
-/// Every printed symmetry, at several c: outputs and constraints stay as they are, and c = 1 (0 where nothing
-/// is scaled) changes nothing.
+/// Every printed symmetry, at several c: outputs and constraints do not change, and c = 1 (0 without scaling)
+/// is the identity.
 #[test]
 fn symmetries_do_what_they_say() {
     let tried = |text: &str, start: &[(&str, f64)]| {
@@ -242,7 +243,7 @@ fn symmetries_do_what_they_say() {
         tried(&half, &[&rates[..], &[("S", 0.7), ("I", 0.3), ("R", 1.0)]].concat()),
         ["multiply S, I by c; replace R by c*R + 3/2*(1 - c); divide beta, k by c"]
     );
-    // an exponent is added to where a factor is multiplied
+    // exponents are added where factors are multiplied
     assert_eq!(
         tried(
             "name='e'\nparameters=['a', 'b']\n[states]\nx='-x'\n[outputs]\ny='a*exp(2*b)*x'\nz='x'",
@@ -259,8 +260,8 @@ fn symmetries_do_what_they_say() {
     );
 }
 
-/// The same of the reference models, from one point each: those without known starts, segments and unknown
-/// inputs.
+/// Symmetries of the reference models from one point each, for models without known starts, segments and
+/// unknown inputs.
 #[test]
 fn symmetries_of_the_reference_models() {
     let mut tried = 0;
@@ -278,13 +279,13 @@ fn symmetries_of_the_reference_models() {
     assert!(tried >= 70, "{tried}");
 }
 
-/// The table of an answer, by the program.
+/// Table of an answer, by the program.
 fn table(text: &str) -> String {
     let a = without_solutions(&read(text)).expect("judged");
     obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default()).expect("text")
 }
 
-/// Nothing was counted, so nothing is said of a number: the sine has infinitely many, a square two.
+/// Without a count no number is stated: the sine has infinitely many solutions, a square two.
 #[test]
 fn what_is_not_counted_has_no_number() {
     for output in ["sin(th)", "th^2"] {
@@ -304,8 +305,8 @@ fn what_is_not_counted_has_no_number() {
     }
 }
 
-/// First lines say of what is determined locally only, and of nothing else, that it is: other values give the
-/// same outputs, or nobody has counted.
+/// First lines mention "locally" exactly for unknowns that are determined only locally: other values give the
+/// same outputs, or solutions were not counted.
 #[test]
 fn first_lines_say_local() {
     let said = |output: &str, solutions: bool| {
@@ -330,7 +331,7 @@ fn first_lines_say_local() {
     }
 }
 
-/// A constraint that determines an unknown is named beside the outputs: no output holds y.
+/// A constraint that determines an unknown is mentioned beside the outputs: no output contains y.
 #[test]
 fn constraints_are_named_beside_the_outputs() {
     let text = table("name='m'\nconstraints=['x + y = 3']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'");
@@ -340,26 +341,27 @@ fn constraints_are_named_beside_the_outputs() {
     assert!(text.contains("are determined by the outputs themselves"), "{text}");
 }
 
-/// Beyond the bound on the order outputs may change: from t = 0 on, y = (a + b) t + a t^71/71 does.
+/// Beyond the bound on the order outputs may change: y = (a + b) t + a t^71/71 does so from t = 0.
 #[test]
 fn beyond_the_bound_no_output_is_said_to_stay() {
-    let text = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n[outputs]\ny='x'";
+    let text = "name='m'\nparameters=['a', 'b']\nknown_inputs={u={function='t^70'}}\n[states]\nx='a + b + a*u'\n\
+                [outputs]\ny='x'";
     let said = table(text);
     assert!(said.contains("add c to a; subtract c from b"), "{said}");
     let y = |a: f64, b: f64| (a + b) * 1.2 + a * 1.2f64.powi(71) / 71.0;
     assert!((y(0.7, 0.3) - y(0.7 + 1.0, 0.3 - 1.0)).abs() > 1.0);
     let heading = "No derivative up to order 60 changes at the start when you";
     assert!(said.contains(heading) && !said.contains("No output changes"), "{said}");
-    // an end that is proven
+    // a proven end
     let said = table("name='m'\nparameters=['a', 'b']\n[states]\nx='-a*b*x'\n[outputs]\ny='x'");
     assert!(said.contains("No output changes when you") && !said.contains("No derivative up to"), "{said}");
-    // nothing is listed, so there is no heading
+    // an empty list has no heading
     let alone = text.replace("a + b + a*u", "a*u").replace("'a', 'b'", "'a'");
     let said = table(&alone);
     assert!(!said.contains("No output changes") && !said.contains("No derivative up to"), "{said}");
 }
 
-/// The cross-check of a model is one of the information of samples: no filter runs, and none is named.
+/// The cross-check of a model uses the information of samples: no filter runs, and none is mentioned.
 #[test]
 fn models_are_checked_without_a_filter() {
     let model = read(
@@ -374,13 +376,13 @@ fn models_are_checked_without_a_filter() {
     assert!(!text.contains("filter and exact verdicts"), "{text}");
 }
 
-/// Verdicts hold at the time that is named: degrees of x' = a + b t^2 by hand at 0, at 2 and at almost every
-/// time.
+/// Verdicts hold at the stated time: degrees of x' = a + b t^2 by hand at 0, at 2 and at almost every time.
 #[test]
 fn verdicts_are_those_of_the_time_that_is_said() {
     let model = |time: &str| {
         format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n[outputs]\ny='x'"
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n\
+             [outputs]\ny='x'"
         )
     };
     for (time, said, degrees) in [
@@ -395,8 +397,8 @@ fn verdicts_are_those_of_the_time_that_is_said() {
         let of = |name: &str| a.quantities.iter().find(|q| q.name == name).and_then(|q| q.degree);
         assert_eq!([of("a"), of("b")], degrees.map(Some), "{time}");
         assert!(table(&text).replace("\n      ", " ").contains(said), "{time}");
-        // y' = a + b t^2, y'' = 2 b t, y''' = 2 b: at the time that is said a and b follow with so many
-        // derivatives
+        // y' = a + b t^2, y'' = 2 b t, y''' = 2 b: at the stated time a and b follow from the stated number
+        // of derivatives
         let t: f64 = said
             .split("t = ")
             .nth(1)
@@ -406,7 +408,8 @@ fn verdicts_are_those_of_the_time_that_is_said() {
     }
     let without = "name='m'\nparameters=['a']\n[states]\nx='a'\n[outputs]\ny='x'";
     assert!(!table(without).contains("judged at"));
-    // an output of the second segment alone: there the time is generic, whatever the first begins at
+    // an output in the second segment only: the time is generic there, whatever the start of the first
+    // segment
     let late = model("").replace("'a + b*u'", "'c*(a + b*u)'").replace("y='x'", "y='c*x'")
         + "\n[constants]\nc=0\n[[segment]]\nconstants={c='0'}\n[[segment]]\nconstants={c='1'}";
     let a = without_solutions(&read(&late)).expect("judged");
@@ -425,15 +428,16 @@ fn verdicts_are_those_of_the_time_that_is_said() {
     }
 }
 
-/// Runs say when they begin where that matters: a run of x' = a + b t^2 over 1 s from rest ends at
-/// `a + b (1/3 + t + t^2)`.
+/// Runs state their start time where it matters: a run of x' = a + b t^2 over 1 s from rest ends at `a + b
+/// (1/3 + t + t^2)`.
 #[test]
 fn runs_say_when_they_begin() {
     let place = tempfile::tempdir().expect("a folder");
     let file = place.path().join("model.toml");
     for (time, begins) in [("", 0.0), ("time = 2", 2.0), ("time = 'generic'", 1.0)] {
         let text = format!(
-            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n[outputs]\n\
+            "name='m'\nparameters=['a', 'b']\n{time}\nknown_inputs={{u={{function='t^2'}}}}\n[states]\nx='a + b*u'\n\
+             [outputs]\n\
              y='x'\n[simulation]\nduration=1.0\nstep=0.01\nnoise={{y=0.01}}\nvalues={{a=2.0, b=3.0, x=0.0}}"
         );
         std::fs::write(&file, text).expect("written");
@@ -458,12 +462,13 @@ fn runs_say_when_they_begin() {
     }
 }
 
-/// A state whose start is known has no verdict: its error is not called that of something unobservable.
+/// A state with a known start has no verdict, and its error is not attributed to an unobservable unknown.
 #[test]
 fn known_starts_are_not_called_unobservable() {
     use obsdeg_core::degree::Status;
     let model = read(
-        "name='m'\nparameters=['a', 'b']\n[states]\nx={equation='a + b', initial='0'}\n[outputs]\ny='x'\n[simulation]\nduration=1.0\n\
+        "name='m'\nparameters=['a', 'b']\n[states]\nx={equation='a + b', initial='0'}\n[outputs]\ny='x'\n\
+         [simulation]\nduration=1.0\n\
          step=0.1\nnoise={y=0.01}\nvalues={a=2.0, b=3.0}",
     );
     let (run, _) = obsdeg_evidence::system::simulate_system(&model, 1).expect("a run");
@@ -479,7 +484,7 @@ fn known_starts_are_not_called_unobservable() {
     assert_eq!([None, Some(Status::Observable), Some(Status::Inseparable)].map(said), [false, false, true]);
 }
 
-/// Of a bound that says nothing no verdict is given.
+/// A trivial error bound leads to no verdict.
 #[test]
 fn no_verdict_without_certainty() {
     let power = |nested: usize| (0..nested).fold("p".to_string(), |p, _| format!("({p})^1000"));
@@ -495,12 +500,13 @@ fn no_verdict_without_certainty() {
     assert!(without_solutions(&read(&text(1))).is_ok());
 }
 
-/// Constraints that no real point meets are refused; where there is one it is found, or asked for.
+/// Constraints without a real point are refused. An existing point is found, or the message asks for it.
 #[test]
 fn constraints_have_real_points() {
     let judged = |constraint: &str, values: &str| {
         let text = format!(
-            "name='m'\nconstraints=['{constraint}']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'\n[simulation]\nvalues={{{values}}}"
+            "name='m'\nconstraints=['{constraint}']\n[states]\nx='0'\ny='0'\n[outputs]\nz='x'\n[simulation]\n\
+             values={{{values}}}"
         );
         model_file::read(&text).and_then(|m| without_solutions(&m))
     };
@@ -520,7 +526,7 @@ fn constraints_have_real_points() {
         let a = judged(constraint, "").unwrap_or_else(|e| panic!("{constraint}: {e}"));
         assert_eq!(a.rank, 2, "{constraint}");
     }
-    // far from where points are tried: what the refusal says to do helps
+    // far from the tried starts: the advice of the refusal works
     let far = "(x - 100000)^2 + (y - 100000)^2 + (x - 100000)^2*(y - 100000)^2 = 0.000001";
     if let Err(error) = judged(far, "") {
         assert!(error.to_string().contains("give it under [simulation.values]"), "{error}");
@@ -528,7 +534,7 @@ fn constraints_have_real_points() {
     assert_eq!(judged(far, "x=100000.001, y=100000.0").expect("a point is given").rank, 2);
 }
 
-/// What is compared under the other carries of reset carry is said where a psi of one position is.
+/// Comparisons of one position's psi with other carries state the compared quantity.
 #[test]
 fn other_carries_say_what_is_compared() {
     use obsdeg_core::model::Carry;
@@ -549,8 +555,8 @@ fn other_carries_say_what_is_compared() {
     assert!(some[0] > 0 && some[1] > 0, "{some:?}");
 }
 
-/// An extended filter is not trusted where small angles do not hold, and its sigmas there are too small
-/// although single runs are called consistent; an iterated one has no such sentence.
+/// An extended filter is not trusted at large angles: its sigmas are too small there, although single runs
+/// are called consistent. An iterated filter has no such sentence.
 #[test]
 fn the_extended_filter_is_not_trusted_at_large_drifts() {
     let arguments = |command: &'static str, filter: &'static str, more: &[&'static str]| {

@@ -1,20 +1,20 @@
-//! Small random models: none takes more than 10 s of processor time or 1 GB of memory unless the answer
-//! refuses it and says why. A debug build has twice the time.
+//! Small random models: each needs at most 10 s of processor time and 1 GB of memory, or the answer refuses
+//! it and says why. A debug build has twice the time.
 
 use std::io::Write;
 use std::process::Command;
 
 use obsdeg_exact::SplitMix64;
 
-/// Models of everyday runs; `.ci/run release` judges ten thousand.
+/// Number of models in everyday runs; `.ci/run release` judges ten thousand.
 const DAILY: u64 = 25;
 const RELEASE: u64 = 10_000;
-/// Processor time in s.
+/// Limit of processor time, in s.
 const SECONDS: u64 = if cfg!(debug_assertions) { 20 } else { 10 };
-/// Address space in KiB: 1 GB and what a process has without work.
+/// Limit of address space, in KiB: 1 GB plus that of an idle process.
 const KIB: u64 = 1_500_000;
 
-/// One of some texts.
+/// Random element of a list of texts.
 fn one<'a>(random: &mut SplitMix64, of: &[&'a str]) -> &'a str {
     of[random.below(of.len() as u64) as usize]
 }
@@ -23,7 +23,7 @@ fn chance(random: &mut SplitMix64, percent: u64) -> bool {
     random.below(100) < percent
 }
 
-/// An expression in some names.
+/// Random expression in some names.
 fn expression(random: &mut SplitMix64, names: &[String], depth: u64) -> String {
     let kind = random.below(12);
     if depth == 0 || kind < 3 {
@@ -44,7 +44,7 @@ fn expression(random: &mut SplitMix64, names: &[String], depth: u64) -> String {
     }
 }
 
-/// A model of a vector or a matrix.
+/// Random model with a vector or a matrix.
 fn of_vectors(random: &mut SplitMix64) -> String {
     let n = one(random, &["2", "3", "4", "5"]);
     let (shape, entry, rate) = match chance(random, 60) {
@@ -57,7 +57,7 @@ fn of_vectors(random: &mut SplitMix64) -> String {
     format!("[states]\n\"A[{shape}]\" = \"{rate}\"\n[parameters]\np = {{}}\n[outputs]\ny = \"A[{entry}]\"\n")
 }
 
-/// Any small model.
+/// Random small model.
 fn model(random: &mut SplitMix64) -> String {
     let mut out = String::from("name = \"m\"\n");
     if chance(random, 15) {
@@ -92,7 +92,7 @@ fn model(random: &mut SplitMix64) -> String {
     out
 }
 
-/// How a model ended: judged, or refused in a sentence.
+/// Outcome of a model: true if judged, false if refused with a sentence; otherwise an error.
 fn ended(text: &str) -> Result<bool, String> {
     let mut file = tempfile::NamedTempFile::new().expect("a file");
     file.write_all(text.as_bytes()).expect("written");
@@ -137,12 +137,12 @@ fn ten_thousand_small_models_end() {
     all_end(0..RELEASE);
 }
 
-/// A model of one square matrix and its entry (1,1).
+/// Model of one square matrix with its entry (1,1) as output.
 fn of_a_square(n: usize) -> String {
     format!("name = \"m\"\n[states]\n\"A[{n},{n}]\" = \"A*A\"\n[outputs]\ny = \"A[1,1]\"\n")
 }
 
-/// Answer of `analyze` in JSON, within the processor time and the memory of small models, or its error.
+/// JSON answer of `analyze` within the limits of processor time and memory, or its error.
 fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
     let mut file = tempfile::NamedTempFile::new().expect("a file");
     file.write_all(text.as_bytes()).expect("written");
@@ -162,8 +162,8 @@ fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
     }
 }
 
-/// Matrices: the output is a generating function of its first row and column in powers of the start,
-/// `A(t) = A0 (1 - t A0)^-1`, so that it holds the moments `(A0^k)[1,1]`, k = 1, 2, ... These are those of a
+/// Matrices: the output is a generating function of its first row and column in powers of the start, `A(t) =
+/// A0 (1 - t A0)^-1`. So it contains the moments `(A0^k)[1,1]`, k = 1, 2, ... These are the moments of a
 /// strictly proper transfer function of order n with a first moment of one: 2n - 1 numbers are free, and as
 /// many orders show them.
 #[test]
@@ -176,7 +176,8 @@ fn matrices_are_judged_within_the_limits() {
     }
 }
 
-/// Matrices beyond a limit are refused at once, with what was too much and the option that allows more.
+/// Matrices beyond a limit are refused at once. The message names the exceeded limit and the option that
+/// raises it.
 #[test]
 fn matrices_beyond_the_limits_are_refused() {
     let chain = "name = \"m\"\n[states]\n\"A[10,10]\" = \"A*B\"\n\"B[10,10]\" = \"B*C\"\n\"C[10,10]\" = \"C*A\"\n\
@@ -193,8 +194,8 @@ fn matrices_beyond_the_limits_are_refused() {
     }
 }
 
-/// Where solutions are not counted, the sentence names the option that allows more work, and with more they
-/// are.
+/// If solutions are not counted, the sentence names the option that allows more work, and with more work they
+/// are counted.
 #[test]
 fn solutions_beyond_the_limit_name_their_option() {
     let text = "name = \"m\"\n[states]\nx = \"-a*x^2 + b*y\"\ny = \"a*b*x - c*y\"\n\
@@ -206,7 +207,7 @@ fn solutions_beyond_the_limit_name_their_option() {
     assert!(reason("0") && !reason("30"));
 }
 
-/// What an adversary wrote: each is refused with what was too much.
+/// Adversarial texts: each is refused, and the message names the exceeded limit.
 #[test]
 fn small_texts_that_ask_for_too_much_are_refused() {
     let powers = (0..12).fold("p".to_string(), |inner, _| format!("({inner})^1000"));
@@ -250,7 +251,7 @@ fn small_texts_that_ask_for_too_much_are_refused() {
             ),
             "a description of 1000000 characters; expected at most 4000",
         ),
-        // 64 choices of factors, none of which has a real point: the work of all of them is bounded
+        // 64 choices of factors without real points: their total work is bounded
         (
             format!(
                 "name = \"m\"\nconstraints = [{}]\nparameters = [\"x\", \"y\"]\n[outputs]\ns = \"x + y\"\n",
@@ -273,15 +274,15 @@ fn small_texts_that_ask_for_too_much_are_refused() {
     }
 }
 
-/// Models of the generator whose work was not counted once: an elimination of long polynomials, remedies of a
-/// model that is judged in many digits, and rows that lose so many digits that all of them are made anew for
-/// every row.
+/// Models of the generator whose work once was not counted: an elimination of long polynomials, remedies of a
+/// model in many digits, and rows that lose so many digits that every row needs a new computation of all of
+/// them.
 #[test]
 fn models_that_took_too_long_end() {
     let drawn = |seed: u64| model(&mut SplitMix64::of(seed, "small models", &["any"]));
     let long = answered(&drawn(2684), &[]).expect("judged");
     assert!(long["note"].as_str().expect("a note").contains("beyond its limit of work"), "{}", long["note"]);
-    // the output is the time, which says nothing of any unknown
+    // the output is the time and determines no unknown
     let blind = answered(&drawn(2747), &[]).expect("judged");
     assert_eq!(blind["rank"], 0);
     let all =
@@ -297,7 +298,7 @@ fn models_that_took_too_long_end() {
 }
 
 /// Constraints, functions and powers whose work grows faster than their text: each ends within the limits,
-/// refused with the option that allows more, or judged.
+/// judged or refused with the option that allows more.
 #[test]
 fn work_beside_the_rows_is_counted() {
     let states = |n: usize, rate: &str| (0..n).map(|i| format!("x{i} = \"{rate}\"\n")).collect::<String>();
@@ -316,8 +317,8 @@ fn work_beside_the_rows_is_counted() {
         let error = answered(text, &[]).expect_err(expected);
         assert!(error.contains(expected) && error.contains("a larger --work-limit allows more"), "{error}");
     }
-    // one sum of 1,200 sines: the proof that they are independent is refused, digits judge it; 1,199
-    // directions are left
+    // a sum of 1,200 sines: the proof of independence is refused, real numbers judge it; 1,199 directions are
+    // unobservable
     let sines: Vec<String> = (0..1200).map(|i| format!("sin(x{i}*x{})", (i + 1) % 1200)).collect();
     let sines =
         format!("name = \"m\"\n[states]\n{}[outputs]\ny = \"{}\"\n", states(1200, "0"), sines.join(" + "));
@@ -328,15 +329,15 @@ fn work_beside_the_rows_is_counted() {
         "{}",
         answer["note"]
     );
-    // powers beyond 32 bits: x shows itself, x'/x the power of p; no expression is formed
+    // powers beyond 32 bits: x is an output, x'/x is the power of p; no expression is formed
     let high = "name = \"m\"\n[states]\nx = \"-((((p^1000)^1000)^1000)^10)*x\"\n[parameters]\np = {}\n\
                 [outputs]\ny = \"x\"\n";
     let answer = answered(high, &[]).expect("judged");
     assert_eq!(answer["rank_profile"], serde_json::json!([1, 2]));
 }
 
-/// Many names: each text ends within the limits. 100,000 outputs are judged, with solutions; values of 2,000
-/// unknowns are not tried, and the sentence names the option; more unknowns than are allowed are refused.
+/// Texts with many names end within the limits. 100,000 outputs are judged, with solutions. Values of 2,000
+/// unknowns are not tried, and the sentence names the option. More unknowns than allowed are refused.
 #[test]
 fn many_names_end_within_the_limits() {
     let names = |letter: &str, n: usize, value: &str| {

@@ -1,4 +1,4 @@
-//! How many solutions an observable unknown has, against published verdicts, by hand, and by trying all
+//! Number of solutions of an observable unknown, against published verdicts, by hand, and by trying all
 //! points of a small field.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ fn counted(text: &str) -> SystemAnalysis {
     analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
-/// The number of solutions by name, of those that are observable and decided.
+/// Number of solutions of each observable and decided unknown, by name.
 fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
     let number = |n: &NumberOfSolutions| match n {
         NumberOfSolutions::OneByExpression => Some(1),
@@ -28,7 +28,7 @@ fn numbers(a: &SystemAnalysis) -> BTreeMap<&str, usize> {
         .collect()
 }
 
-/// What is published as global has one solution, what is local has several; all of it is decided.
+/// Published global verdicts have one solution, published local verdicts several; all are decided.
 #[test]
 fn no_contradiction_with_published_verdicts() {
     let (mut decided, mut open) = (0, Vec::new());
@@ -50,7 +50,7 @@ fn no_contradiction_with_published_verdicts() {
     assert_eq!((decided, open), (57, Vec::new()));
 }
 
-/// By hand. Complex solutions are counted: p^3 has three.
+/// Numbers of solutions by hand. Complex solutions count: p^3 has three.
 #[test]
 fn numbers_by_hand() {
     let of = |parameters: &[&str], outputs: &[&str]| {
@@ -75,55 +75,59 @@ fn numbers_by_hand() {
     is(of(&["p"], &["p^4 - p", "p^6"]), &[("p", 1)]);
     is(of(&["p", "q"], &["p + q", "p*q"]), &[("p", 2), ("q", 2)]);
     is(of(&["p", "q", "r"], &["p + q + r", "p*q + q*r + r*p", "p*q*r"]), &[("p", 3), ("q", 3), ("r", 3)]);
-    // a sign that two share, a sign of each
+    // a common sign of two unknowns, and a sign of each
     is(of(&["p", "q"], &["p^2", "p*q"]), &[("p", 2), ("q", 2)]);
     is(of(&["p", "q", "r"], &["p^2", "q^2", "p*q", "r^3 + p"]), &[("p", 2), ("q", 2), ("r", 6)]);
-    // fractions: p + 1/p; what vanishes below is no solution ((p-1)(p-q) = 0 has p = 1)
+    // fractions: p + 1/p; a zero of the denominator is no solution ((p-1)(p-q) = 0 has p = 1)
     is(of(&["p"], &["p + 1/p"]), &[("p", 2)]);
     is(of(&["p"], &["(p^2 - p)/(p - 1)"]), &[("p", 1)]);
     is(of(&["p", "q"], &["(p^2 - p)/(p - q)", "q"]), &[("p", 2), ("q", 1)]);
-    // what a symmetry moves has no number, and does not spoil those of others
+    // unknowns that a symmetry changes have no number, and do not affect the numbers of others
     is(of(&["p", "q", "r"], &["p*q", "r^2 + p*q*r"]), &[("r", 2)]);
     is(of(&["p", "q", "r"], &["p*q^2", "p*q^2*r"]), &[("r", 1)]);
 }
 
-/// Two compartments that may be swapped, and a third that may not; with states known or not.
+/// Two exchangeable compartments and a third that is not, with known or unknown states.
 #[test]
 fn numbers_of_systems() {
-    let twins = "name = \"twins\"\nparameters = [\"a\", \"b\"]\n[states]\nu = \"-a*u\"\nv = \"-b*v\"\n[outputs]\ny = \"u + v\"\n";
+    let twins = "name = \"twins\"\nparameters = [\"a\", \"b\"]\n[states]\nu = \"-a*u\"\nv = \"-b*v\"\n[outputs]\n\
+                 y = \"u + v\"\n";
     let two = counted(twins);
     assert_eq!(numbers(&two), BTreeMap::from([("u", 2), ("v", 2), ("a", 2), ("b", 2)]));
     let three = twins.replace("[outputs]\ny = \"u + v\"", "w = \"-(a + b)*w\"\n[outputs]\ny = \"u + v + w\"");
-    // the three rates are a, b, a + b: only a and b can change places, as -1 has no use at generic rates
+    // the rates are a, b, a + b: only a and b are exchangeable
     assert_eq!(numbers(&counted(&three)), BTreeMap::from([("u", 2), ("v", 2), ("w", 1), ("a", 2), ("b", 2)]));
-    // each seen once more
+    // one more output determines a
     let told = twins.replace("[outputs]\n", "[outputs]\nz = \"a^2\"\n");
     assert_eq!(numbers(&counted(&told)), BTreeMap::from([("u", 1), ("v", 1), ("a", 1), ("b", 1)]));
-    // in two experiments with the same rates all of it is swapped at once
+    // in two experiments with the same rates everything is exchanged together
     let again = counted(&format!("experiments = 2\n{twins}"));
     assert_eq!(numbers(&again).values().copied().collect::<Vec<_>>(), [2; 6]);
-    // a known jump of u tells them apart, and so does a constraint; one that is the same for both does not
+    // a known jump of u distinguishes the two, and so does a constraint; a symmetric constraint does not
     let jump = counted(&format!("{twins}[[segment]]\n[[segment]]\ncarry = {{u = \"u + 1\"}}\n"));
     assert_eq!(numbers(&jump).values().copied().collect::<Vec<_>>(), [1; 4]);
     let constrained =
         |holds: &str| counted(&twins.replace("[states]", &format!("constraints = [\"{holds}\"]\n[states]")));
     assert_eq!(numbers(&constrained("u - 2*v = 1")).values().copied().collect::<Vec<_>>(), [1; 4]);
     assert_eq!(numbers(&constrained("u + v = 1")), numbers(&two));
-    // an unknown input that is constant, one that is a ramp
-    let pushed = "name = \"pushed\"\nparameters = [\"a\"]\nunknown_inputs = {w = \"constant\"}\n[states]\nx = \"-a*x + w^2\"\n[outputs]\ny = \"x\"\n";
+    // an unknown constant input; an output shows its square only
+    let pushed = "name = \"pushed\"\nparameters = [\"a\"]\nunknown_inputs = {w = \"constant\"}\n[states]\n\
+                  x = \"-a*x + w^2\"\n[outputs]\ny = \"x\"\n";
     assert_eq!(numbers(&counted(pushed)), BTreeMap::from([("a", 1), ("w", 2), ("x", 1)]));
 }
 
-/// Where derivatives have no proven end, more than one solution may become fewer: it is not said.
+/// If the derivatives have no proven end, later orders could reduce several solutions: the number stays
+/// undecided.
 #[test]
 fn special_starts_leave_it_open() {
     let text = |start: &str| {
         format!(
-            "name = \"s\"\nparameters = [\"a\", \"b\"]\n[states]\nx = {{equation = \"a^2 + b*x\"{start}}}\n[outputs]\ny = \"x\"\n"
+            "name = \"s\"\nparameters = [\"a\", \"b\"]\n[states]\nx = {{equation = \"a^2 + b*x\"{start}}}\n[outputs]\n\
+             y = \"x\"\n"
         )
     };
     assert_eq!(numbers(&counted(&text(""))), BTreeMap::from([("a", 2), ("b", 1), ("x", 1)]));
-    // linear in its state, and a has a sign that may change
+    // linear in its state, and the sign of a is exchangeable
     assert_eq!(numbers(&counted(&text(", initial = 0"))), BTreeMap::from([("a", 2), ("b", 1)]));
     let cubic = |start: &str| text(start).replace("a^2 + b*x", "a^3 + a + b*x^2");
     assert_eq!(numbers(&counted(&cubic(""))), BTreeMap::from([("a", 3), ("b", 1), ("x", 1)]));
@@ -134,7 +138,7 @@ fn special_starts_leave_it_open() {
         matches!(&a.number_of_solutions, Some(NumberOfSolutions::Undecided(r)) if r.contains("not generic")),
         "{a:?}"
     );
-    // functions and work
+    // functions, and a work limit of zero
     let wave =
         counted("name = \"f\"\nparameters = [\"a\"]\n[states]\nx = \"a*sin(x)\"\n[outputs]\ny = \"x\"\n");
     let a = wave.quantities.iter().find(|q| q.name == "a").expect("a");
@@ -144,25 +148,25 @@ fn special_starts_leave_it_open() {
     let model = model_file::read(&text("")).expect("a model");
     let options = SystemOptions { count_limit: 0, ..SystemOptions::default() };
     let none = analyze_system(&model, options).expect("judged");
-    // an output, and y''/y', are known without counting
+    // an output and y''/y' are unique without counting
     assert_eq!(numbers(&none), BTreeMap::from([("b", 1), ("x", 1)]));
     assert_eq!(none.counting_order, None);
 }
 
-/// A polynomial with small coefficients: `(coefficient, exponents)`.
+/// Polynomial with small coefficients: `(coefficient, exponents)`.
 type Terms = Vec<(i64, Vec<u32>)>;
 
-/// A system over the field of `Q` elements, in unknowns of which the first are states.
-struct Tiny {
+/// System over the field of `Q` elements; the first unknowns are states.
+struct SmallFieldSystem {
     rates: Vec<Terms>,
     outputs: Vec<Terms>,
     unknowns: usize,
 }
 
-/// Larger than any order, so that it can be divided by.
+/// Order of the field, above any order of derivatives, so that orders have inverses.
 const Q: i64 = 37;
 
-impl Tiny {
+impl SmallFieldSystem {
     fn draw(rng: &mut SplitMix64) -> Self {
         let unknowns = 2 + rng.below(2) as usize;
         let states = 1 + rng.below(2) as usize;
@@ -207,7 +211,7 @@ impl Tiny {
     fn outputs(&self, point: &[i64], order: usize) -> Vec<i64> {
         let mut series = vec![[0; ORDERS]; self.unknowns];
         series.iter_mut().zip(point).for_each(|(x, &start)| x[0] = start);
-        // every term is multiplied out factor by factor, one coefficient at a time
+        // terms are multiplied factor by factor, one coefficient at a time
         let mut rates: Vec<Vec<Product>> = self.rates.iter().map(products).collect();
         let mut outputs: Vec<Vec<Product>> = self.outputs.iter().map(products).collect();
         let inverse = |k: i64| (1..Q).find(|x| x * k % Q == 1).expect("a field");
@@ -225,10 +229,10 @@ impl Tiny {
     }
 }
 
-/// More than any order.
+/// Number of coefficients of a series, above any order.
 const ORDERS: usize = 16;
 
-/// A term: its coefficient, its factors, and the series of the product of the first, of the first two, ...
+/// Coefficient of a term, its factors, and the series of the partial products of the factors.
 type Product = (i64, Vec<(usize, [i64; ORDERS])>);
 
 fn products(terms: &Terms) -> Vec<Product> {
@@ -239,7 +243,7 @@ fn products(terms: &Terms) -> Vec<Product> {
     terms.iter().map(|(c, exponents)| (*c, factors(exponents))).collect()
 }
 
-/// Coefficient `k` of a sum of terms of which those before were asked for.
+/// Coefficient `k` of a sum of terms whose lower coefficients were computed before.
 fn coefficient(terms: &mut [Product], series: &[[i64; ORDERS]], k: usize) -> i64 {
     let mut sum: i64 = 0;
     for (c, factors) in terms {
@@ -256,21 +260,21 @@ fn coefficient(terms: &mut [Product], series: &[[i64; ORDERS]], k: usize) -> i64
     sum.rem_euclid(Q)
 }
 
-/// All points of a field of 37 elements are sorted by their outputs: of an unknown with k values hardly a
-/// point has more with it, and, for k up to 3, enough have all of them (all but special ones of 1 and 2, half
-/// of 3 by the density of primes that split).
+/// All points of a field of 37 elements are grouped by their outputs. For an unknown with k solutions, almost
+/// no point has more than k values with the same outputs. For k up to 3 enough points have all k (all but
+/// special points for 1 and 2, half for 3, by the density of primes that split).
 #[test]
 fn counts_are_those_of_all_points_of_a_small_field() {
     let mut rng = SplitMix64::new(20);
     let mut seen = BTreeMap::new();
     for _ in 0..60 {
-        let tiny = Tiny::draw(&mut rng);
+        let tiny = SmallFieldSystem::draw(&mut rng);
         let a = counted(&tiny.text());
         let numbers = numbers(&a);
         if numbers.is_empty() {
             continue;
         }
-        // an expression holds derivatives of up to two orders beyond the degree
+        // an expression contains derivatives of up to two orders beyond the degree
         let order = a.counting_order.unwrap_or(a.last_order + 2);
         let mut fibres: BTreeMap<Vec<i64>, Vec<Vec<i64>>> = BTreeMap::new();
         let all = Q.pow(tiny.unknowns as u32);
@@ -299,11 +303,11 @@ fn counts_are_those_of_all_points_of_a_small_field() {
             );
         }
     }
-    // enough of each kind
+    // enough unknowns of each kind
     assert!([1, 2, 3].iter().all(|k| seen.get(k).is_some_and(|n| *n >= 5)), "{seen:?}");
 }
 
-/// An expression of an unknown is one solution only where all that it rests on has one.
+/// An expression gives one solution only if everything on which it rests has one.
 #[cfg(feature = "symbolica")]
 #[test]
 fn expressions_that_rest_on_what_is_local() {
@@ -316,7 +320,7 @@ fn expressions_that_rest_on_what_is_local() {
         let q = list.into_iter().find(|q| q["name"] == name).expect("an unknown");
         (q["number_of_solutions"].clone(), q["solution"].is_string())
     };
-    // S and E have a second solution, in which a and nu change places
+    // S and E have a second solution, with a and nu exchanged
     let seir = of("seir_known_population");
     for name in ["S", "E", "a", "nu"] {
         assert_eq!(number(&seir, name).0, serde_json::json!({"counted": 2}), "{name}");

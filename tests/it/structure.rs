@@ -1,4 +1,4 @@
-//! Crates, their modules and files import only from what lies below them, as crates/README.md draws it.
+//! Crates, their modules and files import only from below, as crates/README.md draws it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -25,7 +25,7 @@ fn sources(place: &Path) -> Vec<PathBuf> {
     out
 }
 
-/// What a place names behind `prefix`, comments and unit tests apart.
+/// Names behind `prefix` in the files of a place, without comments and unit tests.
 fn named(place: &Path, prefix: &str) -> BTreeSet<String> {
     let comment = Regex::new(r"//[^\n]*").expect("a pattern");
     let one = Regex::new(&format!(r"\b{prefix}(\w+)")).expect("a pattern");
@@ -41,7 +41,7 @@ fn named(place: &Path, prefix: &str) -> BTreeSet<String> {
     out
 }
 
-/// Modules of a crate and what they import from it.
+/// Modules of a crate with their imports from the same crate.
 fn modules_of(name: &str) -> Imports {
     let source = root().join("crates").join(name).join("src");
     let places: Vec<(String, PathBuf)> = fs::read_dir(source)
@@ -58,12 +58,12 @@ fn modules_of(name: &str) -> Imports {
     places.iter().map(imports).collect()
 }
 
-/// Modules of the crates that have more than a page of them.
+/// Modules of the crates that the code map lists module by module.
 fn modules() -> Imports {
     ["core", "evidence", "calibration", "design"].into_iter().flat_map(modules_of).collect()
 }
 
-/// Crates of the workspace and where their sources are.
+/// Crates of the workspace with the folders of their sources.
 fn all_crates() -> Vec<(&'static str, PathBuf)> {
     let names = [
         "exact",
@@ -88,7 +88,7 @@ fn all_crates() -> Vec<(&'static str, PathBuf)> {
     names.into_iter().map(place).collect()
 }
 
-/// Crates of the workspace and what they import from it.
+/// Crates of the workspace with their imports from each other.
 fn crates() -> Imports {
     let all = all_crates();
     let known: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
@@ -99,31 +99,31 @@ fn crates() -> Imports {
     all.iter().map(imports).collect()
 }
 
-/// A way from a place back to it.
+/// Circular import: a path from a place back to it.
 fn circle(imports: &Imports) -> Option<Vec<String>> {
-    fn climb(imports: &Imports, way: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
-        let here = way.last().cloned().unwrap_or_default();
+    fn climb(imports: &Imports, path: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
+        let here = path.last().cloned().unwrap_or_default();
         for next in imports.get(&here).into_iter().flatten() {
-            if way.contains(next) {
-                way.push(next.clone());
+            if path.contains(next) {
+                path.push(next.clone());
                 return true;
             }
             if done.contains(next) {
                 continue;
             }
-            way.push(next.clone());
-            if climb(imports, way, done) {
+            path.push(next.clone());
+            if climb(imports, path, done) {
                 return true;
             }
-            way.pop();
+            path.pop();
         }
         done.insert(here);
         false
     }
     let mut done = BTreeSet::new();
     imports.keys().find_map(|start| {
-        let mut way = vec![start.clone()];
-        climb(imports, &mut way, &mut done).then_some(way)
+        let mut path = vec![start.clone()];
+        climb(imports, &mut path, &mut done).then_some(path)
     })
 }
 
@@ -132,7 +132,7 @@ fn nothing_imports_from_above() {
     for imports in [crates(), modules()] {
         assert_eq!(circle(&imports), None);
     }
-    // the search for circles finds one
+    // the search finds a circular import
     let edge = |a: &str, b: &str| (a.to_string(), BTreeSet::from([b.to_string()]));
     let knot = Imports::from([edge("a", "b"), edge("b", "c"), edge("c", "b")]);
     assert_eq!(circle(&knot), Some(["a", "b", "c", "b"].map(String::from).to_vec()));
@@ -151,7 +151,7 @@ fn the_drawing_is_what_is_there() {
     assert_eq!(drawn, found, "crates/README.md draws other imports than there are");
 }
 
-/// Files of a crate by the path of their module: their text without comments and unit tests.
+/// Files of a crate by module path: text without comments and unit tests.
 type Files = BTreeMap<Vec<String>, String>;
 
 fn files_of(folder: &Path) -> Files {
@@ -171,12 +171,13 @@ fn files_of(folder: &Path) -> Files {
     sources(folder).iter().map(|file| (module(file), text(file))).collect()
 }
 
-/// The identifier at the start of a text, which may be empty.
+/// Identifier at the start of a text; empty if there is none.
 fn identifier(text: &str) -> &str {
     &text[..text.find(|c: char| c != '_' && !c.is_alphanumeric()).unwrap_or(text.len())]
 }
 
-/// Paths that a text of a module names by `crate::`, `super::` or `self::`, from the root of the crate.
+/// Paths in the text of a module that begin with `crate::`, `super::` or `self::`, relative to the root of
+/// the crate.
 fn paths(module: &[String], text: &str) -> Vec<Vec<String>> {
     let mut out = Vec::new();
     for root in ["crate::", "super::", "self::"] {
@@ -219,8 +220,8 @@ fn paths(module: &[String], text: &str) -> Vec<Vec<String>> {
     out
 }
 
-/// The module whose file defines what a path names: the longest module of the path, or one below from which
-/// that exports the name.
+/// Module whose file defines the name of a path: the longest module of the path, or a module below it from
+/// which it exports the name.
 fn defined_in(files: &Files, path: &[String]) -> Option<Vec<String>> {
     let module = (0..=path.len()).rev().map(|n| &path[..n]).find(|m| files.contains_key(*m))?;
     let Some(name) = path.get(module.len()) else { return Some(module.to_vec()) };
@@ -233,8 +234,8 @@ fn defined_in(files: &Files, path: &[String]) -> Option<Vec<String>> {
     if defines(&files[module]) {
         return Some(module.to_vec());
     }
-    // `super::` in a module that is written out in its file may mean that file: what its module does not name
-    // is no import
+    // `super::` in an inline module may mean its own file: a name that the module does not contain is no
+    // import
     let exports = |(at, _): (usize, &str)| identifier(&files[module][at..]) == name;
     if !files[module].match_indices(name.as_str()).any(exports) {
         return None;
@@ -243,7 +244,7 @@ fn defined_in(files: &Files, path: &[String]) -> Option<Vec<String>> {
     Some(below.map_or_else(|| module.to_vec(), |(m, _)| m.clone()))
 }
 
-/// What every file of a crate imports from the others.
+/// Files of a crate with their imports from each other.
 fn imports_of_files(files: &Files) -> Imports {
     let imports = |(module, text): (&Vec<String>, &String)| {
         let all = paths(module, text).into_iter().filter_map(|path| defined_in(files, &path));
@@ -272,10 +273,11 @@ fn no_files_import_each_other() {
     assert_eq!(circle(&imports_of_files(&files)), None);
 }
 
-/// Most columns of a line of comment, its indentation counted; code and formulas between fences apart.
+/// Largest number of columns of a comment line, including indentation, outside code and formulas between
+/// fences.
 const COLUMNS: usize = 110;
 
-/// Lines of comment that are longer than [`COLUMNS`], by their numbers.
+/// Numbers of the comment lines that are longer than [`COLUMNS`].
 fn long_comments(text: &str) -> Vec<usize> {
     let mut fenced = false;
     let mut out = Vec::new();

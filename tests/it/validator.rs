@@ -1,10 +1,10 @@
-//! JSON Schema (draft 2020-12), of its keywords those that the program's schemas have: any other one is
-//! refused, so that nothing is accepted because it was not read.
+//! JSON Schema (draft 2020-12), limited to the keywords of the program's schemas. Any other keyword is
+//! refused, so that none is ignored.
 
 use regex::Regex;
 use serde_json::Value;
 
-/// Keywords that describe and refuse nothing.
+/// Keywords that only describe.
 const ANNOTATIONS: [&str; 7] = ["$id", "$schema", "$defs", "title", "description", "default", "format"];
 
 /// Faults of a value by a schema, each with its place; `root` holds the definitions.
@@ -77,7 +77,8 @@ fn choices(root: &Value, of: &Value, value: &Value, place: &str) -> usize {
     all.filter(|schema| faults(root, schema, value, place).is_empty()).count()
 }
 
-/// Keywords of one value: numbers limit numbers only, lengths lists or texts, patterns texts.
+/// True if a value satisfies one keyword: numeric keywords apply to numbers, lengths to lists or texts,
+/// patterns to texts.
 fn holds(keyword: &str, of: &Value, value: &Value) -> bool {
     let limit = || of.as_f64().expect("a number");
     let length = || of.as_u64().expect("a length") as usize;
@@ -101,7 +102,7 @@ fn holds(keyword: &str, of: &Value, value: &Value) -> bool {
     }
 }
 
-/// True if a value is of the type of this name.
+/// True if a value has the type of this name.
 fn is(name: &Value, value: &Value) -> bool {
     match name.as_str() {
         Some("null") => value.is_null(),
@@ -120,7 +121,7 @@ mod tests {
 
     use super::faults;
 
-    /// Cases of the specification: what a keyword accepts and what it refuses.
+    /// Cases of the specification: accepted and refused values of every keyword.
     #[test]
     fn every_keyword_refuses() {
         let pair = json!({ "prefixItems": [{ "type": "string" }, { "type": "number" }], "items": false });

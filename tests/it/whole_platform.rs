@@ -1,5 +1,5 @@
 //! Accelerometers, torquers and mounting (section 10 of the method): the reference verdicts, a second path
-//! that shares nothing with the engine, and laws on random schemes.
+//! independent of the engine, and laws on random schemes.
 
 use obsdeg_core::degree::{Degrees, judge};
 use obsdeg_core::model::{
@@ -20,7 +20,7 @@ fn cardinals() -> Scheme {
     at(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Positions that follow each other by turns of 90 degrees about platform axes.
+/// Random slew sequence with turns of 90 degrees about platform axes.
 fn walk(positions: usize, seed: u64) -> Scheme {
     let mut rng = SplitMix64::new(seed);
     let names = cardinal_names();
@@ -47,7 +47,7 @@ fn walk(positions: usize, seed: u64) -> Scheme {
     scheme
 }
 
-/// `C_c^n` by the letters: column j is the direction of platform axis j in North, Up, East.
+/// Attitude matrix `C_c^n` of three letters: column j is the direction of platform axis j in North, Up, East.
 fn integer_attitude(name: &str) -> [[i64; 3]; 3] {
     let mut c = [[0; 3]; 3];
     for (j, letter) in name.chars().enumerate() {
@@ -70,7 +70,7 @@ fn exact(scheme: &Scheme) -> (Vec<String>, Degrees) {
     (platform.names().to_vec(), degrees)
 }
 
-/// Coefficients by degree: how many of degree 0, 1, 2 and not observable.
+/// Numbers of coefficients of degree 0, 1, 2 and not observable.
 fn by_degree((names, degrees): &(Vec<String>, Degrees)) -> [usize; 4] {
     let mut out = [0; 4];
     for (_, degree) in names.iter().zip(&degrees.degree).filter(|(n, _)| !n.starts_with("psi")) {
@@ -79,7 +79,7 @@ fn by_degree((names, degrees): &(Vec<String>, Degrees)) -> [usize; 4] {
     out
 }
 
-/// The rows of the table: 24 cardinal attitudes.
+/// Rows of the reference table with 24 cardinal attitudes.
 #[test]
 fn cardinal_attitudes() {
     type Row<'a> = (&'a str, [(&'a [usize], [usize; 4]); 3]);
@@ -106,7 +106,7 @@ fn cardinal_attitudes() {
     }
 }
 
-/// The rows of the table: slews, 31 positions.
+/// Rows of the reference table with slews, 31 positions.
 #[test]
 fn self_calibration_with_slews() {
     for seed in [1, 2, 3] {
@@ -127,7 +127,7 @@ fn self_calibration_with_slews() {
 
 mod floats;
 
-/// The positions of a scheme, in floating point.
+/// Positions of a scheme in floating point.
 fn legs(scheme: &Scheme) -> Vec<floats::Leg> {
     let platform = Platform::new(scheme.clone()).expect("a scheme");
     let back = |m: &floats::M| -> floats::M { std::array::from_fn(|i| std::array::from_fn(|j| m[j][i])) };
@@ -156,7 +156,7 @@ fn legs(scheme: &Scheme) -> Vec<floats::Leg> {
     legs
 }
 
-/// What the second path says of a scheme.
+/// Rank profile and degrees of a scheme by the second path.
 fn by_floats(scheme: &Scheme) -> (Vec<usize>, Vec<Option<usize>>) {
     let terms = scheme.unknowns.to_string();
     floats::judge(&terms.split(',').collect::<Vec<_>>(), &legs(scheme), scheme.carry)
@@ -173,8 +173,8 @@ fn both_paths_agree(scheme: &Scheme) {
     }
 }
 
-/// The reference table by the second path, and sets of terms and attitudes drawn at random, with slews of 90
-/// and 120 degrees and others.
+/// The second path confirms the reference table, and verdicts for random terms and attitudes, with slews of
+/// 90, 120 and other angles.
 #[test]
 fn a_second_path() {
     for terms in ["F,I,O,S,K0,K1", "F,I,O,S,K0,K1,M3,K2"] {
@@ -210,7 +210,7 @@ fn a_second_path() {
     }
 }
 
-/// Positions reached gimbal by gimbal, one gimbal at a time.
+/// Positions reached by turning one gimbal at a time.
 fn turned_about(start: &str, positions: usize, rng: &mut SplitMix64) -> Scheme {
     let mut angles: Vec<i64> = start.split(',').map(|a| a.parse().expect("degrees")).collect();
     let mut list = vec![start.to_string()];
@@ -224,8 +224,7 @@ fn turned_about(start: &str, positions: usize, rng: &mut SplitMix64) -> Scheme {
     scheme
 }
 
-/// Fewest generic positions that make all coefficients observable, and positions with slews that suffice for
-/// 33 unknowns.
+/// Fewest generic positions that make all coefficients observable.
 #[test]
 fn fewest_positions() {
     let mut rng = SplitMix64::new(3);
@@ -251,9 +250,9 @@ fn fewest_positions() {
     }
 }
 
-/// Laws on random schemes: an unknown more never lowers a degree; GM with M6 hides three directions at least,
-/// GM with M3 (of which one triad defines the axes) no more than M3 alone does without them; what is seen of
-/// the relative mounting is the same in every frame.
+/// Laws on random schemes: one more unknown never lowers a degree. GM with M6 leaves at least three more
+/// directions unobservable than GM with M3 unless psi is reset. The verdicts on the relative mounting are the
+/// same in every frame.
 #[test]
 fn laws() {
     let mut rng = SplitMix64::new(23);
@@ -287,7 +286,7 @@ fn laws() {
         let rotations = if carry == Carry::Reset { 0 } else { 3 };
         assert!(defect(&with_m6) >= defect(&with_m3) + rotations, "{terms:?} {carry}");
         assert!(defect(&with_m6) >= 3, "{terms:?} {carry}");
-        // the frame of the gyros: the same directions, but for those that define it
+        // the frame of the gyros: the same rank, apart from the terms that define the frame
         terms.retain(|t| *t != "GM");
         let with_gm3 = of(&[&terms[..], &["GM3", "M6"]].concat());
         assert_eq!(with_gm3.1.rank(), with_m3.1.rank(), "{terms:?} {carry}");
@@ -299,7 +298,7 @@ fn laws() {
     }
 }
 
-/// Wrong use is refused, or explained.
+/// Wrong use is refused or explained.
 #[test]
 fn wrong_use_has_a_reason() {
     use obsdeg_core::analysis::{AnalysisOptions, analyze};
@@ -332,8 +331,8 @@ fn wrong_use_has_a_reason() {
     assert!(degree("K1_X").is_none() && degree("K3_X").is_none());
 }
 
-/// Positions that turn while Z is observed, with drifts: what turning adds to the derivatives of Z changes no
-/// verdict.
+/// Positions that rotate while Z is observed, with drifts: the contribution of the rotation to the
+/// derivatives of Z changes no verdict.
 #[test]
 fn rotating_segments_by_the_second_path() {
     let all = ["F", "I", "O", "S", "II", "OO", "SS"];
@@ -359,8 +358,8 @@ fn rotating_segments_by_the_second_path() {
     }
 }
 
-/// Rotations with errors of accelerometers and torquers: psi integrated along the turn and Z sampled there
-/// determine what the exact verdict says, and no degree is below that with the drifts alone.
+/// Rotations with errors of accelerometers and torquers: psi integrated along the rotation and samples of Z
+/// confirm the exact verdict. No degree is below that with the drifts alone.
 #[test]
 fn courses_by_samples() {
     let all = ["F", "I", "O", "S", "II", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
@@ -376,7 +375,7 @@ fn courses_by_samples() {
         let start = ["10,25,40", "0,0,0", "-70,15,130"][case % 3];
         let mut scheme = turned_about(start, 1 + rng.below(3) as usize, &mut rng);
         scheme.carry = Carry::ALL[case / 3 % 3];
-        // a way by gimbals is known from the start of a position, not from the end of a rotation
+        // a slew path by gimbals is known from the start of a position, not from the end of a rotation
         let rotated = if scheme.carry == Carry::Inertial { scheme.positions.len() - 1 } else { 0 };
         let axis = ["X_p", "Y_p", "Z_p", "N", "U", "E"][rng.below(6) as usize];
         let angle = ["70", "-120", "360", "500"][rng.below(4) as usize];
@@ -411,9 +410,9 @@ fn courses_by_samples() {
     assert!(compared > 10, "{compared}");
 }
 
-/// By hand: about the vertical the gyro along it has one constant drift, D_F + GS (w + wU), so that alone
-/// does not tell its parts apart; a position before, where GS acts by wU alone, does not either as long as
-/// psi is new (reset); with psi carried the turn tells them.
+/// By hand: during a rotation about the vertical the gyro along it has one constant drift, D_F + GS (w + wU),
+/// whose parts are indistinguishable. A position before, where GS acts through wU alone, does not change this
+/// under reset carry. With psi carried the turn distinguishes them.
 #[test]
 fn a_torquer_about_the_vertical() {
     let scheme = |carry: Carry, attitudes: &[&str]| {
@@ -435,7 +434,8 @@ fn a_torquer_about_the_vertical() {
     assert!(degree(&both, "D_FY").is_some() && degree(&both, "GS_Y").is_some());
 }
 
-/// Seven positions by quarter turns, proven; what no tour determines is said at once.
+/// Fewest positions by quarter turns, with proof. Coefficients that no slew sequence determines are reported
+/// at once.
 #[test]
 fn fewest_positions_of_walks() {
     use obsdeg_design::design::{Candidates, WalkOptions, scheme_of_walk, walks};
@@ -452,7 +452,7 @@ fn fewest_positions_of_walks() {
     let (names, degrees) = exact(&scheme_of_walk(&found, &base).expect("a scheme"));
     let seen = |(n, d): (&String, &Option<usize>)| n.starts_with("psi") || d.is_some();
     assert!(names.iter().zip(&degrees.degree).all(seen));
-    // no walk of one position less, drawn at random, does
+    // no random slew sequence with one position less suffices
     for seed in 0..300 {
         let scheme = Scheme { unknowns: base.unknowns.clone(), ..walk(fewest - 1, seed) };
         let (names, degrees) = exact(&scheme);
@@ -464,7 +464,7 @@ fn fewest_positions_of_walks() {
         let text = obsdeg_report::written(w, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
         text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    // a tour of all turns proves that there is none; a search that ends does not
+    // a sequence with all slews proves that no sequence suffices; an unsuccessful search does not
     assert!(!none.never.is_empty() && title(&none).contains("degrees makes every required"), "{none:?}");
     let sought = obsdeg_design::design::Walks { never: Vec::new(), ..none.clone() };
     assert!(title(&sought).contains("degrees was found that makes every required"), "{sought:?}");

@@ -1,5 +1,5 @@
-//! The page of `crates/web` in a real browser, from disk: what it says, opens, saves, searches and shows,
-//! against the command line.
+//! The page of `crates/web` in a real browser, from disk: text, files, search and pictures, against the
+//! command line.
 
 use std::fs;
 use std::path::Path;
@@ -16,10 +16,10 @@ use crate::workbench_page::{choose, click, key, opened, quiet, root, says, schem
 fn the_page_is_small_and_asks_for_nothing() {
     let Some((mut browser, page)) = opened(1400) else { return };
     let text = fs::read_to_string(page).expect("the page");
-    // 2.99 MB measured, 0.1 of it multiple shooting, Allan deviations and zstd, 0.07 identifiable functions
-    // and relations, 0.04 sets of outputs; a page that grows past the bound is looked at before it is moved
+    // 2.99 MB measured: 0.1 for multiple shooting, Allan deviations and zstd, 0.07 for identifiable functions
+    // and relations, 0.04 for sets of outputs; examine the page before raising the bound
     assert!(text.len() < 3_010_000, "{} bytes", text.len());
-    // what would be forbidden is refused: the policy is not void
+    // a forbidden request is refused: the policy is in force
     let refused = browser.value("fetch('https://example.com').then(() => 'sent', () => 'refused')");
     assert_eq!(refused, json!("refused"));
     assert!(browser.events.iter().any(|e| e.to_string().contains("Content Security Policy")));
@@ -28,7 +28,7 @@ fn the_page_is_small_and_asks_for_nothing() {
     assert_eq!(private, json!(true));
 }
 
-/// No control of the page without a test that moves it.
+/// Every control of the page has a test that operates it.
 #[test]
 fn every_control_is_driven() {
     let page = include_str!("../../crates/web/page/page.html");
@@ -53,7 +53,7 @@ fn its_json_is_that_of_the_command_line() {
             (example["name"].as_str().expect("a name"), example["kind"].as_str().expect("a kind"));
         let file = format!("examples/{name}/{kind}.toml");
         assert_eq!(example["text"], json!(fs::read_to_string(root().join(&file)).expect("readable")));
-        // the page holds no symbolic engine: with one, solutions are left out of both
+        // the page has no symbolic engine, so solutions are omitted on both sides
         let mut request = json!({ "sources": [{ "name": file, "text": example["text"] }] });
         let mut command = vec!["analyze", &file, "--format", "json"];
         if cfg!(feature = "symbolica") {
@@ -66,7 +66,7 @@ fn its_json_is_that_of_the_command_line() {
         assert!(printed.len() > 500 || said["problem"].is_object(), "{file}: {said}");
         assert!(said["text"].as_str().unwrap_or_default() == printed, "{file}: other bytes");
     }
-    // another command, with random numbers in it
+    // another command with random numbers
     let file = "examples/six-positions/scheme.toml";
     let text = fs::read_to_string(root().join(file)).expect("readable");
     let request = json!({ "sources": [{ "name": file, "text": text }], "seed": 5 });
@@ -101,7 +101,7 @@ fn schemes_come_and_go() {
             b.call("Input.dispatchDragEvent", json!({ "type": kind, "x": 300, "y": 300, "data": data }));
         }
     };
-    // by the chooser
+    // by the file chooser
     b.call("Page.setInterceptFileChooserDialog", json!({ "enabled": true }));
     click(b, "#open");
     let chooser = "Page.fileChooserOpened";
@@ -109,7 +109,7 @@ fn schemes_come_and_go() {
     let six = root().join("examples/six-positions/scheme.toml");
     b.call("DOM.setFileInputFiles", json!({ "files": [six], "backendNodeId": node.expect("a chooser") }));
     wait(b, "six", "document.querySelectorAll('#positions li').length == 6");
-    // dropped, saved, and the same
+    // a dropped file, saved again, is the same
     drop_file(b, &root().join("examples/twelve-positions/scheme.toml"));
     wait(b, "twelve", "document.querySelectorAll('#positions li').length == 12");
     click(b, "#save");
@@ -127,7 +127,7 @@ fn schemes_come_and_go() {
     assert_eq!(answer["schema"], json!("obsdeg.analysis/1"));
     click(b, "#report");
     assert!(whole("scheme.html").contains("<math"));
-    // a link holds it
+    // a link contains the scheme
     click(b, "#link");
     wait(b, "link", "location.hash.length > 100");
     let link = b.value("location.href").as_str().expect("an address").to_string();
@@ -139,7 +139,7 @@ fn schemes_come_and_go() {
     b.value("location.hash = 'scheme=%%%', 1");
     wait(b, "a damaged link", "document.getElementById('notice').textContent.includes('damaged')");
     assert_eq!(scheme(b), before);
-    // wrong TOML: its place, and nothing is lost
+    // wrong TOML: the message has its place, and no text is lost
     let wrong = folder.path().join("wrong.toml");
     fs::write(&wrong, "carry = \"platform\"\n[[position]]\nangles_deg = [0, 0, \"NUE\n").expect("written");
     drop_file(b, &wrong);
@@ -164,7 +164,7 @@ fn schemes_come_and_go() {
         "symmetries",
         "document.getElementById('text-verdicts').textContent.includes('multiply x2 by s; divide b by s')",
     );
-    // a link holds a model too
+    // a link contains a model too
     let model = b.value("document.getElementById('text').value");
     click(b, "#link");
     wait(b, "link of a text", "location.hash.startsWith('#text=')");
@@ -174,14 +174,14 @@ fn schemes_come_and_go() {
     wait(b, "the text is there", "window.obsdeg && document.getElementById('text').value.length > 100");
     assert_eq!(b.value("document.getElementById('text').value"), model);
     wait(b, "and judged", "document.getElementById('text-verdicts').textContent.includes('rank 5 of 6')");
-    // written by hand
+    // typed text
     write(
         b,
         "#text",
         "name = \"decay\"\n\n[states]\nx = \"-k*x\"\n\n[parameters]\nk = {}\n\n[outputs]\ny = \"x\"\n",
     );
     wait(b, "judged", "document.getElementById('text-verdicts').textContent.includes('rank 2 of 2')");
-    // what is written stays while one looks at the positions, which a model has none of
+    // typed text is kept while the positions are shown, which a model does not have
     click(b, "#tab-scheme");
     click(b, "#tab-text");
     assert!(b.value("document.getElementById('text').value").to_string().contains("decay"));
@@ -189,7 +189,7 @@ fn schemes_come_and_go() {
     wait(b, "no scheme", "document.getElementById('notice').textContent.includes('expected a scheme')");
     click(b, "#renew");
     wait(b, "the positions", "document.getElementById('text').value.includes('[[position]]')");
-    // an angle by name stays when another changes, and small ones are decimals
+    // an angle given by name is kept when another angle changes, and small angles are decimals
     write(
         b,
         "#text",
@@ -214,8 +214,8 @@ fn schemes_come_and_go() {
     assert!(page.is_file());
 }
 
-/// The families of errors that are not estimated stand below the verdicts, with the figures of the command
-/// line; with an edit they are those of the new scheme.
+/// The families of errors that are not estimated stand below the verdicts, with the numbers of the command
+/// line. After an edit they belong to the new scheme.
 #[test]
 fn errors_that_are_not_estimated_are_shown() {
     let Some((mut browser, _)) = opened(1280) else { return };
@@ -248,20 +248,21 @@ fn errors_that_are_not_estimated_are_shown() {
     };
     assert_eq!(shown(b, "platform"), "1 no effect, 2 visible");
     choose(b, "#carry", "reset");
-    // the table of before is there until the new scheme is simulated
+    // the previous table stays until the new scheme is simulated
     wait(
         b,
         "classes of the new scheme",
-        "[...document.querySelectorAll('#omitted tbody tr')].some(r => r.cells[0].textContent == 'K0 (3)' && r.cells[1].textContent == '1 no effect, 2 silent')",
+        "[...document.querySelectorAll('#omitted tbody tr')].some(r => r.cells[0].textContent == 'K0 (3)' && \
+         r.cells[1].textContent == '1 no effect, 2 silent')",
     );
     b.value("document.getElementById('not-estimated').open = false, 1");
     assert_eq!(shown(b, "reset"), "1 no effect, 2 silent");
     quiet(b);
 }
 
-/// With a bench a requirement is held against the total, in words, in the bar and beside sigma; without one
-/// the summary of met requirements carries its condition, and the table the size that uses up a margin. The
-/// totals are those of the command line.
+/// With a bench a requirement is compared with the total, in words, in the bar and beside sigma. Without a
+/// bench the summary of met requirements states its condition, and the table the size that uses up a margin.
+/// The totals are those of the command line.
 #[test]
 fn requirements_are_judged_by_the_total() {
     let Some((mut browser, _)) = opened(1280) else { return };
@@ -274,7 +275,8 @@ fn requirements_are_judged_by_the_total() {
     let head = b.value("[...document.querySelectorAll('#omitted th')].at(-1).textContent");
     assert_eq!(head, json!("uses up a margin at"));
     let k0 = b.value(
-        "[...document.querySelectorAll('#omitted tbody tr')].find(r => r.cells[0].textContent == 'K0 (3)').cells[6].textContent",
+        "[...document.querySelectorAll('#omitted tbody tr')].find(r => r.cells[0].textContent == 'K0 \
+         (3)').cells[6].textContent",
     );
     let pair =
         ["--angles", "0,0,0", "--angles", "180,0,0", "--requirement", "D_IY=0.2", "--format", "json", "-q"];
@@ -327,7 +329,7 @@ fn the_best_positions_are_found() {
     click(b, "#found tbody tr:first-child button");
     wait(b, "five", "document.querySelectorAll('#positions li').length == 5");
     wait(b, "all", "document.getElementById('summary').textContent.startsWith('rank 15 of 15')");
-    // by another criterion, which needs a requirement, and for some unknowns
+    // another criterion, which needs a requirement, for some unknowns
     write(b, "#requirements", "D = 0.1");
     click(b, "#tab-design");
     write(b, "#design-k", "3");
@@ -344,7 +346,7 @@ fn the_best_positions_are_found() {
     assert!(value.as_str().is_some_and(|v| v.starts_with(&best.to_string()[..4])), "{value} {best}");
     choose(b, "#design-criterion", "worst");
     write(b, "#design-observable", "");
-    // a longer search is ended, and the next one begins
+    // a longer search is stopped, and the next one starts
     click(b, "#tab-design");
     write(b, "#design-k", "9");
     click(b, "#design-go");
@@ -357,7 +359,7 @@ fn the_best_positions_are_found() {
     quiet(b);
 }
 
-/// The tour says what the table beside it shows.
+/// The tour's statements agree with the table beside it.
 #[test]
 fn the_tour_shows_what_it_says() {
     let Some((mut browser, _)) = opened(1400) else { return };
@@ -367,21 +369,22 @@ fn the_tour_shows_what_it_says() {
     says(b, "psi_y", 5, "not told from D_FZ");
     click(b, "#tour-next");
     says(b, "psi_y", 2, "0");
-    // every multiple of 5 degrees but 0 and 180 gives degree 0, as is said
+    // every multiple of 5 degrees except 0 and 180 gives degree 0, as stated
     wait(
         b,
         "marks",
-        "document.getElementById('alpha').title.startsWith('Other verdicts at -180, 0, 180 deg (tried: multiples of 5)')",
+        "document.getElementById('alpha').title.startsWith('Other verdicts at -180, 0, 180 deg (tried: multiples of \
+         5)')",
     );
     click(b, "#tour-next");
     says(b, "psi_y", 3, "not excited");
-    // the poles are the latitudes that are marked
+    // the poles are the marked latitudes
     wait(
         b,
         "latitudes",
         "document.getElementById('latitude').title.startsWith('Other verdicts at -90, 90 deg (')",
     );
-    // against the first step, not the one before
+    // compared with the first step, not with the previous one
     for name in ["D_FY", "D_IY"] {
         says(b, name, 3, "not excited");
         says(b, name, 2, "\u{2013} was 2");
@@ -417,7 +420,8 @@ fn it_is_for_everyone() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && \
+         document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
     b.value("document.getElementById('not-estimated').open = true, 1");
     b.value(&format!("{axe};1"));
@@ -432,7 +436,8 @@ fn it_is_for_everyone() {
                 b.settle();
                 let beyond = b.value(
                     "(() => { const w = document.documentElement.clientWidth; \
-                     const out = [...document.body.querySelectorAll('*')].filter(e => e.checkVisibility() && (!e.closest('.wide') || e.classList.contains('wide'))) \
+                     const out = [...document.body.querySelectorAll('*')].filter(e => e.checkVisibility() && \
+                     (!e.closest('.wide') || e.classList.contains('wide'))) \
                      .filter(e => e.getBoundingClientRect().right > w + 1).map(e => e.tagName + '#' + e.id); \
                      return document.documentElement.scrollWidth > w ? ['page', ...out] : out; })()",
                 );
@@ -441,7 +446,8 @@ fn it_is_for_everyone() {
                     continue;
                 }
                 let found = b.value(
-                    "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + v.nodes[0].html.slice(0, 200))])",
+                    "axe.run().then(r => [r.passes.length, r.violations.map(v => v.impact + ' ' + v.id + ': ' + \
+                     v.nodes[0].html.slice(0, 200))])",
                 );
                 assert!(
                     found[0].as_u64() > Some(10) && found[1] == json!([]),
@@ -450,7 +456,7 @@ fn it_is_for_everyone() {
             }
         }
     }
-    // by keys alone: tabs have arrows, everything that works has a name
+    // keyboard alone: arrow keys switch tabs, every control has a name
     b.value("document.getElementById('tab-scheme').focus(), 1");
     key(b, "ArrowRight", 39, 0);
     assert_eq!(b.value("document.activeElement.id"), json!("tab-design"));

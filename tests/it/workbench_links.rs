@@ -1,19 +1,19 @@
-//! Links to the page that somebody else made: names, numbers, keys and sizes put nothing into the page, and
-//! end in a message or in a scheme.
+//! Foreign links to the page: names, numbers, keys and sizes inject nothing into the page, and end in a
+//! message or in a scheme.
 
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
 use crate::workbench_page::{opened, quiet, scheme, wait};
 
-/// A scheme file with two positions, something before them, and something in the first.
+/// Scheme file with two positions, `before` in front of them and `within` in the first.
 fn file(before: &str, within: &str) -> String {
     format!(
         "{before}\n[[position]]\nangles_deg = [0, 0, 0]\n{within}\n[[position]]\nangles_deg = [180, 0, 0]\n"
     )
 }
 
-/// Texts of links, and what the page says.
+/// Texts of links with the expected text of the page.
 fn hostile() -> Vec<(String, &'static str)> {
     const IMAGE: &str = "<img src=x onerror='window.hacked=1'>";
     let mut out = Vec::new();
@@ -63,7 +63,7 @@ fn hostile() -> Vec<(String, &'static str)> {
     out
 }
 
-/// Opens a link, and waits for what the page says.
+/// Opens a link and waits for the expected text.
 fn link(browser: &mut Browser, part: &str, said: &str) {
     browser.value("document.getElementById('notice').textContent = '', 1");
     browser.value(&format!("location.hash = 'scheme=' + {part}, 1"));
@@ -79,9 +79,10 @@ fn link(browser: &mut Browser, part: &str, said: &str) {
 fn links_of_others_put_nothing_into_the_page() {
     let Some((mut browser, _)) = opened(1200) else { return };
     let b = &mut browser;
-    // as the page packs a text
+    // the same encoding as the page's
     b.value(
-        "window.packedText = (text) => btoa(Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b)).join(''))\
+        "window.packedText = (text) => btoa(Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b))\
+         .join(''))\
          .replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', ''), 1",
     );
     for (text, said) in hostile() {

@@ -1,4 +1,4 @@
-//! The page of `crates/web` in a real browser, from disk: what its tests do there.
+//! The page of `crates/web` in a real browser, from disk: actions of its tests.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,8 +13,8 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The page, built from what is there now; none where it was never built here (`cargo run -p obsdeg-web`,
-/// minutes of compilation for another target), or where there is no target or no browser.
+/// Opens the page, built from the current sources. `None` if it was never built here (`cargo run -p
+/// obsdeg-web`, minutes of compilation for another target), or without the target or a browser.
 #[expect(clippy::print_stderr, reason = "a skipped test says why")]
 pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
     static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();
@@ -73,9 +73,10 @@ pub(crate) fn ready(browser: &mut Browser) {
     wait(browser, "start", "document.querySelector('#verdicts tbody tr')");
 }
 
-const CELL: &str = "(name, column) => document.querySelector(`#verdicts tr[data-name=\"${name}\"]`)?.children[column]?.textContent";
+const CELL: &str = "(name, column) => document.querySelector(`#verdicts tr[data-name=\"${name}\"]`)\
+                    ?.children[column]?.textContent";
 
-/// Waits until a cell of the table of verdicts says so.
+/// Waits until a cell of the table of verdicts has the given text.
 pub(crate) fn says(browser: &mut Browser, name: &str, column: usize, text: &str) {
     let condition = format!("({CELL})({name:?}, {column})?.startsWith({text:?})");
     wait(browser, name, &condition);
@@ -85,7 +86,7 @@ pub(crate) fn click(browser: &mut Browser, selector: &str) {
     browser.mouse(selector, true);
 }
 
-/// Writes into a field as a person would, and leaves it.
+/// Types into a field and leaves it.
 pub(crate) fn write(browser: &mut Browser, selector: &str, text: &str) {
     browser.value(&format!(
         "document.querySelector({selector:?}).focus(), document.querySelector({selector:?}).select?.(), 1"
@@ -97,19 +98,22 @@ pub(crate) fn write(browser: &mut Browser, selector: &str, text: &str) {
 
 pub(crate) fn choose(browser: &mut Browser, selector: &str, value: &str) {
     browser.value(&format!(
-        "(() => {{ const e = document.querySelector({selector:?}); e.value = {value:?}; e.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+        "(() => {{ const e = document.querySelector({selector:?}); e.value = {value:?}; e.dispatchEvent(new \
+         Event('change', {{ bubbles: true }})); }})()"
     ));
 }
 
 pub(crate) fn key(browser: &mut Browser, key: &str, code: u32, modifiers: u32) {
     for kind in ["rawKeyDown", "keyUp"] {
-        let event = json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": modifiers });
+        let event = json!({
+            "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": modifiers
+        });
         browser.call("Input.dispatchKeyEvent", event);
     }
     browser.settle();
 }
 
-/// Drags from one point to another in so many steps.
+/// Drags the mouse from one point to another in `steps` steps.
 pub(crate) fn drag(browser: &mut Browser, from: [f64; 2], to: [f64; 2], steps: usize, pause: Duration) {
     let mut event = |kind: &str, [x, y]: [f64; 2], buttons: u32| {
         let button = if buttons == 0 && kind == "mouseMoved" { "none" } else { "left" };
@@ -145,7 +149,7 @@ pub(crate) fn swipe(browser: &mut Browser, from: [f64; 2], to: [f64; 2]) {
     browser.settle();
 }
 
-/// Left, top, width and height of an element that is scrolled to.
+/// Left, top, width and height (pixels) of an element after scrolling to it.
 pub(crate) fn place(browser: &mut Browser, selector: &str) -> [f64; 4] {
     let place = browser.value(&format!(
         "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{ block: 'center' }}); \
@@ -154,7 +158,7 @@ pub(crate) fn place(browser: &mut Browser, selector: &str) -> [f64; 4] {
     [0, 1, 2, 3].map(|k| place[k].as_f64().expect("a number"))
 }
 
-/// The point of a slider's thumb at a value from -180 to 180.
+/// Position of a slider's thumb at a value from -180 to 180 (deg).
 pub(crate) fn thumb(browser: &mut Browser, axis: &str, value: f64) -> [f64; 2] {
     let [x, y, w, h] = place(browser, &format!("#{axis}"));
     [x + 8.0 + (w - 16.0) * (value + 180.0) / 360.0, y + h / 2.0]
@@ -168,7 +172,7 @@ pub(crate) fn names(browser: &mut Browser) -> Value {
     browser.value("[...document.querySelectorAll('#positions .name')].map(b => b.textContent)")
 }
 
-/// Nothing was said to the console, nothing was asked of a network.
+/// Asserts that the page wrote nothing to the console and made no network request.
 pub(crate) fn quiet(browser: &Browser) {
     for event in &browser.events {
         let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);

@@ -1,4 +1,4 @@
-//! Positions of the workbench, edited by mouse, keys and touch, and how soon the verdict follows.
+//! Positions of the workbench, edited by mouse, keyboard and touch, and the delay of the verdict.
 
 use std::fs;
 use std::time::Duration;
@@ -23,9 +23,10 @@ fn positions_are_edited() {
     wait(
         b,
         "sigmas",
-        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
+        "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && \
+         document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15",
     );
-    // a slider: psi_y becomes observable, the row says what it was
+    // slider: psi_y becomes observable, and the row shows its previous status
     click(b, "#positions li:nth-child(2) .name");
     let (from, to) = (thumb(b, "alpha", 180.0), thumb(b, "alpha", 90.0));
     drag(b, from, to, 20, Duration::from_millis(5));
@@ -33,13 +34,13 @@ fn positions_are_edited() {
     wait(b, "highlight", "document.querySelector('tr[data-name=psi_y]').classList.contains('changed')");
     let turned = b.value("Number(document.getElementById('alpha').value)").as_f64().expect("a number");
     assert!((turned - 90.0).abs() <= 10.0 && turned % 5.0 == 0.0, "{turned}");
-    // one gesture is one step back, and forward
+    // one gesture is one step of undo and redo
     key(b, "z", 90, 2);
     says(b, "psi_y", 3, "inseparable");
     click(b, "#redo");
     says(b, "psi_y", 2, "0");
     click(b, "#undo");
-    // marks: alpha 0 and 180 are where psi_y is lost
+    // marks: psi_y is not observable at alpha 0 and 180
     click(b, "#redo");
     wait(b, "marks", "document.querySelectorAll('#alpha-marks i').length >= 2");
     let marks = b.value("document.getElementById('alpha').title");
@@ -82,7 +83,7 @@ fn positions_are_edited() {
     let before = b.value(answers);
     write(b, "#beta-number", "12.5");
     wait(b, "a number", "obsdeg.scheme().includes('12.5')");
-    // the answer to what was asked before it does not take the refusal away
+    // the answer to an earlier question does not remove the refusal
     write(b, "#beta-number", "x");
     wait(b, "the answer before", &format!("{answers} > {before}"));
     wait(b, "no number", "document.getElementById('notice').textContent.includes('beta: expected a number')");
@@ -98,13 +99,13 @@ fn positions_are_edited() {
         "name and dwell",
         "obsdeg.scheme().includes('name = \"second\"') && obsdeg.scheme().includes('dwell_s = 300')",
     );
-    // what the engine refuses is told, and the table is not taken for its verdict
+    // a refusal by the engine is shown, and the table is not presented as its verdict
     write(b, "#name", "<b>");
     wait(b, "refused", "document.getElementById('notice').textContent.includes('position name')");
     wait(b, "stale", "document.getElementById('summary').textContent.startsWith('not judged')");
     write(b, "#name", "second");
     wait(b, "judged again", "document.getElementById('summary').textContent.startsWith('rank')");
-    // the list: add, duplicate, delete, order by hand and by keys
+    // list: add, duplicate, delete, reorder by mouse and by keyboard
     click(b, "#add");
     click(b, "#duplicate");
     wait(b, "four", "document.querySelectorAll('#positions li').length == 4");
@@ -126,7 +127,7 @@ fn positions_are_edited() {
     assert_eq!(b.value("document.activeElement.textContent.startsWith('second')"), json!(true));
     click(b, "#positions li:nth-child(2) .moves button:first-child");
     assert!(names(b)[0].as_str().is_some_and(|n| n.starts_with("second")));
-    // the view turns by hand and by keys, and the slew ends at the next position
+    // the view turns by mouse and by keyboard, and the slew ends at the next position
     let picture = "document.getElementById('view').toDataURL()";
     let before = b.value(picture);
     let [x, y, w, h] = place(b, "#view");
@@ -160,7 +161,7 @@ fn positions_are_edited() {
     ] {
         assert!(text.contains(line), "{line} is not in {text}");
     }
-    // the command line reads what the page writes, and says the same
+    // the command line reads the page's file and gives the same verdicts
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scheme.toml");
     fs::write(&file, &text).expect("written");
@@ -180,7 +181,7 @@ fn positions_are_edited() {
     quiet(b);
 }
 
-/// What the page says of attitudes is what the engine says, letter by letter.
+/// Attitudes in letters agree between page and engine.
 #[test]
 fn attitudes_are_those_of_the_engine() {
     let Some((mut browser, _)) = opened(1400) else { return };
@@ -193,15 +194,15 @@ fn attitudes_are_those_of_the_engine() {
         let answer: Value = serde_json::from_slice(&answer.stdout).expect("JSON");
         let letters = answer["positions"][0]["attitude"].as_str().expect("letters").to_string();
         wait(&mut browser, angles, &format!("document.getElementById('letters').value == {letters:?}"));
-        // and back: the letters' own angles are the same attitude
+        // reverse direction: the angles of the letters give the same attitude
         write(&mut browser, "#letters", &letters);
         wait(&mut browser, angles, &format!("document.getElementById('letters').value == {letters:?}"));
     }
     quiet(&browser);
 }
 
-/// By a finger: a slider, the order, the view. About the axis that another position was turned about,
-/// verdicts are others at its angle, at its mirror image and half a turn from both.
+/// Touch: a slider, the order, the view. About the axis between two positions, verdicts differ at the angle
+/// of the other position, at its mirror image, and half a turn from both.
 #[test]
 fn marks_are_where_positions_stand_alike() {
     let Some((mut browser, _)) = opened(1400) else { return };
@@ -215,7 +216,7 @@ fn marks_are_where_positions_stand_alike() {
         "[...document.querySelectorAll('#alpha-marks i')].map(e => Math.round(parseFloat(e.style.left) * 3.6 - 180))",
     );
     assert_eq!(places, json!([-168, -12, 12, 168]));
-    // the same by the command line, at each of these and beside it
+    // the command line gives the same at each of these angles and beside them
     for (angle, observable) in
         [("12", 1), ("-168", 2), ("-12", 6), ("168", 6), ("11", 3), ("-169", 3), ("13", 3)]
     {
@@ -242,7 +243,7 @@ fn it_is_touched() {
         "observable",
         "document.querySelector('tr[data-name=psi_y] td.degree').textContent.startsWith('0')",
     );
-    // what the page says stays in sight
+    // the summary stays in sight
     let seen = "(() => { const r = document.getElementById('summary').getBoundingClientRect(); \
                 return r.top >= 0 && r.bottom <= innerHeight && r.height > 10; })()";
     assert_eq!(b.value(seen), json!(true));
@@ -258,7 +259,7 @@ fn it_is_touched() {
     quiet(b);
 }
 
-/// A slider that is dragged with six positions; a crash; 400 positions.
+/// Dragging a slider with six positions; a crash; 400 positions.
 #[test]
 #[expect(clippy::print_stderr, reason = "what was measured")]
 fn it_keeps_up() {
@@ -267,7 +268,8 @@ fn it_keeps_up() {
     let open = |b: &mut Browser, text: &str| {
         b.value(&format!(
             "(() => {{ const held = new DataTransfer(); held.items.add(new File([{}], 'many.toml')); \
-             document.dispatchEvent(new DragEvent('drop', {{ dataTransfer: held, bubbles: true, cancelable: true }})); }})()",
+             document.dispatchEvent(new DragEvent('drop', {{ dataTransfer: held, bubbles: true, cancelable: true \
+             }})); }})()",
             json!(text)
         ));
     };
@@ -276,14 +278,15 @@ fn it_keeps_up() {
     wait(b, "six", "document.querySelectorAll('#positions li').length == 6");
     let settled = "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)') && \
                    document.querySelectorAll('#verdicts td.sigma:not(:empty)').length == 15";
-    // what the engine alone takes, by the same question: other tests run beside this one, and slow both
+    // time of the engine alone for the same question, measured here because parallel tests slow down both
     let alone = format!(
         "(async () => {{ const times = []; for (let i = 0; i < 21; i++) {{ const from = performance.now(); \
-         await obsdeg.ask('verdicts', [{{ sources: [{{ name: 'six.toml', text: {} }}], solutions: false, omitted: false }}]); \
+         await obsdeg.ask('verdicts', [{{ sources: [{{ name: 'six.toml', text: {} }}], solutions: false, omitted: \
+         false }}]); \
          times.push(performance.now() - from); }} return times.sort((a, b) => a - b)[10]; }})()",
         json!(six)
     );
-    // in the best of a few drags
+    // the best of a few drags
     let mut least = f64::INFINITY;
     for round in 0..5 {
         wait(b, "sigmas and solutions", settled);
@@ -311,10 +314,9 @@ fn it_keeps_up() {
         );
         least = least.min(found[0] / engine);
     }
-    // questions that another overtakes are left out, and the table is drawn in no more time than the engine
-    // takes
+    // outdated questions are skipped, and drawing the table takes no longer than the engine
     assert!(least < 3.0, "{least} times what the engine takes");
-    // a crash is said, and the next question is answered
+    // a crash is reported, and the next question is answered
     let said = b.value("obsdeg.ask('nothing there', []).then(() => 'answered', p => p.message)");
     assert!(
         said.as_str().is_some_and(|s| s.contains("The engine stopped") && s.contains("started again")),

@@ -1,5 +1,4 @@
-//! Records of 100,000 rows at two positions: how they are read, with the memory that it takes, and
-//! calibrated.
+//! Records of 100,000 rows at two positions: time and memory of reading, and of a calibration.
 
 use std::fmt::Write;
 use std::io::Cursor;
@@ -20,7 +19,8 @@ fn main() {
 
 const ROWS: usize = 100_000;
 
-/// p1 and p2 of 1000 s each without drift, rows every 0.02 s, noise that repeats after 104,729 rows.
+/// Record of p1 and p2, 1000 s each without drift, with rows every 0.02 s and noise that repeats after
+/// 104,729 rows.
 fn record() -> (Scheme, Conditions, String) {
     let attitudes = ["0,0,0", "180,0,0"].map(|a| parse_attitude(a).expect("an attitude"));
     let scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
@@ -38,7 +38,7 @@ fn records(text: &str) -> Vec<Record> {
     vec![Record::csv("run.csv", Box::new(Cursor::new(text.to_owned()))).expect("a record")]
 }
 
-/// Rows to bins: nothing is estimated.
+/// Reads the rows into bins, without an estimate.
 #[divan::bench(sample_count = 20)]
 fn read(bencher: Bencher<'_, '_>) {
     let (scheme, conditions, text) = record();
@@ -48,7 +48,7 @@ fn read(bencher: Bencher<'_, '_>) {
         .bench_values(|r| read_records(&scheme, &conditions, r, &options, &|_| true).expect("a reading"));
 }
 
-/// The whole: multiple shooting, estimates, curvature, findings.
+/// Complete calibration: multiple shooting, estimates, curvature, findings.
 #[divan::bench(sample_count = 5)]
 fn calibrated(bencher: Bencher<'_, '_>) {
     let (scheme, conditions, text) = record();

@@ -1,5 +1,5 @@
-//! A record of a platform, estimated: `cargo run -p obsdeg-calibration --example bench_day` in the root of
-//! the repository, or with a scheme and a record of your own.
+//! Calibration of a platform from a record: `cargo run -p obsdeg-calibration --example bench_day` in the root
+//! of the repository, or with a scheme and a record of your own.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use std::error::Error;

@@ -1,4 +1,4 @@
-//! What a calibration says: plain data.
+//! Answer of a calibration as plain data.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
@@ -74,7 +74,8 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Its platform as true values of another run: what is determined, psi that of the first record.
+    /// True values of another run of the calibrated platform: the determined unknowns, with psi of the first
+    /// record.
     pub fn values(&self) -> Vec<Assignment> {
         let first = |e: &Estimated| {
             let name = e.name.strip_suffix(" (record 1)").unwrap_or(&e.name).to_string();
@@ -392,16 +393,16 @@ pub struct NextRun {
     pub met: bool,
 }
 
-/// A calibration before, of what `S` says.
+/// Prior calibration; `S` describes what it is for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before<S> {
-    /// Names of the unknowns with a stated prior that is in the estimates already: it counts once.
+    /// Names of the unknowns with a stated prior that the estimates already include: it counts once.
     pub priors: Vec<String>,
-    /// Its estimates; the covariance is the one that counts.
+    /// Estimates of the prior calibration, with the covariance that counts.
     pub estimates: CovarianceTable,
-    /// The records that it rests on, those of its own prior too.
+    /// Records that the prior calibration rests on, including those of its own prior.
     pub rests_on: Vec<Basis>,
-    /// What it is of.
+    /// Platform or model that the prior calibration is for.
     pub of: S,
 }
 
@@ -704,21 +705,21 @@ pub struct ResidualSeries {
     pub allan: Vec<(f64, f64, f64)>,
 }
 
-/// A measurement and what is left of it.
+/// Residual of one measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residual {
-    /// Which record, from 0.
+    /// Index of the record, from 0.
     pub record: usize,
-    /// Which position, from 0.
+    /// Index of the position, from 0.
     pub position: usize,
-    /// Which channel, from 0.
+    /// Index of the channel, from 0.
     pub channel: usize,
-    /// When, in s.
+    /// Time of the measurement, in s.
     pub t_s: f64,
-    /// What is left of it, in g or rad.
+    /// Measurement minus estimate, in g or rad.
     pub residual: f64,
-    /// Its standard deviation by the noise that was assumed.
+    /// Standard deviation by the assumed noise, in g or rad.
     pub sigma: f64,
-    /// What all other measurements leave of it, in its own standard deviations.
+    /// Difference from the value that all other measurements predict, over its standard deviation.
     pub normalised: f64,
 }

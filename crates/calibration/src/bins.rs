@@ -1,94 +1,94 @@
-//! Samples taken together: over a few seconds a channel is a line, and what is measured of it at the middle
-//! is one number with the weight of all samples. Samples that no line explains (spikes) are left out and
-//! listed. Only the samples of one bin are held.
+//! Bins of samples: over a few seconds a channel is a straight line, and its value at the middle has the
+//! weight of all samples. Samples far from the line (spikes) are left out and listed. Only the samples of one
+//! bin are in memory.
 
-/// What the samples of one channel say of the middle of a bin.
+/// Mean of one channel at the middle of a bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
-    /// The value there.
+    /// Value at the middle of the bin.
     pub value: f64,
-    /// Its variance: this times that of a sample, or this alone where the record gives a sigma.
+    /// Variance: relative to that of a sample, or absolute where the record gives a sigma.
     pub variance: f64,
     /// True if the record gives the sigma.
     pub given: bool,
-    /// Samples that count.
+    /// Number of samples that count.
     pub samples: usize,
-    /// Their squared distances from the line.
+    /// Sum of squared distances of these samples from the line.
     pub scatter: f64,
-    /// Degrees of freedom of these.
+    /// Degrees of freedom of the sum.
     pub free: usize,
 }
 
-/// A few seconds of a record.
+/// Bin: a few seconds of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bin {
-    /// The middle: the mean of its times, in s.
+    /// Middle of the bin: the mean of its times, in s.
     pub t: f64,
     /// First and last line of the record.
     pub lines: (u64, u64),
-    /// Per channel; `None` where nothing was measured.
+    /// Means by channel; `None` where nothing was measured.
     pub channels: Vec<Option<Mean>>,
-    /// The mean temperature, where the record has it.
+    /// Mean temperature; `None` where the record has none.
     pub temperature: Option<f64>,
 }
 
-/// A sample that no line explains.
+/// Sample far from the line of its bin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spike {
-    /// Its line in the record.
+    /// Line of the record.
     pub line: u64,
-    /// Its time in s.
+    /// Time, in s.
     pub t: f64,
-    /// The channel.
+    /// Index of the channel.
     pub channel: usize,
-    /// How far it is off.
+    /// Distance from the line.
     pub off: f64,
-    /// In standard deviations of the others.
+    /// Distance in standard deviations of the other samples.
     pub sigmas: f64,
 }
 
-/// Most channels: three components of Z and an azimuth.
+/// Largest number of channels: three components of Z and an azimuth.
 pub const CHANNELS: usize = 4;
 
-/// One sample: its line, its time, its channels, and their standard deviations where the record gives them.
+/// Sample: its line, time and channels, and their standard deviations where the record gives them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The line.
+    /// Line of the record.
     pub line: u64,
-    /// In s.
+    /// Time, in s.
     pub t: f64,
-    /// Per channel; those behind the last channel are not read.
+    /// Values by channel; entries behind the last channel are not used.
     pub z: [Option<f64>; CHANNELS],
-    /// Per channel, where the record says so.
+    /// Standard deviations by channel; `None` where the record gives none.
     pub sigma: Option<[f64; CHANNELS]>,
-    /// The temperature, where the record has it.
+    /// Temperature; `None` where the record has none.
     pub temperature: Option<f64>,
 }
 
-/// Fewest samples of a line of which some may be spikes.
+/// Fewest samples of a line in which spikes are sought.
 pub(crate) const FEWEST: usize = 8;
-/// A spike is so many standard deviations off: of a million samples of a right record none is, but by a
-/// chance of one in five hundred.
+/// Distance of a spike, in standard deviations. A right record of a million samples has a false spike with a
+/// probability of one in five hundred.
 const SPIKE: f64 = 6.0;
 
-/// Takes samples together.
+/// Collects samples into bins.
 #[derive(Debug, Clone)]
 pub struct Binner {
     length_s: f64,
-    /// A standard deviation per channel, where the samples of a bin are all alike.
+    /// Standard deviations by channel, for bins whose samples are all equal.
     sigmas: Vec<f64>,
     now: Vec<Sample>,
 }
 
 impl Binner {
-    /// Bins of at most `length_s`, of channels with about such standard deviations of a sample.
+    /// Bins of at most `length_s`, for channels with about these standard deviations of a sample.
     pub fn new(length_s: f64, sigmas: Vec<f64>) -> Self {
         Self { length_s, sigmas, now: Vec::new() }
     }
 
-    /// Takes a sample; gives the bin that it ends.
+    /// Adds a sample; returns the bin that it ends.
     pub fn push(&mut self, sample: Sample, spikes: &mut Vec<Spike>) -> Option<Bin> {
-        // a hair less, so that samples every 10 s are bins of 10 s
+        // a small margin, so that samples every 10 s are bins of 10 s
         let ends = self.now.first().is_some_and(|first| {
             sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
         });
@@ -97,7 +97,7 @@ impl Binner {
         bin
     }
 
-    /// The bin of what there is, if there is anything.
+    /// Bin of the remaining samples; `None` without samples.
     pub fn end(&mut self, spikes: &mut Vec<Spike>) -> Option<Bin> {
         let mut now = std::mem::take(&mut self.now);
         let bin = self.bin(&now, spikes);
@@ -153,15 +153,14 @@ impl Binner {
     }
 }
 
-/// The median of some numbers.
+/// Median of some numbers.
 fn median(mut of: Vec<f64>) -> f64 {
     let middle = of.len() / 2;
     *of.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// A line that a part of the samples cannot move: slope (the median of those from each sample of the first
-/// half to its partner in the second; Theil 1950), level at 0, and the standard deviation about it by the
-/// median distance.
+/// Robust line: slope (median of the slopes from each sample of the first half to its partner in the second;
+/// Theil 1950), level at 0, and the standard deviation about it by the median distance.
 fn resistant(points: &[(f64, f64, u64)]) -> (f64, f64, f64) {
     let half = points.len() / 2;
     let slope = median(
@@ -193,8 +192,8 @@ mod tests {
         (bins, spikes)
     }
 
-    /// Samples every 10 s are bins of their own; a line of more is its value at the middle, with the weight
-    /// of all of them.
+    /// Samples every 10 s are bins of their own; a line of several samples gives its value at the middle,
+    /// with the weight of all.
     #[test]
     fn alone_and_together() {
         let (alone, _) = binned((0..3).map(|i| sample(i + 2, 10.0 * i as f64, i as f64)));
@@ -209,8 +208,8 @@ mod tests {
         assert!(spikes.is_empty() && all.len() == 1);
     }
 
-    /// Two spikes in a noisy line are found at their lines and change its value by nothing that shows; the
-    /// scatter is the noise.
+    /// Two spikes in a noisy line are found at their lines and do not change its value; the scatter is the
+    /// noise.
     #[test]
     fn spikes_are_left_out() {
         let mut noise = Noise::new(3, 0);
@@ -232,7 +231,7 @@ mod tests {
         assert!((sigma / 1e-3 - 1.0).abs() < 0.1, "{sigma}");
     }
 
-    /// What the record gives a sigma is a bin of its own; gaps are none.
+    /// A sample with its own sigma is a bin of its own; gaps make no bins.
     #[test]
     fn given_sigmas_and_gaps() {
         let given = |line: u64, z: Option<f64>| Sample {

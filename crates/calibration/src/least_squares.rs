@@ -1,41 +1,41 @@
-//! Least squares on a linearised run in square-root information form, from its end to its start: no
-//! covariance, no gain, no prior.
+//! Least squares on a linearised run in square-root information form, from its end to its start: without
+//! covariances, gains or a prior.
 //!
-//! Rows `A d_k = b` say what the measurements from step k on know of the state there. A step
-//! `d_k = Phi d_(k-1) + G xi`, `xi` unit normals, makes of them `[A G, A Phi] [xi, d_(k-1)] = b` beside
-//! `xi = 0`; a QR factorisation parts what is said of `xi` from what is left for `d_(k-1)` (Dyer, McReynolds
-//! 1969, doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the
-//! information on the start, its last entry what no start explains; going forward again, the rows of `xi`
+//! Rows `A d_k = b` hold the information of the measurements from step k on about the state there. With a
+//! step `d_k = Phi d_(k-1) + G xi`, `xi` unit normals, they become `[A G, A Phi] [xi, d_(k-1)] = b` beside
+//! `xi = 0`. A QR factorisation separates the rows of `xi` from those of `d_(k-1)` (Dyer, McReynolds 1969,
+//! doi:10.1007/BF00929453; Bierman 1977, chapter X). At the start the triangle is the root of the information
+//! on the start, and its last entry is the residual of the fit. In the forward direction, the rows of `xi`
 //! give every state of the run with its covariance.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_ekf::{EkfError, Stage};
 
-/// A run linearised along one trajectory: of every step Phi, Q and rows ([`Stage`]s of one step), a root of
-/// Q, and what the trajectory leaves of the measurements.
+/// Run linearised along one trajectory: Phi, Q and output rows of every step ([`Stage`]s of one step), a root
+/// of Q, and the residuals of the measurements along the trajectory.
 #[derive(Debug, Clone, Default)]
 pub struct Linearised {
-    /// The steps.
+    /// Stages, one per step.
     pub stages: Vec<Stage>,
-    /// Of every step `G` (n x q) with `Q = G G^T`.
+    /// Roots of Q by step: `G` (n x q) with `Q = G G^T`.
     pub roots: Vec<DMatrix<f64>>,
     /// Measurement minus output, in the order of the rows.
     pub residuals: Vec<f64>,
-    /// Gaps of a trajectory in parts: after which step the next part begins, and the local coordinates there
-    /// of the end of the step before (shape n), in order. The states behind a gap are corrections of the next
-    /// part. Empty where the trajectory is one.
+    /// Gaps of a trajectory in parts, in order: the number of the step before the next part, and the end of
+    /// that step in local coordinates of the next part (shape n). States behind a gap are corrections of the
+    /// next part. Empty for a trajectory in one part.
     pub gaps: Vec<(usize, DVector<f64>)>,
 }
 
 impl Linearised {
-    /// The number of states.
+    /// Number of states.
     pub fn states(&self) -> usize {
         self.stages.first().map_or(0, |s| s.transition.states())
     }
 
-    /// Corrections of all states after the steps for a start corrected by `start`, without noise:
-    /// `d_k = Phi d_(k-1)`, and the gap where one is. `on_step` hears the step and the correction behind its
-    /// gap.
+    /// Passes the corrections of all states after the steps to `on_step`, for a start corrected by `start`,
+    /// without noise: `d_k = Phi d_(k-1)`, plus the gap where there is one. `on_step` gets the step and the
+    /// correction behind its gap.
     pub(crate) fn carried(&self, start: &[f64], mut on_step: impl FnMut(usize, &[f64])) {
         let (mut d, mut scratch) = (start.to_vec(), Vec::new());
         let mut gaps = self.gaps.iter().peekable();
@@ -48,7 +48,7 @@ impl Linearised {
         }
     }
 
-    /// The same without the measurements for which `keep` is false.
+    /// Run without the measurements for which `keep` is false.
     #[must_use]
     pub fn without(&self, keep: &[bool]) -> Self {
         let mut out = self.clone();
@@ -62,7 +62,7 @@ impl Linearised {
     }
 }
 
-/// What is said of the noise of a step once everything after it is known: `own xi + before d_(k-1) = right`.
+/// Rows of the noise of a step, given everything after it: `own xi + before d_(k-1) = right`.
 #[derive(Debug, Clone)]
 struct OfNoise {
     own: DMatrix<f64>,
@@ -70,35 +70,35 @@ struct OfNoise {
     right: DVector<f64>,
 }
 
-/// What a run says of its start.
+/// Information of a run on its start.
 #[derive(Debug, Clone)]
 pub struct Information {
-    /// The root `S` (n x n) of the information on the start.
+    /// Root `S` (n x n) of the information on the start.
     pub root: DMatrix<f64>,
-    /// `S d = right` is the most probable start, as a correction of that of the trajectory.
+    /// Right side of `S d = right`, with d the most probable correction of the trajectory's start.
     pub right: DVector<f64>,
-    /// The sum of squares that is left there.
+    /// Sum of squares at that correction.
     pub left: f64,
     noise: Vec<OfNoise>,
 }
 
-/// A state of a run from all its measurements.
+/// State of a run by all its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
-    /// The correction of the trajectory's.
+    /// Correction of the trajectory's state.
     pub correction: DVector<f64>,
-    /// A root (n x any) of the covariance of its error, which is this times its transpose.
+    /// Root (n x any) of the error covariance, which is this times its transpose.
     pub root: DMatrix<f64>,
 }
 
 impl State {
-    /// The standard deviation of a component.
+    /// Standard deviation of a component.
     pub fn sigma(&self, i: usize) -> f64 {
         self.root.row(i).norm()
     }
 }
 
-/// The upper triangle of a QR factorisation, at least `rows` of it.
+/// Upper triangle of a QR factorisation, with at least `rows` rows.
 fn triangle(of: DMatrix<f64>, rows: usize) -> DMatrix<f64> {
     let r = of.qr().r();
     let columns = r.ncols();
@@ -107,7 +107,7 @@ fn triangle(of: DMatrix<f64>, rows: usize) -> DMatrix<f64> {
 }
 
 impl Information {
-    /// Of a run.
+    /// Information of a run.
     ///
     /// # Errors
     /// [`EkfError::NotFinite`].
@@ -126,14 +126,14 @@ impl Information {
                 let mut right = rows.column_mut(n);
                 right -= shift;
             }
-            // what this step measured
+            // measurements of this step
             let mut with = rows.clone().resize(n + 1 + m, n + 1, 0.0);
             for (i, output) in stage.outputs.iter().enumerate() {
                 let weight = 1.0 / output.r.sqrt();
                 output.h.iter().for_each(|&(j, c)| with[(n + 1 + i, j)] += weight * c);
                 with[(n + 1 + i, n)] = weight * run.residuals[next + i];
             }
-            // carried to the step before, its noise first
+            // carried to the step before, with the noise first
             let a = with.columns(0, n);
             let mut all = DMatrix::zeros(q + with.nrows(), q + n + 1);
             all.view_mut((0, 0), (q, q)).fill_with_identity();
@@ -166,13 +166,12 @@ impl Information {
         })
     }
 
-    /// The sum of squares of a run that starts as the trajectory does: the noise of its steps is still free.
+    /// Sum of squares of a run that starts as the trajectory does; the noise of its steps is free.
     pub fn at_zero(&self) -> f64 {
         self.left + self.right.norm_squared()
     }
 
-    /// All states of the run, from its start on, when the start is known as `start` says; `run` is the one
-    /// that this is of.
+    /// States of the run from its start on, for the start `start`; `run` is the run of this information.
     ///
     /// # Errors
     /// [`EkfError::Singular`].
@@ -208,27 +207,27 @@ impl Information {
     }
 }
 
-/// The least-squares solution of rows that are stacked one after the other.
+/// Least-squares solution of stacked rows.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// The unknowns (shape n).
+    /// Unknowns (shape n).
     pub x: DVector<f64>,
-    /// The inverse root of the information (n x any): the covariance is this times its transpose.
+    /// Inverse root of the information (n x any): the covariance is this times its transpose.
     pub inverse_root: DMatrix<f64>,
-    /// The root itself, by the directions in which the unknowns are free.
+    /// Root of the information, by the directions in which the unknowns are free.
     pub root: DMatrix<f64>,
-    /// The sum of squares that the rows leave.
+    /// Sum of squares of the residuals.
     pub left: f64,
 }
 
-/// Rows `A x = b` with unit errors, put one after the other.
+/// Rows `A x = b` with unit errors, stacked.
 #[derive(Debug, Clone)]
 pub struct Rows {
     all: DMatrix<f64>,
 }
 
 impl Rows {
-    /// None yet, on n unknowns.
+    /// No rows, for n unknowns.
     pub fn new(n: usize) -> Self {
         Self { all: DMatrix::zeros(0, n + 1) }
     }
@@ -242,10 +241,10 @@ impl Rows {
         self.all = if all.nrows() > 4 * (n + 1) { all.qr().r() } else { all };
     }
 
-    /// Their solution.
+    /// Least-squares solution of the rows.
     ///
     /// # Errors
-    /// [`EkfError::Singular`] when they do not determine all unknowns.
+    /// [`EkfError::Singular`] when the rows do not determine all unknowns.
     pub fn solve(&self) -> Result<Solution, EkfError> {
         let n = self.all.ncols() - 1;
         let r = triangle(self.all.clone(), n + 1);
@@ -264,13 +263,13 @@ impl Rows {
 }
 
 impl Solution {
-    /// The covariance (n x n).
+    /// Covariance (n x n).
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.inverse_root * self.inverse_root.transpose()
     }
 
-    /// The covariance of two functionals where errors of the rows are `factor` times as large as they were
-    /// taken for, but for those of the rows `known` (any x n): `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
+    /// Covariance of two functionals if the errors of the rows are `factor` times as large as assumed, except
+    /// for the rows `known` (any x n): `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
     pub fn covariance_with(
         &self,
         a: &[(usize, f64)],
@@ -279,19 +278,19 @@ impl Solution {
         known: &DMatrix<f64>,
     ) -> f64 {
         let more = factor * factor;
-        // by roots: what nothing determines is huge in the covariance itself
+        // by roots: an undetermined direction is huge in the covariance itself
         let (a, b) = (self.whitened(a), self.whitened(b));
         let known = known * &self.inverse_root;
         more * a.dot(&b) - (more - 1.0) * (&known * a.transpose()).dot(&(&known * b.transpose()))
     }
 
-    /// A functional of the unknowns as one of unit errors.
+    /// Functional of the unknowns as a row over unit errors.
     fn whitened(&self, terms: &[(usize, f64)]) -> RowDVector<f64> {
         let zero = RowDVector::zeros(self.inverse_root.ncols());
         terms.iter().fold(zero, |sum, &(i, k)| sum + self.inverse_root.row(i) * k)
     }
 
-    /// The standard deviation of a functional of the unknowns.
+    /// Standard deviation of a functional of the unknowns.
     pub fn sigma(&self, terms: &[(usize, f64)]) -> f64 {
         self.whitened(terms).norm()
     }
@@ -303,7 +302,7 @@ mod tests {
 
     use super::*;
 
-    /// Errors of the data three times as large, those of what is known as they were:
+    /// Errors of the data three times as large, those of the known rows unchanged:
     /// `A^-1 (9 J^T J + K^T K) A^-1`, where `A = J^T J + K^T K`.
     #[test]
     fn what_is_known_stays_as_it_is() {
@@ -321,8 +320,8 @@ mod tests {
         assert!((found - expected).amax() < 1e-12);
     }
 
-    /// A walk in two states with a constant, seen in part: against the normal equations of all states at
-    /// once.
+    /// A random walk in two states with a constant, partly observed, against the normal equations of all
+    /// states at once.
     #[test]
     fn all_states_at_once() {
         let phi = DMatrix::from_row_slice(3, 3, &[1.0, 0.3, 0.5, -0.1, 0.9, 0.0, 0.0, 0.0, 1.0]);

@@ -1,11 +1,10 @@
-//! Calibration: what a scheme determines, estimated from the record of its run, with how far that can be
-//! trusted.
+//! Calibration: estimates of a scheme's unknowns from the records of its runs, with their reliability.
 //!
-//! A record ([`record`]) is taken together into bins ([`bins`]) and laid beside the timeline of its scheme
-//! ([`platform`]); the estimate is that of least squares without a prior ([`least_squares`]), of what the
-//! exact verdict calls determined; a filter is the second path to it.
+//! The samples of a record ([`record`]) form bins ([`bins`]), which are placed on the timeline of its scheme
+//! ([`platform`]). The estimate is that of least squares without a prior ([`least_squares`]), of the unknowns
+//! that the exact verdict calls determined. A filter checks it as a second path.
 //!
-//! A record of any system: x decays, and is measured.
+//! Calibration of any other system from a record: x decays, and is measured.
 //!
 //! ```
 //! use obsdeg_calibration::record::Record;
@@ -14,13 +13,14 @@
 //!
 //! let model = "name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }\n\
 //!     [simulation]\nvalues = { x = 1, p = 1 }\nnoise = { z = 0.001 }";
-//! let rows: String = (0..20).map(|k| 0.1 * f64::from(k)).map(|t| format!("{t},{}\n", 2.0 * (-0.5 * t).exp())).collect();
+//! let times = (0..20).map(|k| 0.1 * f64::from(k));
+//! let rows: String = times.map(|t| format!("{t},{}\n", 2.0 * (-0.5 * t).exp())).collect();
 //! let record = Record::csv("decay.csv", Box::new(std::io::Cursor::new(format!("t,z\n{rows}"))))?;
 //! let model = model_file::read(model)?;
 //! let options = SystemOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
 //! let found = calibrate_system(&model, record, &options, &|_| true)?;
-//! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate).expect("it is determined");
-//! assert!((p - 0.5).abs() < 1e-4);
+//! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate);
+//! assert!((p.expect("it is determined") - 0.5).abs() < 1e-4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -36,17 +36,17 @@ pub mod system;
 #[cfg(feature = "parquet")]
 mod zstd_pages;
 
-/// How far a calibration is.
+/// Progress of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Going<'a> {
-    /// So many samples of a record are read.
+    /// Samples of a record that were read.
     Reads {
-        /// The record.
+        /// Name of the record.
         record: &'a str,
-        /// The samples.
+        /// Number of samples so far.
         samples: usize,
     },
-    /// So many linearisations of all runs, or evaluations of a model, were made.
+    /// Number of linearisations of all runs, or of evaluations of a model, so far.
     Passes(usize),
 }
 

@@ -1,8 +1,8 @@
-//! Records: columns of numbers with their units in the header, from CSV or Parquet, row by row; only one row
-//! is held.
+//! Records: columns of numbers with their units in the header, from CSV or Parquet, read row by row with one
+//! row in memory.
 //!
 //! A header is `name [unit]`; a name without brackets has no unit. Lines that begin with `#` are comments. An
-//! empty cell is a value that is not there.
+//! empty cell is a missing value.
 
 use std::collections::HashSet;
 #[cfg(feature = "parquet")]
@@ -23,17 +23,17 @@ use sha2::{Digest, Sha256};
 #[cfg(feature = "parquet")]
 use crate::zstd_pages::ParquetFile;
 
-/// The standard acceleration of gravity, in m/s^2.
+/// Standard acceleration of gravity, in m/s^2.
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
-/// Where something of a record is wrong.
+/// Place of an error in a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// The record.
+    /// Name of the record.
     pub record: String,
-    /// Its line from 1, the header included; of Parquet the row from 1.
+    /// Line from 1, including the header; for Parquet the row from 1.
     pub line: u64,
-    /// The header of the column; empty for all of the row.
+    /// Header of the column; empty for the whole row.
     pub column: String,
 }
 
@@ -44,124 +44,124 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// Why a record cannot be read.
+/// Reason why a record cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RecordError {
-    /// The file or pipe.
+    /// The file or pipe cannot be read.
     #[error("cannot read the record {record}: {reason}")]
     Read {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// Why.
+        /// Reason of the failure.
         reason: String,
     },
-    /// No header.
+    /// The record has no header.
     #[error("the record {record} is empty; expected a header such as `t [s],position,fx [g],fy [g],fz [g]`")]
     Empty {
-        /// The record.
+        /// Name of the record.
         record: String,
     },
-    /// A header that is none.
+    /// A header is malformed.
     #[error("{place}: expected a name, or a name with its unit as in `fx [g]`, once")]
     Header {
-        /// Where.
+        /// Place of the header.
         place: Place,
     },
-    /// A column that is wanted.
+    /// A required column does not exist.
     #[error("{record}: no column {expected}; found {found}{hint}")]
     Missing {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// What is wanted.
+        /// Required columns.
         expected: String,
-        /// What there is.
+        /// Columns that were found.
         found: String,
-        /// What helps.
+        /// Advice on the column.
         hint: &'static str,
     },
-    /// A unit of something else.
+    /// A column has the unit of another quantity.
     #[error("{place}: expected {expected}")]
     Unit {
-        /// Where.
+        /// Place of the column.
         place: Place,
-        /// The units that would do.
+        /// Units that are allowed.
         expected: String,
     },
-    /// A unit of the file that is none.
+    /// A unit stated in the scheme is invalid.
     #[error("record.units.{name}: found `{found}`; expected a unit, or what one count is, as in `2.44e-5 g`")]
     Count {
-        /// The column, as the file names it.
+        /// Name of the column in the scheme.
         name: String,
-        /// What it says.
+        /// Unit that was found.
         found: String,
     },
-    /// Not a number.
+    /// A cell is not a number.
     #[error("{place}: expected {expected}, found `{found}`")]
     Number {
-        /// Where.
+        /// Place of the cell.
         place: Place,
-        /// What it is to be.
+        /// Expected content.
         expected: &'static str,
-        /// What there is.
+        /// Content that was found.
         found: String,
     },
-    /// A number that cannot be.
+    /// A number is out of range.
     #[error("{place}: found {found}, expected {expected}")]
     Value {
-        /// Where.
+        /// Place of the cell.
         place: Place,
-        /// What there is.
+        /// Number that was found.
         found: String,
-        /// Changes that would meet every requirement.
+        /// Expected values.
         expected: &'static str,
     },
-    /// A row of another length.
+    /// A row has a wrong number of cells.
     #[error("{place}: {found} cells; expected {expected}, as in the header")]
     Cells {
-        /// Where.
+        /// Place of the row.
         place: Place,
-        /// Its cells.
+        /// Number of cells found.
         found: usize,
-        /// Those of the header.
+        /// Number of columns of the header.
         expected: usize,
     },
-    /// Time that does not go on.
+    /// A time does not increase.
     #[error(
         "{place}: the time {found} is not after that of the row before, {before}; expected times that increase"
     )]
     Time {
-        /// Where.
+        /// Place of the time.
         place: Place,
-        /// The time.
+        /// Time that was found.
         found: String,
-        /// The one before.
+        /// Time of the row before.
         before: String,
     },
-    /// Nothing after the header.
+    /// The record has no rows.
     #[error("{record}: no rows after the header")]
     NoRows {
-        /// The record.
+        /// Name of the record.
         record: String,
     },
 }
 
-/// A column of a header.
+/// Column of a header.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// Its name.
+    /// Name of the column.
     pub name: String,
-    /// Its unit, if it says one.
+    /// Unit of the column; `None` if the header states none.
     pub unit: Option<String>,
-    /// What one of its numbers is of that unit.
+    /// Value of one count, in that unit.
     pub count: f64,
-    /// As it is written.
+    /// Text of the header cell.
     pub text: String,
-    /// True if its cells are dates (ISO 8601), which are read as Unix seconds.
+    /// True if the cells are dates (ISO 8601), which are read as Unix seconds.
     pub dates: bool,
 }
 
-/// A date with a time (ISO 8601, UTC where no offset is given) as seconds since 1970-01-01T00:00Z:
-/// `2026-11-23T10:00:00.25+01:00`, a blank in the place of T too.
+/// Seconds since 1970-01-01T00:00Z of a date with a time (ISO 8601, UTC where no offset is given), such as
+/// `2026-11-23T10:00:00.25+01:00`; a blank may replace T.
 fn unix_seconds(text: &str) -> Option<f64> {
     let (date, time) = text.split_once(['T', ' '])?;
     let whole = |text: &str, digits: usize| {
@@ -214,7 +214,7 @@ impl Column {
     }
 }
 
-/// What rows come from.
+/// Source of the rows.
 enum Rows {
     Csv(Lines),
     #[cfg(feature = "parquet")]
@@ -229,14 +229,14 @@ struct Lines {
     buffer: Vec<u8>,
     /// Separator of columns.
     separator: char,
-    /// True if the cells belong to a row that is still to be read.
+    /// True if the cells belong to a row that has not been returned yet.
     held: bool,
 }
 
 /// Separators of columns besides the comma, with their names.
 const SEPARATORS: [(char, &str); 2] = [(';', "semicolons"), ('\t', "tabs")];
 
-/// A number as it is written: with a decimal comma where columns are separated by something else.
+/// Number in a cell: with a decimal comma where another character separates the columns.
 fn number(text: &str, separator: char) -> Option<f64> {
     if separator != ','
         && let Some((whole, part)) = text.split_once(',')
@@ -247,7 +247,7 @@ fn number(text: &str, separator: char) -> Option<f64> {
     text.parse().ok()
 }
 
-/// Most bytes of Parquet from a pipe: it ends with its header, so that all of it is held.
+/// Most bytes of Parquet from a pipe: its header comes last, so that all of it is kept in memory.
 #[cfg(feature = "parquet")]
 const PIPED: u64 = 1 << 28;
 /// Longest line, in bytes.
@@ -305,7 +305,7 @@ impl Lines {
                 let cells = reader.records().next().transpose().map_err(|e| wrong(e.to_string()))?;
                 self.cells.extend(cells.iter().flatten().map(|c| c.trim().to_string()));
             } else {
-                // strings of the row before are filled again
+                // the strings of the row before are reused
                 let mut count = 0;
                 for cell in text.split(self.separator).map(str::trim) {
                     match self.cells.get_mut(count) {
@@ -324,37 +324,37 @@ impl Lines {
     }
 }
 
-/// A record whose header was read.
+/// Record whose header has been read.
 pub struct Record {
     name: String,
     columns: Vec<Column>,
     rows: Rows,
-    /// Separator and decimal mark; none for commas and points.
+    /// Separator and decimal mark in words; `None` for commas and points.
     written: Option<String>,
 }
 
-/// A column that is wanted: its index, and what a number of it is times to be in the unit of the caller.
+/// Requested column: its index, and the factor from its numbers to the unit of the caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
-    /// Which.
+    /// Index of the column.
     pub column: usize,
-    /// In its own unit.
+    /// Factor from a number of the column to the unit of the caller.
     pub scale: f64,
 }
 
-/// One row: the wanted numbers (`None` where the cell is empty) and its label.
+/// Row: its requested numbers (`None` for an empty cell) and its label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row<'a> {
-    /// Its line from 1.
+    /// Line from 1.
     pub line: u64,
-    /// The wanted numbers in their order.
+    /// Requested numbers, in their order.
     pub numbers: &'a [Option<f64>],
-    /// The text of the label column.
+    /// Text of the label column.
     pub label: &'a str,
 }
 
 impl Record {
-    /// A record from a file, with the feature `parquet`: Parquet if it begins so, else CSV.
+    /// Record from a file: with the feature `parquet`, Parquet if it begins as such, otherwise CSV.
     ///
     /// # Errors
     /// [`RecordError`].
@@ -374,8 +374,8 @@ impl Record {
         Self::parquet(name, Box::new(ParquetFile::new(file).map_err(|e| wrong(&e))?))
     }
 
-    /// A record from a pipe, with the feature `parquet`: Parquet, which ends with its header and so is read
-    /// whole, if it begins so, else CSV.
+    /// Record from a pipe: with the feature `parquet`, Parquet if it begins as such, otherwise CSV. Parquet
+    /// is read whole, since its header comes last.
     ///
     /// # Errors
     /// [`RecordError`].
@@ -399,7 +399,7 @@ impl Record {
         Self::parquet(name, Box::new(reader))
     }
 
-    /// Number of rows, where the file says it before they are read.
+    /// Number of rows; `None` unless the file states it before them.
     pub(crate) fn rows_stated(&self) -> Option<usize> {
         match &self.rows {
             Rows::Csv(_) => None,
@@ -433,14 +433,14 @@ impl Record {
         Ok(Self { name: name.into(), columns, rows: Rows::Parquet(reader), written: None })
     }
 
-    /// A record as CSV.
+    /// Record in CSV.
     ///
     /// # Errors
     /// [`RecordError`].
     pub fn csv(name: &str, text: Box<dyn Read>) -> Result<Self, RecordError> {
         let wrong =
             |e: &dyn std::fmt::Display| RecordError::Read { record: name.into(), reason: e.to_string() };
-        // a mark of the byte order is no part of a name
+        // a byte order mark is no part of a name
         let mut text = BufReader::new(text);
         if text.fill_buf().map_err(|e| wrong(&e))?.starts_with(&[0xef, 0xbb, 0xbf]) {
             text.consume(3);
@@ -451,7 +451,7 @@ impl Record {
             return Err(RecordError::Empty { record: name.into() });
         }
         let mut columns = columns(name, lines.cells.clone(), lines.line)?;
-        // the first row says how numbers and times are written
+        // the first row shows how numbers and times are written
         lines.held = lines.next(name)?;
         let decimal = |c: &String| c.contains(',') && number(c, lines.separator).is_some();
         let separator = SEPARATORS.iter().find(|(c, _)| *c == lines.separator).map(|(_, name)| *name);
@@ -467,25 +467,25 @@ impl Record {
         Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines), written })
     }
 
-    /// Separator and decimal mark; none where columns are separated by commas.
+    /// Separator and decimal mark in words; `None` for commas and points.
     pub fn written(&self) -> Option<&str> {
         self.written.as_deref()
     }
 
-    /// What it is called.
+    /// Name of the record.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its columns.
+    /// Columns of the record.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Names and units that a file gives the columns.
+    /// Record with the names and units that a scheme gives its columns.
     ///
     /// # Errors
-    /// [`RecordError`] for a column that is not there, two of one name, or a unit that is none.
+    /// [`RecordError`] for a column that does not exist, two of one name, or an invalid unit.
     pub fn named(mut self, by: &Recording) -> Result<Self, RecordError> {
         let found: Vec<Option<usize>> = by.columns.values().map(|own| self.find(own)).collect();
         for ((name, own), column) in by.columns.iter().zip(found) {
@@ -513,13 +513,13 @@ impl Record {
         Ok(self)
     }
 
-    /// The index of the column of this name.
+    /// Index of the column of this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c.name == name)
     }
 
-    /// What a number of a column is times to be in the first of `units`, which are given with what one of
-    /// each is of the first.
+    /// Column with the factor from its numbers to the first of `units`; these are given with their values in
+    /// the first.
     ///
     /// # Errors
     /// [`RecordError::Unit`].
@@ -532,12 +532,12 @@ impl Record {
         })
     }
 
-    /// A column of another unit than is expected.
+    /// Error of a column with another unit than expected.
     pub(crate) fn unit(&self, column: usize, expected: String) -> RecordError {
         RecordError::Unit { place: self.at(1, column), expected }
     }
 
-    /// A column that is not there, nor under another name.
+    /// Error of a column that does not exist under any name.
     pub fn missing(&self, expected: &str) -> RecordError {
         self.without(expected, "; a column of another name is given under [record.columns]")
     }
@@ -560,17 +560,15 @@ impl Record {
         place(&self.name, line, &self.columns[column].text)
     }
 
-    /// Goes through all rows: of each the `wanted` numbers and the text of the `label` column. The first
-    /// wanted is the time, which must be there and increase; it may begin anew with another label where
-    /// `anew` says so.
+    /// Reads all rows and passes `each` the `wanted` numbers and the text of the `label` column. The first
+    /// number is the time, which must exist and increase; if `anew`, it may start again with another label.
     ///
-    /// Gives the digest by which two records are the same, the first half of SHA-256 (FIPS 180-4) in
-    /// hexadecimal. It is of the `wanted` numbers alone, in the units of the caller and row by row: neither
-    /// other columns nor labels, names, comments or the kind of file are in it, so that a record to which
-    /// somebody adds a column of notes, or which he saves in another format, is still the same.
+    /// Returns a digest, equal for equal records: the first half of SHA-256 (FIPS 180-4) in hexadecimal. It
+    /// covers the `wanted` numbers alone, in the units of the caller and row by row. Other columns, labels,
+    /// names, comments and the file format do not change it.
     ///
     /// # Errors
-    /// [`RecordError`], and what `each` refuses.
+    /// [`RecordError`], and the errors of `each`.
     pub fn read<E: From<RecordError>>(
         self,
         wanted: &[Wanted],
@@ -609,13 +607,13 @@ impl Record {
                 last = label.into();
             }
             if t <= before {
-                // as they are written, but for rounding
+                // as written, without the rounding of the scale
                 let written = |t: f64| (t / wanted[0].scale * 1e9).round() / 1e9;
                 let (found, before) = (written(t).to_string(), written(before).to_string());
                 return Err(RecordError::Time { place: at(), found, before }.into());
             }
             (before, any) = (t, true);
-            // what is not there is NaN
+            // NaN for a missing value
             let mut bytes = [0; 8 * MOST];
             let bytes = &mut bytes[..8 * wanted.len()];
             for (x, place) in numbers.iter().zip(bytes.chunks_exact_mut(8)) {
@@ -669,13 +667,13 @@ impl Record {
 /// Most columns that an error lists.
 const LISTED: usize = 40;
 
-/// Most numbers that are wanted of a row.
+/// Largest number of requested columns.
 pub const MOST: usize = 64;
 
-/// What a time is.
+/// Expected content of a time cell, for messages.
 const TIME: &str = "a number, the time since any moment";
 
-/// What a cell holds.
+/// Content of a cell.
 enum Cell {
     Number(f64),
     Nothing,
@@ -703,7 +701,7 @@ impl Cell {
     }
 }
 
-/// A decimal: the integer of its bytes, the highest first, in units of 10^-scale.
+/// Decimal number: the integer in its bytes, the highest first, in units of 10^-scale.
 #[cfg(feature = "parquet")]
 fn decimal(bytes: &[u8], scale: i32) -> Cell {
     let negative = bytes.first().is_some_and(|b| *b >= 0x80);
@@ -711,11 +709,11 @@ fn decimal(bytes: &[u8], scale: i32) -> Cell {
         return Cell::Text("a decimal of more than 38 digits".into());
     }
     let whole = bytes.iter().fold(if negative { -1_i128 } else { 0 }, |x, b| (x << 8) | i128::from(*b));
-    // as the text of it is read, without a second rounding
+    // parsed from text, without a second rounding
     format!("{whole}e{}", -scale).parse().map_or(Cell::Nothing, Cell::Number)
 }
 
-/// A label of Parquet.
+/// Text of a Parquet label.
 #[cfg(feature = "parquet")]
 fn text_of(field: &Field) -> String {
     match field {
@@ -729,7 +727,7 @@ fn place(record: &str, line: u64, column: &str) -> Place {
     Place { record: record.into(), line, column: column.into() }
 }
 
-/// The columns of headers, each once.
+/// Columns of the headers; each name occurs once.
 fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<Column>, RecordError> {
     let mut out: Vec<Column> = Vec::with_capacity(headers.len());
     let mut names = HashSet::new();
@@ -744,7 +742,7 @@ fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<Column>,
 mod tests {
     use super::*;
 
-    /// Line, numbers, label.
+    /// Line, numbers and label of a row.
     type Read = (u64, Vec<Option<f64>>, String);
 
     fn all(text: &str) -> Result<Vec<Read>, RecordError> {
@@ -764,13 +762,15 @@ mod tests {
 
     #[test]
     fn rows_with_units_gaps_and_comments() {
-        let rows = all("\u{feff}# made by hand\nt [ms], f [g] ,position\n500,1.5,p1\n# a gap\n1500,,\n2500.5,-1e-3,p 2\n").expect("rows");
+        let rows = all("\u{feff}# made by hand\nt [ms], f [g] ,position\n500,1.5,p1\n# a gap\n1500,,\n\
+            2500.5,-1e-3,p 2\n")
+        .expect("rows");
         assert_eq!(rows[0], (3, vec![Some(0.5), Some(1.5)], "p1".to_string()));
         assert_eq!(rows[1], (5, vec![Some(1.5), None], String::new()));
         assert_eq!(rows[2], (6, vec![Some(2.5005), Some(-1e-3)], "p 2".to_string()));
     }
 
-    /// Semicolons and tabs, decimal commas.
+    /// Semicolons and tabs as separators, decimal commas.
     #[test]
     fn what_else_loggers_write() {
         for (text, written) in [
@@ -796,7 +796,7 @@ mod tests {
         assert!(e.ends_with("line 2, column `f [g]`: expected a number, found `1.234,5`"), "{e}");
     }
 
-    /// Dates, against seconds that the calendar of a system has for them.
+    /// Dates, against seconds by a system's calendar.
     #[test]
     fn dates_are_unix_seconds() {
         for (text, seconds) in [
@@ -835,7 +835,7 @@ mod tests {
         assert!(record.missing("`x`").to_string().len() < 1000);
     }
 
-    /// Names and counts that a file gives.
+    /// Names and counts that a scheme gives the columns.
     #[test]
     fn names_and_counts() {
         let by = |columns: &[(&str, &str)], units: &[(&str, &str)]| {
@@ -873,7 +873,8 @@ mod tests {
             ("t [s],f [g]\n", "r.csv: no rows after the header"),
             (
                 "t [s],g [g]\n0,1\n",
-                "r.csv: no column `f [g]`; found `t [s]`, `g [g]`; a column of another name is given under [record.columns]",
+                "r.csv: no column `f [g]`; found `t [s]`, `g [g]`; a column of another name is given under \
+                 [record.columns]",
             ),
             ("t [s],f\n0,1\n", "r.csv: line 1, column `f`: expected a unit, `f [g]`"),
             ("t [h],f [g]\n0,1\n", "r.csv: line 1, column `t [h]`: expected a unit, `t [s]` or `t [ms]`"),
@@ -892,11 +893,13 @@ mod tests {
             ("t [s],f [g]\n0,1\n1,abc\n", "r.csv: line 3, column `f [g]`: expected a number, found `abc`"),
             (
                 "t [s],f [g]\n0,NaN\n",
-                "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a value that is not there)",
+                "r.csv: line 2, column `f [g]`: found NaN, expected a finite number (an empty cell is a \
+                 value that is not there)",
             ),
             (
                 "t [ms],f [g]\n100,1\n100,1\n",
-                "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; expected times that increase",
+                "r.csv: line 3, column `t [ms]`: the time 100 is not after that of the row before, 100; \
+                 expected times that increase",
             ),
             (
                 "t [s],f [g]\n,1\n",
@@ -905,7 +908,8 @@ mod tests {
             ("t [s],f [g]\n0,1\n0.5\n", "r.csv: line 3: 1 cells; expected 2, as in the header"),
             (
                 "t [s],f [g]\n0,1\n0,1\n",
-                "r.csv: line 3, column `t [s]`: the time 0 is not after that of the row before, 0; expected times that increase",
+                "r.csv: line 3, column `t [s]`: the time 0 is not after that of the row before, 0; expected \
+                 times that increase",
             ),
         ] {
             assert_eq!(all(text).expect_err(text).to_string(), message);

@@ -1,5 +1,5 @@
-//! What a calibration is of, and what it rests on: so that numbers are not taken for those of another
-//! platform, and no record counts twice.
+//! Subject of a calibration and its records: they prevent numbers of another platform from being used, and
+//! records from counting twice.
 
 use obsdeg_core::model::{Carry, Geometry, Scheme};
 use obsdeg_evidence::simulation::latitude_of;
@@ -24,7 +24,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Of a scheme.
+    /// Setup of a scheme.
     pub fn of(scheme: &Scheme) -> Self {
         let angles = |p: &obsdeg_core::model::Position| {
             p.angles.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
@@ -39,7 +39,7 @@ impl Setup {
         }
     }
 
-    /// What is different there from what is here, in words: nothing where one is a run of the other.
+    /// Differences from `there`, in words; empty if both describe the same platform.
     pub fn differences(&self, there: &Self) -> Vec<String> {
         let mut out = Vec::new();
         let mut say = |what: &str, here: &str, there: &str| {
@@ -76,7 +76,7 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// The one among `others` that has the same numbers.
+    /// Element of `others` with the same numbers.
     pub(crate) fn among<'a>(&self, others: &'a [Self]) -> Option<&'a Self> {
         others.iter().find(|o| o.digest == self.digest)
     }

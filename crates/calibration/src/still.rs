@@ -1,48 +1,49 @@
-//! Intervals at rest: where the scatter of some channels within a window about a sample, all together, is
-//! within so many times that of the beginning.
+//! Intervals at rest: the scatter of some channels within a window about a sample, combined, stays within a
+//! multiple of the scatter at the beginning.
 //!
 //! D. Tedaldi, A. Pretto, E. Menegatti, *A robust and easy to implement method for IMU calibration without
-//! external equipments*, ICRA 2014, doi:10.1109/ICRA.2014.6907297, (15). Samples are held for as long as a
-//! window and a shortest interval are, not longer.
+//! external equipments*, ICRA 2014, doi:10.1109/ICRA.2014.6907297, (15). Samples stay in memory for one
+//! window and one shortest interval.
 
 use std::collections::VecDeque;
 
 use obsdeg_core::model::Still;
 
-/// A sample on its way: its time, the channels that decide, and what it carries.
+/// Sample in the window: its time, the channels that decide, and its payload.
 #[derive(Debug, Clone)]
-struct Held<S> {
+struct WindowSample<S> {
     t: f64,
     x: Vec<f64>,
     carried: S,
 }
 
-/// What becomes of a sample.
+/// Sample with its interval at rest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told<S> {
-    /// The sample.
+pub struct DecidedSample<S> {
+    /// Payload of the sample.
     pub sample: S,
-    /// The interval at rest that it is of, from 0.
+    /// Index of its interval at rest, from 0; `None` in motion.
     pub interval: Option<usize>,
 }
 
-/// Finds the intervals; samples come out in the order in which they went in.
+/// Detector of intervals at rest; samples come out in the order in which they went in.
 #[derive(Debug, Clone)]
 pub struct Detector<S> {
     of: Still,
-    /// Samples from the window of the next to be judged on; those before `next` are judged.
-    held: VecDeque<Held<Option<S>>>,
+    /// Samples from the start of the window of the next undecided sample on; those before `next` are decided.
+    samples: VecDeque<WindowSample<Option<S>>>,
     next: usize,
-    /// The first of the window about the next.
+    /// Index of the first sample of the window about the next undecided one.
     first: usize,
-    /// Of the window `first..last`: sums and sums of squares, by channel, about the first sample ever.
+    /// End of the window `first..last`; `sums` has the sums and sums of squares of its samples, by channel,
+    /// about the first sample of all (`origin`).
     last: usize,
     sums: Vec<[f64; 2]>,
     origin: Vec<f64>,
-    /// The variance that is still at rest, once the beginning is over.
+    /// Largest variance at rest; `None` until the beginning is over.
     limit: Option<f64>,
     begin: f64,
-    /// An interval that is not long enough yet: its samples, and when it began.
+    /// Samples of an interval that is not long enough yet, and the time `since` which it lasts, in s.
     waiting: Vec<S>,
     since: f64,
     found: usize,
@@ -51,11 +52,11 @@ pub struct Detector<S> {
 }
 
 impl<S> Detector<S> {
-    /// With nothing seen.
+    /// Detector without samples.
     pub fn new(of: &Still) -> Self {
         Self {
             of: of.clone(),
-            held: VecDeque::new(),
+            samples: VecDeque::new(),
             next: 0,
             first: 0,
             last: 0,
@@ -70,27 +71,27 @@ impl<S> Detector<S> {
         }
     }
 
-    /// How many intervals there were.
+    /// Number of intervals found.
     pub fn found(&self) -> usize {
         self.found
     }
 
-    /// Takes a sample with the channels `x` that decide; `out` gets those of which it is known now.
-    pub fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<Told<S>>) {
+    /// Adds a sample with the channels `x` that decide; samples that are decided now go to `out`.
+    pub fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<DecidedSample<S>>) {
         if self.origin.is_empty() {
             self.sums = vec![[0.0; 2]; x.len()];
             self.origin.clone_from(&x);
             self.begin = t;
         }
-        self.held.push_back(Held { t, x, carried: Some(sample) });
+        self.samples.push_back(WindowSample { t, x, carried: Some(sample) });
         if self.limit.is_none() && t - self.begin >= self.of.initial {
             self.set_limit();
         }
         self.judge(false, out);
     }
 
-    /// The rest, when no more come.
-    pub fn end(&mut self, out: &mut Vec<Told<S>>) {
+    /// Decides the remaining samples at the end of the record.
+    pub fn end(&mut self, out: &mut Vec<DecidedSample<S>>) {
         if self.limit.is_none() {
             self.set_limit();
         }
@@ -98,45 +99,46 @@ impl<S> Detector<S> {
         self.leave(out);
     }
 
-    /// The variance of all that is held, all channels together: the norm of their vector.
+    /// Sets the limit from the variance of all samples in memory, all channels together: the norm of their
+    /// vector.
     fn set_limit(&mut self) {
         let mut sums = vec![[0.0; 2]; self.origin.len()];
-        self.held.iter().for_each(|h| add(&mut sums, &self.origin, &h.x, 1.0));
-        self.limit = Some(self.of.factor * spread(&sums, self.held.len()));
+        self.samples.iter().for_each(|h| add(&mut sums, &self.origin, &h.x, 1.0));
+        self.limit = Some(self.of.factor * spread(&sums, self.samples.len()));
     }
 
-    fn judge(&mut self, all: bool, out: &mut Vec<Told<S>>) {
+    fn judge(&mut self, all: bool, out: &mut Vec<DecidedSample<S>>) {
         let Some(limit) = self.limit else { return };
         let half = self.of.window / 2.0;
-        while let Some(middle) = self.held.get(self.next).map(|h| h.t) {
-            if !all && self.held.back().is_none_or(|h| h.t <= middle + half) {
+        while let Some(middle) = self.samples.get(self.next).map(|h| h.t) {
+            if !all && self.samples.back().is_none_or(|h| h.t <= middle + half) {
                 return;
             }
             // the window is cut at both ends of the record
-            while self.held.get(self.last).is_some_and(|h| h.t <= middle + half) {
-                add(&mut self.sums, &self.origin, &self.held[self.last].x, 1.0);
+            while self.samples.get(self.last).is_some_and(|h| h.t <= middle + half) {
+                add(&mut self.sums, &self.origin, &self.samples[self.last].x, 1.0);
                 self.last += 1;
             }
-            while self.held[self.first].t < middle - half {
-                add(&mut self.sums, &self.origin, &self.held[self.first].x, -1.0);
+            while self.samples[self.first].t < middle - half {
+                add(&mut self.sums, &self.origin, &self.samples[self.first].x, -1.0);
                 self.first += 1;
             }
             let still = spread(&self.sums, self.last - self.first) <= limit;
-            if let Some(sample) = self.held[self.next].carried.take() {
-                self.told(middle, sample, still, out);
+            if let Some(sample) = self.samples[self.next].carried.take() {
+                self.decide(middle, sample, still, out);
             }
             self.next += 1;
             while self.first > 0 {
-                self.held.pop_front();
+                self.samples.pop_front();
                 (self.first, self.next, self.last) = (self.first - 1, self.next - 1, self.last - 1);
             }
         }
     }
 
-    fn told(&mut self, t: f64, sample: S, still: bool, out: &mut Vec<Told<S>>) {
+    fn decide(&mut self, t: f64, sample: S, still: bool, out: &mut Vec<DecidedSample<S>>) {
         if !still {
             self.leave(out);
-            out.push(Told { sample, interval: None });
+            out.push(DecidedSample { sample, interval: None });
             return;
         }
         if !self.inside && self.waiting.is_empty() {
@@ -148,17 +150,17 @@ impl<S> Detector<S> {
                 self.inside = true;
                 self.found += 1;
                 let interval = Some(self.found - 1);
-                out.extend(self.waiting.drain(..).map(|sample| Told { sample, interval }));
+                out.extend(self.waiting.drain(..).map(|sample| DecidedSample { sample, interval }));
             }
             return;
         }
-        out.push(Told { sample, interval: Some(self.found - 1) });
+        out.push(DecidedSample { sample, interval: Some(self.found - 1) });
     }
 
-    /// The interval is over; one that was too short was none.
-    fn leave(&mut self, out: &mut Vec<Told<S>>) {
+    /// Ends an interval; one that was too short does not count.
+    fn leave(&mut self, out: &mut Vec<DecidedSample<S>>) {
         self.inside = false;
-        out.extend(self.waiting.drain(..).map(|sample| Told { sample, interval: None }));
+        out.extend(self.waiting.drain(..).map(|sample| DecidedSample { sample, interval: None }));
     }
 }
 
@@ -169,7 +171,7 @@ fn add(sums: &mut [[f64; 2]], origin: &[f64], x: &[f64], sign: f64) {
     }
 }
 
-/// The norm of the variances.
+/// Norm of the variances of the channels.
 fn spread(sums: &[[f64; 2]], count: usize) -> f64 {
     let n = count.max(1) as f64;
     sums.iter().map(|s| (s[1] / n - (s[0] / n).powi(2)).max(0.0)).map(|v| v * v).sum::<f64>().sqrt()
@@ -185,9 +187,9 @@ mod tests {
         Still { by: vec![], initial: 5.0, window: 1.0, factor: 6.0, shortest: 2.0 }
     }
 
-    /// Rest, a turn, a rest that is too short, a turn, rest: every sample comes out once, in order, and those
-    /// at rest but for half a window about the turns are of the first and the second interval. Against
-    /// windows that are summed one by one.
+    /// Rest, a turn, a rest that is too short, a turn, rest. Every sample comes out once, in order. Samples
+    /// at rest, except for half a window about the turns, belong to the first and the second interval. The
+    /// reference sums every window by itself.
     #[test]
     fn rest_and_turns() {
         let mut noise = Noise::new(5, 0);
@@ -207,7 +209,7 @@ mod tests {
         let mut most = 0;
         for (i, (t, x)) in samples.iter().enumerate() {
             detector.push(*t, x.clone(), i, &mut out);
-            most = most.max(detector.held.len() + detector.waiting.len());
+            most = most.max(detector.samples.len() + detector.waiting.len());
         }
         detector.end(&mut out);
         assert_eq!(out.iter().map(|o| o.sample).collect::<Vec<_>>(), (0..2000).collect::<Vec<_>>());
@@ -221,7 +223,7 @@ mod tests {
             of(0).hypot(of(1))
         };
         let limit = 6.0 * variance(&samples[..501]);
-        for (i, told) in out.iter().enumerate() {
+        for (i, decide) in out.iter().enumerate() {
             let t = samples[i].0;
             let window: Vec<_> = samples.iter().filter(|s| (s.0 - t).abs() <= 0.5).cloned().collect();
             let rest = variance(&window) <= limit;
@@ -230,13 +232,13 @@ mod tests {
                 t if t < 14.0 => None,
                 _ => rest.then_some(1),
             };
-            assert_eq!(told.interval, expected, "{t}");
+            assert_eq!(decide.interval, expected, "{t}");
         }
         let of = |k: usize| out.iter().filter(|o| o.interval == Some(k)).count();
         assert!((940..=1000).contains(&of(0)) && (440..=500).contains(&of(1)), "{} {}", of(0), of(1));
     }
 
-    /// A record that ends before its beginning does is judged by all that there is.
+    /// A record shorter than the beginning is judged by all its samples.
     #[test]
     fn shorter_than_its_beginning() {
         let mut detector = Detector::new(&still());

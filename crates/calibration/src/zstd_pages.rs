@@ -1,7 +1,7 @@
 //! Parquet files with columns compressed by zstd, whose pages are decompressed here.
 //!
-//! The `zstd` feature of the crate `parquet` needs a C compiler. So a compressed column is read as if it were
-//! not compressed, and the pages that come of it are decompressed by a decoder in Rust.
+//! The `zstd` feature of the crate `parquet` needs a C compiler. A compressed column is therefore read as if
+//! it were not compressed, and its pages are decompressed by a decoder in Rust.
 
 use std::io::Read;
 use std::sync::Arc;
@@ -119,7 +119,7 @@ impl<R: ChunkReader> PageReader for Pages<R> {
     }
 }
 
-/// A page with its bytes decompressed: of version 2 those behind the levels, unless it says that they are not
+/// Page with its bytes decompressed: for version 2 those behind the levels, unless the page is marked as not
 /// compressed.
 fn page(mut page: Page) -> Result<Page> {
     match &mut page {
@@ -133,7 +133,7 @@ fn page(mut page: Page) -> Result<Page> {
     Ok(page)
 }
 
-/// Bytes of a page whose first `levels` are not compressed.
+/// Decompressed bytes of a page, whose first `levels` bytes are not compressed.
 fn plain(bytes: &Bytes, levels: usize) -> Result<Bytes> {
     let wrong = |e: &dyn std::fmt::Display| ParquetError::General(format!("a page by zstd: {e}"));
     if levels > bytes.len() {
@@ -157,7 +157,7 @@ mod tests {
 
     use super::*;
 
-    /// Files by pyarrow, whose rows follow from a formula: tests/data/README.md.
+    /// Rows of files by pyarrow equal those of a formula: tests/data/README.md.
     #[test]
     fn rows_are_those_of_another_writer() {
         let files: [&[u8]; 2] =
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Bytes that are no frame, or one that is cut, are an error and no panic.
+    /// Invalid or truncated frames give an error and no panic.
     #[test]
     fn damaged_pages_are_refused() {
         let bytes: &[u8] = include_bytes!("../tests/data/zstd-1.parquet");

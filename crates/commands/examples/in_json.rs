@@ -1,4 +1,4 @@
-//! How another language asks: a command by its name, options and files as JSON.
+//! Calls from other languages: a command by its name, options and files as JSON.
 //!
 //! `cargo run -p obsdeg-commands --example in_json`
 
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let answer: Value = serde_json::from_str(&answer.text()?)?;
     println!("two positions, {} carry: rank {}", answer["carry"], answer["rank"]);
 
-    // what is wrong is said with its place
+    // errors name their place
     let wrong = json!({ "sources": [{ "name": "two.toml", "text": "carry = \"sideways\"\n" }] });
     if let Err(problem) = call("analyze", &wrong.to_string(), &mut Host::silent()) {
         let place = problem.place.as_ref().map(|p| p.line_and_column());

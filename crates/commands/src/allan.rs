@@ -11,7 +11,7 @@ use crate::calibrate::{GRAVITY, number_within};
 use crate::host::Host;
 use crate::problem::{Kind, Problem};
 
-/// Probability of a confidence band where nothing is said.
+/// Default probability of a confidence band.
 const CONFIDENCE: f64 = 0.95;
 /// Range of that probability.
 const PROBABILITY: [f64; 2] = [0.5, 0.9999];

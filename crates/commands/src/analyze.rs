@@ -22,7 +22,7 @@ use crate::host::{Host, Now};
 use crate::problem::Problem;
 use crate::source::{Input, Named};
 
-/// What `analyze` is asked.
+/// Request of `analyze`: the input, and the options of its verdicts and solutions.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Analyze {
@@ -30,7 +30,7 @@ pub struct Analyze {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// What is judged.
+    /// Positions, combinations and assumptions.
     #[command(flatten)]
     #[serde(flatten)]
     pub input: InputOptions,
@@ -50,7 +50,10 @@ pub struct Analyze {
     pub relation_limit: Option<u64>,
 
     /// Solving expressions and numbers of solutions
-    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(SOLUTIONS))]
+    #[arg(
+        long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on",
+        action = ArgAction::Set, value_parser = one_of(SOLUTIONS)
+    )]
     pub solutions: bool,
 
     /// Axes of Z in solutions
@@ -62,7 +65,10 @@ pub struct Analyze {
     pub formulas: bool,
 
     /// Exact classes of the errors that a scheme does not estimate
-    #[arg(long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on", action = ArgAction::Set, value_parser = one_of(OMITTED))]
+    #[arg(
+        long, value_name = "ON|OFF", help_heading = "Solutions", default_value = "on",
+        action = ArgAction::Set, value_parser = one_of(OMITTED)
+    )]
     pub omitted: bool,
 
     /// Changes of the estimates per unit of each error that a scheme does not estimate, in deg/h per ug and
@@ -87,7 +93,7 @@ pub struct Analyze {
     pub reduced: bool,
 }
 
-/// The orders that may be asked for.
+/// Largest orders of derivatives that a request may name.
 const ORDERS: RangeInclusive<u64> = 0..=1000;
 
 impl Default for Analyze {
@@ -123,13 +129,13 @@ const FRAMES: [Word<Frame>; 2] = [
     ("platform", "those of the platform", Frame::Platform),
 ];
 
-/// The answer on a scheme or a model.
+/// Answer on a scheme or a model.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Judged {
-    /// On a scheme.
+    /// Answer on a scheme.
     Scheme(Box<SchemeAnalysis>),
-    /// On a model.
+    /// Answer on a model.
     Model(Box<SystemAnalysis>),
 }
 
@@ -156,18 +162,18 @@ impl Answer for Judged {
     }
 }
 
-/// The answers on all that was asked about: one alone is as it is, several are a list by their names.
+/// Answers on all inputs: the answer itself for one input, a list with names for several.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub enum Judgements {
-    /// On one.
+    /// One answer.
     One(Judged),
-    /// On several, or none.
+    /// Answers on several inputs, or on none.
     Several(Several<Judged>),
 }
 
 impl Judged {
-    /// The first sentence, then every unknown with its degree.
+    /// The first sentence of the answer, and every unknown with its degree.
     fn verdicts(&self) -> [String; 2] {
         let degree = |name: &str, degree: Option<usize>| match degree {
             Some(k) => format!("{name} {k}"),
@@ -183,7 +189,7 @@ impl Judged {
 }
 
 impl Judgements {
-    /// The verdicts in lines of text: the first sentence of each answer, and its degrees.
+    /// Verdicts as lines of text: the first sentence of each answer, and its degrees.
     pub fn verdicts(&self) -> Vec<String> {
         match self {
             Self::One(one) => one.verdicts().to_vec(),
@@ -236,7 +242,7 @@ impl Answer for Judgements {
 /// Judges schemes and models, as [`InputOptions::read`] gives them.
 ///
 /// # Errors
-/// What is wrong with one of them; with several its name.
+/// Error of the first scheme or model that cannot be judged, with its name if there are several.
 pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result<Judgements, Problem> {
     if let Some(order) = options.order {
         check_whole("--order", order, &ORDERS)?;
@@ -248,7 +254,7 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
         if several && !(host.going)(Now::of(what, i as u64, read.len() as u64)) {
             return Err(Problem::interrupted());
         }
-        // what is wrong in a model has its place in its file
+        // errors in a model already have a place in its file
         let of_scheme = several && matches!(input, Input::Scheme(_));
         let one = judge(options, input, host).map_err(|e| if of_scheme { e.in_file(name) } else { e })?;
         judged.push((name.clone(), one));
@@ -284,7 +290,7 @@ pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
 /// the same outputs.
 ///
 /// # Errors
-/// [`Problem`] of a model that has none, or of which none is written.
+/// [`Problem`] of a model that has no reduced model, or whose reduced model cannot be written.
 pub fn reduced_model(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
     let [(_, Input::Model(file))] = read else {
         return Err(Problem::input("a reduced model is of one model"));
@@ -316,7 +322,7 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
     let why = &options.why;
     Ok(match input {
         Input::Scheme(scheme) => {
-            // a record that can not be predicted says so before anything is solved
+            // a record that cannot be predicted is an error before anything is solved
             let of_record = options
                 .sensitivities
                 .then(|| sensitivities(scheme, &Conditions::of(scheme), seed))

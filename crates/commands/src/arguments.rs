@@ -1,4 +1,4 @@
-//! Options that several commands share: what is judged, under which assumptions.
+//! Options that several commands share: the input, and its assumptions.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -17,7 +17,7 @@ use crate::problem::Problem;
 use crate::source::{Input, Named, Source};
 use crate::text;
 
-/// The seed where none is given.
+/// Default seed.
 pub(crate) const SEED: u64 = 1;
 
 /// Options that concern a model as well as a scheme.
@@ -44,11 +44,11 @@ const OF_BOTH: [&str; 20] = [
     "help_long",
 ];
 
-/// Options that concern models alone; all others of a command are about schemes.
+/// Options that concern models only; all other options of a command concern schemes.
 const OF_MODELS: [&str; 7] =
     ["order", "count_limit", "relation_limit", "work_limit", "reduced", "starts", "profile"];
 
-/// The options on the command line that concern one kind of file only, as they are written.
+/// Options on the command line that concern one kind of file only, as they are written.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Given {
     schemes: Vec<String>,
@@ -56,7 +56,7 @@ pub struct Given {
 }
 
 impl Given {
-    /// Of the names of what was given, in snake case.
+    /// Sorts the given options, each with its name in snake case, by the kind of file that they concern.
     pub fn of<'a>(given: impl IntoIterator<Item = (&'a str, String)>) -> Self {
         let mut out = Self::default();
         for (id, option) in given {
@@ -67,17 +67,16 @@ impl Given {
         out
     }
 
-    /// The same without an option, which concerns both kinds here.
+    /// The same options without `option`, which concerns both kinds of file in this command.
     pub(crate) fn without(mut self, option: &str) -> Self {
         self.schemes.retain(|o| o != option);
         self
     }
 
-    /// Refuses options that are about the other kind of file than all that was read: nothing would hear of
-    /// them.
+    /// Refuses options for schemes if all files are models, and options for models if all are schemes.
     ///
     /// # Errors
-    /// The options, and the file that does not hear of them.
+    /// The options, and a file of the other kind.
     pub fn concern<'a>(&self, read: impl IntoIterator<Item = &'a Named>) -> Result<(), Problem> {
         let (mut schemes, mut models) = (None, None);
         for (name, input) in read {
@@ -99,7 +98,7 @@ impl Given {
     }
 }
 
-/// What is judged beside files: positions, and what holds whatever files say.
+/// Input besides files: positions, combinations, and assumptions that override files.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[command(next_help_heading = "What is judged")]
 #[serde(default)]
@@ -118,12 +117,12 @@ pub struct InputOptions {
     #[arg(long, value_name = "EXPR", allow_hyphen_values = true)]
     pub combination: Vec<String>,
 
-    /// What holds of schemes, whatever their files say.
+    /// Assumptions that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub assumptions: Assumptions,
 
-    /// What is unknown.
+    /// Unknowns that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub terms: TermOptions,
@@ -142,13 +141,13 @@ pub struct InputOptions {
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(WORK))]
     pub work_limit: Option<u64>,
 
-    /// Which options were given
+    /// Given options that concern one kind of file only.
     #[arg(skip)]
     #[serde(skip)]
     pub given: Given,
 }
 
-/// Limits of the work of a verdict, in millions of operations.
+/// Range of work limits, in millions of operations.
 pub(crate) const WORK: RangeInclusive<u64> = 1..=1_000_000_000;
 
 /// The words of `--path`.
@@ -175,7 +174,7 @@ const AXES: [Word<DefinedBy>; 3] = [
     ("body", "families have GM and M6, of which a rotation is not observable", DefinedBy::Body),
 ];
 
-/// What holds of schemes, whatever their files say.
+/// Assumptions that override those of scheme files.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[command(next_help_heading = "Assumptions")]
 #[serde(default)]
@@ -190,7 +189,7 @@ pub struct Assumptions {
     pub latitude: Option<Latitude>,
 }
 
-/// What is unknown.
+/// Unknown terms of the error model.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[command(next_help_heading = "Assumptions")]
 #[serde(default)]
@@ -209,21 +208,22 @@ pub struct TermOptions {
     pub axes: Option<DefinedBy>,
 }
 
-/// A list of terms, as it is written: the frame may change what families are.
+/// Reads a list of terms and keeps it as text: the frame may change the meaning of families.
 fn listed(text: &str) -> Result<String, TermError> {
     text.parse::<Unknowns>().map(|_| text.into())
 }
 
 impl TermOptions {
-    /// What is unknown, if they say so.
+    /// Unknowns that the options name; `None` without `--terms`.
     ///
     /// # Errors
-    /// Terms that there are not, or not together.
+    /// Unknown terms, terms that exclude each other, or `--axes` without `--terms`.
     pub fn unknowns(&self) -> Result<Option<Unknowns>, Problem> {
         if let (None, Some(axes)) = (&self.terms, self.axes) {
             let word = AXES.iter().find(|(.., a)| *a == axes).map_or("", |(word, ..)| word);
             return Err(Problem::input(format!(
-                "--axes {word} does nothing here: expected --terms with it, as in --terms all (a scheme file says frame = \"{word}\")"
+                "--axes {word} does nothing here: expected --terms with it, as in --terms all (a scheme file \
+                 says frame = \"{word}\")"
             )));
         }
         let of = |text: &String| Unknowns::of(text, self.axes).map_err(|e| Problem::input(e.to_string()));
@@ -232,17 +232,17 @@ impl TermOptions {
 }
 
 impl Assumptions {
-    /// Makes them hold.
+    /// Sets the assumptions in a scheme.
     pub fn apply(&self, scheme: &mut Scheme) {
         scheme.carry = self.carry.unwrap_or(scheme.carry);
         scheme.latitude = self.latitude.or(scheme.latitude);
     }
 }
 
-/// Any whole number.
+/// Range of all whole numbers.
 pub const ANY: RangeInclusive<u64> = 0..=u64::MAX;
 
-/// Reads a whole number of a range.
+/// Parser of a whole number within a range.
 pub fn whole<T: TryFrom<u64>>(
     range: RangeInclusive<u64>,
 ) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
@@ -258,7 +258,7 @@ fn expected(range: &RangeInclusive<u64>) -> String {
     format!("expected a whole number {} to {high}", range.start())
 }
 
-/// Refuses a whole number beyond a range.
+/// Refuses a whole number outside a range.
 pub(crate) fn check_whole(
     option: &str,
     number: impl Into<u64>,
@@ -271,7 +271,7 @@ pub(crate) fn check_whole(
     }
 }
 
-/// Any text; help and completions list the words that mean something of their own.
+/// Parser of any text; help and completions list the words with a meaning of their own.
 #[derive(Clone)]
 pub(crate) struct WordOr<const N: usize>(pub(crate) [(&'static str, &'static str); N]);
 
@@ -287,10 +287,10 @@ impl<const N: usize> TypedValueParser for WordOr<N> {
     }
 }
 
-/// A word of an option, what it means and what it stands for.
+/// Word of an option, its meaning, and its value.
 pub type Word<T> = (&'static str, &'static str, T);
 
-/// Reads one of several words, as what it stands for; the help and the completions list them.
+/// Parser of one of several words, as its value; help and completions list the words.
 pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     words: [Word<T>; N],
 ) -> impl TypedValueParser<Value = T> {
@@ -302,7 +302,7 @@ pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
     read.try_map(meant)
 }
 
-/// Three Euler angles, and the turn from there if there is one, as they were written.
+/// Three Euler angles and, if given, the turn that starts there, as they were written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitude {
     text: String,
@@ -336,10 +336,10 @@ impl FromStr for Attitude {
 }
 
 impl InputOptions {
-    /// The models and the schemes: from the texts or the angles, with whatever options override.
+    /// Reads schemes and models from texts or from `--angles`, and applies the options that override them.
     ///
     /// # Errors
-    /// What is wrong with them, at its place.
+    /// Defect of an input, with its place.
     pub fn read(&self, sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
         let mut read: Vec<Named> = sources.into_iter().map(Source::read).collect::<Result<_, _>>()?;
         if read.is_empty() {
@@ -379,10 +379,10 @@ impl InputOptions {
         Ok(read)
     }
 
-    /// The same of what takes one.
+    /// Reads exactly one scheme or model, as [`InputOptions::read`] does.
     ///
     /// # Errors
-    /// What is wrong with it, at its place.
+    /// Defect of the input, with its place; more than one input.
     pub fn read_one(&self, sources: Vec<Source>) -> Result<Input, Problem> {
         let mut read = self.read(sources)?;
         match (read.pop(), read.len()) {

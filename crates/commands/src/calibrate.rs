@@ -1,4 +1,4 @@
-//! What a scheme determines, from the record of its run.
+//! Estimates of what a scheme or model determines, from records of its runs.
 
 use std::ops::RangeInclusive;
 
@@ -28,18 +28,18 @@ use crate::host::Host;
 use crate::problem::{Kind, Problem};
 use crate::source::{Input, ModelFile, Named, Source};
 
-/// Starts where nothing is said.
+/// Default number of starts.
 const STARTS: u32 = 16;
-/// Numbers of starts.
+/// Range of the number of starts.
 const SOME_STARTS: RangeInclusive<u64> = 1..=10_000;
-/// The gate where nothing is said.
+/// Default of `--gate`.
 const GATE: f64 = 0.999;
-/// What one g may be, in m/s^2.
+/// Range of one g, in m/s^2.
 pub(crate) const GRAVITY: [f64; 2] = [9.0, 10.5];
-/// What the gate may be.
+/// Range of `--gate`.
 const PROBABILITY: [f64; 2] = [0.5, 1.0];
 
-/// What `calibrate` is asked.
+/// Request of `calibrate`: how records are read, and how estimates are made.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Calibrate {
@@ -49,14 +49,17 @@ pub struct Calibrate {
 
     /// Starts of the iteration, that of the file and others about it; fewer are made where no other solution
     /// is to be expected
-    #[arg(long, value_name = "N", help_heading = "Models", default_value_t = STARTS, value_parser = whole::<u32>(SOME_STARTS))]
+    #[arg(
+        long, value_name = "N", help_heading = "Models", default_value_t = STARTS,
+        value_parser = whole::<u32>(SOME_STARTS)
+    )]
     pub starts: u32,
 
     /// The profile of an unknown, what the data say of it when all others follow; may be given several times
     #[arg(long, value_name = "NAME", help_heading = "Models")]
     pub profile: Vec<String>,
 
-    /// What holds of schemes, whatever their files say.
+    /// Assumptions that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub assumptions: Assumptions,
@@ -112,7 +115,7 @@ pub struct Calibrate {
     #[serde(skip)]
     pub dry_run: bool,
 
-    /// Which options were given
+    /// Given options that concern one kind of file only.
     #[arg(skip)]
     #[serde(skip)]
     pub given: Given,
@@ -141,7 +144,7 @@ impl Default for Calibrate {
     }
 }
 
-/// Reads a number from `low` to `high`.
+/// Parser of a number from `low` to `high`.
 pub(crate) fn number_within(
     [low, high]: [f64; 2],
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
@@ -151,15 +154,15 @@ pub(crate) fn number_within(
     }
 }
 
-/// A calibration, of a platform or of a model.
+/// Calibration of a platform or a model, or the way in which records are read.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Calibrated {
-    /// Of a platform.
+    /// Calibration of a platform.
     Platform(Box<Calibration>),
-    /// Of a model.
+    /// Calibration of a model.
     Model(Box<SystemCalibration>),
-    /// How records are read: nothing was estimated.
+    /// Way in which records are read; nothing was estimated.
     Read(Box<RecordsRead>),
 }
 
@@ -215,7 +218,7 @@ impl Calibrated {
         }
     }
 
-    /// True if it was ended before it had settled.
+    /// True if the calibration was ended before it settled.
     pub fn interrupted(&self) -> bool {
         match self {
             Self::Platform(c) => c.findings.contains(&Finding::Interrupted),
@@ -224,10 +227,10 @@ impl Calibrated {
         }
     }
 
-    /// What goes into a folder beside the JSON: coefficients, their covariance, residuals, figures.
+    /// Files beside the JSON: coefficients, their covariance, residuals, figures.
     ///
     /// # Errors
-    /// What cannot be drawn.
+    /// [`ReportError`] of a figure that cannot be drawn.
     pub fn files(&self) -> Result<Vec<File>, ReportError> {
         let coefficients = obsdeg_report::written(self, Format::Csv, Layout::default())?;
         let (covariance, residuals) = match self {
@@ -249,10 +252,10 @@ impl Calibrated {
     }
 }
 
-/// Calibrates a platform or a model from records of its runs; `before` is the JSON of a calibration before.
+/// Calibrates a platform or a model from records of its runs. `before` is the JSON of an earlier calibration.
 ///
 /// # Errors
-/// What is wrong with the scheme, the model, a record or the calibration before.
+/// Defect of the scheme, the model, a record or the earlier calibration.
 pub fn calibrate(
     a: &Calibrate,
     named: Named,
@@ -295,7 +298,7 @@ pub fn calibrate(
     Ok(Calibrated::Platform(Box::new(found)))
 }
 
-/// A model and its data.
+/// Calibrates a model from its only record.
 fn of_model(
     a: &Calibrate,
     file: &ModelFile,
@@ -339,8 +342,8 @@ impl Calibrate {
     }
 }
 
-/// A calibration before, of a scheme or a model as `kind` and `of`, the schema and the key that says what it
-/// is of.
+/// Reads an earlier calibration. `kind` is the name of its JSON layout without the version; `of` is `scheme`
+/// or `model`.
 fn prior<S: serde::de::DeserializeOwned>(
     source: &Source,
     kind: &str,
@@ -367,13 +370,13 @@ fn prior<S: serde::de::DeserializeOwned>(
     let key = |name: &str| value.get(name).cloned().unwrap_or_default();
     let older = |e: serde_json::Error| wrong(&format!("a calibration of another version ({e})"));
     let mut estimates: CovarianceTable = serde_json::from_value(key("covariance")).map_err(older)?;
-    // sigmas that are not to be relied upon as they are
+    // the sigmas of an inconsistent calibration are too small
     if value["consistent"] == false {
         estimates.covariance.clone_from(&estimates.rescaled);
     }
     let rests_on = serde_json::from_value(key("rests_on")).map_err(older)?;
     let of = serde_json::from_value(key(if of == "scheme" { "setup" } else { of })).map_err(older)?;
-    // unknown, standard deviation, unit; none of a model
+    // a prior is unknown, standard deviation, unit; a model's calibration has none
     let named = |prior: &serde_json::Value| prior[0].as_str().map(String::from);
     let priors = value["assumed"]["priors"].as_array().map_or(&[][..], Vec::as_slice);
     let priors = priors.iter().filter_map(named).collect();

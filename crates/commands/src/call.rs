@@ -1,4 +1,4 @@
-//! A command by its name, its options and files as JSON: how other languages ask.
+//! Calls from other languages: a command by its name, options and files as JSON.
 
 use obsdeg_calibration::record::Record;
 use obsdeg_report::{
@@ -22,42 +22,41 @@ use crate::report::{CalibrationFile, Report, origin, report};
 use crate::simulate::{Simulate, files as simulation_files, simulate};
 use crate::source::{Input, Named, Source, title};
 
-/// The commands.
+/// Names of the commands.
 pub const COMMANDS: [&str; 9] =
     ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report", "paper"];
 
-/// An answer, whatever it is of.
+/// Answer of any command, written in the formats that are asked for.
 pub trait Rendered: Send + Sync {
-    /// Name and version of the layout of the JSON (`obsdeg.analysis/1`); none of lists of answers and of
-    /// texts.
+    /// Name and version of the JSON layout (`obsdeg.analysis/1`); `None` for lists of answers and for texts.
     fn layout(&self) -> Option<&str>;
 
-    /// What the command line prints with `--format`, byte for byte; a report is a page in any format.
+    /// Text that the command line prints with `--format`, byte for byte; a report is its page in any format.
     ///
     /// # Errors
-    /// What cannot be written.
+    /// [`Problem`] of an answer that cannot be written.
     fn written(&self, format: Format) -> Result<String, Problem>;
 
-    /// One of the lists of the JSON as CSV (`--table`); the main one where none is named.
+    /// One list of the JSON as CSV (`--table`); the main list if `name` is `None`.
     ///
     /// # Errors
-    /// A table that there is not.
+    /// [`Problem`] of a name that the answer has no list for.
     fn table(&self, name: Option<&str>) -> Result<String, Problem>;
 
-    /// A part of an HTML page: tables and formulas that read without scripts.
+    /// Part of an HTML page: tables and formulas that need no scripts.
     ///
     /// # Errors
-    /// What cannot be written.
+    /// [`Problem`] of an answer that cannot be written.
     fn fragment(&self) -> Result<String, Problem>;
 
-    /// What goes into a folder beside the JSON: figures, series, schemes that were found.
+    /// Files of the folder, besides the JSON: figures, series, found schemes.
     ///
     /// # Errors
-    /// What cannot be drawn.
+    /// [`Problem`] of a figure that cannot be drawn.
     fn files(&self) -> Result<Vec<File>, Problem>;
 }
 
-/// An answer to whoever asked in JSON.
+/// Answer to a request in JSON.
 pub struct Answered {
     /// The answer.
     pub answer: Box<dyn Rendered>,
@@ -66,23 +65,23 @@ pub struct Answered {
 }
 
 impl Answered {
-    /// What the command line prints with `--format json`, byte for byte; of a report the page, of a part of a
-    /// search the file.
+    /// Text that the command line prints with `--format json`, byte for byte. For a report it is the page,
+    /// for a part of a search the file.
     ///
     /// # Errors
-    /// What cannot be written.
+    /// [`Problem`] of an answer that cannot be written.
     pub fn text(&self) -> Result<String, Problem> {
         self.answer.written(Format::Json)
     }
 }
 
-/// An answer, and the files that belong to it.
-struct Whole<A, F> {
+/// Answer with the function that makes its files.
+struct AnswerWithFiles<A, F> {
     answer: A,
     files: F,
 }
 
-impl<A, F> Rendered for Whole<A, F>
+impl<A, F> Rendered for AnswerWithFiles<A, F>
 where
     A: Answer + Send + Sync,
     F: Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync,
@@ -108,10 +107,10 @@ where
     }
 }
 
-/// A text that is what it is: the page of a report, a part of a search.
-struct Text(String);
+/// Answer that is a text in every format: the page of a report, a part of a search.
+struct PlainText(String);
 
-impl Rendered for Text {
+impl Rendered for PlainText {
     fn layout(&self) -> Option<&str> {
         None
     }
@@ -133,13 +132,13 @@ impl Rendered for Text {
     }
 }
 
-/// No files belong to an answer.
+/// No files, for answers without any.
 fn none<A>(_: &A) -> Result<Vec<File>, Problem> {
     Ok(Vec::new())
 }
 
-/// What becomes of an answer.
-trait Wanted {
+/// Form in which an answer is returned.
+trait OutputForm {
     type Out;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -151,10 +150,10 @@ trait Wanted {
     fn text(text: String, passed: bool) -> Result<Self::Out, Problem>;
 }
 
-/// All of it is kept.
-struct All;
+/// Answers that can be written in every format, with their files.
+struct AllFormats;
 
-impl Wanted for All {
+impl OutputForm for AllFormats {
     type Out = Answered;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -162,15 +161,15 @@ impl Wanted for All {
         passed: bool,
         files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Answered, Problem> {
-        Ok(Answered { answer: Box::new(Whole { answer, files }), passed })
+        Ok(Answered { answer: Box::new(AnswerWithFiles { answer, files }), passed })
     }
 
     fn text(text: String, passed: bool) -> Result<Answered, Problem> {
-        Ok(Answered { answer: Box::new(Text(text)), passed })
+        Ok(Answered { answer: Box::new(PlainText(text)), passed })
     }
 }
 
-/// An answer as JSON.
+/// Answer as JSON, with its sentences.
 pub struct InJson {
     /// The JSON, as the command line prints it.
     pub text: String,
@@ -180,10 +179,10 @@ pub struct InJson {
     pub passed: bool,
 }
 
-/// Only its text: a program that asks for no more holds no writer of anything else.
+/// Answers as JSON only: a program that needs nothing else links no other writer.
 struct JsonOnly;
 
-impl Wanted for JsonOnly {
+impl OutputForm for JsonOnly {
     type Out = InJson;
 
     fn whole<A: Answer + Send + Sync + 'static>(
@@ -199,27 +198,26 @@ impl Wanted for JsonOnly {
     }
 }
 
-/// The text of an answer ([`Answered::text`]) and its sentences alone, and whether the command line would
-/// exit with 0.
+/// Answers a command with the text of the answer ([`Answered::text`]), its sentences, and the outcome of its
+/// checks.
 ///
 /// # Errors
-/// As [`call`].
+/// The errors of [`call`].
 pub fn call_json(command: &str, request: &str, host: &mut Host<'_>) -> Result<InJson, Problem> {
     object(request).and_then(|request| answered::<JsonOnly>(command, request, host)).map_err(in_snake_case)
 }
 
-/// Answers a command. `request` is a JSON object with its options, named as on the command line in snake
-/// case, and with its files, each a `{"name": ..., "text": ...}`: `sources` are the schemes and models;
-/// `calibrate` has `records` and `before` too, `report` `calibrations`, and `design` has `candidates_file`,
-/// `merge` and `resume`.
+/// Answers a command. `request` is a JSON object with options, named as on the command line in snake case,
+/// and files, each `{"name": ..., "text": ...}`. `sources` are schemes and models. `calibrate` also has
+/// `records` and `before`, `report` has `calibrations`, `design` has `candidates_file`, `merge` and `resume`.
 ///
 /// # Errors
-/// What is wrong with the request; options are named in snake case.
+/// Defect of the request; options are named in snake case.
 pub fn call(command: &str, request: &str, host: &mut Host<'_>) -> Result<Answered, Problem> {
-    object(request).and_then(|request| answered::<All>(command, request, host)).map_err(in_snake_case)
+    object(request).and_then(|request| answered::<AllFormats>(command, request, host)).map_err(in_snake_case)
 }
 
-fn answered<W: Wanted>(
+fn answered<W: OutputForm>(
     command: &str,
     request: Map<String, Value>,
     host: &mut Host<'_>,
@@ -303,14 +301,14 @@ fn answered<W: Wanted>(
     }
 }
 
-/// The schemes and models that most commands are about.
+/// Files of most commands: schemes and models.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Sources {
     sources: Vec<Source>,
 }
 
-/// What a calibration reads.
+/// Files of a calibration.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Records {
@@ -326,13 +324,13 @@ struct StaticRecords {
     records: Vec<Source>,
 }
 
-/// A record that is a text.
+/// Record from a text.
 fn of_text(r: Source) -> Result<Record, Problem> {
     let bytes = std::io::Cursor::new(r.text.into_bytes());
     Record::csv(&r.name, Box::new(bytes)).map_err(|e| Problem::input(e.to_string()))
 }
 
-/// What a review reads, and the command that it names.
+/// Files of a review, and the command line that it names.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Pages {
@@ -341,11 +339,11 @@ struct Pages {
     command: String,
 }
 
-/// Nothing is read.
+/// Files of a command that reads none.
 #[derive(Default, Serialize, Deserialize)]
 struct NoFiles {}
 
-/// Options and files of a command, and which options were given.
+/// Options and files of a command, and the given options that concern one kind of file only.
 struct Request<O, F> {
     options: O,
     files: F,
@@ -357,14 +355,14 @@ where
     O: Default + Serialize + DeserializeOwned,
     F: Default + Serialize + DeserializeOwned,
 {
-    /// Takes an object apart; what it has no name for is refused.
+    /// Splits a JSON object into options and files; refuses other names.
     fn read(request: Map<String, Value>) -> Result<Self, Problem> {
         let options = names(&O::default())?;
         let known = names(&F::default())?;
         let (mut asked, mut files) = (Map::new(), Map::new());
         for (name, value) in request {
             match (options.contains(&name), known.contains(&name)) {
-                // as if it were not there
+                // null is the same as no option
                 (true, _) if value.is_null() => {}
                 (true, _) => drop(asked.insert(name, value)),
                 (_, true) => drop(files.insert(name, value)),
@@ -382,7 +380,7 @@ where
     }
 }
 
-/// The names of the options of something.
+/// Names of the fields of a struct of options or files.
 fn names(of: &impl Serialize) -> Result<Vec<String>, Problem> {
     match serde_json::to_value(of) {
         Ok(Value::Object(map)) => Ok(map.into_iter().map(|(name, _)| name).collect()),
@@ -390,7 +388,7 @@ fn names(of: &impl Serialize) -> Result<Vec<String>, Problem> {
     }
 }
 
-/// Options of their types; where one has another its name is in the error.
+/// Options from JSON; an error names the option whose value has the wrong type.
 fn typed<T: DeserializeOwned>(map: Map<String, Value>) -> Result<T, Problem> {
     let alone = map.clone();
     serde_json::from_value(Value::Object(map)).map_err(|e| {
@@ -402,7 +400,7 @@ fn typed<T: DeserializeOwned>(map: Map<String, Value>) -> Result<T, Problem> {
     })
 }
 
-/// The schemes and models in texts.
+/// Reads schemes and models from texts.
 fn read(sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
     if sources.is_empty() {
         return Err(Problem::input("nothing to judge; expected schemes or models as sources"));
@@ -410,7 +408,7 @@ fn read(sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
     sources.into_iter().map(Source::read).collect()
 }
 
-/// The positions of every scheme as a picture.
+/// Picture of the positions of every scheme.
 fn position_figures(read: &[Named]) -> Vec<File> {
     let mut files = Vec::new();
     for (name, input) in read {
@@ -424,35 +422,37 @@ fn position_figures(read: &[Named]) -> Vec<File> {
     files
 }
 
-/// A calibration from records that are no texts, as [`call`] gives one of texts: `request` has all but
-/// `records`.
+/// Calibrates from records that are no texts; `request` is as in [`call`], without `records`.
 ///
 /// # Errors
-/// What is wrong with the request or a record.
+/// Defect of the request or of a record.
 pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
         let mut asked: Request<Calibrate, Records> = Request::read(object(request)?)?;
         asked.options.given = asked.given;
         let source = one(asked.files.sources)?;
-        calibrated::<All>(&asked.options, source, records, asked.files.before.as_ref(), host)
+        calibrated::<AllFormats>(&asked.options, source, records, asked.files.before.as_ref(), host)
     };
     answer().map_err(in_snake_case)
 }
 
-/// The noise of sensors in a record that is no text, as [`call`] gives it of texts: `request` has all but
-/// `records`.
+/// Noise of sensors in a record that is no text; `request` is as in [`call`], without `records`.
 ///
 /// # Errors
-/// What is wrong with the request or the record.
+/// Defect of the request or of the record.
 pub fn call_allan(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
         let asked: Request<Allan, StaticRecords> = Request::read(object(request)?)?;
-        noise_of::<All>(&asked.options, records, host)
+        noise_of::<AllFormats>(&asked.options, records, host)
     };
     answer().map_err(in_snake_case)
 }
 
-fn noise_of<W: Wanted>(options: &Allan, records: Vec<Record>, host: &Host<'_>) -> Result<W::Out, Problem> {
+fn noise_of<W: OutputForm>(
+    options: &Allan,
+    records: Vec<Record>,
+    host: &Host<'_>,
+) -> Result<W::Out, Problem> {
     let found = records.len();
     let [record] = <[Record; 1]>::try_from(records)
         .map_err(|_| Problem::input(format!("found {found} records; expected one of sensors at rest")))?;
@@ -461,7 +461,7 @@ fn noise_of<W: Wanted>(options: &Allan, records: Vec<Record>, host: &Host<'_>) -
     W::whole(found, passed, |found| Ok(allan_files(found)?))
 }
 
-fn calibrated<W: Wanted>(
+fn calibrated<W: OutputForm>(
     options: &Calibrate,
     source: Source,
     records: Vec<Record>,
@@ -481,7 +481,7 @@ fn one(sources: Vec<Source>) -> Result<Source, Problem> {
     }
 }
 
-/// The object that a request is.
+/// Parses a request, which is a JSON object.
 fn object(request: &str) -> Result<Map<String, Value>, Problem> {
     match serde_json::from_str(request) {
         Ok(Value::Object(request)) => Ok(request),
@@ -490,7 +490,8 @@ fn object(request: &str) -> Result<Map<String, Value>, Problem> {
     }
 }
 
-/// Options in words as JSON names them: `--slew-rate` is `slew_rate`.
+/// Renames the options in a message from the command line's form to that of JSON: `--slew-rate` to
+/// `slew_rate`.
 fn in_snake_case(mut problem: Problem) -> Problem {
     let mut out = String::with_capacity(problem.message.len());
     let mut rest = problem.message.as_str();

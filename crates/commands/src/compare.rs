@@ -1,4 +1,4 @@
-//! Schemes side by side.
+//! Comparison of schemes.
 
 use clap::Args;
 use obsdeg_evidence::compare::{Comparison, Entry};
@@ -9,7 +9,7 @@ use crate::conditions::{GyroNoiseOptions, MeasurementOptions};
 use crate::problem::Problem;
 use crate::source::{Input, Named, title};
 
-/// What `compare` is asked.
+/// Request of `compare`: assumptions, conditions and requirements.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Compare {
@@ -17,12 +17,12 @@ pub struct Compare {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// What holds of schemes, whatever their files say.
+    /// Assumptions that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub assumptions: Assumptions,
 
-    /// What is measured, and how well it is to be known.
+    /// Measurement and requirements.
     #[command(flatten)]
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
@@ -44,16 +44,17 @@ impl Default for Compare {
     }
 }
 
-/// Judges schemes side by side.
+/// Compares schemes.
 ///
 /// # Errors
-/// What is wrong with one of them, with its name; models.
+/// Defect of a scheme, with its name; a model among the inputs.
 pub fn compare(options: &Compare, read: Vec<Named>) -> Result<Comparison, Problem> {
     let mut entries = Vec::with_capacity(read.len());
     for (name, input) in read {
         let Input::Scheme(mut scheme) = input else {
             return Err(Problem::input(format!(
-                "{name} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge models side by side)"
+                "{name} is a model file; expected scheme files (`obsdeg analyze` and `obsdeg report` judge \
+                 models side by side)"
             )));
         };
         options.assumptions.apply(&mut scheme);

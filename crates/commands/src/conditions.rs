@@ -15,10 +15,10 @@ use crate::arguments::{Word, one_of};
 use crate::problem::Problem;
 use crate::text;
 
-/// Numbers of Monte Carlo runs.
+/// Range of the number of Monte Carlo runs.
 pub(crate) const RUNS: RangeInclusive<u64> = 2..=10_000_000;
 
-/// Reads a number of a range.
+/// Parser of a number within a range.
 pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| {
         let number = text.trim().parse().ok().filter(|x| range.admits(*x));
@@ -26,7 +26,7 @@ pub(crate) fn within(range: Range) -> impl Fn(&str) -> Result<f64, String> + Clo
     }
 }
 
-/// Reads `NAME=X` with a number of a range.
+/// Parser of `NAME=X` with a number within a range.
 pub(crate) fn assigned(
     range: Range,
 ) -> impl Fn(&str) -> Result<Assignment, String> + Clone + Send + Sync + 'static {
@@ -36,7 +36,7 @@ pub(crate) fn assigned(
     }
 }
 
-/// What is measured, and how well it is to be known: all that a prediction by information needs.
+/// Measurement and requirements: all conditions that a prediction from the information matrix needs.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 #[command(next_help_heading = "Measurement")]
@@ -85,7 +85,7 @@ pub struct MeasurementOptions {
     pub judged: RequirementOptions,
 }
 
-/// Requirements and bench that estimates are judged by.
+/// Requirements, and the bench that total uncertainties include.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 #[command(next_help_heading = "Measurement")]
@@ -106,23 +106,24 @@ pub struct RequirementOptions {
 }
 
 impl RequirementOptions {
-    /// Checks that every requirement concerns an unknown of some scheme, and that no name has two values.
+    /// Checks that every requirement concerns an unknown of at least one scheme and that no name has two
+    /// values.
     ///
     /// # Errors
-    /// The assignment that does not, and what it might mean.
+    /// The assignment that concerns none, with names it might mean.
     pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
         stated_once("--bench", &self.bench)?;
         concern_some("--requirement", &self.requirement, schemes)
     }
 
-    /// Adds them to what is stated.
+    /// Adds the requirements and the bench to those of the conditions.
     pub(crate) fn add_to(&self, conditions: &mut Conditions) {
         conditions.requirements.extend(general_first(self.requirement.clone()));
         conditions.bench.extend(general_first(self.bench.clone()));
     }
 }
 
-/// Reads a size of a bench: `K0=20`.
+/// Parser of a size of a bench error: `K0=20`.
 fn benched(text: &str) -> Result<Assignment, String> {
     if text.parse::<Assignment>().is_err() {
         return Err("expected NAME=NUMBER in the unit of the error, as in K0=20 or latitude=10".into());
@@ -131,7 +132,7 @@ fn benched(text: &str) -> Result<Assignment, String> {
     if may_be_omitted(&a.name) { Ok(a) } else { Err(omitted_meant(&a.name)) }
 }
 
-/// The datasheet of the gyros; a scheme file may give it too.
+/// Datasheet of the gyros; scheme files may state it too.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 #[command(next_help_heading = "Gyro noise")]
@@ -159,7 +160,7 @@ pub struct GyroNoiseOptions {
 }
 
 impl GyroNoiseOptions {
-    /// What they say of a run.
+    /// Settings of a run that the options state.
     pub fn settings(&self) -> Settings {
         Settings {
             angle_random_walk_deg_sqrt_h: self.angle_random_walk,
@@ -171,12 +172,12 @@ impl GyroNoiseOptions {
     }
 }
 
-/// A run's conditions; a scheme file may give them too, options come last.
+/// Conditions of a run; options override those of scheme files.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 #[command(next_help_heading = "Conditions of the run")]
 pub struct ConditionOptions {
-    /// What is measured, and how well it is to be known.
+    /// Measurement and requirements.
     #[command(flatten)]
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
@@ -239,7 +240,7 @@ fn filter_words(filter: FilterKind) -> &'static str {
     }
 }
 
-/// Refuses two values of one name in the same option: one of them would not count.
+/// Refuses an option that gives one name two values: one of them would be ignored.
 ///
 /// # Errors
 /// The name, and both values.
@@ -253,10 +254,10 @@ fn stated_once(option: &str, given: &[Assignment]) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Refuses an assignment that concerns an unknown of none of the schemes: nothing would hear of it.
+/// Refuses an assignment that concerns no unknown of any scheme: it would be ignored.
 ///
 /// # Errors
-/// The assignment, and what it might mean.
+/// The assignment, and names it might mean.
 pub(crate) fn concern_some<'a>(
     option: &str,
     given: &[Assignment],
@@ -283,12 +284,12 @@ pub(crate) fn concern_some<'a>(
 }
 
 impl MeasurementOptions {
-    /// Checks that every assignment concerns an unknown of some scheme.
+    /// Checks that every assignment concerns an unknown of at least one scheme.
     ///
     /// # Errors
-    /// The assignment that does not, and what it might mean.
+    /// The assignment that concerns none, with names it might mean.
     pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
-        // without such noise of its own or of a scheme the time is of nothing
+        // without accelerometer bias instability the correlation time has no effect
         let states = |s: &Scheme| s.simulation.accelerometer_bias_instability_ug.is_some();
         if self.accelerometer_correlation_time.is_some()
             && self.accelerometer_instability.is_none()
@@ -302,7 +303,7 @@ impl MeasurementOptions {
         self.judged.concern(schemes)
     }
 
-    /// The options that are given.
+    /// Names of the given options.
     pub fn given(&self) -> impl Iterator<Item = &'static str> {
         let all = [
             ("--dwell", self.dwell.is_some()),
@@ -319,7 +320,7 @@ impl MeasurementOptions {
         all.into_iter().filter_map(|(option, given)| given.then_some(option))
     }
 
-    /// Conditions that the scheme and the options state; the others are the paper's.
+    /// Conditions that the scheme and the options state; the others are those of the paper.
     pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = Conditions::of(scheme);
         out.apply(&Settings {
@@ -339,10 +340,10 @@ impl MeasurementOptions {
 }
 
 impl ConditionOptions {
-    /// Checks that every assignment concerns an unknown of some scheme.
+    /// Checks that every assignment concerns an unknown of at least one scheme.
     ///
     /// # Errors
-    /// The assignment that does not, and what it might mean.
+    /// The assignment that concerns none, with names it might mean.
     pub fn concern<'a>(&self, schemes: impl Iterator<Item = &'a Scheme> + Clone) -> Result<(), Problem> {
         self.measurement.concern(schemes.clone())?;
         for (option, given) in [("--value", &self.value), ("--estimate", &self.estimate)] {
@@ -351,7 +352,7 @@ impl ConditionOptions {
         Ok(())
     }
 
-    /// The paper's run, with what the scheme and the options say.
+    /// Conditions of the paper's run, with those of the scheme and the options in their place.
     pub fn conditions(&self, scheme: &Scheme) -> Conditions {
         let mut out = self.measurement.conditions(scheme);
         out.apply(&Settings {

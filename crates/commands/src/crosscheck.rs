@@ -1,4 +1,4 @@
-//! The exact verdicts against a filter.
+//! Evidence: the exact verdicts compared with a filter.
 
 use clap::Args;
 use obsdeg_core::model::{Carry, Latitude, Scheme};
@@ -14,7 +14,7 @@ use crate::problem::Problem;
 use crate::source::Input;
 use crate::text;
 
-/// What `crosscheck` is asked.
+/// Request of `crosscheck`: the input, its conditions, and defects put into the filter on purpose.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Crosscheck {
@@ -22,12 +22,12 @@ pub struct Crosscheck {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// What is judged.
+    /// Positions, combinations and assumptions.
     #[command(flatten)]
     #[serde(flatten)]
     pub input: InputOptions,
 
-    /// A run's conditions.
+    /// Conditions of a run.
     #[command(flatten)]
     #[serde(flatten)]
     pub conditions: ConditionOptions,
@@ -50,7 +50,7 @@ pub struct Crosscheck {
     pub filter_drop: Option<String>,
 }
 
-/// Monte Carlo runs where nothing is said.
+/// Default number of Monte Carlo runs.
 const DEFAULT_RUNS: u32 = 200;
 
 impl Default for Crosscheck {
@@ -67,18 +67,18 @@ impl Default for Crosscheck {
     }
 }
 
-/// The evidence on a scheme or a model.
+/// Evidence on a scheme or a model.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Evidence {
-    /// On a scheme.
+    /// Evidence on a scheme.
     Scheme(Box<CrossCheck>),
-    /// On a model.
+    /// Evidence on a model.
     Model(Box<SystemEvidence>),
 }
 
 impl Evidence {
-    /// True if nothing disagrees.
+    /// True if no check disagrees.
     pub fn passed(&self) -> bool {
         match self {
             Self::Scheme(e) => e.passed,
@@ -117,10 +117,10 @@ impl Answer for Evidence {
     }
 }
 
-/// Holds the exact verdicts against a filter.
+/// Compares the exact verdicts with a filter.
 ///
 /// # Errors
-/// What is wrong with the scheme, the model or the conditions.
+/// Defect of the scheme, the model or the conditions.
 pub fn crosscheck(options: &Crosscheck, input: &Input, host: &Host<'_>) -> Result<Evidence, Problem> {
     match input {
         Input::Scheme(scheme) => {
@@ -143,10 +143,10 @@ pub fn crosscheck(options: &Crosscheck, input: &Input, host: &Host<'_>) -> Resul
     }
 }
 
-/// What goes into a folder beside the evidence: its figures.
+/// Files beside the evidence: its figures.
 ///
 /// # Errors
-/// What cannot be drawn.
+/// [`ReportError`] of a figure that cannot be drawn.
 pub fn files(evidence: &Evidence) -> Result<Vec<File>, ReportError> {
     match evidence {
         Evidence::Scheme(evidence) => Ok(crosscheck_figures(evidence)?),

@@ -25,22 +25,22 @@ use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
-use crate::measure::{MeasureOptions, Wanted, measured};
+use crate::measure::{MeasureOptions, SetRequirements, measured};
 use crate::next::{FurtherOptions, further};
 use crate::problem::Problem;
 use crate::source::Source;
 use crate::text;
 
-/// Numbers of positions.
+/// Range of the number of positions.
 const POSITIONS: RangeInclusive<u64> = 1..=100;
-/// Numbers of schemes that are listed.
+/// Range of the number of listed schemes.
 const KEPT: RangeInclusive<u64> = 1..=1000;
-/// Blocks of parts that are searched again.
+/// Range of the number of blocks that are searched again.
 const CHECKED: RangeInclusive<u64> = 0..=1_000_000_000;
-/// Restarts of the exchange.
+/// Range of the number of restarts of the exchange.
 const RESTARTS: RangeInclusive<u64> = 1..=1_000_000;
 
-/// The words of `--candidates`; whatever else it says is a file.
+/// Words of `--candidates`; any other text is the path of a file.
 const CANDIDATES: [(&str, &str); 3] = [
     (CARDINAL, "the 24 attitudes along North, Up, East, South, Down, West"),
     ("free", "the attitudes that weights on all attitudes need, reset carry"),
@@ -56,7 +56,7 @@ const CRITERIA: [Word<CriterionName>; 5] = [
     ("margin", "the largest sigma over its requirement, as for --meet", CriterionName::Margin),
 ];
 
-/// What `design` is asked.
+/// Request of `design`: candidates, requirements, criterion and limits of the search.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[command(group(ArgGroup::new("asked").args(["positions", "minimum", "next"])))]
 #[serde(default)]
@@ -84,12 +84,12 @@ pub struct Search {
     #[serde(with = "text")]
     pub round: Option<String>,
 
-    /// What holds of schemes, whatever their files say.
+    /// Assumptions that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub assumptions: Assumptions,
 
-    /// What is unknown.
+    /// Unknowns that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub terms: TermOptions,
@@ -137,7 +137,10 @@ pub struct Search {
 
     /// With --merge: search N blocks of the parts again, chosen at random, and refuse a part whose block
     /// gives something else (default: 0; a block is at most 16 of the starts)
-    #[arg(long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED), conflicts_with_all = ["minimum", "part"])]
+    #[arg(
+        long, value_name = "N", help_heading = "Parts", value_parser = whole::<u64>(CHECKED),
+        conflicts_with_all = ["minimum", "part"]
+    )]
     pub check: Option<u64>,
 
     /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names
@@ -145,17 +148,17 @@ pub struct Search {
     #[arg(skip)]
     pub certificate: bool,
 
-    /// What a scheme must be.
+    /// Requirements on a scheme.
     #[command(flatten)]
     #[serde(flatten)]
     pub wanted: WantedOptions,
 
-    /// What is measured, and how well it is to be known.
+    /// Measurement and requirements on sigmas.
     #[command(flatten)]
     #[serde(flatten)]
     pub measurement: MeasurementOptions,
 
-    /// Of a model: what its outputs are chosen from.
+    /// Candidates for the outputs of a model.
     #[command(flatten)]
     #[serde(flatten)]
     pub outputs: MeasureOptions,
@@ -166,7 +169,7 @@ pub struct Search {
     pub further: FurtherOptions,
 }
 
-/// What a scheme must be.
+/// Requirements on a scheme: observable coefficients, degrees, immunity, criterion, times, gimbals.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[command(next_help_heading = "What is wanted")]
 #[serde(default)]
@@ -219,7 +222,7 @@ pub struct WantedOptions {
 }
 
 impl Default for Search {
-    /// Nothing is asked for yet: a number of positions, or the minimum.
+    /// Request without a number of positions and without `--minimum`.
     fn default() -> Self {
         Self {
             seed: SEED,
@@ -247,12 +250,12 @@ impl Default for Search {
     }
 }
 
-/// The largest degree of a coefficient or family, or of all that are required: `D_F=1`, `1`.
+/// Largest degree of one coefficient or family, or of all that are required: `D_F=1`, `1`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DegreeCap {
-    /// The coefficient or family; none: all.
+    /// Coefficient or family; `None` stands for all required coefficients.
     pub name: Option<String>,
-    /// The degree.
+    /// Largest degree allowed.
     pub cap: usize,
 }
 
@@ -289,32 +292,32 @@ fn percent(text: &str) -> Result<f64, String> {
     found.ok_or_else(|| format!("expected 0 to 100 percent, found `{text}`"))
 }
 
-/// What a search reads.
+/// Files of a search.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SearchFiles {
-    /// The scheme whose conditions hold; its positions are not chosen from, and as many are searched where no
-    /// number is asked for.
+    /// Scheme whose conditions hold. Its positions are no candidates; their number is the number of positions
+    /// by default.
     pub conditions_file: Option<Source>,
-    /// The scheme whose positions are chosen from.
+    /// Scheme whose positions are the candidates.
     pub candidates_file: Option<Source>,
-    /// Parts that are put together.
+    /// Parts to merge.
     pub merge: Vec<Source>,
-    /// The part that goes on.
+    /// Interrupted part that is continued.
     pub resume: Option<Source>,
     /// The calibration after which further positions are sought.
     pub after: Option<Source>,
 }
 
-/// What a search finds.
+/// Result of a search.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Designed {
     /// Schemes.
     Schemes(Box<Searched>),
-    /// The fewest positions where the way between them counts.
+    /// Fewest positions where the slew path between them counts.
     Walks(Box<Walked>),
-    /// A part of a search.
+    /// Part of a search.
     Part(Box<Part>),
     /// Sets of outputs of a model.
     Outputs(Box<Sensors>),
@@ -322,11 +325,11 @@ pub enum Designed {
     Next(Box<NextPositions>),
 }
 
-/// Schemes, with what they were searched under.
+/// Found schemes, with the base scheme and the conditions of the search.
 #[derive(Debug, Serialize)]
 #[serde(transparent)]
 pub struct Searched {
-    /// What was found.
+    /// Found schemes.
     pub found: Design,
     #[serde(skip)]
     base: Scheme,
@@ -336,11 +339,11 @@ pub struct Searched {
     certificate: Option<File>,
 }
 
-/// Walks, with what they were searched under.
+/// Found slew sequences, with the base scheme of the search.
 #[derive(Debug, Serialize)]
 #[serde(transparent)]
 pub struct Walked {
-    /// What was found.
+    /// Found slew sequences.
     pub found: Walks,
     #[serde(skip)]
     base: Scheme,
@@ -382,10 +385,10 @@ impl Answer for Walked {
     }
 }
 
-/// Searches schemes.
+/// Searches schemes, or sets of outputs of a model.
 ///
 /// # Errors
-/// Options that are wrong or do nothing; a search in which nothing was found.
+/// Options that are wrong or have no effect; a search that found nothing.
 pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Designed, Problem> {
     if let Some(found) = of_model(a, files, host)? {
         return Ok(Designed::Outputs(Box::new(found)));
@@ -483,12 +486,12 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
 }
 
-/// The scheme whose assumptions hold, what is chosen from, and the conditions.
+/// Scheme with the assumptions of the search, candidates, and conditions.
 pub(crate) fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candidates, Conditions), Problem> {
     let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
     if let Some(file) = &files.conditions_file {
         base = file.scheme()?;
-        // one dwell of all positions is that of the scheme
+        // a dwell that all positions share becomes the default dwell of the scheme
         let mut dwells = base.positions.iter().map(|p| p.dwell.map(|d| d.seconds()));
         let first = dwells.next().flatten();
         if base.simulation.dwell_s.is_none() && dwells.all(|d| d == first) {
@@ -502,7 +505,7 @@ pub(crate) fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candid
     for limit in &a.wanted.gimbal {
         base.gimbals.limit(limit).map_err(|e| Problem::input(format!("--gimbal: {e}")))?;
     }
-    // any position has the unknowns that count
+    // the options concern unknowns that every position has
     let any = std::array::from_fn(|_| Angle::from_degrees(0));
     let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
     a.measurement.concern(std::iter::once(&with_any))?;
@@ -511,11 +514,11 @@ pub(crate) fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candid
     Ok((base, candidates, conditions))
 }
 
-/// Options that concern models.
+/// Options that a search for outputs of a model takes.
 const OF_MODELS: [&str; 9] =
     ["seed", "keep", "observable", "max_degree", "measure", "own_outputs", "cost", "order", "work_limit"];
 
-/// Sets of outputs, if a model is given or candidates for its outputs are; `None` for schemes.
+/// Sets of outputs, if a model or candidates for its outputs are given; `None` for schemes.
 fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<Sensors>, Problem> {
     let file = files.conditions_file.as_ref();
     let model = file.filter(|file| file.is_model());
@@ -534,7 +537,7 @@ fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<S
         )));
     }
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
-    let wanted = Wanted {
+    let wanted = SetRequirements {
         required: &a.wanted.observable,
         max_degree: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
         keep: a.keep.unwrap_or(10).into(),
@@ -543,7 +546,7 @@ fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<S
     measured(outputs, &wanted, file, host).map(Some)
 }
 
-/// The certificate of a proven optimum, as a file.
+/// Certificate of a proven optimum, as a file.
 fn proof(
     base: &Scheme,
     conditions: &Conditions,
@@ -552,7 +555,7 @@ fn proof(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<File, Problem> {
     let certificate = certify_optimum(base, conditions, options, found, progress)?;
-    // a block a line
+    // one block per line
     let text = serde_json::to_string(&certificate).map_err(no_json)?.replace("{\"start\"", "\n{\"start\"");
     Ok(File { name: "certificate.json".into(), bytes: (text + "\n").into_bytes() })
 }
@@ -567,7 +570,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// The same as JSON text: only what differs from what holds without options.
+    /// Options and files as JSON text, without options that have their default.
     fn of(a: &Search, files: &SearchFiles) -> Result<String, Problem> {
         let mut asked = serde_json::Map::new();
         asked.insert("options".into(), Value::Object(stated(&Search { part: None, ..a.clone() })?));
@@ -581,7 +584,7 @@ impl Asked {
         Ok(Value::Object(asked).to_string())
     }
 
-    /// The files that were given, or else those of the part.
+    /// Given files, else those of the part.
     fn files(&self, given: &SearchFiles) -> SearchFiles {
         SearchFiles {
             conditions_file: given.conditions_file.clone().or_else(|| self.conditions_file.clone()),
@@ -597,7 +600,7 @@ fn no_json(e: serde_json::Error) -> Problem {
     Problem::internal(e.to_string())
 }
 
-/// The options that differ from what holds without any, as JSON.
+/// Options without those that have their default, as JSON.
 pub(crate) fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Problem> {
     let object = |a: &Search| serde_json::to_value(a).map_err(no_json);
     let (all, none) = (object(a)?, object(&Search::default())?);
@@ -605,8 +608,8 @@ pub(crate) fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Probl
     Ok(all.as_object().into_iter().flatten().filter(differs).map(|(n, v)| (n.clone(), v.clone())).collect())
 }
 
-/// Options and files of a search: where parts are merged those of the parts, with the options given beside
-/// them over them; of a scheme file alone, as many positions as it has.
+/// Options and files of a search. At a merge: those of the parts, overridden by the given options. For a
+/// scheme file alone: as many positions as it has.
 fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
     let mut asked = Asked { options: a.clone(), ..Asked::default() };
     if let Some(first) = files.merge.first()
@@ -626,7 +629,7 @@ fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
     Ok(asked)
 }
 
-/// Refuses options that would do nothing, each with what it needs.
+/// Refuses options that would have no effect; the message names the option that they need.
 fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Result<(), Problem> {
     let (w, free) = (&a.wanted, a.candidates == "free");
     if a.minimum {
@@ -649,7 +652,8 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
         let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
         if let Some(option) = given.chain(a.measurement.given()).next() {
             return Err(Problem::input(format!(
-                "{option} does nothing with --minimum, which asks what positions determine at all, by any degree and with any noise; it is for --positions"
+                "{option} does nothing with --minimum, which asks what positions determine at all, by any \
+                 degree and with any noise; it is for --positions"
             )));
         }
     }
@@ -690,7 +694,7 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
     }
 }
 
-/// A part of a search from its file, unchanged since it was written.
+/// Reads a part of a search; refuses a file that was changed after it was written.
 fn read_part(part: &Source) -> Result<Part, Problem> {
     let named = |why: String| Problem::input(format!("{}: {why}", part.name));
     let read: Part = serde_json::from_str(&part.text).map_err(|e| {
@@ -701,7 +705,7 @@ fn read_part(part: &Source) -> Result<Part, Problem> {
     Ok(read)
 }
 
-/// The fewest positions where the way between them counts.
+/// Fewest positions where the slew path between them counts.
 fn fewest_of_walks(
     a: &Search,
     base: Scheme,
@@ -722,10 +726,10 @@ fn fewest_of_walks(
     Ok(Designed::Walks(Box::new(Walked { found, base })))
 }
 
-/// What to choose from where nothing is said.
+/// Default of `--candidates`.
 const CARDINAL: &str = "cardinal";
 
-/// What to choose from, and the scheme whose assumptions hold.
+/// Candidates, and the scheme whose assumptions hold.
 fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates), Problem> {
     if let Some(file) = file {
         let scheme = file.scheme()?;
@@ -736,7 +740,7 @@ fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates),
         return Ok((Scheme::default(), Candidates::cardinals()));
     }
     if text == "free" {
-        // where the search for attitudes begins
+        // grid from which the search for free attitudes starts
         return Ok((Scheme::default(), Candidates::grid(45_000_000_000)?));
     }
     if let Some(step) = text.strip_prefix("grid:") {
@@ -746,17 +750,18 @@ fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates),
         return Ok((Scheme::default(), Candidates::grid(step)?));
     }
     Err(Problem::input(format!(
-        "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a scheme file that exists"
+        "--candidates {text}: there is no such file; expected cardinal, free, a grid such as grid:45, or a \
+         scheme file that exists"
     )))
 }
 
-/// True if `--candidates` says what it is by a word, and is no file.
+/// True if `--candidates` is one of its words and not the path of a file.
 pub fn is_word(candidates: &str) -> bool {
     candidates == CARDINAL || candidates == "free" || candidates.starts_with("grid:")
 }
 
 impl Walked {
-    /// What goes into a folder beside the JSON: the scheme that was found.
+    /// Files beside the JSON: the found scheme.
     pub fn files(&self) -> Vec<File> {
         let scheme = scheme_of_walk(&self.found, &self.base);
         let file = |s: Scheme| File { name: "winner.toml".into(), bytes: write(&s).into_bytes() };
@@ -765,15 +770,15 @@ impl Walked {
 }
 
 impl Searched {
-    /// The certificate that was asked for, which is then no more among the files.
+    /// Takes the requested certificate out of the files of the answer.
     pub fn take_certificate(&mut self) -> Option<File> {
         self.certificate.take()
     }
 
-    /// What goes into a folder beside the JSON: the best scheme, its positions, the front.
+    /// Files beside the JSON: the best scheme, its positions, the front.
     ///
     /// # Errors
-    /// What cannot be drawn.
+    /// [`Problem`] of a figure that cannot be drawn.
     pub fn files(&self) -> Result<Vec<File>, Problem> {
         let Self { found, base, conditions, certificate } = self;
         let mut files: Vec<File> = certificate.iter().cloned().collect();
@@ -787,7 +792,7 @@ impl Searched {
     }
 }
 
-/// A scheme that was found, as a file that `obsdeg analyze --scheme` reads.
+/// Found scheme, as a file that `obsdeg analyze --scheme` reads.
 fn scheme_file(
     found: &Design,
     best: &Found,

@@ -1,32 +1,32 @@
-//! Who asks: what an answer may use, and who hears how far it is.
+//! Caller of a command: the resources that an answer may use, and the receiver of its progress.
 
 use obsdeg_calibration::Going;
 use obsdeg_design::design::Progress;
 use obsdeg_symbolic::Worker;
 use serde::Serialize;
 
-/// How far an answer is.
+/// Progress of an answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Now {
-    /// What is being done.
+    /// Name of the current work.
     pub what: String,
-    /// So much of it is done.
+    /// Amount of work done, in the unit that `what` names.
     pub done: u64,
-    /// How much there is; none where nobody knows.
+    /// Total amount of work; `None` if it is unknown.
     pub total: Option<u64>,
-    /// Of a search: sequences that were evaluated.
+    /// Number of sequences evaluated; `None` outside searches.
     pub examined: Option<u64>,
-    /// Of a search: the best criterion so far.
+    /// Best criterion so far; `None` outside searches and before a value is found.
     pub best: Option<f64>,
 }
 
 impl Now {
-    /// Some of a known amount.
+    /// Progress of work of a known amount.
     pub(crate) fn of(what: impl Into<String>, done: u64, total: u64) -> Self {
         Self { what: what.into(), done, total: Some(total), examined: None, best: None }
     }
 
-    /// Some of an amount that nobody knows.
+    /// Progress of work of an unknown amount.
     pub(crate) fn open(what: impl Into<String>, done: u64) -> Self {
         Self { what: what.into(), done, total: None, examined: None, best: None }
     }
@@ -49,16 +49,16 @@ impl From<Going<'_>> for Now {
     }
 }
 
-/// What an answer may use, and who hears how far it is.
+/// Resources that an answer may use, and the receiver of its progress.
 pub struct Host<'a> {
-    /// The symbolic engine, where there is one.
+    /// Symbolic engine; `None` if there is none.
     pub worker: Option<&'a mut Worker>,
-    /// Told how far the work is; work that is told `false` ends.
+    /// Receiver of the progress; it returns false to end the work.
     pub going: &'a (dyn Fn(Now) -> bool + Sync),
 }
 
 impl Host<'_> {
-    /// Without a symbolic engine, and nobody who listens.
+    /// Host without a symbolic engine that ignores progress.
     pub fn silent() -> Self {
         Self { worker: None, going: &|_| true }
     }

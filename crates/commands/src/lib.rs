@@ -1,9 +1,9 @@
-//! The commands of obsdeg as functions: options and texts in, answers out. The command line, Python and a
-//! browser ask here and nowhere else, so that they give the same answers.
+//! Commands of obsdeg as functions from options and texts to answers. The command line, Python and the
+//! browser call these and nothing else, so they give the same answers.
 //!
-//! Every command has its options as a struct, which reads itself from a command line and from JSON (the names
-//! of options in snake case), and a function. Nothing here reads files, prints, or knows who asks, but for
-//! [`Host`].
+//! Every command is a function with a struct of options, which can be read from a command line and from JSON
+//! (names of options in snake case). Nothing here reads files or prints. [`Host`] is the only link to the
+//! caller.
 //!
 //! ```
 //! use obsdeg_commands::{Host, call};

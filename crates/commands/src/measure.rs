@@ -1,4 +1,4 @@
-//! Sets of outputs of a model: what to measure.
+//! Sets of outputs of a model that make its unknowns observable.
 
 use std::ops::RangeInclusive;
 
@@ -14,10 +14,10 @@ use crate::problem::Problem;
 use crate::source::{Input, ModelFile, Source};
 use crate::text;
 
-/// The orders that may be asked for.
+/// Largest orders of derivatives that a request may name.
 const ORDERS: RangeInclusive<u64> = 0..=1000;
 
-/// Outputs of a model that are chosen from.
+/// Candidates for the outputs of a model, their costs, and limits of the search.
 #[derive(Debug, Clone, Default, PartialEq, Args, Serialize, Deserialize)]
 #[command(next_help_heading = "Outputs of a model")]
 #[serde(default)]
@@ -52,20 +52,20 @@ fn cost(text: &str) -> Result<Assignment, String> {
     Ok(cost)
 }
 
-/// What holds beside the candidates.
-pub(crate) struct Wanted<'a> {
-    /// Unknowns that must be observable; none: all.
+/// Requirements on a set of outputs, number of listed sets, and seed.
+pub(crate) struct SetRequirements<'a> {
+    /// Unknowns that must be observable; empty: all.
     pub(crate) required: &'a [String],
-    /// Largest degrees: of one unknown, or of all.
+    /// Largest degree of one unknown; without a name, of all.
     pub(crate) max_degree: Vec<(Option<String>, usize)>,
     pub(crate) keep: usize,
     pub(crate) seed: u64,
 }
 
-/// Finds sets of outputs of the model in a file.
+/// Finds sets of outputs of a model that make the required unknowns observable.
 pub(crate) fn measured(
     a: &MeasureOptions,
-    wanted: &Wanted<'_>,
+    wanted: &SetRequirements<'_>,
     file: &Source,
     host: &Host<'_>,
 ) -> Result<Sensors, Problem> {
@@ -96,13 +96,18 @@ pub(crate) fn measured(
     sensors(&model, &options, &going).map_err(|e| wrong(&file, e))
 }
 
-/// What sets are chosen from, with the costs that were given.
+/// Candidates for outputs, with the given costs.
 fn candidates(a: &MeasureOptions, model: &SystemModel) -> Result<Vec<Candidate>, SensorError> {
     let all = if model.candidates.is_empty() { "states" } else { "candidates" };
-    // an empty text: those of the model
+    // an empty list stands for the default candidates
     let asked = a.measure.as_deref().filter(|list| !list.trim().is_empty());
     let mut out = model.candidates_of(asked.unwrap_or(all))?;
-    for given in &a.cost {
+    for (i, given) in a.cost.iter().enumerate() {
+        if a.cost[..i].iter().any(|other| other.name == given.name) {
+            let what = format!("the cost of {}", given.name);
+            let message = "it is given twice; expected one --cost for each candidate".into();
+            return Err(ModelError { what, message, span: None }.into());
+        }
         let known = out.iter().map(|c| c.named.name.clone()).collect::<Vec<_>>();
         let found = out.iter_mut().find(|c| c.named.name == given.name);
         let none = || ModelError {

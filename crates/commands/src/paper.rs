@@ -1,4 +1,4 @@
-//! The paper against the algebra.
+//! Audit of the paper: its equations and claims against the model.
 
 use clap::Args;
 use obsdeg_evidence::audit::{Audit, audit};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::arguments::{ANY, SEED, whole};
 use crate::problem::Problem;
 
-/// What `paper` is asked.
+/// Request of `paper`: the seed.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Paper {
@@ -25,7 +25,7 @@ impl Default for Paper {
 /// Recomputes the equations and claims of the paper.
 ///
 /// # Errors
-/// A defect of the program.
+/// Defect of the program.
 pub fn paper(options: &Paper) -> Result<Audit, Problem> {
     audit(options.seed).map_err(|e| Problem::internal(e.to_string()))
 }

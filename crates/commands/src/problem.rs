@@ -1,4 +1,4 @@
-//! Why there is no answer: what is wrong, whose fault it is, and where.
+//! Reason for a missing answer: kind, message and place.
 
 use std::ops::Range;
 
@@ -12,37 +12,37 @@ use obsdeg_evidence::simulation::SimulationError;
 use obsdeg_report::ReportError;
 use serde::Serialize;
 
-/// Whose fault it is.
+/// Origin of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// The input is wrong.
+    /// Bad input.
     Input,
-    /// A defect of the program.
+    /// Defect of the program.
     Internal,
-    /// Whoever asked did not want to wait.
+    /// Interruption by the caller.
     Interrupted,
 }
 
-/// A place of a text.
+/// Place in a text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// What the text is called.
+    /// Name of the text.
     pub name: String,
-    /// All of it.
+    /// The complete text.
     pub text: String,
-    /// The bytes that are meant.
+    /// Range of bytes that the message is about.
     pub span: Range<usize>,
 }
 
 impl Place {
-    /// A place, within its text.
+    /// Place whose range is clipped to the text.
     fn new(name: &str, text: &str, span: Range<usize>) -> Self {
         let end = span.end.min(text.len());
         Self { name: name.into(), text: text.into(), span: span.start.min(end)..end }
     }
 
-    /// Line and column of its beginning, counted from 1; columns are characters.
+    /// Line and column of the beginning of the range, counted from 1; columns are characters.
     pub fn line_and_column(&self) -> (usize, usize) {
         let before = self.text.get(..self.span.start).unwrap_or_default();
         let line = before.rsplit('\n').next().unwrap_or_default();
@@ -50,40 +50,40 @@ impl Place {
     }
 }
 
-/// Why there is no answer. Options are written in it as on the command line, `--slew-rate`.
+/// Reason for a missing answer. Options are written in it as on the command line, `--slew-rate`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct Problem {
-    /// Whose fault it is.
+    /// Origin of the problem.
     pub kind: Kind,
-    /// What is wrong: place, expected, found.
+    /// Message: place, expected, found.
     pub message: String,
-    /// Where, if it is in a text.
+    /// Place of the problem; `None` if it is not in a text.
     pub place: Option<Place>,
 }
 
 impl Problem {
-    /// The input is wrong.
+    /// Bad input.
     pub fn input(message: impl Into<String>) -> Self {
         Self { kind: Kind::Input, message: message.into(), place: None }
     }
 
-    /// The program is wrong.
+    /// Defect of the program.
     pub fn internal(message: impl Into<String>) -> Self {
         Self { kind: Kind::Internal, message: message.into(), place: None }
     }
 
-    /// Whoever asked did not want to wait, and there is nothing to show.
+    /// Interruption by the caller, without a partial result.
     pub fn interrupted() -> Self {
         Self { kind: Kind::Interrupted, message: "interrupted; nothing was written".into(), place: None }
     }
 
-    /// The input is wrong at a place of a text.
+    /// Bad input at a place of a text.
     pub fn at(message: impl Into<String>, name: &str, text: &str, span: Range<usize>) -> Self {
         Self { place: Some(Place::new(name, text, span)), ..Self::input(message) }
     }
 
-    /// The same, with the scheme it came from.
+    /// The problem with the name of its scheme before the message.
     #[must_use]
     pub fn in_file(mut self, name: &str) -> Self {
         self.message = format!("{} (in {name})", self.message);
@@ -91,7 +91,7 @@ impl Problem {
     }
 }
 
-/// Bad input: a scheme or model that certificates do not cover, or that has a fault of its own.
+/// Bad input: a scheme or model that certificates do not cover, or that is defective.
 impl From<CertificateError> for Problem {
     fn from(e: CertificateError) -> Self {
         match e {
@@ -101,7 +101,7 @@ impl From<CertificateError> for Problem {
     }
 }
 
-/// What is wrong with the input, or with the program.
+/// Bad input, or a defect of the program.
 impl From<AnalysisError> for Problem {
     fn from(e: AnalysisError) -> Self {
         match e {
@@ -118,10 +118,11 @@ impl From<SimulationError> for Problem {
     fn from(e: SimulationError) -> Self {
         match e {
             SimulationError::Prediction(PredictionError::Analysis(e)) => e.into(),
-            // accuracy orders beyond the series
+            // accuracy orders above the largest that the series determine
             SimulationError::Prediction(PredictionError::Accuracy(_)) => Self::input(e.to_string()),
             SimulationError::Filter(e) if e.is_numeric() => Self::input(format!(
-                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps and rates that are closer together"
+                "these numbers cannot be resolved in double precision ({e}); expected priors, noise, steps \
+                 and rates that are closer together"
             )),
             SimulationError::Filter(_) => Self::internal(e.to_string()),
             _ => Self::input(e.to_string()),
@@ -170,7 +171,7 @@ mod tests {
         let at = |span| Problem::at("wrong", "file", text, span).place.map(|p| p.line_and_column());
         assert_eq!(at(0..1), Some((1, 1)));
         assert_eq!(at(text.find('"').unwrap_or(0)..text.len()), Some((2, 5)));
-        // beyond its end
+        // a range beyond the end of the text
         assert_eq!(at(1000..2000), Some((3, 1)));
     }
 }

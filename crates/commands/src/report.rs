@@ -1,4 +1,4 @@
-//! The design review of schemes and models.
+//! Design review of schemes and models.
 
 use clap::Args;
 use obsdeg_calibration::{Calibration, Setup};
@@ -17,7 +17,7 @@ use crate::host::{Host, Now};
 use crate::problem::Problem;
 use crate::source::{Input, ModelFile, Named, Source, title};
 
-/// What `report` is asked.
+/// Request of `report`: assumptions, conditions and number of Monte Carlo runs.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Report {
@@ -25,27 +25,30 @@ pub struct Report {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// What holds of schemes, whatever their files say.
+    /// Assumptions that override those of scheme files.
     #[command(flatten)]
     #[serde(flatten)]
     pub assumptions: Assumptions,
 
     /// Monte Carlo runs of the evidence
-    #[arg(id = "monte_carlo", long = "runs", value_name = "N", default_value_t = DEFAULT_RUNS, value_parser = whole::<u32>(RUNS))]
+    #[arg(
+        id = "monte_carlo", long = "runs", value_name = "N", default_value_t = DEFAULT_RUNS,
+        value_parser = whole::<u32>(RUNS)
+    )]
     pub runs: u32,
 
-    /// A run's conditions.
+    /// Conditions of a run.
     #[command(flatten)]
     #[serde(flatten)]
     pub conditions: ConditionOptions,
 
-    /// Which options were given
+    /// Given options that concern one kind of file only.
     #[arg(skip)]
     #[serde(skip)]
     pub given: Given,
 }
 
-/// Monte Carlo runs where nothing is said.
+/// Default number of Monte Carlo runs.
 const DEFAULT_RUNS: u32 = 100;
 
 impl Default for Report {
@@ -60,7 +63,7 @@ impl Default for Report {
     }
 }
 
-/// A review, with the calibrations that are part of it.
+/// Review with the calibrations that are part of it.
 #[derive(Debug)]
 pub struct Reviewed {
     review: DesignReview,
@@ -68,19 +71,19 @@ pub struct Reviewed {
     certificates: Vec<String>,
 }
 
-/// A calibration that is part of a review: what it is called, and its JSON.
+/// Calibration that is part of a review.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CalibrationFile {
-    /// What it is called, such as the folder it is in.
+    /// Name of the calibration, such as its folder.
     pub name: String,
-    /// The file.
+    /// JSON of the calibration.
     pub source: Source,
 }
 
 /// Reviews schemes and models.
 ///
 /// # Errors
-/// What is wrong with one of them.
+/// Defect of a scheme, a model or a calibration.
 pub fn report(
     a: &Report,
     read: Vec<Named>,
@@ -105,7 +108,7 @@ pub fn report(
     let mut read = Vec::new();
     for file in calibrations {
         let (found, of) = calibration(&file.source, &entries)?;
-        // what was stated gives way to what was found, as it is
+        // calibrated values replace stated ones, without a factor
         let own = &mut entries[of].conditions;
         own.drift_scale = 1.0;
         own.values.extend(found.values());
@@ -141,28 +144,28 @@ impl Reviewed {
         self.review.comparison.schemes.iter().map(|s| &s.requirements)
     }
 
-    /// Its files: the text first, then the pictures that it refers to, in `folder` beside it.
+    /// Files of the review: the text first, then the pictures that it refers to, in `folder` beside it.
     ///
     /// # Errors
-    /// What cannot be drawn.
+    /// [`Problem`] of a picture that cannot be drawn.
     pub fn files(&self, origin: &Origin, format: ReviewFormat, folder: &str) -> Result<Vec<File>, Problem> {
         let origin = Origin { certificates: self.certificates.clone(), ..origin.clone() };
         Ok(obsdeg_report::review(&self.review, &self.calibrations, &origin, format, folder)?)
     }
 }
 
-/// What a review was made by and of: a command that gives the same answer, and the digest of every file.
+/// Origin of a review: a command that gives the same answer, and the digest of every file.
 pub fn origin<'a>(command: String, sources: impl Iterator<Item = &'a Source>) -> Origin {
     Origin { command, inputs: sources.map(digest).collect(), certificates: Vec::new() }
 }
 
-/// `sha256 of scheme.toml: ...`
+/// Line `sha256 of scheme.toml: ...` with the digest in hexadecimal digits.
 fn digest(source: &Source) -> String {
     let hex: String = Sha256::digest(source.text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect();
     format!("sha256 of {}: {hex}", source.name)
 }
 
-/// A calibration of one of the schemes, and of which.
+/// Reads a calibration; returns it with the index of its scheme among `entries`.
 fn calibration(source: &Source, entries: &[Entry]) -> Result<(Calibration, usize), Problem> {
     let wrong = |found: &str| {
         let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";

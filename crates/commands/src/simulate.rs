@@ -1,4 +1,4 @@
-//! One run of the filter against a simulated truth.
+//! One run of a filter against a simulated truth.
 
 use clap::Args;
 use obsdeg_evidence::requirements::Requirements;
@@ -14,7 +14,7 @@ use crate::conditions::ConditionOptions;
 use crate::problem::Problem;
 use crate::source::Input;
 
-/// What `simulate` is asked.
+/// Request of `simulate`: the input, and the conditions of the run.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Simulate {
@@ -22,12 +22,12 @@ pub struct Simulate {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// What is judged.
+    /// Positions, combinations and assumptions.
     #[command(flatten)]
     #[serde(flatten)]
     pub input: InputOptions,
 
-    /// A run's conditions.
+    /// Conditions of the run.
     #[command(flatten)]
     #[serde(flatten)]
     pub conditions: ConditionOptions,
@@ -39,18 +39,18 @@ impl Default for Simulate {
     }
 }
 
-/// A run, of a scheme or of a model.
+/// Run of a scheme or of a model.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Run {
-    /// Of a scheme.
+    /// Run of a scheme.
     Scheme(Box<Simulation>),
-    /// Of a model.
+    /// Run of a model.
     Model(Box<SystemRun>),
 }
 
 impl Run {
-    /// Outcome of the requirements of a scheme, by prediction; `None` for a model, which has none.
+    /// Outcome of the requirements of a scheme, by prediction; `None` for a model, which has no requirements.
     pub fn requirements(&self) -> Option<&Requirements> {
         match self {
             Self::Scheme(run) => Some(&run.requirements),
@@ -89,10 +89,10 @@ impl Answer for Run {
     }
 }
 
-/// Simulates a run, with its series.
+/// Simulates a run; returns it with its series.
 ///
 /// # Errors
-/// What is wrong with the scheme, the model or the conditions.
+/// Defect of the scheme, the model or the conditions.
 pub fn simulate(options: &Simulate, input: &Input) -> Result<(Run, Traces), Problem> {
     match input {
         Input::Scheme(scheme) => {
@@ -108,10 +108,10 @@ pub fn simulate(options: &Simulate, input: &Input) -> Result<(Run, Traces), Prob
     }
 }
 
-/// What goes into a folder beside the summary: the series, and the figures.
+/// Files beside the summary: the series and the figures.
 ///
 /// # Errors
-/// What cannot be drawn.
+/// [`ReportError`] of a figure that cannot be drawn.
 pub fn files(run: &Run, traces: &Traces) -> Result<Vec<File>, ReportError> {
     let mut files = vec![
         File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },

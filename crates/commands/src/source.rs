@@ -1,4 +1,4 @@
-//! What is read: a scheme or a model, told apart by what it says; its errors have their place in its text.
+//! Schemes and models as texts: their kind follows from the content, and errors have their place in the text.
 
 use std::ops::Range;
 use std::path::Path;
@@ -10,25 +10,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::problem::Problem;
 
-/// A text with a scheme or a model.
+/// Text of a scheme or a model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
-    /// What it is called, a file's name as it was given.
+    /// Name of the text, such as the path of its file as given.
     #[serde(default)]
     pub name: String,
-    /// All that it says: TOML, or JSON of a model.
+    /// Content: TOML, or JSON of a model.
     pub text: String,
-    /// What it must be.
+    /// Kind that the content must be of.
     #[serde(default)]
     pub must_be: Expected,
 }
 
-/// What a text must be.
+/// Kind that a text must be of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Expected {
-    /// Either.
+    /// A scheme or a model.
     #[default]
     Any,
     /// A scheme.
@@ -37,19 +37,19 @@ pub enum Expected {
     Model,
 }
 
-/// What is judged.
+/// Scheme or model to judge.
 #[derive(Debug, Clone)]
 pub enum Input {
-    /// A torquing scheme.
+    /// Torquing scheme.
     Scheme(Box<Scheme>),
     /// Any system.
     Model(Box<ModelFile>),
 }
 
-/// What was read, with its name (none for angles).
+/// Input with its name, which is empty for angles of the command line.
 pub type Named = (String, Input);
 
-/// A model with the text it came from.
+/// Model with the text that it was read from.
 #[derive(Debug, Clone)]
 pub struct ModelFile {
     /// The model.
@@ -58,12 +58,12 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
-    /// What is wrong with the model.
+    /// Problem of a model's error, with its place in the text.
     pub fn wrong(&self, e: &ModelError) -> Problem {
         self.source.wrong(&e.to_string(), e.span.clone())
     }
 
-    /// What is wrong with a run of it.
+    /// Problem of an error in a run of the model.
     pub fn wrong_run(&self, e: &RunError) -> Problem {
         match e {
             RunError::Model(e) => self.wrong(e),
@@ -73,15 +73,15 @@ impl ModelFile {
 }
 
 impl Source {
-    /// A text that is either.
+    /// Text of a scheme or a model.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), text: text.into(), must_be: Expected::Any }
     }
 
-    /// The scheme or the model that it is, with its name.
+    /// Reads the scheme or the model in the text.
     ///
     /// # Errors
-    /// What is wrong with it, at its place.
+    /// Defect of the content, with its place.
     pub fn read(self) -> Result<Named, Problem> {
         self.refuse_foreign()?;
         let name = self.name.clone();
@@ -93,10 +93,10 @@ impl Source {
         Ok((name, input))
     }
 
-    /// The scheme.
+    /// Reads the scheme in the text.
     ///
     /// # Errors
-    /// What is wrong with it, at its place.
+    /// Defect of the content, with its place.
     pub fn scheme(&self) -> Result<Scheme, Problem> {
         scheme_file::read(&self.text).map_err(|e| match self.is_model() {
             true => Problem::input(format!(
@@ -107,7 +107,7 @@ impl Source {
         })
     }
 
-    /// The model.
+    /// Reads the model in the text.
     fn model(self) -> Result<ModelFile, Problem> {
         let read = if self.is_json() { json::read(&self.text) } else { model_file::read(&self.text) };
         match read {
@@ -120,7 +120,7 @@ impl Source {
         }
     }
 
-    /// Refuses a model of another tool, with the line of Python that judges it.
+    /// Refuses a model of another tool; the message has the line of Python that judges it.
     fn refuse_foreign(&self) -> Result<(), Problem> {
         let ending = Path::new(&self.name).extension().map(|e| e.to_string_lossy().to_lowercase());
         let by_ending = match ending.as_deref() {
@@ -140,19 +140,19 @@ impl Source {
         let plain = |c: char| c.is_alphanumeric() || "/._- +~@:".contains(c);
         let name = if self.name.chars().all(plain) && !self.name.is_empty() { &self.name } else { "FILE" };
         Err(Problem::input(format!(
-            "{} seems to be {kind}; expected a scheme (TOML) or a model (TOML, JSON). The Python package imports it: python -c 'import obsdeg; \
-             print(obsdeg.analyze(obsdeg.load(\"{name}\")))'",
+            "{} seems to be {kind}; expected a scheme (TOML) or a model (TOML, JSON). The Python package \
+             imports it: python -c 'import obsdeg; print(obsdeg.analyze(obsdeg.load(\"{name}\")))'",
             self.name
         )))
     }
 
-    /// True if it is meant as a model, which may be JSON.
+    /// True if the text is meant as a model: JSON, or TOML with keys of a model.
     pub(crate) fn is_model(&self) -> bool {
         self.is_json() || model_file::is_model(&self.text)
     }
 
-    /// True if it is JSON: no TOML begins with a brace. What neither begins so nor is meant as a scheme or a
-    /// model in TOML is what its name says.
+    /// True if the text is JSON: no TOML begins with a brace. A text that neither begins with one nor has
+    /// keys of a scheme or a model in TOML is judged by its name.
     fn is_json(&self) -> bool {
         let toml = || scheme_file::is_scheme(&self.text) || model_file::is_model(&self.text);
         let named = Path::new(&self.name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -168,7 +168,7 @@ impl Source {
     }
 }
 
-/// A file's name without its ending; the folder's for a `scheme.toml`.
+/// File name without its ending; for `scheme.toml` the name of its folder.
 pub fn title(name: &str) -> String {
     let path = Path::new(name);
     let stem = path.file_stem().unwrap_or(path.as_os_str());

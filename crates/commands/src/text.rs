@@ -1,5 +1,4 @@
-//! Options in JSON as on the command line: what has a text there is that text, or a number that is read as
-//! its shortest text.
+//! Options in JSON as on the command line: their texts, or numbers, which are read as their shortest texts.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -42,7 +41,7 @@ where
     Option::<Text>::deserialize(from)?.map(Text::read).transpose()
 }
 
-/// The same of lists.
+/// Lists of such options.
 pub(crate) mod list {
     use std::collections::BTreeMap;
 

@@ -14,8 +14,8 @@ fn main() {
     growth();
 }
 
-/// How the time of a chain grows: the exponent between each size and twice that (the best of three runs),
-/// where all benches are run, not some, nor tested.
+/// Prints the growth of a chain's time: the exponent of the size between each size and its double, best of
+/// three runs. It runs only when all benches run, without a filter or a test.
 #[allow(clippy::print_stdout, reason = "what a bench is for")]
 fn growth() {
     if !std::env::args().skip(1).eq(["--bench"]) {
@@ -55,7 +55,7 @@ fn references() -> Vec<String> {
     files.iter().map(|f| std::fs::read_to_string(f).expect("readable")).collect()
 }
 
-/// All 141, read, compiled and judged in two fields.
+/// Reads, compiles and judges all 141 reference models in two fields.
 #[divan::bench]
 fn all_references(bencher: Bencher<'_, '_>) {
     let texts = references();
@@ -67,7 +67,8 @@ fn all_references(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// All 141 with the numbers of solutions, by the default limit of work, without solving expressions.
+/// Judges all 141 models and counts their solutions, with the default work limit and without solving
+/// expressions.
 #[divan::bench(sample_count = 1, sample_size = 1)]
 fn all_references_counted() {
     for text in references() {
@@ -76,17 +77,24 @@ fn all_references_counted() {
     }
 }
 
-/// MAPK (34 unknowns), the rail vehicle (89 unknowns), the largest others.
-#[divan::bench(args = ["mapk_5out", "mapk_6out", "rail_vehicle_27dof_jothi2016", "jak_stat_bachmann", "ovarian_follicle", "tumor_hu2019"])]
+/// Judges one of the largest models: MAPK (34 unknowns) or the rail vehicle (89 unknowns).
+#[divan::bench(args = [
+    "mapk_5out",
+    "mapk_6out",
+    "rail_vehicle_27dof_jothi2016",
+    "jak_stat_bachmann",
+    "ovarian_follicle",
+    "tumor_hu2019",
+])]
 fn one_reference(bencher: Bencher<'_, '_>, name: &str) {
     let text = std::fs::read_to_string(folder().join(format!("{name}.json"))).expect("readable");
     let model = json::read(&text).expect("a model");
     bencher.bench(|| judge(black_box(&model), 1, None).expect("judged").findings.degrees.rank());
 }
 
-/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i, of which the last is observed: full rank
-/// needs order 2n-1. With functions the last factor is sin(x_i); with related ones the other is sin(x_(i-1) -
-/// x_i).
+/// A chain of n states with n rates, x_i' = a_i (x_(i-1) - x_i) x_i. The last state is observed: full rank
+/// needs order 2n-1. `functions` replaces the last factor by sin(x_i); `related` replaces the other one by
+/// sin(x_(i-1) - x_i).
 fn chain_of_links(n: usize, functions: bool, related: bool) -> SystemModel {
     let states: Vec<String> = (0..n).map(|i| format!("\"x{i}\"")).collect();
     let rates: Vec<String> = (0..n).map(|i| format!("\"a{i}\"")).collect();
@@ -102,14 +110,15 @@ fn chain_of_links(n: usize, functions: bool, related: bool) -> SystemModel {
     };
     let equations: Vec<String> = (0..n).map(equation).collect();
     let text = format!(
-        "{{\"name\": \"chain\", \"states\": [{}], \"params\": [{}], \"equations\": {{{}}}, \"outputs\": {{\"y\": \"x{}\"}}}}",
+        "{{\"name\": \"chain\", \"states\": [{}], \"params\": [{}], \"equations\": {{{}}}, \"outputs\": \
+         {{\"y\": \"x{}\"}}}}",
         states.join(","),
         rates.join(","),
         equations.join(","),
         n - 1
     );
     let mut model = json::read(&text).expect("a model");
-    // the longest chains are beyond the default limit of work
+    // The longest chains exceed the default work limit.
     model.work_limit = WorkLimit(1_000_000);
     model
 }
@@ -118,35 +127,35 @@ fn chain(n: usize, functions: bool) -> SystemModel {
     chain_of_links(n, functions, false)
 }
 
-/// The rank, which is full.
+/// Rank of the model, which is full.
 fn rank_of(model: &SystemModel) -> usize {
     let rank = judge(black_box(model), 1, None).expect("judged").findings.degrees.rank();
     assert_eq!(rank, model.states.len() + model.parameters.len());
     rank
 }
 
-/// Unknowns and order grow together: 2n unknowns.
+/// Chains of 2n unknowns: the order grows with the number of unknowns.
 #[divan::bench(args = [4, 8, 16, 32, 64], max_time = 3)]
 fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain(n, false);
     bencher.bench(|| rank_of(&model));
 }
 
-/// The same with a sine in every link: functions of independent arguments.
+/// Chains with a sine in every link: functions of independent arguments.
 #[divan::bench(args = [4, 8, 16, 32, 64], max_time = 3)]
 fn chain_of_functions(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain(n, true);
     bencher.bench(|| rank_of(&model));
 }
 
-/// And with sines of differences of their arguments, which addition theorems take apart.
+/// Chains with sines of differences of states, which the addition theorems take apart.
 #[divan::bench(args = [4, 8, 16, 32], max_time = 3)]
 fn chain_of_related_functions(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain_of_links(n, true, true);
     bencher.bench(|| rank_of(&model));
 }
 
-/// A sine in every link by true values in real numbers.
+/// Chains with a sine in every link, evaluated in real numbers.
 #[divan::bench(args = [4, 8, 16], max_time = 3)]
 fn chain_of_functions_in_digits(bencher: Bencher<'_, '_>, n: usize) {
     let model = chain(n, true);

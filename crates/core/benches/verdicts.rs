@@ -1,8 +1,8 @@
 //! Exact six-position verdicts per second on one core.
 //!
 //! `cargo bench -p obsdeg-core` prints times per verdict; the counter column is verdicts per second.
-//! A verdict is the full answer (rank profile, degree of all 15 unknowns, what is excited) from the
-//! cosines and sines of the attitudes, in one field; the certified verdict runs in two fields.
+//! A verdict is the full answer (rank profile, degrees of all 15 unknowns, excited unknowns) from the
+//! cosines and sines of the attitudes, in one field. The certified verdict runs in two fields.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -40,7 +40,7 @@ fn samples(platform: &Platform) -> Vec<Sample> {
 
 const CARRIES: [Carry; 3] = Carry::ALL;
 
-/// One field.
+/// Verdicts in one field.
 #[divan::bench(args = CARRIES)]
 fn six_positions_one_field(bencher: Bencher<'_, '_>, carry: Carry) {
     let platform = platform(carry);
@@ -51,7 +51,7 @@ fn six_positions_one_field(bencher: Bencher<'_, '_>, carry: Carry) {
     });
 }
 
-/// Two fields that agree: what `analyze` prints.
+/// Verdicts in two fields that agree, as `analyze` prints them.
 #[divan::bench(args = CARRIES)]
 fn six_positions_two_fields(bencher: Bencher<'_, '_>, carry: Carry) {
     let platform = platform(carry);
@@ -75,20 +75,21 @@ fn prepared(bencher: Bencher<'_, '_>, platform: &Platform) {
         .bench_local(|| climb(black_box(&mut rows), &mut basis, |_, _| {}));
 }
 
-/// One field, from the rows of each attitude: what a search over schemes of known attitudes repeats.
+/// Verdicts in one field from prepared rows of each attitude, as a search over schemes of known attitudes
+/// repeats them.
 #[divan::bench(args = CARRIES)]
 fn six_positions_prepared(bencher: Bencher<'_, '_>, carry: Carry) {
     prepared(bencher, &platform(carry));
 }
 
-/// Drifts and accelerometers: 21 coefficients, Z of three components.
+/// Verdicts on drifts and accelerometer errors: 21 coefficients, Z of three components.
 #[divan::bench(args = CARRIES)]
 fn six_positions_of_21_unknowns(bencher: Bencher<'_, '_>, carry: Carry) {
     prepared(bencher, &of_terms(carry, "F,I,O,S,K0,K1,M3"));
 }
 
-/// Torquers, accelerometers and mounting with drifts, 33 coefficients: what `analyze` says without solutions
-/// of seven positions with slews.
+/// Verdicts on drifts, torquers, accelerometers and mounting: 33 coefficients, seven positions with slews,
+/// as `analyze` gives them without solutions.
 #[divan::bench]
 fn self_calibration(bencher: Bencher<'_, '_>) {
     let attitudes = ["DNE", "SDE", "USE", "WSU", "WUN", "SUW", "SWD"];

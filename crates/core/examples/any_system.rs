@@ -1,5 +1,5 @@
-//! Any system: prey are counted, predators are not. What of the four rates and the predators do the counts
-//! determine?
+//! Any system: a predator-prey model of which only the prey are counted. The example prints which of the
+//! four rates and of the two populations the counts determine.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use obsdeg_core::system::{ModelError, SystemOptions, analyze_system, model_file};

@@ -1,4 +1,4 @@
-//! Answers without the solutions that need the symbolic engine, because others held it.
+//! Answers without the solutions that need the symbolic engine, because other processes held it.
 
 use obsdeg_symbolic::WorkerError;
 use schemars::JsonSchema;
@@ -15,7 +15,7 @@ pub struct EngineBusy {
 }
 
 impl EngineBusy {
-    /// Of a failure of the worker, if that is why.
+    /// Mark for a failure of the worker; `None` if the failure has another reason than a busy engine.
     pub(crate) fn of(failure: &WorkerError) -> Option<Self> {
         let WorkerError::Busy { seconds } = failure else { return None };
         let advice = "Run the command again, or wait longer (--engine-wait).".into();

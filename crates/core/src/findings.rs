@@ -1,5 +1,5 @@
-//! What is found of a scheme: degrees, accuracy orders, sparse combinations and null vectors; exact and
-//! typed. An analysis words it, a prediction counts in it.
+//! Findings of a scheme: degrees, accuracy orders, sparse combinations and null vectors, exact and typed. An
+//! analysis puts them into words; a prediction computes with them.
 
 use obsdeg_symbolic::Worker;
 
@@ -14,13 +14,13 @@ use crate::solution::combinations::{NullVector, combinations, null_space};
 use crate::solution::requested::{CombinationError, Requested, requested_combinations};
 use crate::solution::solver::{Frame, Functional, Solver};
 
-/// Why nothing is found of a scheme.
+/// Reasons for the lack of findings.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AnalysisError {
     /// The scheme cannot be analysed.
     #[error(transparent)]
     Scheme(#[from] SchemeError),
-    /// No verdict.
+    /// The verdicts could not be reached.
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
     /// A combination is no linear combination of the unknowns.
@@ -28,62 +28,62 @@ pub enum AnalysisError {
     Combination(#[from] CombinationError),
 }
 
-/// A scheme that was judged: what everything else is computed from.
+/// Judged scheme, from which everything else is computed.
 pub struct Judged<'a> {
-    /// The model.
+    /// Platform of the scheme.
     pub platform: &'a Platform,
-    /// The verdicts, with the random values and bases that they come from.
+    /// Verdicts, with the random values and bases behind them.
     pub verdicts: Verdicts,
     requested: Vec<Requested>,
     seed: u64,
 }
 
-/// What is found of a scheme.
+/// Findings of a scheme.
 pub struct SchemeFindings {
-    /// The verdicts.
+    /// Verdicts on the unknowns and on the requested combinations.
     pub verdicts: Findings,
-    /// How certain they are.
+    /// Certainty of the verdicts.
     pub certainty: ByPrimes,
-    /// Observable combinations beyond single unknowns, by degree, then those that the scheme asks for.
+    /// Observable combinations beyond single unknowns, by degree, then those that the scheme requests.
     pub combinations: Vec<CombinationFinding>,
-    /// Basis of the directions that no derivative of Z sees (unknowns that are not excited left out).
+    /// Basis of the unobservable directions, without unknowns that are not excited.
     pub null_space: Vec<NullVector>,
-    /// What dwells determine.
+    /// Accuracy orders, or the reason why there are none.
     pub accuracy: Result<Accuracy, AccuracyError>,
 }
 
-/// An observable combination, or one that was asked for.
+/// Observable or requested combination.
 pub struct CombinationFinding {
-    /// What it is, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`, or as it was asked for.
+    /// Name, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`; for a requested combination its text.
     pub name: String,
-    /// True if it was asked for.
+    /// True if the combination was requested.
     pub requested: bool,
-    /// Its coefficients in the first field of the verdicts (up to a factor).
+    /// Coefficients in the first field of the verdicts, up to a factor.
     pub vector: Vec<u64>,
-    /// Its exact coefficients, that of the leading unknown first, if they could be computed.
+    /// Exact coefficients, that of the leading unknown first; `None` if they could not be computed.
     pub functional: Option<Functional>,
-    /// Status and degree.
+    /// Verdict on the combination: status and degree.
     pub verdict: Verdict,
-    /// The accuracy orders, if there are any.
+    /// Accuracy orders of the combination, if there are any.
     pub orders: Orders,
 }
 
 /// Accuracy orders of a functional; `None` where no dwell makes it observable, or none are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Orders {
-    /// With psi of the start.
+    /// Accuracy order with psi at the start.
     pub start: Option<usize>,
-    /// With psi of the end, which is what a filter shows.
+    /// Accuracy order with psi at the end, which is what a filter shows.
     pub end: Option<usize>,
 }
 
 impl<'a> Judged<'a> {
-    /// Judges a scheme, and reads the combinations that it asks for.
+    /// Judges a scheme, and reads its requested combinations.
     ///
     /// # Errors
     /// [`AnalysisError`].
     pub fn new(platform: &'a Platform, seed: u64) -> Result<Self, AnalysisError> {
-        // before anything grows
+        // checked before anything grows with the number of unknowns
         let found = platform.names().len();
         if found > MAX_UNKNOWNS {
             return Err(SchemeError::TooManyUnknowns { found }.into());
@@ -93,12 +93,12 @@ impl<'a> Judged<'a> {
         Ok(Self { platform, verdicts, requested, seed })
     }
 
-    /// What coefficients and solutions are computed with; without a worker nothing symbolic is started.
+    /// Solver of coefficients and solutions; without a worker it computes nothing symbolic.
     pub fn solver<'b>(&'b self, frame: Frame, worker: Option<&'b mut Worker>) -> Solver<'b> {
         Solver::new(self.platform, &self.verdicts, self.seed, frame, worker)
     }
 
-    /// Everything that is found of the scheme.
+    /// All findings of the scheme.
     pub fn findings(&self, solver: &mut Solver<'_>) -> SchemeFindings {
         let Self { platform, verdicts, requested, seed } = self;
         let basis = combinations(platform, verdicts, solver);
@@ -147,7 +147,7 @@ impl<'a> Judged<'a> {
 }
 
 impl SchemeFindings {
-    /// The accuracy orders of an unknown.
+    /// Accuracy orders of an unknown.
     pub fn orders(&self, unknown: usize) -> Orders {
         let of = |a: &Accuracy| Orders { start: a.order[unknown], end: a.order_at_end[unknown] };
         self.accuracy.as_ref().map_or_else(|_| Orders::default(), of)

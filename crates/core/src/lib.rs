@@ -32,10 +32,10 @@
 //! # Ok::<(), obsdeg_core::system::ModelError>(())
 //! ```
 //!
-//! The way of the data: a model ([`model`], [`system`]) turns into derivative rows, these into a staircase
-//! and verdicts ([`degree`]), these into sparse combinations, a null space and solutions ([`solution`]), with
-//! dwells into accuracy orders ([`accuracy`]); all that is found stands in one exact value ([`findings`]), of
-//! which an [`analysis::Analysis`] is the view in words. No module imports from one that comes after it here.
+//! Data flow: a model ([`model`], [`system`]) gives derivative rows, the rows a staircase and verdicts
+//! ([`degree`]), these sparse combinations, a null space and solutions ([`solution`]), and with dwells
+//! accuracy orders ([`accuracy`]). All findings form one exact value ([`findings`]); an
+//! [`analysis::Analysis`] is its view in words. No module imports from one that comes after it here.
 
 pub mod accuracy;
 pub mod analysis;

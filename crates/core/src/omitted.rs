@@ -1,9 +1,9 @@
-//! What the records of a scheme say of errors that it does not estimate: exact classes by ranks.
+//! Effects of errors that a scheme does not estimate on its records: exact classes by ranks.
 //!
-//! J are the columns of the unknowns in all samples, O those of the omitted errors, with true transition
-//! matrices over the dwells (`T`, `cos wT`, `sin wT` random in a prime field, as for the accuracy order;
-//! under reset carry derivatives at each position). In the reduced echelon form of the rows of `[J O]`,
-//! pivots leftmost:
+//! J are the columns of the unknowns in all samples, O those of the omitted errors. Transition matrices over
+//! the dwells are true ones (`T`, `cos wT`, `sin wT` random in a prime field, as for the accuracy order);
+//! under reset carry the rows are derivatives at each position. In the reduced echelon form of the rows of
+//! `[J O]`, pivots leftmost:
 //!
 //! - column j of O is zero in every row: *no effect*;
 //! - no row that is zero in J has an entry in column j: `O_j = J v`, *silent*. The entry of v at a pivot of J
@@ -23,13 +23,13 @@ use crate::degree::coefficient::{
 };
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::platform_rows::{LocalRow, chain_of};
-use crate::degree::transition::AtATime;
+use crate::degree::transition::RandomTime;
 use crate::model::platform::{Block, LOCAL, Platform, RandomValues, Sample, local_output};
 use crate::model::{Carry, Observed, OmittedModel, Scheme};
 
-/// Pairs of fields that are drawn before a disagreement is an error.
+/// Number of pairs of fields drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
-/// Most columns of unknowns and omitted errors together.
+/// Largest number of columns of unknowns and omitted errors together.
 const MAX_COLUMNS: usize = 1000;
 
 /// Class of an omitted error for one scheme. Exact: no noise, no weights.
@@ -84,34 +84,34 @@ pub struct OmittedVerdicts {
     pub error_bound: f64,
 }
 
-/// Why there are no classes.
+/// Reasons for the lack of classes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OmittedError {
     /// Attitudes change while samples are taken.
     #[error("omitted errors are classified for positions, not for rotating segments")]
     Rotation,
-    /// More columns than are taken.
+    /// There are too many columns.
     #[error("{found} unknowns and omitted errors; expected at most {MAX_COLUMNS} for exact classes")]
     TooMany {
         /// Number of columns.
         found: usize,
     },
-    /// No field, or fields that disagree.
+    /// No field was found, or the fields disagree.
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
 }
 
 /// Classes in one field, with the change of every determined unknown by every silent error.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Found {
+struct FoundClasses {
     classes: Vec<OmittedClass>,
-    /// Per unknown.
+    /// True per unknown if the samples determine it.
     determined: Vec<bool>,
-    /// Per error, per unknown; empty unless silent.
+    /// Changes per error and unknown; empty unless the error is silent.
     changes: Vec<Vec<u64>>,
 }
 
-/// The classes of everything that `platform` does not estimate.
+/// Classes of all errors that `platform` does not estimate.
 ///
 /// # Errors
 /// [`OmittedError`].
@@ -137,7 +137,7 @@ pub fn omitted_verdicts(
             Ok::<_, OmittedError>((values, found))
         };
         let ((values, first), (_, second)) = (draw(0)?, draw(1)?);
-        let nonzero = |f: &Found| -> Vec<Vec<bool>> {
+        let nonzero = |f: &FoundClasses| -> Vec<Vec<bool>> {
             f.changes.iter().map(|v| v.iter().map(|x| *x != 0).collect()).collect()
         };
         let agree = first.classes == second.classes
@@ -159,11 +159,11 @@ pub fn omitted_verdicts(
     Err(EnsembleError::Disagreement.into())
 }
 
-/// The answer, in names.
+/// The answer, by names of errors and unknowns.
 fn verdicts(
     platform: &Platform,
     model: &OmittedModel,
-    found: &Found,
+    found: &FoundClasses,
     exact: Vec<Vec<Option<Coefficient>>>,
     order: u64,
 ) -> OmittedVerdicts {
@@ -192,7 +192,7 @@ fn verdicts(
         unknowns,
         decisions: unknowns * (1 + model.terms().len()),
         order,
-        // rows of the accuracy order, with three g factors and generic angles
+        // rows as for the accuracy order, with three g factors and generic angles
         row_degree: 64 + 2 * dwells.unwrap_or(usize::MAX / 8),
         row_bits: 64.0 + 16.0 * platform.scheme().positions.len() as f64,
     };
@@ -204,7 +204,7 @@ fn verdicts(
 }
 
 /// Classes and changes at one sample.
-fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> Found {
+fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> FoundClasses {
     let (n, m) = (platform.names().len(), model.terms().len());
     let field = sample.point.ring;
     let mut space = Echelon::new(field, n + m);
@@ -228,7 +228,7 @@ fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut
         OmittedClass::Silent => (0..n).map(|c| change(c, j)).collect(),
         _ => Vec::new(),
     });
-    Found { determined, changes: changes.collect(), classes }
+    FoundClasses { determined, changes: changes.collect(), classes }
 }
 
 fn quotient(field: &Field, a: u64, b: u64) -> u64 {
@@ -240,7 +240,7 @@ fn rows(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut Sp
     let point = &sample.point;
     let field = point.ring;
     let blocks = model.blocks(platform, point);
-    // the outputs that the scheme uses, with errors of the accelerometers in them
+    // outputs of the scheme, with the errors of the accelerometers
     let vertical = platform.observed().accelerometers;
     let outputs = local_output(&field, Observed { accelerometers: true, ..platform.observed() });
     let used = outputs.into_iter().filter(|(component, _)| vertical || *component != 2).collect();
@@ -249,13 +249,13 @@ fn rows(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut Sp
         return reset_rows(platform, model, &field, &blocks, &chain);
     }
     let time = 1 + rng.below(field.modulus() - 1);
-    let at_a_time = AtATime::random(field, [point.w_n, point.w_u], time, rng);
+    let at_a_time = RandomTime::random(field, [point.w_n, point.w_u], time, rng);
     let dwells = dwell_ratios(platform.scheme());
     let power = |j: usize| field.pow(time, j as u64);
     dwell_rows(&field, &blocks, &chain, power, |i| at_a_time.phi(dwells[i])).0
 }
 
-/// Derivatives at each position, whose psi is its own.
+/// Derivative rows at each position, each position with its own psi.
 fn reset_rows(
     platform: &Platform,
     model: &OmittedModel,
@@ -274,9 +274,9 @@ fn reset_rows(
     blocks.iter().flat_map(|b| chain.iter().map(move |l| row_of(b, l))).collect()
 }
 
-/// Exact changes by silent errors at generic latitude, where they hold at every one: per error, per unknown;
-/// `None` for what is no number with roots times powers of the rates, depends on dwells or generic angles, or
-/// is zero in `changed` (errors x unknowns).
+/// Exact changes by silent errors at generic latitude, where they hold at every latitude: per error, per
+/// unknown. `None` if the change is no number with roots times powers of the rates, depends on dwells or
+/// generic angles, or is zero in `changed` (errors x unknowns).
 fn exact_changes(
     platform: &Platform,
     model: &OmittedModel,
@@ -308,7 +308,7 @@ fn exact_changes(
     }
     let [one, two] = &samples[..] else { return Vec::new() };
     let recovered = |j: usize, c: usize| -> Option<Coefficient> {
-        let value = |f: &Found| f.changes.get(j)?.get(c).copied();
+        let value = |f: &FoundClasses| f.changes.get(j)?.get(c).copied();
         let field = one.0.field;
         let image = |value, rates| Image { value, rates };
         let rates = rates_between(&field, image(value(&one.2[0])?, one.1), image(value(&one.4)?, one.3))?;

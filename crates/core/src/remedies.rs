@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::model::Carry;
 
-/// Most candidates of which pairs are formed.
+/// Largest number of candidates of which pairs are formed.
 pub(crate) const MOST_PAIRED: usize = 48;
 
 /// Remedies of the unknowns that are not observable.
@@ -81,7 +81,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// The unknown whose value this change gives, if it gives one.
+    /// Unknown whose value this change gives; `None` for other changes.
     pub fn known(&self) -> Option<&str> {
         match self {
             Self::Known { name } => Some(name),
@@ -96,14 +96,14 @@ impl Remedies {
         self.remedies.iter().any(|r| r.resolves.iter().any(|x| x.name == name))
     }
 
-    /// Closes the list: of `open` unknowns, those without a remedy.
+    /// Completes the list: records the unknowns of `open` that have no remedy.
     pub(crate) fn close(&mut self, open: impl Iterator<Item = String>) {
         self.unresolved = open.filter(|name| !self.resolves(name)).collect();
     }
 }
 
-/// The unobservable directions: for every unknown its entries in a basis of the null space. A row `c` of
-/// further information has the entries `c N`, and with such rows an unknown becomes observable if its own
+/// Unobservable directions: for every unknown its entries in a basis N of the null space. A row `c` of
+/// further information has the entries `c N`. With such rows an unknown becomes observable if its own
 /// entries lie in their span.
 pub(crate) struct Directions<S: Scalars> {
     field: S,
@@ -114,24 +114,24 @@ pub(crate) struct Directions<S: Scalars> {
 }
 
 impl<S: Scalars> Directions<S> {
-    /// The directions that no row of a space sees.
+    /// Directions that no row of a space observes.
     pub(crate) fn of(field: S, space: &S::Space) -> Self {
         let basis = space.null_space();
         let units = (0..space.columns()).map(|c| basis.iter().map(|v| v[c]).collect()).collect();
         Self { field, units, count: basis.len() }
     }
 
-    /// Products of numbers, at most, of [`known`](Self::known) for a number of unknowns and of
-    /// [`resolved`](Self::resolved) by these.
+    /// Largest number of products that [`known`](Self::known) takes for a number of unknowns, and
+    /// [`resolved`](Self::resolved) with them.
     pub(crate) fn products(&self, known: usize, open: usize) -> u64 {
         let [known, open, count] = [known, open, self.count].map(|n| n as u64);
-        // a row is reduced by those before it and these by it, an unknown by all
+        // a known row is reduced by those before it and reduces them; an open unknown is reduced by all
         let rows = known.saturating_mul(known).saturating_add(open.saturating_mul(known + 1));
         rows.saturating_mul(count)
     }
 
-    /// Products of numbers, at most, of the search for [`pairs`](Self::pairs) of one list, of candidates that
-    /// give at most this number of unknowns each.
+    /// Largest number of products that the search for [`pairs`](Self::pairs) of one list takes, if each
+    /// candidate gives at most `known` unknowns.
     pub(crate) fn products_of_pairs(&self, candidates: usize, known: usize, open: usize) -> u64 {
         let paired = candidates.min(MOST_PAIRED) as u64;
         let pairs = paired * paired.saturating_sub(1) / 2;
@@ -139,16 +139,16 @@ impl<S: Scalars> Directions<S> {
     }
 
     /// Information of known values of some unknowns on the unobservable directions.
-    pub(crate) fn known(&self, columns: &[usize]) -> Told<S> {
+    pub(crate) fn known(&self, columns: &[usize]) -> Information<S> {
         let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.count);
         for &c in columns {
             space.insert(&self.units[c]);
         }
-        Told { space, given: columns.to_vec() }
+        Information { space, given: columns.to_vec() }
     }
 
     /// Information of further rows on the unobservable directions.
-    pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> Told<S>
+    pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> Information<S>
     where
         S::Element: 'a,
     {
@@ -162,8 +162,8 @@ impl<S: Scalars> Directions<S> {
         told
     }
 
-    /// Unknowns of `open` that become observable by that and are not given.
-    pub(crate) fn resolved(&self, by: &Told<S>, open: &[usize]) -> Vec<usize> {
+    /// Unknowns of `open` that become observable by this information and are not given.
+    pub(crate) fn resolved(&self, by: &Information<S>, open: &[usize]) -> Vec<usize> {
         let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.units[*c]);
         open.iter().copied().filter(resolved).collect()
     }
@@ -212,14 +212,14 @@ impl<S: Scalars> Directions<S> {
         still.rank() + 1 == self.count && set.iter().all(|&c| !still.contains(&self.units[c]))
     }
 
-    /// Pairs of one candidate of `left` and one of `right` (of one list where `right` is missing), the pair
-    /// that resolves most of what is open first: `judge` gets their indices and says what the engine finds
-    /// resolved, or `None` at the end of its work. False if candidates were left out: more than `MOST_PAIRED`
-    /// in a list, or the end of the work.
+    /// Tries pairs of one candidate of `left` and one of `right` (of one list if `right` is missing), the
+    /// pair that resolves most open unknowns first. `judge` receives their indices and returns the unknowns
+    /// that the engine finds resolved, or `None` at the end of its work. Returns false if candidates were
+    /// left out: more than `MOST_PAIRED` in a list, or the end of the work.
     pub(crate) fn pairs(
         &self,
-        left: &[Told<S>],
-        right: Option<&[Told<S>]>,
+        left: &[Information<S>],
+        right: Option<&[Information<S>]>,
         open: Vec<usize>,
         mut judge: impl FnMut(usize, usize) -> Option<Vec<usize>>,
     ) -> bool {
@@ -238,7 +238,7 @@ impl<S: Scalars> Directions<S> {
         let count = |of: &[usize], open: &BTreeSet<usize>| of.iter().filter(|c| open.contains(c)).count();
         loop {
             found.retain(|pair| count(&pair.2, &open) > 0);
-            // the first of those that resolve most
+            // the first of the pairs that resolve most
             let best = (0..found.len()).max_by_key(|&k| (count(&found[k].2, &open), Reverse(k)));
             let Some(k) = best else { break };
             let (i, j, _) = found.remove(k);
@@ -250,14 +250,14 @@ impl<S: Scalars> Directions<S> {
 }
 
 /// Information of a candidate on the unobservable directions.
-pub(crate) struct Told<S: Scalars> {
-    /// Span of its rows, in entries.
+pub(crate) struct Information<S: Scalars> {
+    /// Span of the candidate's rows, in entries of the directions.
     space: S::Space,
-    /// Unknowns whose values it gives.
+    /// Unknowns whose values the candidate gives.
     given: Vec<usize>,
 }
 
-impl<S: Scalars> Told<S> {
+impl<S: Scalars> Information<S> {
     /// Information of two candidates together.
     fn and(&self, other: &Self) -> Self {
         let mut space = self.space.clone();

@@ -1,4 +1,4 @@
-//! Verdicts on 36 published systems against those that another program printed (tests/data/identifiability).
+//! Verdicts on 36 published systems, compared with those of another program (tests/data/identifiability).
 #![allow(clippy::print_stdout, reason = "a table of systems")]
 
 use std::time::Instant;
@@ -9,19 +9,19 @@ use serde_json::Value;
 /// Limit of the work of relations, in millions of products at each point.
 const LIMIT: u64 = 300;
 
-/// Unknowns with a number of solutions within the default limits, and with relations.
+/// Number of unknowns with a decided number of solutions, within the default limits and with relations.
 const DECIDED: usize = 250;
 const DECIDED_BY_RELATIONS: usize = 339;
 
-/// Verdicts and numbers of a system.
+/// Comparison of the verdicts and numbers of a system.
 #[derive(Default)]
 struct Found {
     observable: usize,
-    /// Unknowns with a number of solutions.
+    /// Number of unknowns with a decided number of solutions.
     decided: usize,
-    /// Published as global, and one solution here.
+    /// Number of unknowns published as global that have one solution here.
     agree: usize,
-    /// Published as global, and not decided here.
+    /// Number of unknowns published as global that are not decided here.
     open: usize,
     /// Contradictions to the published verdicts.
     differ: Vec<String>,
@@ -102,7 +102,7 @@ fn nothing_differs(all: &[(String, Found)]) {
     }
 }
 
-/// All systems, within the default limits of work.
+/// Compares all systems, within the default limits of work.
 #[test]
 fn nothing_contradicts_the_published_verdicts() {
     let all = table(&|_| true, SystemOptions::default());
@@ -111,7 +111,7 @@ fn nothing_contradicts_the_published_verdicts() {
     assert_eq!(found, (36, 420, DECIDED));
 }
 
-/// Systems that equations in the unknowns do not decide within their limit, but relations do.
+/// Systems that relations decide, but equations in the unknowns do not within their limit.
 #[test]
 fn relations_decide_what_counting_does_not() {
     const QUICK: [&str; 2] = ["SLIQR", "SEIR 36 ref"];
@@ -126,14 +126,14 @@ fn relations_decide_what_counting_does_not() {
     }
 }
 
-/// Both ways: every published generator is observable here, and as their differentials span a space of the
+/// Every published generator is observable here. Conversely, as their differentials span a space of the
 /// dimension of the rank, every function found here depends on them.
 #[test]
 fn published_generators_are_identifiable() {
     let mut asked = 0;
     for system in systems() {
         let generators = names(&system["identifiable_functions"]);
-        // `//` are quotients there
+        // the published files write quotients as `//`
         let quoted = |g: &&str| serde_json::to_string(&g.replace("//", "/")).expect("a text");
         let list = generators.iter().map(quoted).collect::<Vec<_>>();
         let text = system["toml"].as_str().expect("a model");
@@ -152,8 +152,9 @@ fn published_generators_are_identifiable() {
     assert!(asked > 490, "{asked}");
 }
 
-/// All of them, with a table: `cargo test --release -p obsdeg-core --test published -- --ignored
-/// --nocapture`; `ONLY=name` chooses those with a name like it, `LIMIT=millions` limits the work.
+/// Prints a table of all systems:
+/// `cargo test --release -p obsdeg-core --test published -- --ignored --nocapture`. `ONLY=name` selects
+/// those with a similar name, `LIMIT=millions` limits the work.
 #[test]
 #[ignore = "minutes"]
 fn all_published_systems() {

@@ -1,4 +1,5 @@
-//! What a search repeats: exact verdicts of candidate sets, information of candidate sequences.
+//! Benchmarks of a search: exact verdicts of candidate sets, information of candidate sequences,
+//! bounds.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -22,14 +23,15 @@ fn base(carry: Carry) -> Scheme {
     Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() }
 }
 
-/// All sets of six of 24 judged exactly, on all cores; items are sets.
+/// Exact verdicts of all sets of six of the 24 cardinal attitudes, on all cores; items are sets.
 #[divan::bench(args = [Carry::Platform, Carry::Inertial, Carry::Reset])]
 fn sets_of_six(bencher: Bencher<'_, '_>, carry: &Carry) {
     let rows = Rows::new(&base(*carry), &Candidates::cardinals().attitudes, &ALL, 1).expect("rows");
     bencher.counter(ItemsCount::new(134_596usize)).bench(|| black_box(rows.observable_sets(6).len()));
 }
 
-/// The bound on twelve of the 24 cardinal attitudes under reset carry: optimal weights, and what they prove.
+/// Certificate for twelve of the 24 cardinal attitudes under reset carry: optimal weights and their
+/// bound.
 #[divan::bench(args = ["D", "worst", "E"])]
 fn certificate_of_twelve(bencher: Bencher<'_, '_>, criterion: &str) {
     let candidates = Candidates::cardinals();
@@ -42,7 +44,7 @@ fn certificate_of_twelve(bencher: Bencher<'_, '_>, criterion: &str) {
     bencher.bench(|| evaluator.bound(black_box(&criterion), 12, &[], &|| true).expect("a bound"));
 }
 
-/// The same over all attitudes, from a grid of 45 degrees, on all cores.
+/// Certificate for twelve positions over all attitudes, from a grid of 45 degrees, on all cores.
 #[divan::bench(sample_count = 5)]
 fn certificate_over_all_attitudes(bencher: Bencher<'_, '_>) {
     let evaluator = reset(&Candidates::grid(45_000_000_000).expect("a grid"));
@@ -75,7 +77,8 @@ fn twelve_certified(bencher: Bencher<'_, '_>) {
     });
 }
 
-/// What the command does for them: with the front, its bound, and that over all attitudes.
+/// `design` of twelve of the 24 cardinal attitudes with all its parts: the front, its bound, and the
+/// bound over all attitudes.
 #[divan::bench(sample_count = 3, args = ["D", "worst"])]
 fn the_command_for_twelve_of_24(criterion: &str) -> Design {
     let criterion = if criterion == "D" { CriterionName::D } else { CriterionName::Worst };
@@ -89,7 +92,7 @@ fn reset(candidates: &Candidates) -> Evaluator {
     evaluator.expect("an evaluator")
 }
 
-/// The same where the noise of Z is correlated.
+/// Worst sigma of a sequence of five where the noise of Z is correlated, on one core.
 #[divan::bench]
 fn sigma_of_five_correlated(bencher: Bencher<'_, '_>) {
     let conditions = Conditions { accelerometer_instability_ug: 3.0, ..Conditions::default() };
@@ -101,7 +104,7 @@ fn sigma_of_five_correlated(bencher: Bencher<'_, '_>) {
         .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
 }
 
-/// The information of a sequence of five and its worst sigma, from nothing, on one core.
+/// Information and worst sigma of a sequence of five, from no positions, on one core.
 #[divan::bench]
 fn sigma_of_five(bencher: Bencher<'_, '_>) {
     let candidates = Candidates::cardinals().attitudes;
@@ -112,8 +115,8 @@ fn sigma_of_five(bencher: Bencher<'_, '_>) {
         .bench(|| evaluator.of_sequence(black_box(&[1, 8, 22, 5, 10]), &Criterion::Worst));
 }
 
-/// The best five of 24 in all orders, proven, without the front, on all cores; items are the sequences it
-/// stands for.
+/// Best five of the 24 cardinal attitudes in all orders, proven, without the front, on all cores; items
+/// are the sequences covered.
 #[divan::bench(sample_count = 10)]
 fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let base = base(Carry::Inertial);
@@ -134,14 +137,14 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
     bencher.counter(ItemsCount::new(2_897_280usize)).bench(|| search.exhaust(&symmetry, 5));
 }
 
-/// The best five of 24 in all orders by branch and bound, what it is held against sought first; items are the
-/// sequences it stands for.
+/// Best five of 24 in all orders by branch and bound, with an incumbent by exchange; items are the
+/// sequences covered.
 #[divan::bench(sample_count = 10, args = [Carry::Platform, Carry::Inertial])]
 fn best_five_of_24_pruned(bencher: Bencher<'_, '_>, carry: &Carry) {
     bencher.counter(ItemsCount::new(331_776usize)).bench(|| pruned(*carry, 5));
 }
 
-/// The best six.
+/// Best six of 24 in all orders by branch and bound; items are the sequences covered.
 #[divan::bench(sample_count = 3, args = [Carry::Platform, Carry::Inertial])]
 fn best_six_of_24_pruned(bencher: Bencher<'_, '_>, carry: &Carry) {
     bencher.counter(ItemsCount::new(7_962_624usize)).bench(|| pruned(*carry, 6));
@@ -165,14 +168,14 @@ fn pruned(carry: Carry, k: usize) -> Best {
     search.exhaust_pruned(&rows.symmetry(&|_, _| true), k, 1)
 }
 
-/// The same with the front, as the command runs it.
+/// `design` of five of 24 with the front, as the command runs it.
 #[divan::bench(sample_count = 3)]
 fn the_command_for_five_of_24() -> Design {
     let options = DesignOptions { positions: Some(5), ..DesignOptions::default() };
     design(&base(Carry::Inertial), &Conditions::default(), &options, &|_| true).expect("designed")
 }
 
-/// The same by total uncertainty, with a bench.
+/// `design` of five of 24 by total uncertainty, with a bench of two errors.
 #[divan::bench(sample_count = 3)]
 fn the_command_for_five_of_24_with_a_bench() -> Design {
     let options = DesignOptions { positions: Some(5), ..DesignOptions::default() };

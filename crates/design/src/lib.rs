@@ -1,11 +1,12 @@
-//! The search for torquing schemes, and all that a review of them needs.
+//! Search for torquing schemes and for outputs of models, and design reviews.
 //!
 //! ```
 //! use obsdeg_core::model::Scheme;
 //! use obsdeg_design::design::{DesignOptions, design};
 //! use obsdeg_evidence::simulation::Conditions;
 //!
-//! let options = DesignOptions { positions: Some(3), required: vec!["D_F".into()], ..DesignOptions::default() };
+//! let required = vec!["D_F".into()];
+//! let options = DesignOptions { positions: Some(3), required, ..DesignOptions::default() };
 //! let found = design(&Scheme::default(), &Conditions::default(), &options, &|_| true)?;
 //! assert!(found.found.iter().all(|s| s.positions.len() == 3));
 //! # Ok::<(), obsdeg_design::design::DesignError>(())

@@ -1,4 +1,4 @@
-//! The bias of three gyros from sightings of two stars: the attitude is a quaternion, its error a rotation
+//! Bias of three gyros from sightings of two stars: the attitude is a quaternion, its error a rotation
 //! vector.
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
@@ -26,7 +26,7 @@ impl Manifold for Body {
         let turn = (self.attitude * from.attitude.inverse()).scaled_axis();
         turn.iter().chain((self.bias - from.bias).iter()).copied().collect()
     }
-    /// To first order in the correction, which is small after every update.
+    /// Correct to first order in the correction, which is small after every update.
     fn transport(&self, d: &[f64]) -> Option<Transition> {
         let mut out = DMatrix::identity(6, 6);
         let half = Vector3::new(d[0], d[1], d[2]).cross_matrix() * 0.5;

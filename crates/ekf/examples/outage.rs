@@ -1,12 +1,12 @@
-//! A position seen every second but for an outage: what the filter says at the time, and what all data say
-//! afterwards.
+//! Position measured every second except in an outage: the filter's estimates, and the smoothed
+//! estimates from all data.
 #![allow(clippy::print_stdout, reason = "an example shows what it finds")]
 
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 use obsdeg_ekf::integrate::van_loan;
 use obsdeg_ekf::{EkfError, Filter, Form, Interval, Measurement, ProcessNoise, Transition};
 
-/// The position of x = (position, velocity).
+/// Measurement of the position of x = (position, velocity).
 struct Position;
 
 impl Measurement for Position {

@@ -27,7 +27,7 @@ pub fn overlapping_deviation(rates: &[f64], m: usize) -> Result<f64, EkfError> {
             found: (1, n),
         });
     }
-    // sums of the differences from the first: what is common does not cost digits
+    // sums of the differences from the first sample: a common offset costs no digits
     let mut theta = Vec::with_capacity(n + 1);
     let mut sum = 0.0;
     theta.push(sum);

@@ -5,10 +5,10 @@
 //! of the coefficients. Estimates at different cluster times are means of squares of overlapping second
 //! differences of the summed samples, so they depend on each other. These differences are stationary and
 //! normal: their covariances follow from a generalised autocovariance of the sums, `-|t|/2`, `t^2 ln|t|/(2
-//! pi)` and `|t|^3/12` for the three noises, and the covariance of two variances is twice the mean of the
-//! squared covariances over all pairs (Greenhall, Riley 2003, *Uncertainty of stability variances based on
-//! finite differences*). So weights, sigmas and degrees of freedom follow from the fitted noise, and no rule
-//! of thumb is needed.
+//! pi)` and `|t|^3/12` for the three noises, and the covariance of two variances is twice the mean of
+//! the squared covariances over all pairs (Greenhall, Riley 2003, *Uncertainty of stability variances
+//! based on finite differences*). Weights, sigmas and degrees of freedom thus follow from the fitted
+//! noise, without rules of thumb.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -17,42 +17,42 @@ use crate::error::EkfError;
 
 /// Noises of a sensor that an Allan deviation distinguishes, in the order of [`NoiseFit::terms`].
 pub const TERMS: usize = 3;
-/// Standard deviations of a squared coefficient, as they are without this noise, from which on it is
-/// resolved.
+/// Score above which a noise is resolved: its squared coefficient in standard deviations, as these are
+/// without the noise.
 pub const RESOLVED: f64 = 3.0;
 /// Probability that an unresolved coefficient lies below its limit.
 pub const LIMIT: f64 = 0.95;
 /// Quantile of the unit normal distribution at [`LIMIT`].
 const LIMIT_SIGMAS: f64 = 1.644_853_626_951_472_2;
-/// Cluster times further apart than this factor are taken as independent: the correlation of their estimates
-/// is below a few percent.
+/// Ratio of cluster times above which estimates count as independent: their correlation is below a few
+/// percent.
 const APART: usize = 256;
-/// Lags per cluster in the sums over lags: covariances are smooth between.
+/// Number of lags per cluster in the sums over lags; covariances are smooth in between.
 const PER_CLUSTER: usize = 16;
-/// Most passes over the weights.
+/// Largest number of passes over the weights.
 const PASSES: usize = 60;
-/// Most doublings of a squared coefficient in search of its limit, and halvings of the interval of the limit.
+/// Largest number of doublings of a squared coefficient in search of its limit, and of halvings of the
+/// interval of the limit.
 const DOUBLINGS: usize = 20;
 const HALVINGS: usize = 30;
-/// Relative change of the squared coefficients at which the weights have settled.
+/// Relative change of the squared coefficients below which the weights have converged.
 const SETTLED: f64 = 1e-9;
 
-/// An overlapping Allan variance.
+/// Overlapping Allan variance at one cluster size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllanPoint {
-    /// Samples of a cluster.
+    /// Number of samples of a cluster.
     pub samples: usize,
     /// Variance, in the square of the unit of the samples.
     pub variance: f64,
 }
 
-/// The overlapping Allan variance at clusters of `m` samples, over stretches of evenly spaced samples with
-/// gaps between them: all differences within a stretch, of all stretches. `None` where no stretch has 2m
-/// samples.
+/// Overlapping Allan variance at clusters of `m` samples: all differences within stretches of evenly
+/// spaced samples, with gaps between stretches. `None` if no stretch has 2m samples.
 pub fn overlapping_variance(stretches: &[Vec<f64>], m: usize) -> Option<AllanPoint> {
     let (mut total, mut count) = (0.0, 0);
     for rates in stretches.iter().filter(|s| m > 0 && s.len() >= 2 * m) {
-        // sums of the differences from the first: what is common does not cost digits
+        // sums of the differences from the first sample: a common offset costs no digits
         let mut theta = Vec::with_capacity(rates.len() + 1);
         let mut sum = 0.0;
         theta.push(sum);
@@ -128,64 +128,64 @@ fn pair(lengths: &[usize], m: usize, other: usize) -> [[f64; TERMS]; TERMS] {
     out
 }
 
-/// One noise as the fit has it; coefficients in the unit of the samples, with times in samples: N for the
-/// mean over one sample, K for the step from one sample to the next.
+/// Fit of one noise. Coefficients are in the unit of the samples, with times in samples: N for the mean
+/// over one sample, K for the step from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermFit {
     /// Coefficient and its standard deviation; `None` where it is not resolved.
     pub found: Option<(f64, f64)>,
     /// Upper limit: the coefficient lies below it with probability [`LIMIT`].
     pub limit: f64,
-    /// The least coefficient that this record resolves, beside the noises that it has.
+    /// Smallest coefficient that this record resolves beside the noises that it has.
     pub least: f64,
 }
 
-/// An Allan deviation beside the fitted one.
+/// Allan deviation beside the fitted one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedPoint {
-    /// Samples of a cluster.
+    /// Number of samples of a cluster.
     pub samples: usize,
     /// Deviation, in the unit of the samples.
     pub deviation: f64,
-    /// Lower end of its confidence band.
+    /// Lower end of the confidence band of the deviation.
     pub low: f64,
-    /// Upper end of its confidence band.
+    /// Upper end of the confidence band of the deviation.
     pub high: f64,
-    /// Degrees of freedom of the variance, by the fitted noise.
+    /// Degrees of freedom of the variance for the fitted noise.
     pub degrees_of_freedom: f64,
     /// Deviation of the fitted noise.
     pub fitted: f64,
 }
 
-/// Noise coefficients by a fit.
+/// Fit of the noise coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseFit {
     /// White noise, flicker noise, random walk.
     pub terms: [TermFit; TERMS],
-    /// The variances that were fitted.
+    /// Fitted deviations, by cluster size.
     pub points: Vec<FittedPoint>,
     /// Sum of squared residuals by the covariance of the variances.
     pub chi_square: f64,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of that sum.
     pub degrees_of_freedom: usize,
-    /// Probability that noise of these three kinds leaves a larger sum.
+    /// Probability of a larger sum for noise of these three kinds alone.
     pub probability: f64,
 }
 
-/// A fit in progress.
-struct Fitting<'a> {
+/// Allan variances with the sums from which their covariances follow.
+struct FitProblem<'a> {
     points: &'a [AllanPoint],
     pairs: Vec<[[f64; TERMS]; TERMS]>,
 }
 
 /// Squared coefficients and their covariance (zero for noises that were left out).
-struct Solved {
+struct Solution {
     x: [f64; TERMS],
     covariance: DMatrix<f64>,
     left: f64,
 }
 
-impl Fitting<'_> {
+impl FitProblem<'_> {
     /// Covariance of the variances for squared coefficients `x`.
     fn covariance(&self, x: &[f64; TERMS]) -> DMatrix<f64> {
         let n = self.points.len();
@@ -196,19 +196,19 @@ impl Fitting<'_> {
     }
 
     /// Least squares for the noises `kept` with weights by squared coefficients `by`.
-    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solved> {
+    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solution> {
         let n = self.points.len();
         let root = Cholesky::new(self.covariance(&by.map(|x| x.max(0.0))))?.l();
         let design = DMatrix::from_fn(n, kept.len(), |i, j| shapes(self.points[i].samples)[kept[j]]);
         let y = DVector::from_iterator(n, self.points.iter().map(|p| p.variance));
         let (a, b) = (root.solve_lower_triangular(&design)?, root.solve_lower_triangular(&y)?);
-        // columns of about one, for the sake of rounding
+        // columns of about unit length, against rounding
         let scale: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
         let scaled = DMatrix::from_fn(n, kept.len(), |i, j| a[(i, j)] / scale[j]);
         let inverse = (scaled.transpose() * &scaled).try_inverse()?;
         let found = &inverse * (scaled.transpose() * &b);
         let left = (&b - &scaled * &found).norm_squared();
-        let mut out = Solved { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
+        let mut out = Solution { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
         for (i, &k) in kept.iter().enumerate() {
             out.x[k] = found[i] / scale[i];
             for (j, &l) in kept.iter().enumerate() {
@@ -218,10 +218,10 @@ impl Fitting<'_> {
         Some(out)
     }
 
-    /// The same with the weights of its own solution.
-    fn settle(&self, kept: &[usize]) -> Option<Solved> {
+    /// Least squares as [`Self::solve`], with weights from its own solution.
+    fn settle(&self, kept: &[usize]) -> Option<Solution> {
         let mut by = [0.0; TERMS];
-        // each noise as if it were all there is, at the best: where the weights begin
+        // initial weights: each noise as large as it can be alone
         for &k in kept {
             let each = self.points.iter().map(|p| p.variance / shapes(p.samples)[k]);
             by[k] = each.fold(f64::INFINITY, f64::min);
@@ -230,7 +230,7 @@ impl Fitting<'_> {
         for _ in 0..PASSES {
             let change = by.iter().zip(&out.x).map(|(a, b)| (a - b.max(0.0)).abs() / (a + b.abs() + 1e-300));
             let settled = change.fold(0.0, f64::max) <= SETTLED;
-            // halfway, so that two weights do not take turns
+            // mean with the previous weights, which prevents oscillation
             by = std::array::from_fn(|k| (by[k] + out.x[k].max(0.0)) / 2.0);
             out = self.solve(kept, &by)?;
             if settled {
@@ -240,7 +240,7 @@ impl Fitting<'_> {
         Some(out)
     }
 
-    /// All of these noises with `k`, in order.
+    /// Noises `others` and `k`, in order.
     fn with(others: &[usize], k: usize) -> Vec<usize> {
         let mut all = others.to_vec();
         all.push(k);
@@ -248,30 +248,31 @@ impl Fitting<'_> {
         all
     }
 
-    /// Squared coefficient of `k` in standard deviations, both by the weights of a fit of the other noises
-    /// `kept`: a score test of the absence of `k`. Standard deviations by its own weights grow with the
-    /// coefficient, so that one which few clusters show would never be significant. Infinite where the others
-    /// fit nothing.
+    /// Squared coefficient of `k` in standard deviations, both by the weights of a fit of the other
+    /// noises `kept`: a score test of the absence of `k`. Standard deviations by its own weights grow
+    /// with the coefficient, so a noise that few clusters show would never be significant. Infinite if
+    /// the others fit nothing.
     fn test(&self, kept: &[usize], k: usize) -> f64 {
         let others: Vec<usize> = kept.iter().copied().filter(|&l| l != k).collect();
         let found = self.settle(&others).and_then(|o| self.solve(kept, &o.x.map(|x| x.max(0.0))));
         found.map_or(f64::INFINITY, |f| f.x[k] / f.covariance[(k, k)].sqrt())
     }
 
-    /// Standard deviation of the squared coefficient of `k` where there are only the noises `others`, as
-    /// `solved` has them.
-    fn without(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
+    /// Standard deviation of the squared coefficient of `k` if only the noises `others` are present,
+    /// with the coefficients of `solved`.
+    fn without(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
         let mut by = solved.x;
         by[k] = 0.0;
-        // where there are no others, the noise itself gives the weights
+        // without others, the noise itself gives the weights
         let by = if others.is_empty() { solved.x } else { by };
         Some(self.solve(&Self::with(others, k), &by)?.covariance[(k, k)].sqrt())
     }
 
-    /// The squared coefficient that would give an estimate as small as the one found, or a smaller one, with
-    /// probability 1 - [`LIMIT`]: estimate and standard deviation are those by its own weights (Neyman). The
-    /// estimate is skewed to the right, so the normal quantile is on the safe side.
-    fn limit(&self, others: &[usize], solved: &Solved, k: usize) -> Option<f64> {
+    /// Limit of the squared coefficient: the value for which an estimate at most as large as the one
+    /// found has probability 1 - [`LIMIT`]. Estimate and standard deviation are those by its own
+    /// weights (Neyman). The estimate is skewed to the right, so the normal quantile is on the safe
+    /// side.
+    fn limit(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
         let all = Self::with(others, k);
         let beyond = |x: f64| -> Option<bool> {
             let mut by = solved.x;
@@ -294,12 +295,13 @@ impl Fitting<'_> {
     }
 }
 
-/// Fits noise to Allan variances of stretches of `lengths` samples; bands hold a deviation with probability
-/// `confidence`. Noises that are not resolved are left out one after the other, the least significant first.
+/// Fits noise to Allan variances of stretches of `lengths` samples. Each band contains its deviation
+/// with probability `confidence`. Unresolved noises are removed one after the other, the least
+/// significant first.
 ///
 /// # Errors
-/// [`EkfError::Shape`] for fewer variances than noises and one; [`EkfError::NotFinite`] where their
-/// covariance has no root: samples that are all the same.
+/// [`EkfError::Shape`] for too few variances: at least one more than noises; [`EkfError::NotFinite`] if
+/// their covariance is singular, as for constant samples.
 pub fn fit(points: &[AllanPoint], lengths: &[usize], confidence: f64) -> Result<NoiseFit, EkfError> {
     let n = points.len();
     if n < TERMS + 1 {
@@ -307,7 +309,7 @@ pub fn fit(points: &[AllanPoint], lengths: &[usize], confidence: f64) -> Result<
     }
     let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
     let pairs = pairs.map(|(i, j)| pair(lengths, points[i].samples, points[j].samples)).collect();
-    let fitting = Fitting { points, pairs };
+    let fitting = FitProblem { points, pairs };
     let none =
         || EkfError::NotFinite { what: "the Allan variances", value: points[0].variance, row: 0, column: 0 };
     let mut kept: Vec<usize> = (0..TERMS).collect();
@@ -362,10 +364,10 @@ mod tests {
 
     use super::*;
 
-    /// Figures of allantools, with where they come from.
+    /// Figures of allantools, with their origin.
     const FIGURES: &str = include_str!("../tests/data/allantools.csv");
 
-    /// The three series of these figures.
+    /// Series `white`, `flicker` or `walk` of these figures.
     fn series(name: &str) -> Vec<f64> {
         let next = |n: &u64| Some(16807 * n % 2_147_483_647);
         let numbers = std::iter::successors(Some(1_234_567_890_u64), next).take(1000);
@@ -399,8 +401,8 @@ mod tests {
                 (band[0] / number(4) - 1.0).abs() < 1e-6 && (band[1] / number(5) - 1.0).abs() < 1e-6,
                 "{line}"
             );
-            // its degrees of freedom are approximate, and poor for short clusters: 782 for white noise and m
-            // = 1, where 666 are right
+            // its degrees of freedom are approximate, and poor for short clusters: 782 for white noise
+            // and m = 1, where 666 are right
             if m >= 16 {
                 let which = ["white", "flicker", "walk"].iter().position(|n| *n == cells[0]).expect("there");
                 let model = shapes(m)[which];
@@ -420,8 +422,8 @@ mod tests {
         assert!((own - 665.8).abs() < 1.0, "{own}");
     }
 
-    /// White noise and a random walk in many records: errors are as large as their sigmas say, and flicker
-    /// noise is seldom resolved where there is none (it may stand for a random walk that is not).
+    /// White noise and a random walk in many records: errors are as large as their sigmas, and flicker
+    /// noise is seldom resolved where there is none (it may replace an unresolved random walk).
     #[test]
     fn sigmas_are_true() {
         let (records, samples, walk) = (60, 4096, 0.1);
@@ -462,11 +464,11 @@ mod tests {
         assert!(flicker < 3 && unresolved == 0, "{flicker} {unresolved}");
     }
 
-    /// Limits of a random walk that a record resolves seldom or never, and of none: one of 95 % fails in at
-    /// most 5 % of all records, whatever the walk is. Of 200 at most 20 (binomial, normal approximation of
-    /// 99.9 %: 10 + 3.29 sqrt(200 0.05 0.95)). Where there is no walk, one that is resolved has a probability
-    /// of 1 in 740: of 200 at most 3 (Poisson with mean 0.27, 99.98 %). Walks of 0.02 were resolved in 391 of
-    /// 400 other records.
+    /// Limits of random walks that a record seldom or never resolves, and of none. A limit of 95 %
+    /// fails in at most 5 % of all records for any walk: in at most 20 of 200 (binomial, normal
+    /// approximation of 99.9 %: 10 + 3.29 sqrt(200 0.05 0.95)). Without a walk, one is resolved with a
+    /// probability of 1 in 740: at most 3 of 200 (Poisson with mean 0.27, 99.98 %). Walks of 0.02 were
+    /// resolved in 391 of 400 other records.
     #[test]
     fn limits_hold_as_often_as_they_say() {
         let (records, samples) = (200, 4096);
@@ -493,7 +495,7 @@ mod tests {
         }
     }
 
-    /// Two stretches with a gap between them are pooled; a constant is no noise.
+    /// Two stretches with a gap between them are pooled; a constant contains no noise.
     #[test]
     fn stretches_are_pooled() {
         let white = series("white");

@@ -1,4 +1,4 @@
-//! Whether a filter's errors are what its covariance says: NEES, NIS, whiteness, with chi-square bands
+//! Consistency of a filter's errors with its covariance: NEES, NIS, whiteness, with chi-square bands
 //! (Bar-Shalom, Li, Kirubarajan 2001, *Estimation with Applications to Tracking and Navigation*, 5.4).
 
 use nalgebra::DMatrix;
@@ -8,11 +8,11 @@ use crate::covariance::{Covariance, Form};
 use crate::decomposition::singular_values;
 use crate::error::EkfError;
 
-/// The probability that a statistic of a right model lies in its band.
+/// Probability that a statistic of a right model lies in its band.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// The interval that the mean of `count` independent chi-square variables of `dof` degrees of freedom each
-/// stays in with probability `confidence`.
+/// Interval that contains the mean of `count` independent chi-square variables of `dof` degrees of
+/// freedom each with probability `confidence`.
 ///
 /// ```
 /// let (low, high) = obsdeg_ekf::consistency::chi_square_band(15.0, 200.0, 0.95);
@@ -24,15 +24,16 @@ pub fn chi_square_band(dof: f64, count: f64, confidence: f64) -> (f64, f64) {
     (chi.inverse_cdf(tail) / count, chi.inverse_cdf(1.0 - tail) / count)
 }
 
-/// What a chi-square variable of `dof` degrees of freedom stays below with probability `confidence`: the gate
-/// of an innovation. Infinite where `dof` is none.
+/// Quantile of a chi-square variable of `dof` degrees of freedom at probability `confidence`: the gate
+/// of an innovation. Infinite unless `dof` is positive.
 pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
     ChiSquared::new(dof).map_or(f64::INFINITY, |chi| chi.inverse_cdf(confidence))
 }
 
-/// What a unit normal over the root of an independent chi-square per degree of freedom (of `dof`) is below
-/// with probability `confidence`: the gate of a residual whose sigma is estimated from the others (Student
-/// 1908, doi:10.1093/biomet/6.1.1). Infinite where `dof` is none.
+/// Quantile of Student's t at probability `confidence`: a unit normal over the root of an independent
+/// chi-square per degree of freedom (`dof` of them). It is the gate of a residual whose sigma is
+/// estimated from the others (Student 1908, doi:10.1093/biomet/6.1.1). Infinite unless `dof` is
+/// positive.
 ///
 /// ```
 /// let gate = obsdeg_ekf::consistency::student_quantile(10.0, 0.975);
@@ -42,12 +43,12 @@ pub fn student_quantile(dof: f64, confidence: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |t| t.inverse_cdf(confidence))
 }
 
-/// The probability that a chi-square of `dof` degrees of freedom is above `x`.
+/// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`.
 pub fn chi_square_tail(dof: f64, x: f64) -> f64 {
     ChiSquared::new(dof).map_or(0.0, |chi| chi.sf(x))
 }
 
-/// `e^T P^-1 e` of a fixed covariance for any number of errors, by `P = U diag(d) U^T`.
+/// Evaluates `e^T P^-1 e` for a fixed covariance and any number of errors, by `P = U diag(d) U^T`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nees {
     /// U above its diagonal, column by column.
@@ -56,7 +57,7 @@ pub struct Nees {
 }
 
 impl Nees {
-    /// The factors of `p`.
+    /// Factorises `p`.
     ///
     /// # Errors
     /// [`EkfError`] unless `p` is symmetric and positive definite.
@@ -64,7 +65,7 @@ impl Nees {
         Self::of_covariance(&Covariance::new("P", p, Form::Ud)?)
     }
 
-    /// The factors of the covariance of a filter; nothing is computed in the UD form.
+    /// Takes the factors of the covariance of a filter, without computation in the UD form.
     ///
     /// # Errors
     /// [`EkfError::NotPositiveDefinite`].
@@ -73,7 +74,8 @@ impl Nees {
         Ok(Self { u, d })
     }
 
-    /// `e^T P^-1 e`, chi-square with n degrees of freedom when `e ~ N(0, P)`; `e` (shape n) is used up.
+    /// Returns `e^T P^-1 e`, chi-square with n degrees of freedom if `e ~ N(0, P)`; `e` (shape n) is
+    /// overwritten.
     ///
     /// # Errors
     /// [`EkfError::Shape`].
@@ -95,9 +97,9 @@ impl Nees {
         Ok(sum)
     }
 
-    /// The part of `e^T P^-1 e` (`e`: shape n) along directions of which P says no less than `least` of the
-    /// components' own sigmas, and the number of these directions: principal axes of the correlation matrix.
-    /// Of the others a filter that is linearised in doubles knows less than it believes.
+    /// Part of `e^T P^-1 e` (`e`: shape n) along the principal axes of the correlation matrix whose
+    /// sigma is at least `least` times those of the components, and the number of these axes. Along the
+    /// other axes a filter that is linearised in doubles knows less than its covariance claims.
     ///
     /// ```
     /// use obsdeg_ekf::consistency::Nees;
@@ -155,8 +157,8 @@ impl Nees {
     }
 }
 
-/// The autocorrelation of a sequence of unit normals at lags 1, 2, ...; each is normal with variance 1/N for
-/// white innovations.
+/// Autocorrelation of a sequence of unit normals at lags 1, 2, ...; each value is normal with variance
+/// 1/N for white innovations.
 pub fn autocorrelation(whitened: &[f64], lags: usize) -> Vec<f64> {
     let power: f64 = whitened.iter().map(|v| v * v).sum();
     (1..=lags)
@@ -167,14 +169,14 @@ pub fn autocorrelation(whitened: &[f64], lags: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The probability that white noise has autocorrelations (of `count` samples) at least this large: Ljung and
-/// Box 1978, doi:10.1093/biomet/65.2.297.
+/// Probability that white noise has autocorrelations (of `count` samples) at least this large: Ljung
+/// and Box 1978, doi:10.1093/biomet/65.2.297.
 pub fn ljung_box(autocorrelation: &[f64], count: usize) -> f64 {
     ljung_box_of_sequences(autocorrelation, count, 1)
 }
 
-/// The same of `sequences` independent sequences of `length` samples each, whose products are summed at every
-/// lag: each has `length - lag` of them.
+/// Probability as [`ljung_box`] for `sequences` independent sequences of `length` samples each, whose
+/// products are summed at every lag: each sequence has `length - lag` of them.
 ///
 /// ```
 /// use obsdeg_ekf::consistency::{ljung_box, ljung_box_of_sequences};

@@ -1,4 +1,4 @@
-//! The covariance of the estimate, in one of two forms.
+//! Covariance of the estimate, in one of two forms.
 //!
 //! - **Joseph**: P itself, symmetric, updated one scalar measurement at a time by
 //!   `(I - k h) P (I - k h)^T + k r k^T`, in which rounding cannot make P indefinite to first order.
@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use crate::error::{EkfError, check_symmetric, is_positive};
 use crate::transition::{Transition, dot};
 
-/// How the covariance is stored.
+/// Storage form of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
     /// P, updated in Joseph's form.
@@ -36,7 +36,7 @@ impl ScalarOutput {
         self.h.iter().map(|&(i, c)| c * x[i]).sum()
     }
 
-    /// Checks that it is one of n states, and its variance one.
+    /// Checks that its states are among n, and that its variance is positive and finite.
     ///
     /// # Errors
     /// [`EkfError`].
@@ -50,7 +50,7 @@ impl ScalarOutput {
     }
 }
 
-/// Checks that the entries of a row are finite and those of n states.
+/// Checks that the entries of a row are finite and belong to n states.
 fn check_entries(what: &'static str, row: &[(usize, f64)], n: usize) -> Result<(), EkfError> {
     match row.iter().find(|(state, x)| *state >= n || !x.is_finite()) {
         Some(&(column, value)) if column < n => Err(EkfError::NotFinite { what, value, row: 0, column }),
@@ -59,7 +59,7 @@ fn check_entries(what: &'static str, row: &[(usize, f64)], n: usize) -> Result<(
     }
 }
 
-/// The noise that one step adds to the state: Q, positive semidefinite, with the states it touches.
+/// Noise that one step adds to the state: Q, positive semidefinite, with the states that it affects.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProcessNoise {
     states: Vec<usize>,
@@ -92,7 +92,7 @@ impl ProcessNoise {
     }
 }
 
-/// What one scalar update did.
+/// Result of one scalar update.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gain {
     /// The Kalman gain (shape n).
@@ -183,7 +183,7 @@ impl Covariance {
         }
     }
 
-    /// `P <- Phi P Phi^T + Q`.
+    /// Propagates the covariance: `P <- Phi P Phi^T + Q`.
     ///
     /// # Errors
     /// [`EkfError::Shape`] unless Phi and Q are of the states of P.
@@ -193,7 +193,7 @@ impl Covariance {
         Ok(())
     }
 
-    /// The same for a step that was checked.
+    /// Propagates the covariance for a step that was checked.
     pub(crate) fn propagate_checked(&mut self, phi: &Transition, noise: &ProcessNoise) {
         match self.form {
             Form::Joseph => self.propagate_full(phi, noise),
@@ -231,9 +231,9 @@ impl Covariance {
         }
     }
 
-    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d, d_q]`.
-    /// States behind the last one that changes keep their rows of U and their d; in their columns the changed
-    /// rows of `Phi U` are those of the new U, and the orthogonalisation is left with the block before them.
+    /// Thornton's modified weighted Gram-Schmidt orthogonalisation of `[Phi U, G]` with weights `[d,
+    /// d_q]`. States after the last changed one keep their rows of U and their d; in their columns the
+    /// changed rows of `Phi U` are those of the new U. Only the block before them is orthogonalised.
     fn propagate_ud(&mut self, phi: &Transition, noise: &ProcessNoise) {
         let n = self.n;
         let Some(last) = phi.active().iter().chain(&noise.states).max() else { return };
@@ -289,17 +289,18 @@ impl Covariance {
         self.scratch = buffer;
     }
 
-    /// The update by one scalar measurement; the gain goes to `gain` (its `k` is resized to n).
+    /// Updates the covariance by one scalar measurement; the gain goes to `gain` (its `k` is resized to
+    /// n).
     ///
     /// # Errors
-    /// [`EkfError`] for an output that is none of these states, or without noise; nothing has changed then.
+    /// [`EkfError`] for an output with other states, or without noise; nothing has changed then.
     pub fn update(&mut self, output: &ScalarOutput, gain: &mut Gain) -> Result<(), EkfError> {
         output.check(self.n)?;
         self.update_checked(output, gain);
         Ok(())
     }
 
-    /// The same for an output that was checked.
+    /// Updates the covariance by an output that was checked.
     pub(crate) fn update_checked(&mut self, output: &ScalarOutput, gain: &mut Gain) {
         gain.k.resize(self.n, 0.0);
         match self.form {
@@ -399,7 +400,7 @@ impl Covariance {
     }
 }
 
-/// Checks that Phi and Q of a step are of n states.
+/// Checks that Phi and Q of a step have n states.
 ///
 /// # Errors
 /// [`EkfError::Shape`].
@@ -435,7 +436,7 @@ pub(crate) fn ud_factors(
             return Err(EkfError::NotPositiveSemidefinite { what, pivot, row: j });
         }
         if !definite && pivot <= rounding {
-            // nothing may be left in the column of a zero pivot
+            // the column of a zero pivot must be zero
             if let Some(row) =
                 (0..j).find(|&i| a[(i, j)].abs() > 1e-9 * (a[(i, i)].abs() * p[(j, j)].abs()).sqrt())
             {

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use crate::error::{EkfError, check};
 
-/// Rounds over all pairs of columns before the iteration is given up: seven or eight are usual.
+/// Largest number of rounds over all pairs of columns; seven or eight are usual.
 const SWEEPS: usize = 60;
 /// Squares of columns below this, beside a largest entry of one, count as zero.
 const VANISHING: f64 = 1e-280;
@@ -40,8 +40,8 @@ pub fn singular_values(a: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), Ekf
     Ok((values, v.select_columns(&order)))
 }
 
-/// Turns pairs of columns until all are orthogonal to rounding, and those of `v` alike; the column that was
-/// turned last when they never are.
+/// Turns pairs of columns until all are orthogonal to rounding, and those of `v` alike. Returns the
+/// column that was turned last if they do not converge.
 fn orthogonalise(columns: &mut DMatrix<f64>, v: &mut DMatrix<f64>) -> Option<usize> {
     let tolerance = f64::EPSILON * (columns.nrows() as f64).sqrt();
     let mut turned = None;
@@ -51,7 +51,7 @@ fn orthogonalise(columns: &mut DMatrix<f64>, v: &mut DMatrix<f64>) -> Option<usi
             for i in 0..j {
                 let (x, y) = (columns.column(i), columns.column(j));
                 let (xx, yy, xy) = (x.norm_squared(), y.norm_squared(), x.dot(&y));
-                // beside entries of one, a column whose square vanishes is nothing
+                // beside entries of one, a column whose square underflows counts as zero
                 if xy.abs() <= tolerance * (xx * yy).sqrt() || xx.min(yy) < VANISHING {
                     continue;
                 }

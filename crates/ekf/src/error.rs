@@ -1,95 +1,95 @@
-//! What the filter refuses.
+//! Errors of the filter.
 
 use nalgebra::DMatrix;
 
-/// Why an input is refused; `what` names it (`P0`, `R`, `Phi`, ...).
+/// Error for an input; `what` is its name (`P0`, `R`, `Phi`, ...).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EkfError {
-    /// A matrix or vector of the wrong shape.
+    /// Matrix or vector of the wrong shape.
     #[error("{what} has shape {}x{}; expected {}x{}", found.0, found.1, expected.0, expected.1)]
     Shape {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
         /// Rows and columns expected.
         expected: (usize, usize),
         /// Rows and columns found.
         found: (usize, usize),
     },
-    /// NaN or infinity.
+    /// Entry that is NaN or infinite.
     #[error("{what} has an entry that is not finite: {value} at row {row}, column {column}")]
     NotFinite {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
-        /// The value.
+        /// Entry that was found.
         value: f64,
         /// Row, from 0.
         row: usize,
         /// Column, from 0.
         column: usize,
     },
-    /// Work that ended because nobody waits for it.
+    /// Interruption by the caller.
     #[error("interrupted")]
     Interrupted,
-    /// A state with NaN or infinity.
+    /// State with NaN or infinity.
     #[error("{what} is not finite")]
     StateNotFinite {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
     },
-    /// An estimate that has left what can be followed.
+    /// Divergence of the estimate.
     #[error("the filter diverges: {what}")]
     Diverged {
-        /// What grew.
+        /// Quantity that grew.
         what: &'static str,
     },
-    /// Not symmetric.
+    /// Matrix that is not symmetric.
     #[error("{what} is not symmetric: entries ({row},{column}) and ({column},{row}) differ")]
     NotSymmetric {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
         /// Row, from 0.
         row: usize,
         /// Column, from 0.
         column: usize,
     },
-    /// A covariance that must be invertible is not.
+    /// Covariance that is not invertible.
     #[error("{what} is not positive definite: pivot {pivot:e} in row {row}")]
     NotPositiveDefinite {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
-        /// The pivot found.
+        /// Pivot that was found.
         pivot: f64,
         /// Row, from 0.
         row: usize,
     },
-    /// A covariance has a negative direction.
+    /// Covariance with a negative direction.
     #[error("{what} is not positive semidefinite: pivot {pivot:e} in row {row}")]
     NotPositiveSemidefinite {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
-        /// The pivot found.
+        /// Pivot that was found.
         pivot: f64,
         /// Row, from 0.
         row: usize,
     },
-    /// A variance of measurement noise that is none.
+    /// Variance of measurement noise that is not positive.
     #[error("{what} is {value:e}; expected a variance above 0")]
     NotPositive {
-        /// The input.
+        /// Name of the input.
         what: &'static str,
-        /// The value found.
+        /// Value that was found.
         value: f64,
     },
-    /// The information leaves a direction undetermined.
+    /// Information that leaves a direction undetermined.
     #[error("the information is singular: unknown {column} is not determined")]
     Singular {
-        /// The unknown, from 0.
+        /// Index of the unknown, from 0.
         column: usize,
     },
 }
 
 impl EkfError {
-    /// True if numbers of the right shape went beyond what doubles resolve.
+    /// True if numbers of the right shape exceeded what doubles resolve.
     pub fn is_numeric(&self) -> bool {
         !matches!(self, Self::Shape { .. } | Self::NotSymmetric { .. })
     }

@@ -47,16 +47,16 @@ pub struct Filter<X = DVector<f64>> {
     covariance: Covariance,
 }
 
-/// How an update is made.
+/// Options of an update.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Most linearisations: 1 is the extended filter; more iterate by Gauss and Newton to the most probable
-    /// state (Bell, Cathey 1993, doi:10.1109/9.250476).
+    /// Largest number of linearisations: 1 is the extended filter; more iterate by Gauss and Newton to
+    /// the most probable state (Bell, Cathey 1993, doi:10.1109/9.250476).
     pub iterations: usize,
-    /// The iteration ends when no coordinate moves by more than so many of its standard deviations.
+    /// Largest step of a coordinate, in its standard deviations, at which the iteration ends.
     pub tolerance: f64,
-    /// The probability with which the measurement of a right model is accepted: what is less likely is left
-    /// out. `None` accepts all.
+    /// Probability with which the measurement of a right model is accepted; less likely measurements
+    /// are left out. `None` accepts all.
     pub gate: Option<f64>,
 }
 
@@ -68,29 +68,30 @@ impl Default for Update {
 }
 
 impl Update {
-    /// Up to so many linearisations.
+    /// Update with up to `iterations` linearisations.
     pub fn iterated(iterations: usize) -> Self {
         Self { iterations, ..Self::default() }
     }
 }
 
-/// What one update saw.
+/// Result of one update.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Innovation {
-    /// The innovation at the prediction, whitened: independent unit normals when the model is right (one per
-    /// component that was there).
+    /// Innovation at the prediction, whitened: independent unit normals if the model is right (one per
+    /// component present).
     pub whitened: Vec<f64>,
-    /// True if it was used: false where the gate left it out.
+    /// True if the measurement was used; false if the gate left it out.
     pub accepted: bool,
-    /// Linearisations.
+    /// Number of linearisations.
     pub iterations: usize,
-    /// True if the last step was within the tolerance; the extended filter takes one step and does not ask.
+    /// True if the last step was within the tolerance; always true for the single step of the extended
+    /// filter.
     pub converged: bool,
 }
 
 impl Innovation {
-    /// The normalised innovation squared, chi-square with as many degrees of freedom as there are components
-    /// when the model is right.
+    /// Normalised innovation squared, chi-square with as many degrees of freedom as components if the
+    /// model is right.
     pub fn nis(&self) -> f64 {
         self.whitened.iter().map(|v| v * v).sum()
     }
@@ -118,11 +119,11 @@ impl<X: Manifold> Filter<X> {
         &self.covariance
     }
 
-    /// From `t` to `t + dt`; a gap in the measurements is a longer step, or several. Gives Phi, which a
-    /// smoother wants.
+    /// Propagates from `t` to `t + dt`; a gap in the measurements is a longer step, or several. Returns
+    /// Phi, for a smoother.
     ///
     /// # Errors
-    /// [`EkfError`] when the model gives a shape or a number that cannot be.
+    /// [`EkfError`] if the model gives a wrong shape or a number that is not finite.
     pub fn advance(&mut self, motion: &impl Motion<X>, t: f64, dt: f64) -> Result<Transition, EkfError> {
         let (phi, noise) = motion.advance(t, dt, &mut self.x)?;
         check_state("x", &self.x)?;
@@ -130,8 +131,8 @@ impl<X: Manifold> Filter<X> {
         Ok(phi)
     }
 
-    /// A jump to `x`, of which the local coordinates are `jacobian` times those before, with the noise of the
-    /// jump: a repositioning, or a part of the state that starts anew.
+    /// Jumps to `x`, whose local coordinates are `jacobian` times those before, with the noise of the
+    /// jump: a repositioning, or a part of the state that is initialised again.
     ///
     /// # Errors
     /// [`EkfError`] for a wrong shape or a number that is not finite; nothing has changed then.
@@ -142,10 +143,10 @@ impl<X: Manifold> Filter<X> {
         Ok(())
     }
 
-    /// The update by the measurement `z` (shape m) at `t`, all components of which are there.
+    /// Updates by the measurement `z` (shape m) at `t`, with all components present.
     ///
     /// # Errors
-    /// As [`Self::update_with`].
+    /// [`EkfError`] as for [`Self::update_with`].
     pub fn update(
         &mut self,
         m: &impl Measurement<X>,
@@ -156,9 +157,9 @@ impl<X: Manifold> Filter<X> {
         self.update_with(m, t, &all, &Update::default())
     }
 
-    /// The update by those components of `z` (shape m) that are there, at `t`. Correlated noise is
-    /// decorrelated first; then the components are processed one by one, which is the same for a linearised
-    /// model. An iteration that makes the state less probable is damped.
+    /// Updates by the components of `z` (shape m) that are present, at `t`. Correlated noise is
+    /// decorrelated first; then the components are processed one by one, which is equivalent for a
+    /// linearised model. An iteration that makes the state less probable is damped.
     ///
     /// # Errors
     /// [`EkfError`] for a wrong shape, a number that is not finite, or an R that is not positive definite.
@@ -179,7 +180,7 @@ impl<X: Manifold> Filter<X> {
         let r = m.noise(t);
         check("R", &r, (outputs, outputs))?;
         let whitener = Whitener::new(&r.select_rows(&there).select_columns(&there))?;
-        // what is left of z at a state, and the derivative of h by the coordinates about it
+        // residual of z at a state, and the derivative of h with respect to the coordinates about it
         let seen = |x: &X| -> Result<(Vec<f64>, DMatrix<f64>), EkfError> {
             let (h, jacobian) = (m.h(t, x), m.jacobian(t, x));
             check_column("h", h.as_slice(), outputs)?;
@@ -228,7 +229,7 @@ impl<X: Manifold> Filter<X> {
                     delta.iter_mut().zip(&before).for_each(|(d, b)| *d = 0.5 * (*d + b));
                     halvings += 1;
                 }
-                // the rows in the coordinates about the prediction, and what they leave of z there
+                // the rows in the coordinates about the prediction, and the residual of z there
                 if let Some(transport) = self.x.transport(&delta) {
                     rows *= transport.matrix();
                 }
@@ -260,14 +261,14 @@ impl<X: Manifold> Filter<X> {
     }
 }
 
-/// Halvings of a step that makes the state less probable.
+/// Largest number of halvings of a step that makes the state less probable.
 const HALVINGS: usize = 8;
 
 impl Filter {
-    /// From `t` to `t + dt`, integrated in `substeps` Runge-Kutta steps.
+    /// Propagates from `t` to `t + dt`, integrated in `substeps` Runge-Kutta steps.
     ///
     /// # Errors
-    /// [`EkfError`] when the model gives a shape or a number that cannot be.
+    /// [`EkfError`] if the model gives a wrong shape or a number that is not finite.
     pub fn predict(
         &mut self,
         process: &impl Process,
@@ -280,13 +281,13 @@ impl Filter {
     }
 }
 
-/// Refuses a state with a number that is none.
+/// Refuses a state that is not finite.
 fn check_state<X: Manifold>(what: &'static str, x: &X) -> Result<(), EkfError> {
     if x.is_finite() { Ok(()) } else { Err(EkfError::StateNotFinite { what }) }
 }
 
-/// The update of `p` by independent rows, one by one; gives the estimate of the error, and tells the whitened
-/// innovations.
+/// Updates `p` by independent rows, one by one. Returns the estimate of the error; `seen` receives the
+/// whitened innovations.
 fn sequential(
     p: &mut Covariance,
     rows: &DMatrix<f64>,
@@ -311,7 +312,7 @@ fn sequential(
     Ok(delta)
 }
 
-/// What makes the noise of a measurement independent.
+/// Transformation that makes the noise of a measurement independent.
 struct Whitener {
     /// The lower triangular root of R; `None` where the noise is independent already.
     root: Option<DMatrix<f64>>,
@@ -320,10 +321,10 @@ struct Whitener {
 }
 
 impl Whitener {
-    /// Of the covariance `r`.
+    /// Whitener for the covariance `r`.
     ///
     /// # Errors
-    /// [`EkfError`] unless it is finite, symmetric and positive definite.
+    /// [`EkfError`] unless `r` is finite, symmetric and positive definite.
     fn new(r: &DMatrix<f64>) -> Result<Self, EkfError> {
         let m = r.nrows();
         check_symmetric("R", r, m)?;
@@ -341,13 +342,13 @@ impl Whitener {
         Ok(Self { root: Some(root.l()), variances: vec![1.0; m] })
     }
 
-    /// Rows (m x n) of independent components.
+    /// Rows (m x n) of the independent components.
     fn rows(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         let solved = self.root.as_ref().and_then(|l| l.solve_lower_triangular(rows));
         solved.unwrap_or_else(|| rows.clone())
     }
 
-    /// The independent components of a residual.
+    /// Independent components of a residual.
     fn apply(&self, residual: Vec<f64>) -> Vec<f64> {
         if self.root.is_none() {
             return residual;

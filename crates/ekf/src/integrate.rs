@@ -1,4 +1,5 @@
-//! From a continuous to a discrete system: Runge-Kutta for any, the matrix exponential for a linear one.
+//! Discretisation of a continuous system: Runge-Kutta in general, the matrix exponential for a linear
+//! system.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,17 +17,17 @@ pub struct Propagated {
     pub q: DMatrix<f64>,
 }
 
-/// What changes in a step: rows that are zero in F, those of constants, are none of it.
+/// Derivatives within a step; zero rows of F, those of constants, are left out.
 struct Slope {
     /// `f` (shape n).
     x: DVector<f64>,
-    /// The rows of F that are not zero (r of n).
+    /// Indices of the rows of F that are not zero (r of n).
     rows: Vec<usize>,
-    /// Those of `F Phi` (n x r, a column each).
+    /// These rows of `F Phi` (n x r, a column each).
     phi: DMatrix<f64>,
-    /// Those of `F Q_d` (n x r, a column each), where it is not zero.
+    /// These rows of `F Q_d` (n x r, a column each); `None` if it is zero.
     fq: Option<DMatrix<f64>>,
-    /// `Q`, where it is not zero (n x n).
+    /// Spectral density `Q` (n x n); `None` if it is zero.
     noise: Option<DMatrix<f64>>,
 }
 
@@ -34,7 +35,7 @@ impl Slope {
     fn of(process: &impl Process, t: f64, y: &Propagated) -> Self {
         let (f, n) = (process.jacobian(t, &y.x), y.x.len());
         let rows: Vec<usize> = (0..n).filter(|&i| f.row(i).iter().any(|&a| a != 0.0)).collect();
-        // columns are what lies together
+        // columns are contiguous
         let columns = f.select_rows(&rows).transpose();
         let times = |m: &DMatrix<f64>| m.tr_mul(&columns);
         let some = |m: &DMatrix<f64>| m.iter().any(|&a| a != 0.0);
@@ -64,12 +65,12 @@ impl Slope {
     }
 }
 
-/// The classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in `substeps`
-/// equal parts.
+/// One classical Runge-Kutta step of `x' = f`, `Phi' = F Phi`, `Q_d' = F Q_d + Q_d F^T + Q`, in
+/// `substeps` equal parts.
 ///
 /// # Errors
-/// [`EkfError`] for a shape that is none of these states, before and after the step for a number that is
-/// none.
+/// [`EkfError`] for a shape that does not fit the states, and for a number that is not finite before or
+/// after the step.
 pub fn runge_kutta(
     process: &impl Process,
     t: f64,
@@ -106,8 +107,8 @@ pub fn runge_kutta(
     Ok(y)
 }
 
-/// The exact discretisation of `x' = F x + w` over `dt`: `(Phi, Q_d)` by the exponential of
-/// `[[-F, Q], [0, F^T]] dt` (Van Loan 1978, doi:10.1109/TAC.1978.1101743).
+/// Exact discretisation of `x' = F x + w` over `dt`: `(Phi, Q_d)` by the exponential of `[[-F, Q], [0,
+/// F^T]] dt` (Van Loan 1978, doi:10.1109/TAC.1978.1101743).
 ///
 /// # Errors
 /// [`EkfError`] unless F and Q are square, finite and of one size, and Q is symmetric.

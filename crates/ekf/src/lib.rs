@@ -1,13 +1,14 @@
-//! The extended Kalman filter, the information matrix and consistency statistics. Numbers only: nothing here
-//! knows of exact verdicts, which is why it can confirm or refute them.
+//! Extended Kalman filter, information matrix and consistency statistics. The crate works with numbers
+//! only and knows no exact verdicts, so it can confirm or refute them.
 //!
-//! - [`model`]: what a system is to a filter; [`integrate`]: Runge-Kutta and exact discretisation;
+//! - [`model`]: the description of a system for a filter; [`integrate`]: Runge-Kutta and exact
+//!   discretisation;
 //! - [`filter`]: the extended and the iterated Kalman filter; [`manifold`]: states that are no vectors;
-//!   [`smoother`]: all that an interval says of every moment in it; [`covariance`]: Joseph's and the UD form;
+//!   [`smoother`]: estimates from all data of an interval; [`covariance`]: Joseph's and the UD form;
 //! - [`linear`]: linear models in stages, whose covariance is computed once for many runs;
 //! - [`information`]: the square root of the information matrix of a batch;
-//! - [`noise`]: random walks and bias instability of sensors; [`allan`]: the Allan deviation; [`allan_fit`]:
-//!   noise coefficients from it;
+//! - [`noise`]: random walks and bias instability of sensors; [`allan`]: the Allan deviation;
+//!   [`allan_fit`]: noise coefficients from it;
 //! - [`consistency`]: NEES, NIS, whiteness and their bands; [`decomposition`]: singular values.
 
 pub mod allan;

@@ -7,50 +7,50 @@ use crate::covariance::{Covariance, Gain, ProcessNoise, ScalarOutput, check_step
 use crate::error::{EkfError, check, check_column};
 use crate::transition::{Transition, dot};
 
-/// Equal steps: predict, then update by scalar measurements.
+/// Stage of equal steps: predict, then update by scalar measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Phi of one step.
+    /// Transition matrix Phi of one step.
     pub transition: Transition,
-    /// Q of one step.
+    /// Noise Q of one step.
     pub noise: ProcessNoise,
-    /// The measurements at the end of each step; none during a slew.
+    /// Measurements at the end of each step; empty during a slew.
     pub outputs: Vec<ScalarOutput>,
-    /// The number of steps.
+    /// Number of steps.
     pub steps: usize,
 }
 
 impl Stage {
-    /// Checks that all its parts are of n states.
+    /// Checks that transition, noise and outputs have n states.
     fn check(&self, n: usize) -> Result<(), EkfError> {
         check_step(n, &self.transition, &self.noise)?;
         self.outputs.iter().try_for_each(|output| output.check(n))
     }
 }
 
-/// The gains of all updates, in order.
+/// Gains of all updates, in order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Gains {
     n: usize,
-    /// n numbers per update.
+    /// Kalman gains, n numbers per update.
     k: Vec<f64>,
-    /// `1/sqrt(s)` per update.
+    /// Inverse standard deviation `1/sqrt(s)` of the innovation, per update.
     inverse_root: Vec<f64>,
 }
 
 impl Gains {
-    /// The number of updates.
+    /// Number of updates.
     pub fn updates(&self) -> usize {
         self.inverse_root.len()
     }
 }
 
-/// The covariance recursion over `stages`. `on_step` sees the covariance after every step, with its number
-/// from 0.
+/// Runs the covariance recursion over `stages`. `on_step` receives the covariance after every step,
+/// with the step's number from 0.
 ///
 /// # Errors
-/// [`EkfError`] for a stage that is not one of the states of `p`, or an output without noise, before anything
-/// is computed.
+/// [`EkfError`] for a stage that does not fit the states of `p`, or an output without noise, before
+/// anything is computed.
 pub fn covariance_pass(
     stages: &[Stage],
     mut p: Covariance,
@@ -78,10 +78,10 @@ pub fn covariance_pass(
     Ok(gains)
 }
 
-/// The covariance at the end of `stages`, without the gains that [`covariance_pass`] keeps.
+/// Covariance at the end of `stages`, without the gains that [`covariance_pass`] keeps.
 ///
 /// # Errors
-/// [`EkfError`], as [`covariance_pass`].
+/// [`EkfError`] as for [`covariance_pass`].
 pub fn last_covariance(stages: &[Stage], mut p: Covariance) -> Result<Covariance, EkfError> {
     let n = p.states();
     for stage in stages {
@@ -97,8 +97,8 @@ pub fn last_covariance(stages: &[Stage], mut p: Covariance) -> Result<Covariance
     Ok(p)
 }
 
-/// The state recursion: `measure` fills in the measurements of a step (its number, the stage, one number per
-/// output), `on_step` sees the estimate and the whitened innovations.
+/// Runs the state recursion. `measure` fills in the measurements of a step (its number, the stage, one
+/// number per output), `on_step` receives the estimate and the whitened innovations.
 ///
 /// # Errors
 /// [`EkfError::Shape`] unless `stages` and `x` are those of the gains, before anything is computed.
@@ -141,11 +141,11 @@ pub fn state_pass(
     Ok(())
 }
 
-/// Both recursions at once, for a single run: `measure` as in [`state_pass`]; `on_step` sees the estimate,
-/// its covariance and the whitened innovations after every step.
+/// Runs both recursions at once, for a single run: `measure` as in [`state_pass`]; `on_step` receives
+/// the estimate, its covariance and the whitened innovations after every step.
 ///
 /// # Errors
-/// As [`covariance_pass`], and [`EkfError::Shape`] unless `x` has the states of `p`.
+/// [`EkfError`] as for [`covariance_pass`], and [`EkfError::Shape`] unless `x` has the states of `p`.
 pub fn filter_pass(
     stages: &[Stage],
     mut p: Covariance,
@@ -185,43 +185,43 @@ pub fn filter_pass(
     Ok(gains)
 }
 
-/// What all measurements of a run say of its start.
+/// Estimate of the start of a run from all its measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothedStart {
-    /// The correction of its prior mean (shape n).
+    /// Correction of the prior mean (shape n).
     pub correction: Vec<f64>,
-    /// Its covariance (n x n). What the measurements leave of a prior variance is a difference: below 1e-16
-    /// of the prior variance it is rounding.
+    /// Covariance of the start (n x n). It is a difference from the prior: values below 1e-16 of the
+    /// prior variance are rounding.
     pub covariance: DMatrix<f64>,
-    /// One per update, in order.
+    /// Residuals of the measurements, one per update, in order.
     pub left_out: Vec<LeftOut>,
 }
 
-/// A measurement held against what all others of its run say of it: `u/D` is what it is off by, with variance
-/// `1/D`, and `r u` with variance `r^2 D` is what the estimate from all of them leaves of it (de Jong 1989,
-/// doi:10.1080/01621459.1989.10478853).
+/// Measurement compared with its prediction from all others of its run. The difference is `u/D` with
+/// variance `1/D`. The residual of the estimate from all of them is `r u` with variance `r^2 D` (de
+/// Jong 1989, doi:10.1080/01621459.1989.10478853).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeftOut {
-    /// `u`, its smoothed error over its variance.
+    /// Smoothed error over the variance of the noise, `u`.
     pub u: f64,
-    /// `D`, the variance of u.
+    /// Variance `D` of u.
     pub variance: f64,
 }
 
 impl LeftOut {
-    /// What it is off by, in units of its own standard deviation: a unit normal when the model is right.
+    /// Difference in units of its own standard deviation: a unit normal if the model is right.
     pub fn normalised(&self) -> f64 {
         self.u / self.variance.sqrt()
     }
 }
 
-/// The estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times
-/// what the innovations say of the start, summed backwards through the gains, and its covariance alike
-/// (Bryson, Frazier 1963; Bierman 1973, doi:10.1016/0005-1098(73)90027-2). No covariance is inverted.
-/// `whitened` holds the innovations of the run divided by their standard deviations, in order.
+/// Estimate of the start from all measurements of a run, as a correction of its prior mean: `P0` times
+/// the innovations summed backwards through the gains, and its covariance alike (Bryson, Frazier 1963;
+/// Bierman 1973, doi:10.1016/0005-1098(73)90027-2). No covariance is inverted. `whitened` holds the
+/// innovations of the run divided by their standard deviations, in order.
 ///
 /// # Errors
-/// [`EkfError::Shape`] unless stages, gains, innovations and `p0` are those of one run.
+/// [`EkfError::Shape`] unless stages, gains, innovations and `p0` belong to one run.
 pub fn smoothed_start(
     stages: &[Stage],
     gains: &Gains,

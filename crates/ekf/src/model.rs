@@ -1,4 +1,4 @@
-//! What a filter needs to know of a system: `x' = f(t, x) + w`, `z = h(t, x) + v`.
+//! Model of a system for a filter: `x' = f(t, x) + w`, `z = h(t, x) + v`.
 
 use std::borrow::Cow;
 
@@ -8,10 +8,10 @@ use crate::covariance::ProcessNoise;
 use crate::error::EkfError;
 use crate::transition::Transition;
 
-/// The dynamics `x' = f(t, x) + w`, w white of spectral density Q. States are in the units of the model,
+/// Dynamics `x' = f(t, x) + w`, w white of spectral density Q. States are in the units of the model,
 /// time in seconds.
 pub trait Process {
-    /// The number n of states.
+    /// Number n of states.
     fn states(&self) -> usize;
     /// `f(t, x)` (shape n).
     fn f(&self, t: f64, x: &DVector<f64>) -> DVector<f64>;
@@ -21,21 +21,22 @@ pub trait Process {
     fn noise(&self, t: f64) -> DMatrix<f64>;
 }
 
-/// How a state of any kind moves over a step: the discrete form of a [`Process`], and the only one for a
-/// state that is no vector.
+/// Motion of a state of any kind over a step: the discrete form of a [`Process`], and the only form for
+/// a state that is no vector.
 pub trait Motion<X> {
-    /// Takes `x` from `t` to `t + dt`. Says how its local coordinates move (Phi, n x n, from those about the
-    /// state before to those about the state after), and the noise of the step in the latter.
+    /// Moves `x` from `t` to `t + dt`. Returns the transition of its local coordinates (Phi, n x n,
+    /// from those about the state before to those about the state after), and the noise of the step in
+    /// the latter.
     ///
     /// # Errors
-    /// [`EkfError`] when the model gives a number that is none.
+    /// [`EkfError`] if the model gives a number that is not finite.
     fn advance(&self, t: f64, dt: f64, x: &mut X) -> Result<(Transition, Cow<'_, ProcessNoise>), EkfError>;
 }
 
-/// The observation `z = h(t, x) + v`, `v ~ N(0, R)`. For a state that is no vector, H is the derivative by
-/// its local coordinates.
+/// Observation `z = h(t, x) + v`, `v ~ N(0, R)`. For a state that is no vector, H is the derivative
+/// with respect to its local coordinates.
 pub trait Measurement<X = DVector<f64>> {
-    /// The number m of outputs.
+    /// Number m of outputs.
     fn outputs(&self) -> usize;
     /// `h(t, x)` (shape m).
     fn h(&self, t: f64, x: &X) -> DVector<f64>;
@@ -45,7 +46,7 @@ pub trait Measurement<X = DVector<f64>> {
     fn noise(&self, t: f64) -> DMatrix<f64>;
 }
 
-/// `df/dx` by central differences with steps `step_i` (shape n): what tests hold a Jacobian against.
+/// Derivative `df/dx` by central differences with steps `step_i` (shape n), for tests of Jacobians.
 pub fn central_difference(
     f: impl Fn(&DVector<f64>) -> DVector<f64>,
     x: &DVector<f64>,

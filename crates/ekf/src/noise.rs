@@ -6,19 +6,18 @@ use nalgebra::DMatrix;
 use crate::error::EkfError;
 use crate::integrate::van_loan;
 
-/// The floor of the Allan deviation of flicker noise of coefficient B, over B: `sqrt(2 ln 2/pi)` (IEEE Std
-/// 952-1997, C.1.1.3).
+/// Floor of the Allan deviation of flicker noise of coefficient B, divided by B: `sqrt(2 ln 2/pi)`
+/// (IEEE Std 952-1997, C.1.1.3).
 pub const FLICKER_FLOOR: f64 = 0.664_282_470_267_960_1;
-/// The largest Allan deviation of a first-order Gauss-Markov process over its standard deviation, at
+/// Largest Allan deviation of a first-order Gauss-Markov process divided by its standard deviation, at
 /// [`MARKOV_PEAK_AT`] correlation times: `0.437 sqrt(2)` (C.1.1.5).
 pub const MARKOV_PEAK: f64 = 0.617_364_283_144_441_4;
-/// Where it is largest, in correlation times.
+/// Cluster time of the largest Allan deviation of a Gauss-Markov process, in correlation times.
 pub const MARKOV_PEAK_AT: f64 = 1.892_617_832_925_018_8;
 /// Standard gravity, in m/s^2.
 const STANDARD_GRAVITY: f64 = 9.80665;
 
-/// The random errors of one sensor. Its unit is that of what it measures: rad/s for a gyro, g for an
-/// accelerometer.
+/// Random errors of one sensor, in its unit: rad/s for a gyro, g for an accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensorNoise {
     /// White noise N: angle (velocity) random walk, the root of its two-sided density, in unit sqrt(s).
@@ -27,24 +26,24 @@ pub struct SensorNoise {
     pub walk: f64,
     /// Bias instability: the coefficient B of flicker noise, in the unit.
     pub instability: f64,
-    /// Correlation time in s of the Gauss-Markov process that stands for it.
+    /// Correlation time in s of the Gauss-Markov process that represents the bias instability.
     pub correlation_s: f64,
 }
 
-/// A state of the bias: `b' = -b/time + w`, w white; a random walk has no decay.
+/// State of the bias: `b' = -b/time + w`, w white; a random walk has no decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasState {
-    /// One over the correlation time, in 1/s.
+    /// Decay rate, one over the correlation time, in 1/s.
     pub decay: f64,
     /// Two-sided density of w, in unit^2/s.
     pub density: f64,
-    /// Variance at the start, in unit^2: the stationary one, none for a random walk.
+    /// Variance at the start, in unit^2: the stationary one, zero for a random walk.
     pub variance: f64,
 }
 
 impl SensorNoise {
-    /// A gyro by its datasheet, in rad/s: angle random walk in deg/sqrt(h), rate random walk in
-    /// deg/h/sqrt(h), bias instability in deg/h with a correlation time in s.
+    /// Noise of a gyro by its datasheet, in rad/s: angle random walk in deg/sqrt(h), rate random walk
+    /// in deg/h/sqrt(h), bias instability in deg/h with a correlation time in s.
     ///
     /// ```
     /// let gyro = obsdeg_ekf::SensorNoise::gyro(0.001, 0.01, 0.003, 3600.0);
@@ -61,8 +60,8 @@ impl SensorNoise {
         }
     }
 
-    /// An accelerometer by its datasheet, in g: velocity random walk in m/s/sqrt(h), acceleration random walk
-    /// in ug/sqrt(h), bias instability in ug with a correlation time in s.
+    /// Noise of an accelerometer by its datasheet, in g: velocity random walk in m/s/sqrt(h),
+    /// acceleration random walk in ug/sqrt(h), bias instability in ug with a correlation time in s.
     pub fn accelerometer(velocity_walk: f64, bias_walk: f64, instability: f64, correlation_s: f64) -> Self {
         Self {
             white: velocity_walk / 60.0 / STANDARD_GRAVITY,
@@ -72,13 +71,13 @@ impl SensorNoise {
         }
     }
 
-    /// The stationary standard deviation of the Gauss-Markov process: its largest Allan deviation is the
-    /// floor of the flicker noise that it stands for, `0.617 sigma = 0.664 B`.
+    /// Stationary standard deviation of the Gauss-Markov process: its largest Allan deviation is the
+    /// floor of the flicker noise that it represents, `0.617 sigma = 0.664 B`.
     pub fn markov_sigma(&self) -> f64 {
         self.instability * FLICKER_FLOOR / MARKOV_PEAK
     }
 
-    /// The states of its bias: a random walk, then a Gauss-Markov process, each where there is one.
+    /// States of the bias: a random walk, then a Gauss-Markov process, each if present.
     pub fn states(&self) -> Vec<BiasState> {
         let walk = BiasState { decay: 0.0, density: self.walk.powi(2), variance: 0.0 };
         let (decay, variance) = (1.0 / self.correlation_s, self.markov_sigma().powi(2));
@@ -86,8 +85,8 @@ impl SensorNoise {
         [walk, markov].into_iter().filter(|s| s.density > 0.0).collect()
     }
 
-    /// F and the density Q of the sensor's integral (an angle, a velocity) and its bias states, in this
-    /// order.
+    /// Matrix F and density Q of the sensor's integral (an angle, a velocity) and its bias states, in
+    /// this order.
     pub fn model(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let states = self.states();
         let n = states.len() + 1;
@@ -117,9 +116,9 @@ impl SensorNoise {
     }
 }
 
-/// `(Phi, Q_d)` of `x' = F x + w` over any `dt`: Van Loan's exponential over a part in which nothing decays
-/// by more than e, doubled by `Phi(2h) = Phi Phi`, `Q_d(2h) = Phi Q_d Phi^T + Q_d`. (The exponential alone
-/// holds `e^(-F dt)`, beyond all numbers after many correlation times.)
+/// Discretisation `(Phi, Q_d)` of `x' = F x + w` over any `dt`: Van Loan's exponential over a part in
+/// which nothing decays by more than e, doubled by `Phi(2h) = Phi Phi`, `Q_d(2h) = Phi Q_d Phi^T +
+/// Q_d`. (The exponential alone contains `e^(-F dt)`, which overflows after many correlation times.)
 ///
 /// # Errors
 /// [`EkfError`] as [`van_loan`].

@@ -10,7 +10,7 @@ use crate::filter::Filter;
 use crate::manifold::Manifold;
 use crate::transition::Transition;
 
-/// What a filter went through: its predictions and updates in turn.
+/// Record of a filter's run: its predictions and updates in turn.
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
@@ -48,46 +48,46 @@ pub struct Interval<X = DVector<f64>> {
     moments: Vec<Moment<X>>,
 }
 
-/// A prediction with what its update made of it.
+/// Prediction and updated estimate at one moment.
 #[derive(Debug, Clone)]
 struct Moment<X> {
-    /// Phi from the moment before.
+    /// Transition Phi from the previous moment.
     phi: Transition,
     predicted: (X, Covariance),
     updated: (X, Covariance),
 }
 
-/// The estimate at one moment from all measurements of the interval.
+/// Estimate at one moment from all measurements of the interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smoothed<X> {
-    /// The estimate.
+    /// Estimate of the state.
     pub x: X,
-    /// The covariance of its error (n x n).
+    /// Covariance of the error of the estimate (n x n).
     pub p: DMatrix<f64>,
 }
 
 impl<X: Manifold> Interval<X> {
-    /// Starts where the filter is.
+    /// Record that starts with the present estimate of the filter.
     pub fn new(filter: &Filter<X>) -> Self {
         let now = state(filter);
         let identity = Transition::identity(filter.covariance().states());
         Self { moments: vec![Moment { phi: identity, predicted: now.clone(), updated: now }] }
     }
 
-    /// The filter has moved on (or jumped) by `phi`.
+    /// Adds a prediction (or jump) of the filter by `phi`.
     pub fn predicted(&mut self, filter: &Filter<X>, phi: Transition) {
         let now = state(filter);
         self.moments.push(Moment { phi, predicted: now.clone(), updated: now });
     }
 
-    /// The filter has taken a measurement.
+    /// Replaces the last estimate by the updated one of the filter.
     pub fn updated(&mut self, filter: &Filter<X>) {
         if let Some(last) = self.moments.last_mut() {
             last.updated = state(filter);
         }
     }
 
-    /// The estimates at the start and after every prediction, from all measurements.
+    /// Estimates at the start and after every prediction, from all measurements.
     ///
     /// # Errors
     /// [`EkfError`] when a predicted covariance is not positive definite, or a number not finite.

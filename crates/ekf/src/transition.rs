@@ -59,7 +59,7 @@ impl Transition {
         self.n
     }
 
-    /// With as many constants behind its states.
+    /// Transition with `constants` further states that are constant, after its own.
     #[must_use]
     pub fn widened(&self, constants: usize) -> Self {
         let n = self.n + constants;

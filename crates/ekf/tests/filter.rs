@@ -1,4 +1,4 @@
-//! The filter against textbook formulas, closed forms and statistics.
+//! Tests of the filter against textbook formulas, closed forms and statistics.
 
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 use obsdeg_ekf::consistency::{Nees, autocorrelation, chi_square_band, ljung_box};
@@ -110,8 +110,8 @@ proptest! {
         prop_assert!(close(&step.phi, &phi, 1e-8) && close(&step.q, &q, 1e-8));
     }
 
-    /// A transition that changes some states only, with noise on some only: both forms against the formula,
-    /// and NEES against the inverse.
+    /// A transition that changes only some states, with noise on some only: both forms against the
+    /// formula, and NEES against the inverse.
     #[test]
     fn partial_transitions(
         e in prop::collection::vec(-1.0f64..1.0, 60),
@@ -141,7 +141,7 @@ proptest! {
         }
     }
 
-    /// Stages are the same filter: information and covariance agree, and nothing depends on the data.
+    /// Stages give the same filter: information and covariance agree, and nothing depends on the data.
     #[test]
     fn covariance_pass_is_the_inverse_information(e in prop::collection::vec(-1.0f64..1.0, 40)) {
         let n = 3;
@@ -172,8 +172,8 @@ proptest! {
     }
 }
 
-/// The best achievable variance of the k-th derivative of a polynomial of degree k from dense samples over T:
-/// `(2k+1) ((2k)!/k!)^2 sigma^2 dt / T^(2k+1)`.
+/// Best achievable variance of the k-th derivative of a polynomial of degree k from dense samples over
+/// T: `(2k+1) ((2k)!/k!)^2 sigma^2 dt / T^(2k+1)`.
 #[test]
 fn variance_constants() {
     let (sigma, dt, steps) = (0.3, 1e-3, 4000usize);
@@ -190,7 +190,7 @@ fn variance_constants() {
     }
 }
 
-/// A pendulum seen by its horizontal displacement.
+/// Pendulum measured by its horizontal displacement.
 struct Pendulum;
 
 impl Process for Pendulum {
@@ -270,7 +270,7 @@ fn a_right_model_gives_consistent_errors_and_white_innovations() {
         assert!((low..high).contains(&(nis / runs)), "{form:?}: NIS {}", nis / runs);
         let p = ljung_box(&autocorrelation(&white, 20), white.len());
         assert!(p > 1e-3, "{form:?}: whiteness {p}");
-        // and a coloured sequence is found out
+        // a coloured sequence is detected
         let coloured: Vec<f64> = white.windows(2).map(|w| w[0] + 0.3 * w[1]).collect();
         assert!(ljung_box(&autocorrelation(&coloured, 20), coloured.len()) < 1e-6);
     }
@@ -313,7 +313,7 @@ fn state_pass_is_the_filter_step_by_step() {
     assert!((expected[0] - x[0]).abs() < 1e-12 && (expected[1] - x[1]).abs() < 1e-12);
 }
 
-/// With a diffuse prior P itself loses the small directions; the UD form keeps them.
+/// With a diffuse prior, P itself loses the small directions; the UD form keeps them.
 #[test]
 fn the_ud_form_keeps_what_a_diffuse_prior_costs() {
     let outputs = [

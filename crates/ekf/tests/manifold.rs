@@ -1,5 +1,5 @@
-//! States that are no vectors, iterated updates, gates, gaps and jumps, and the smoother, each against
-//! something that is not the filter.
+//! States that are no vectors, iterated updates, gates, gaps and jumps, and the smoother, each compared
+//! with an independent computation.
 
 use std::borrow::Cow;
 
@@ -13,7 +13,7 @@ use obsdeg_ekf::{
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// An attitude and the bias of three gyros.
+/// Attitude and the bias of three gyros.
 #[derive(Debug, Clone)]
 struct Attitude {
     q: UnitQuaternion<f64>,
@@ -76,7 +76,7 @@ impl Motion<Attitude> for Gyros {
     }
 }
 
-/// Two directions, seen in body axes.
+/// Sighting of two directions in body axes.
 struct Stars;
 
 const STARS: [[f64; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 0.6, 0.8]];
@@ -102,7 +102,7 @@ impl Measurement<Attitude> for Stars {
     }
 }
 
-/// Errors of half a radian at the start: the filter that folds them into the attitude is what it believes.
+/// Errors of half a radian at the start: the filter that folds them into the attitude is consistent.
 #[test]
 fn an_attitude_filter_is_consistent() {
     let (runs, steps, dt) = (200, 40, 0.1);
@@ -135,7 +135,7 @@ fn an_attitude_filter_is_consistent() {
             let z = Stars.h(t, &truth).map(|h| h + 0.01 * normal());
             let z: Vec<Option<f64>> = z.iter().copied().map(Some).collect();
             let seen = filter.update_with(&Stars, t, &z, &Update::iterated(5)).expect("finite");
-            // at the first measurement the directions bend by more than their noise
+            // at the first measurement the nonlinearity of the directions exceeds their noise
             nis += if k > 0 { seen.nis() / f64::from(steps - 1) } else { 0.0 };
             assert!(seen.accepted && seen.iterations >= 2);
         }
@@ -149,7 +149,7 @@ fn an_attitude_filter_is_consistent() {
     assert!((low..high).contains(&(nis / runs)), "NIS {}", nis / runs);
 }
 
-/// A reset is a change of coordinates: the covariance of the rotation vector about the new attitude, by
+/// A reset is a change of coordinates: covariance of the rotation vector about the new attitude, by
 /// differences.
 #[test]
 fn a_reset_carries_the_covariance() {
@@ -176,7 +176,7 @@ fn a_reset_carries_the_covariance() {
     assert!((&found - &expected).view((0, 0), (3, 3)).amax() < 1e-3 * expected.view((0, 0), (3, 3)).amax());
 }
 
-/// The distance of a point in the plane from the origin.
+/// Distance of a point in the plane from the origin.
 struct Distance;
 
 impl Measurement for Distance {
@@ -218,11 +218,11 @@ fn iteration_finds_the_most_probable_state() {
     assert!((x[0] - best.0).abs() < 1e-6 && (x[1] - best.1).abs() < 1e-6, "{x} {best:?}");
     let (x, seen) = updated(&Update::default());
     assert!(seen.iterations == 1 && (x[0] - best.0).abs() > 0.05);
-    // too few iterations say so
+    // too few iterations are reported
     assert!(!updated(&Update { iterations: 2, tolerance: 1e-9, ..Update::default() }).1.converged);
 }
 
-/// Two states, seen with correlated noise.
+/// Measurement of two states with correlated noise.
 struct Both;
 
 impl Measurement for Both {
@@ -260,7 +260,7 @@ fn what_is_missing_or_gated_is_left_out() {
     let seen = filter.update_with(&Both, 0.0, &z, &gate(0.999)).expect("valid");
     assert!(!seen.accepted && (seen.nis() - 72.0 / 3.5).abs() < 1e-9 && filter == fresh());
     assert!(fresh().update_with(&Both, 0.0, &z, &gate(1.0 - 1e-6)).expect("valid").accepted);
-    // a component that is no number is an error, not a missing one
+    // a NaN component is an error, not a missing component
     let refused =
         fresh().update_with(&Both, 0.0, &[Some(f64::NAN), None], &Update::default()).expect_err("refused");
     assert!(refused.to_string().starts_with("z has an entry that is not finite"), "{refused}");
@@ -281,8 +281,8 @@ fn a_jump_moves_the_state_and_its_covariance() {
     assert_eq!(filter, before);
 }
 
-/// A walk in two states, the first seen: the smoother, and what innovations say of the start, against least
-/// squares on all states at once.
+/// Random walk in two states, the first measured: the smoother, and the estimate of the start from the
+/// innovations, against least squares on all states at once.
 #[test]
 fn smoothers_are_least_squares_on_the_whole_interval() {
     let phi = dmatrix![1.0, 0.3; -0.1, 0.9];
@@ -359,7 +359,7 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
     assert!((0..2).all(|i| (x0[i] + start.correction[i] - states[i]).abs() < 1e-10));
     assert!((start.covariance - covariance.view((0, 0), (2, 2))).amax() < 1e-10);
     assert!((0..2).all(|i| (x[i] - states[n - 2 + i]).abs() < 1e-10));
-    // what the estimate of all of them leaves of a measurement, and the variance of that
+    // residual of a measurement from the estimate of all of them, and its variance
     let h = dmatrix![1.0, 0.5];
     for (k, left) in start.left_out.iter().enumerate() {
         let own = covariance.view((2 * k + 2, 2 * k + 2), (2, 2));
@@ -367,7 +367,7 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
         assert!((r * left.u - (z[k] - (&h * states.rows(2 * k + 2, 2))[0])).abs() < 1e-10, "update {k}");
         assert!((r * r * left.variance - (r - of)).abs() < 1e-10, "update {k}");
     }
-    // both recursions at once are the two one after the other
+    // both recursions at once equal the two one after the other
     assert_eq!(gains, covariance_pass(stages, prior, |_, _| {}).expect("run"));
     let mut again = x0.as_slice().to_vec();
     state_pass(stages, &gains, &mut again, fill, |_, _, _| {}).expect("run");
@@ -377,7 +377,7 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
     assert!(state_pass(&[], &gains, &mut again, fill, |_, _, _| {}).is_err());
 }
 
-/// No number and no shape gets past the covariance either.
+/// The covariance, too, refuses numbers that are not finite and wrong shapes.
 #[test]
 fn wrong_outputs_and_steps_are_refused() {
     let mut p = Covariance::new("P0", &DMatrix::identity(2, 2), Form::Ud).expect("definite");

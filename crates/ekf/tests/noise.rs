@@ -1,4 +1,4 @@
-//! Random errors of sensors against quadrature, closed forms and simulated data.
+//! Tests of the random errors of sensors against quadrature, closed forms and simulated data.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::allan::overlapping_deviation;
@@ -11,7 +11,7 @@ const WHITE: SensorNoise = SensorNoise { white: 0.5, walk: 0.0, instability: 0.0
 const WALK: SensorNoise = SensorNoise { white: 0.0, walk: 0.02, instability: 0.0, correlation_s: 1.0 };
 const MARKOV: SensorNoise = SensorNoise { white: 0.0, walk: 0.0, instability: 2.0, correlation_s: 40.0 };
 
-/// Means over steps of `dt` of what the sensor adds, by the exact discretisation of its integral.
+/// Means over steps of `dt` of simulated sensor errors, by the exact discretisation of the integral.
 fn simulated(noise: &SensorNoise, dt: f64, count: usize, seed: u64) -> Vec<f64> {
     let (f, q) = noise.model();
     let (phi, q_d) = discretised(&f, &q, dt).expect("discretised");
@@ -49,9 +49,9 @@ fn deviations(noise: &SensorNoise, dt: f64, sizes: &[usize]) -> Vec<f64> {
     sums.iter().map(|s| (s / RUNS as f64).sqrt()).collect()
 }
 
-/// White noise falls with slope -1/2, a random walk rises with 1/2, and a Gauss-Markov process is flat at its
-/// peak: between 1/1.3 and 1.3 of where it is largest the slope is within 0.05 of none; every deviation is
-/// that of the closed form, within 3 %.
+/// White noise falls with slope -1/2, a random walk rises with 1/2, and a Gauss-Markov process is flat
+/// at its peak: between 1/1.3 and 1.3 of the peak's cluster time the slope is within 0.05 of zero.
+/// Every deviation is within 3 % of the closed form.
 #[test]
 fn allan_slopes() {
     let peak = MARKOV_PEAK_AT * MARKOV.correlation_s;
@@ -68,7 +68,7 @@ fn allan_slopes() {
         let measured = (found[2] / found[0]).ln() / (sizes[2] as f64 / sizes[0] as f64).ln();
         assert!((measured - slope).abs() < 0.05, "{noise:?}: {measured} instead of {slope}");
     }
-    // short of its peak it rises, beyond it falls: the check can fail
+    // below its peak the deviation rises, above it falls: the check can fail
     let found = deviations(&MARKOV, MARKOV.correlation_s / 10.0, &[1, 4, 100, 400]);
     assert!((found[1] / found[0]).log(4.0) > 0.4 && (found[3] / found[2]).log(4.0) < -0.3, "{found:?}");
 }
@@ -85,8 +85,8 @@ fn bias_instability_as_a_gauss_markov_process() {
     for k in -40..=40 {
         assert!(at(MARKOV_PEAK_AT * 1.1f64.powi(k)) <= peak * (1.0 + 1e-12), "{k}");
     }
-    // the series for small x meets the closed form, and short of everything it is a random walk of its
-    // density
+    // the series for small x meets the closed form, and for very short times the process is a random
+    // walk of its density
     assert!((at(0.009_999_999) / at(0.010_000_001) - (1.0 - 1e-7)).abs() < 2e-9);
     let density = MARKOV.states()[0].density;
     let tau = 1e-6 * MARKOV.correlation_s;
@@ -147,7 +147,7 @@ fn discretisation_against_quadrature() {
             }
         }
     }
-    // far beyond what the exponential of -F dt holds
+    // far beyond the range of the exponential of -F dt
     let (phi, q_d) = discretised(&f, &q, 1e6).expect("discretised");
     assert_eq!(phi[(2, 2)], 0.0);
     assert!((q_d[(2, 2)] / noise.markov_sigma().powi(2) - 1.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! The paper's run, 15 states and 200 steps: the whole of it, its parts, and a thousand of them.
+//! Run of the paper (15 states, 200 steps): one run, its stages, and 1000 runs.
 
 use divan::{Bencher, black_box};
 use obsdeg_core::model::settings::{FilterKind, Truth};
@@ -62,7 +62,7 @@ fn full_attitudes(bencher: Bencher<'_, '_>, filter: &FilterKind) {
     bencher.bench(|| black_box(prepared.chunk(0, 1)));
 }
 
-/// A thousand of them on all cores.
+/// 1000 runs of the extended filter on all cores.
 #[divan::bench(sample_count = 5)]
 fn monte_carlo_extended(bencher: Bencher<'_, '_>) {
     let (plan, conditions) = paper(Truth::Exact);
@@ -71,7 +71,7 @@ fn monte_carlo_extended(bencher: Bencher<'_, '_>) {
     bencher.bench(|| black_box(prepared.run(1000, &|_| true)));
 }
 
-/// Monte Carlo on all cores.
+/// Monte Carlo runs of the linear filter on all cores.
 #[divan::bench(args = [1000, 10_000])]
 fn monte_carlo(bencher: Bencher<'_, '_>, runs: usize) {
     let (plan, conditions) = paper(Truth::Linear);

@@ -1,5 +1,5 @@
-//! Time of the effects of errors that are not estimated, beyond that of the sigmas: 33 coefficients by seven
-//! positions with slews, and the twelve by the paper's two.
+//! Time that the effects of errors outside the model take beyond that of the sigmas: 33 coefficients at seven
+//! positions with slews, and the 12 coefficients at the paper's two positions.
 
 use divan::{Bencher, black_box};
 use obsdeg_core::model::{Scheme, scheme_file};
@@ -20,14 +20,14 @@ fn scheme(name: &str) -> (Scheme, Conditions) {
     (scheme, conditions)
 }
 
-/// The sigmas of all unknowns at the end.
+/// Sigmas of all unknowns at the end.
 #[divan::bench(args = SCHEMES)]
 fn sigmas(bencher: Bencher<'_, '_>, name: &str) {
     let (scheme, conditions) = scheme(name);
     bencher.bench(|| Attained::new(black_box(&scheme), &conditions, 1).expect("sigmas").sigmas.len());
 }
 
-/// The table of all errors that are not estimated: classes, changes per unit and visible sizes.
+/// Table of all errors that are not estimated: classes, changes per unit and visible sizes.
 #[divan::bench(args = SCHEMES)]
 fn table(bencher: Bencher<'_, '_>, name: &str) {
     let (scheme, conditions) = scheme(name);

@@ -1,5 +1,5 @@
-//! The paper's run: two positions of 1000 s, a filter against a simulated truth, and what it knows at the
-//! end.
+//! Run of the paper: two positions of 1000 s, a filter against a simulated truth, and its estimates with
+//! their sigmas at the end.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use obsdeg_core::model::{Angle, Scheme};

@@ -1,4 +1,4 @@
-//! Evidence for exact verdicts: what a filter makes of the same scheme or system.
+//! Evidence for exact verdicts: a filter on the same scheme or system, compared with them.
 //!
 //! ```
 //! use obsdeg_core::model::{Angle, Scheme};
@@ -12,11 +12,11 @@
 //! # Ok::<(), obsdeg_evidence::simulation::SimulationError>(())
 //! ```
 //!
-//! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units;
-//! the exact verdicts reach it as numbers ([`prediction`]) and are held against the information of all
-//! samples, slopes over the dwell and Monte Carlo runs ([`crosscheck`]), any system's likewise ([`system`]).
-//! [`requirements`] is the one decision on sigmas; [`compare`] holds schemes side by side; [`audit`] is the
-//! paper, equation by equation.
+//! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units.
+//! The exact verdicts, as numbers ([`prediction`]), are compared with the information of all samples, slopes
+//! over the dwell and Monte Carlo runs ([`crosscheck`]); those of any other system likewise ([`system`]).
+//! [`requirements`] decides on sigmas for all commands, [`compare`] sets schemes side by side, and [`audit`]
+//! checks the paper, equation by equation.
 
 pub mod audit;
 pub mod compare;

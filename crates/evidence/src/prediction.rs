@@ -1,4 +1,4 @@
-//! What the exact engine says of a scheme, as numbers that a filter can be held against.
+//! Verdicts of the exact engine on a scheme as numbers, for comparison with a filter.
 
 use obsdeg_core::accuracy::{Accuracy, AccuracyError};
 use obsdeg_core::degree::{Coefficient, Findings, Status, Verdict};
@@ -9,77 +9,77 @@ use obsdeg_core::solution::{Frame, Sparse};
 /// A linear combination of unknowns: `(unknown, coefficient)` in SI units.
 pub type Combination = Vec<(usize, f64)>;
 
-/// The verdict on one unknown.
+/// Verdict on one unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictedUnknown {
-    /// Whether it can be solved.
+    /// Status: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; `None` if the unknown is not observable.
     pub degree: Option<usize>,
-    /// The accuracy order: `None` when no dwell makes it observable, and for schemes that rotate.
+    /// Accuracy order; `None` if no dwell makes the unknown observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
-    /// True if samples over the dwells determine it (psi: of the start): by the accuracy order, or by the
-    /// degree where the orders are not computed.
+    /// True if samples over the dwells determine the unknown (psi: of the start): by the accuracy order, or
+    /// by the degree where the orders are not computed.
     pub determined: bool,
-    /// The accuracy order of its value at the end, which is what a filter shows.
+    /// Accuracy order of the value at the end, which a filter estimates.
     pub order_at_end: Option<usize>,
-    /// True if samples determine its value at the end: psi moves, and at a pole drift that nobody sees moves
-    /// it.
+    /// True if samples determine the value at the end. It can differ from the start: psi moves, and at a pole
+    /// unobservable drift moves it.
     pub determined_at_end: bool,
-    /// Unknowns that derivatives do not tell it from.
+    /// Unknowns that are indistinguishable from it by derivatives.
     pub partners: Vec<usize>,
 }
 
-/// An observable combination, or one that was asked for.
+/// Observable combination, or a requested one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictedCombination {
-    /// In words: `D_FZ - wN*psi_y`.
+    /// Expression, such as `D_FZ - wN*psi_y`.
     pub expression: String,
-    /// True if it was asked for: others are part of a basis.
+    /// True if the scheme requests the combination; other combinations belong to a basis.
     pub requested: bool,
-    /// Its coefficients; the first is its leading unknown.
+    /// Coefficients of the combination; the first is that of its leading unknown.
     pub terms: Combination,
-    /// Whether it can be solved.
+    /// Status: observable, inseparable or not excited.
     pub status: Status,
-    /// The observable degree.
+    /// Observable degree; `None` if the combination is not observable.
     pub degree: Option<usize>,
-    /// The accuracy order.
+    /// Accuracy order; `None` if no dwell makes the combination observable, and for schemes that rotate.
     pub accuracy_order: Option<usize>,
-    /// The accuracy order of its value at the end.
+    /// Accuracy order of the value at the end.
     pub order_at_end: Option<usize>,
-    /// True if samples over the dwells determine its value at the end.
+    /// True if samples over the dwells determine the value at the end.
     pub determined_at_end: bool,
 }
 
-/// All of it.
+/// Verdicts on a scheme in numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Per unknown, in model order.
+    /// Verdicts on the unknowns, in model order.
     pub unknowns: Vec<PredictedUnknown>,
-    /// Observable combinations beyond single unknowns, and those that the scheme asks for.
+    /// Observable combinations beyond single unknowns, and those that the scheme requests.
     pub combinations: Vec<PredictedCombination>,
-    /// `dim V_0, dim V_1, ...` by derivatives.
+    /// Rank profile `dim V_0, dim V_1, ...` by derivatives.
     pub rank_profile: Vec<usize>,
     /// True if all combinations of the basis have numbers.
     pub all_combinations: bool,
-    /// Basis of the directions that no derivative of Z sees, unknowns that are not excited left out; `None`
-    /// when some have no numbers.
+    /// Basis of the directions that affect no derivative of Z, without unknowns that are not excited; `None`
+    /// if a direction has no numbers.
     pub unseen_by_derivatives: Option<Vec<Combination>>,
-    /// Directions that Z does not see with dwells either, unknowns that are not excited included: a basis,
-    /// except at a pole, where others move psi as well.
+    /// Directions that are unobservable from Z with dwells too, unknowns that are not excited included. It is
+    /// a basis, except at a pole, where other directions move psi as well.
     pub null_space: Vec<Combination>,
-    /// The rank with dwells: unknowns minus this is the defect of a filter.
+    /// Rank with dwells: the number of unknowns minus this is the defect of a filter.
     pub rank: usize,
-    /// True if there are accuracy orders: none are computed for schemes that rotate.
+    /// True if there are accuracy orders: schemes that rotate have none.
     pub has_accuracy_orders: bool,
-    /// Bound on the probability that any of it is wrong.
+    /// Bound on the probability that any of these verdicts is wrong.
     pub error_bound: f64,
 }
 
-/// Why there is no prediction.
+/// Reason why there is no prediction.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PredictionError {
-    /// No verdict, or a combination that is none.
+    /// No verdict, or an invalid combination.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// No accuracy order.
@@ -88,7 +88,7 @@ pub enum PredictionError {
 }
 
 impl Prediction {
-    /// The prediction for `platform` with the rates `(wN, wU)` in rad/s.
+    /// Prediction for `platform` with the rates `(wN, wU)` in rad/s.
     ///
     /// # Errors
     /// [`PredictionError`].
@@ -140,7 +140,7 @@ impl Prediction {
         let all_combinations = combinations.len() == found.combinations.len();
         let components = found.null_space.iter().map(|v| numbers(v.components.as_ref()?));
         let unseen_by_derivatives = components.collect();
-        // with dwells, a direction may be seen that derivatives do not see (at a pole)
+        // with dwells, a direction may be observable that is not so by derivatives (at a pole)
         let unseen = |v: &[u64]| !accuracy.is_some_and(|a| a.sees(v));
         let silent = (0..n).filter(|&c| unknowns[c].status == Status::NotExcited).filter(|&c| {
             let mut unit = vec![0; n];
@@ -169,7 +169,7 @@ impl Prediction {
 }
 
 impl Prediction {
-    /// The null space, if all of it is known.
+    /// Null space; `None` unless all of it is known.
     pub(crate) fn whole_null_space(&self) -> Option<&[Combination]> {
         (self.null_space.len() + self.rank == self.unknowns.len()).then_some(&self.null_space)
     }

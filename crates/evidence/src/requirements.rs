@@ -4,31 +4,31 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// True if a sigma meets a requirement: the comparison on which every "met" and "reached" rests. False for
-/// what is no number.
+/// NaN.
 pub fn meets(sigma: f64, required: f64) -> bool {
     sigma <= required
 }
 
-/// An unknown with its requirement and what is held against it.
+/// Unknown with its requirement and its sigma.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim<'a> {
-    /// The unknown.
+    /// Name of the unknown.
     pub name: &'a str,
-    /// The largest sigma allowed, in the unit of the unknown; an unknown without one does not count.
+    /// Largest sigma allowed, in the unit of the unknown; an unknown without one does not count.
     pub required: Option<f64>,
-    /// Its sigma in the same unit, or why there is none that counts.
+    /// Sigma in the same unit, or the reason why no sigma counts.
     pub sigma: Result<f64, Miss>,
 }
 
 impl Claim<'_> {
-    /// Required over found sigma: at least 1 is met. `None` without a requirement, or without a sigma that
+    /// Margin: required over found sigma, met from 1. `None` without a requirement, or without a sigma that
     /// counts.
     pub fn margin(&self) -> Option<f64> {
         let sigma = self.sigma.ok().filter(|s| s.is_finite() && *s >= 0.0)?;
         self.required.map(|r| r / sigma).filter(|m| !m.is_nan())
     }
 
-    /// Why the requirement is missed, if it is.
+    /// Reason why the requirement is missed; `None` if it is met.
     fn miss(&self, required: f64) -> Option<Miss> {
         match self.sigma {
             Err(why) => Some(why),
@@ -121,7 +121,7 @@ pub struct Requirements {
 }
 
 impl Requirements {
-    /// Decides about `claims`, in their order.
+    /// Decision on `claims`, in their order.
     pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>) -> Self {
         let mut out = Self {
             basis,
@@ -158,7 +158,7 @@ impl Requirements {
         !self.missed.is_empty()
     }
 
-    /// True if the worst margin leaves out some that are missed: their sigma does not count.
+    /// True if the worst margin leaves out missed requirements whose sigma does not count.
     pub fn leaves_out(&self) -> bool {
         self.missed.iter().any(|m| m.why != Miss::TooLarge)
     }
@@ -199,7 +199,7 @@ mod tests {
         assert!(judged.leaves_out());
         assert_eq!(judged.worst.map(|w| w.name).as_deref(), Some("above"));
         assert!(!Requirements::of(Basis::Run, [claim("above", Some(0.1), Ok(0.2))]).leaves_out());
-        // nothing asked for: nothing met, nothing missed
+        // without a requirement none is met and none is missed
         let none = Requirements::of(Basis::Predicted, [claim("free", None, Ok(1.0))]);
         assert_eq!((none.stated, none.met, none.worst.is_none()), (0, 0, true));
         assert!(!none.all_met() && !none.any_missed());

@@ -1,5 +1,5 @@
-//! A rank that rounding hides: 8 cos 20 deg cos 40 deg cos 80 deg = 1, so three vectors lie in a plane. In a
-//! prime field that holds the cosines of decimal degrees the determinant is zero, not small.
+//! A rank that rounding hides: 8 cos 20 deg cos 40 deg cos 80 deg = 1, so three vectors lie in a plane.
+//! In a prime field that contains the cosines of decimal degrees the determinant is zero, not small.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use obsdeg_exact::certainty::{Claim, error_bound};
@@ -23,7 +23,8 @@ fn main() -> Result<(), PrimeError> {
         }
         println!("modulo {}: rank {} of 3", f.modulus(), space.rank());
     }
-    // what two fields that agree are worth: a determinant of three rows, each below 2^4 without denominators
+    // certainty of two fields that agree: a determinant of three rows, each below 2^4 without
+    // denominators
     let claim = Claim { unknowns: 3, decisions: 1, order, row_degree: 0, row_bits: 4.0 };
     println!("wrong with probability below {:.0e}", error_bound(&claim, 2));
     Ok(())

@@ -6,12 +6,12 @@ mod sum;
 
 pub use sum::BallSum;
 
-/// A real number `+-mantissa 2^(exponent - 64 N)`, known up to `error` units of its last place.
+/// Real number `+-mantissa 2^(exponent - 64 N)`, known up to `error` units of its last place.
 ///
-/// Every operation bounds what it loses, so that a ball that does not hold zero is a number that is not zero.
-/// A ball that holds zero is kept as zero with that error: whether it *is* zero nobody can say from one ball,
-/// and [`Ball::radius_log2`] says below what. Midpoint-radius arithmetic (van der Hoeven 2010, "Ball
-/// arithmetic").
+/// Every operation bounds its rounding, so a ball that does not contain zero is a number that is not
+/// zero. A ball that contains zero is stored as zero with that error. One ball alone cannot decide
+/// whether the number *is* zero; [`Ball::radius_log2`] gives a bound on its size. Midpoint-radius
+/// arithmetic (van der Hoeven 2010, "Ball arithmetic").
 ///
 /// ```
 /// use obsdeg_exact::Ball;
@@ -23,19 +23,18 @@ pub use sum::BallSum;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ball<const N: usize> {
     negative: bool,
-    /// The number is in `[2^(exponent - 1), 2^exponent)`; of zero, the place of the error.
+    /// Exponent: the number is in `[2^(exponent - 1), 2^exponent)`; for zero, the place of the error.
     exponent: i64,
-    /// Least limb first; the highest bit is set, or all are zero.
+    /// Limbs, least first; the highest bit is set, or all are zero.
     mantissa: [u64; N],
-    /// In units of `2^(exponent - 64 N)`.
+    /// Error in units of `2^(exponent - 64 N)`.
     error: f64,
 }
 
-/// Exponents beyond this are not kept: what is smaller is zero with this error, of what is larger nothing is
-/// known.
+/// Largest exponent: smaller numbers become zero with this error, larger ones become unknown.
 const FAR: f64 = 1e15;
 
-/// What rounding adds to a sum of error terms at most: each is a handful of operations on doubles.
+/// Factor that covers the rounding of a sum of error terms, each a handful of operations on doubles.
 const SLACK: f64 = 1.0 + 1e-12;
 
 /// `2^k`, zero or infinite beyond the doubles.
@@ -79,7 +78,7 @@ impl<const N: usize> Ball<N> {
         Self { exponent: log2.ceil().clamp(-FAR, FAR) as i64 + Self::BITS, error: 1.0, ..Self::ZERO }
     }
 
-    /// A double, exactly; zero for what is not finite.
+    /// A double, exactly; zero for infinity and NaN.
     pub fn from_f64(x: f64) -> Self {
         if x == 0.0 || !x.is_finite() {
             return Self::ZERO;
@@ -91,7 +90,7 @@ impl<const N: usize> Ball<N> {
         if x < 0.0 { whole.neg() } else { whole }
     }
 
-    /// The nearest double, about; infinite or zero beyond them.
+    /// The nearest double, approximately; infinite or zero beyond their range.
     pub fn to_f64(&self) -> f64 {
         let top = self.mantissa[N - 1] as f64;
         let size = if top == 0.0 { 0.0 } else { top * power(-64) };
@@ -110,7 +109,7 @@ impl<const N: usize> Ball<N> {
         if self.is_zero() { Self::ZERO } else { Self { error: 0.0, ..*self } }
     }
 
-    /// True if the ball holds zero.
+    /// True if the ball contains zero.
     pub fn is_zero(&self) -> bool {
         self.mantissa[N - 1] == 0
     }
@@ -130,12 +129,12 @@ impl<const N: usize> Ball<N> {
         !self.is_zero() && self.negative
     }
 
-    /// `log2` of the midpoint's size, rounded up; minus infinity for zero.
+    /// `log2` of the absolute value of the midpoint, rounded up; minus infinity for zero.
     pub fn size_log2(&self) -> f64 {
         if self.is_zero() { f64::NEG_INFINITY } else { self.exponent as f64 }
     }
 
-    /// `log2` of the error; minus infinity for what is exact.
+    /// `log2` of the error; minus infinity for exact numbers.
     pub fn radius_log2(&self) -> f64 {
         match self.error {
             0.0 => f64::NEG_INFINITY,
@@ -156,7 +155,7 @@ impl<const N: usize> Ball<N> {
         Self { error: (self.error + added) * SLACK, ..*self }.settled()
     }
 
-    /// A ball that holds zero is zero with an error.
+    /// Stores a ball that contains zero as zero with an error.
     fn settled(self) -> Self {
         if self.is_zero() {
             return self;
@@ -168,13 +167,13 @@ impl<const N: usize> Ball<N> {
         Self { negative: false, mantissa: [0; N], error: (self.error + size) * SLACK, ..self }
     }
 
-    /// The mantissa as a double; infinite where it is beyond them.
+    /// The mantissa as a double; infinite beyond their range.
     fn mantissa_f64(&self) -> f64 {
         // rounded down, so that an error is never taken to be smaller
         (self.mantissa[N - 1] as f64) * (1.0 - 1e-15) * power(Self::BITS - 64)
     }
 
-    /// The mantissa over `2^(64 N)`, rounded up.
+    /// The mantissa divided by `2^(64 N)`, rounded up.
     fn fraction(&self) -> f64 {
         ((self.mantissa[N - 1] as f64) * power(-64) * SLACK).min(1.0)
     }
@@ -199,7 +198,7 @@ impl<const N: usize> Ball<N> {
             return *self;
         }
         let (x, y) = if self.exponent >= other.exponent { (self, other) } else { (other, self) };
-        // a zero has no digits to align with
+        // a zero has no digits to align
         if x.is_zero() && !y.is_zero() {
             return y.with_error_of(x);
         }
@@ -247,13 +246,13 @@ impl<const N: usize> Ball<N> {
         out.normalised(error * SLACK)
     }
 
-    /// Digits of any height, and their error in units of the last place there.
+    /// Normalises digits of any height, with `error` in units of their last place.
     fn normalised(mut self, error: f64) -> Self {
         let top = (0..N).rev().find(|&i| self.mantissa[i] != 0);
         let Some(top) = top else {
             return Self { negative: false, error, ..self };
         };
-        // a lower bound of what is left, to be held against the error before it is scaled
+        // a lower bound of the remaining size, to be compared with the error before it is scaled
         let size = (self.mantissa[top] as f64) * (1.0 - 1e-15) * power(64 * top as i64);
         if size <= error {
             let whole = (self.mantissa[top] as f64 + 1.0) * SLACK * power(64 * top as i64);
@@ -268,7 +267,7 @@ impl<const N: usize> Ball<N> {
         self
     }
 
-    /// The same, less certain by the error of a zero.
+    /// The same midpoint, with the error of a zero added.
     fn with_error_of(&self, zero: &Self) -> Self {
         let apart = zero.exponent - self.exponent;
         let out = Self { error: (self.error + zero.error * power(apart)) * SLACK, ..*self };
@@ -297,7 +296,7 @@ impl<const N: usize> Ball<N> {
         if (exponent as f64).abs() > FAR {
             return Self::zero_within(exponent as f64);
         }
-        // the error of one, as a part of 2^exponent, times that of the other: in parts that doubles hold
+        // the product of both errors, as fractions of 2^exponent, in factors that doubles can hold
         let part = power(-Self::BITS / 4);
         let both = ((x.error * part) * (y.error * part)) * part * part;
         let error = x.fraction() * y.error + y.fraction() * x.error + both;
@@ -313,13 +312,13 @@ impl<const N: usize> Ball<N> {
             out_exponent -= 1;
             error *= 2.0;
         }
-        // what lies below the last place, and what the product left out there
+        // the digits below the last place, and what the product left out there
         error = if error == 0.0 && next == 0 { exact_tail(&x.mantissa, &y.mantissa) } else { error + 2.0 };
         Self { negative: x.negative != y.negative, exponent: out_exponent, mantissa, error: error * SLACK }
             .settled()
     }
 
-    /// `1 / self`; `None` for a ball that holds zero, or nearly does.
+    /// `1 / self`; `None` for a ball that contains zero or nearly does.
     #[inline(never)]
     pub fn inverse(&self) -> Option<Self> {
         if self.is_zero() {
@@ -353,7 +352,7 @@ impl<const N: usize> Ball<N> {
         Some(self.mul(&other.inverse()?))
     }
 
-    /// `log2` of a bound on the size of every number of the ball.
+    /// `log2` of a bound on the absolute value of every number of the ball.
     pub fn bound_log2(&self) -> f64 {
         let (size, radius) = (self.size_log2(), self.radius_log2());
         match size.max(radius) {
@@ -362,8 +361,8 @@ impl<const N: usize> Ball<N> {
         }
     }
 
-    /// The square root; `None` for a ball that holds what is not positive. Zero without an error has the root
-    /// zero.
+    /// The square root; `None` for a ball with numbers that are not positive. Zero without an error has
+    /// the root zero.
     #[inline(never)]
     pub fn sqrt(&self) -> Option<Self> {
         if self.is_exactly_zero() {
@@ -394,7 +393,7 @@ impl<const N: usize> Ball<N> {
         Some(scaled.mul(&r).mul(&factor).shifted(even / 2))
     }
 
-    /// The nearest integer to the midpoint, if it is a small one.
+    /// The nearest integer to the midpoint; `None` for a large one.
     pub fn nearest_integer(&self) -> Option<i64> {
         if self.is_zero() {
             return Some(0);
@@ -412,7 +411,7 @@ impl<const N: usize> Ball<N> {
     }
 }
 
-/// The high N limbs of a product and the limb below them; what is left out lies below a unit of the last
+/// The high N limbs of a product and the limb below them; the omitted part is below a unit of the last
 /// place.
 #[inline(always)]
 fn product<const N: usize>(a: &[u64; N], b: &[u64; N]) -> ([u64; N], u64) {
@@ -434,7 +433,7 @@ fn product<const N: usize>(a: &[u64; N], b: &[u64; N]) -> ([u64; N], u64) {
     (out, below)
 }
 
-/// The error of the product of two exact numbers: none when what lies below the last place is zero.
+/// The error of the product of two exact numbers: zero if all digits below the last place are zero.
 fn exact_tail<const N: usize>(a: &[u64; N], b: &[u64; N]) -> f64 {
     let zeros = |m: &[u64; N]| {
         let limb = m.iter().position(|x| *x != 0).unwrap_or(N);
@@ -443,7 +442,7 @@ fn exact_tail<const N: usize>(a: &[u64; N], b: &[u64; N]) -> f64 {
     if zeros(a) + zeros(b) >= 64 * N { 0.0 } else { 2.0 }
 }
 
-/// Shifted to the right, and whether anything was lost.
+/// Digits shifted to the right; true if any were lost.
 fn shifted_right<const N: usize>(a: &[u64; N], bits: usize) -> ([u64; N], bool) {
     if bits == 0 {
         return (*a, false);
@@ -473,7 +472,7 @@ fn shifted_left<const N: usize>(a: &[u64; N], bits: usize) -> [u64; N] {
     out
 }
 
-/// True if the sum has one bit more.
+/// Adds `b` to `a`; true if the sum has one bit more.
 fn add_to<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     let mut carry = false;
     for (x, &y) in a.iter_mut().zip(b) {
@@ -485,7 +484,7 @@ fn add_to<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     carry
 }
 
-/// `a - b`, and whether it is below zero.
+/// Subtracts `b` from `a`; true if the result is below zero.
 fn subtract_from<const N: usize>(a: &mut [u64; N], b: &[u64; N]) -> bool {
     let mut borrow = false;
     for (x, &y) in a.iter_mut().zip(b) {
@@ -528,8 +527,8 @@ pub(crate) mod tests {
         off <= radius.clone() && off >= -radius
     }
 
-    /// Numbers of any size, some close to each other, some with few digits, some uncertain; with a number
-    /// they hold.
+    /// Numbers of any size, some close to each other, some with few digits, some uncertain, each with a
+    /// number that its ball contains.
     pub(crate) fn numbers() -> impl Strategy<Value = (Ball<2>, BigRational)> {
         let places = prop_oneof![Just(0i64), -3..3i64, -140..140i64];
         let digits = prop_oneof![any::<i128>(), (-9..9i128), (i128::MAX - 3..i128::MAX)];
@@ -548,14 +547,14 @@ pub(crate) mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// Whatever the true numbers are, the result holds theirs.
+        /// For all true numbers, the result contains the true result.
         #[test]
         fn results_hold_the_true_ones((a, x) in numbers(), (b, y) in numbers(), (c, z) in numbers()) {
             prop_assert!(holds(&a, &x));
             prop_assert!(holds(&a.add(&b), &(&x + &y)));
             prop_assert!(holds(&a.sub(&b), &(&x - &y)));
             prop_assert!(holds(&a.mul(&b), &(&x * &y)));
-            // what cancels, in three ways
+            // cancellation, in three ways
             prop_assert!(holds(&a.add(&b).sub(&a), &y));
             prop_assert!(holds(&a.mul(&b).sub(&b.mul(&c)), &(&x * &y - &y * &z)));
             let zero = BigRational::from_integer(0.into());
@@ -567,7 +566,7 @@ pub(crate) mod tests {
                 prop_assert!(x >= zero && holds(&root.mul(&root), &x));
                 prop_assert!(!root.is_negative());
             }
-            // a ball that holds zero is zero
+            // a ball that contains zero is zero
             prop_assert_eq!(a.is_zero(), holds(&a, &zero));
         }
     }
@@ -586,7 +585,7 @@ pub(crate) mod tests {
 
     #[test]
     fn digits_are_not_lost() {
-        // as narrow as they can be: sqrt 2 and 1/3 to the last places of 256 bits
+        // as narrow as possible: sqrt 2 and 1/3 to the last places of 256 bits
         let two = Ball::<4>::from_i64(2);
         for x in [two.sqrt(), Ball::from_i64(3).inverse()].map(|x| x.expect("defined")) {
             assert!(x.radius_log2() < -248.0, "{x:?}");

@@ -1,6 +1,6 @@
 //! The bound on the probability that a verdict computed modulo random primes is wrong.
 
-/// What the bound depends on.
+/// Quantities that the error bound depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Claim {
     /// Number of unknowns: no minor that decides a rank is larger.
@@ -26,7 +26,7 @@ pub struct Claim {
 ///   `unknowns * row_bits / 60` over the number of primes `p = 1 mod n` of 61 bits, taken by their
 ///   density `2^60 / (phi(n) ln 2^61)`.
 ///
-/// Primes and points are random to whoever wrote the input, since a hash of the input chooses them
+/// Primes and points are random to the author of the input, since a hash of the input chooses them
 /// ([`crate::SplitMix64::of`]); every field has a stream of its own.
 ///
 /// ```
@@ -51,7 +51,8 @@ pub fn error_bound(claim: &Claim, fields: i32) -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand from the two sentences of [`error_bound`], with powers of two as exact decimals.
+    /// Values computed by hand from the two items of [`error_bound`], with powers of two as exact
+    /// decimals.
     #[test]
     fn hand_computed_values() {
         const TWO60: f64 = 1_152_921_504_606_846_976.0;

@@ -86,7 +86,7 @@ mod tests {
     const ENOUGH: Work = Work::new(1_000_000);
 
     proptest! {
-        /// Columns that were made of others are found, with the coefficients they were made with.
+        /// Dependent columns are found, with the coefficients that they were made with.
         #[test]
         fn made_columns_are_found(
             entries in prop::collection::vec(1u64..1 << 60, 6 * 8),

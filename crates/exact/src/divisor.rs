@@ -1,8 +1,8 @@
 //! Quotients, common divisors and factors of polynomials in several variables.
 //!
-//! A greatest common divisor is interpolated from its images at points, one variable at a time (Brown 1971,
-//! doi:10.1145/321662.321664). Images in one variable first say which variables it holds at all; the others
-//! are numbers from then on. What is found is divided by before it is believed.
+//! A greatest common divisor is interpolated from its images at points, one variable at a time (Brown
+//! 1971, doi:10.1145/321662.321664). Images in one variable first show which variables it contains; the
+//! others are replaced by numbers. Every result is verified by division.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -11,32 +11,32 @@ use crate::groebner::{OverLimit, Work};
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, polynomial};
 
-/// Work of a term of a product, or of a copy: its monomial is made anew, and finds its place among the
-/// others.
+/// Work per term of a product, or of a copy: its monomial is allocated and inserted among the others.
 const TERM: u64 = 4;
-/// Terms from which on a polynomial is no longer near the processor, and how much more each costs then.
+/// Number of terms above which a polynomial exceeds the cache, and the factor on the work per term
+/// then.
 const FAR: (u64, u64) = (4096, 8);
-/// Work of an inverse of a number.
+/// Work per inverse of a number.
 const INVERSE: u64 = 16;
-/// Highest power of a variable: images along it are dense.
+/// Largest power of a variable: images along it are dense.
 const POWER: u64 = 1 << 16;
 
 /// Polynomial algebra within a limit of work.
 pub struct Algebra {
     /// The field of the coefficients.
     pub f: Field,
-    /// Where its random points come from.
+    /// Generator of its random points.
     pub rng: SplitMix64,
-    /// The work that is left.
+    /// Remaining work.
     pub work: Work,
 }
 
-/// Work of this many terms that are made or copied.
+/// Work of `terms` terms that are made or copied.
 pub(crate) fn work_of(terms: u64) -> u64 {
     terms.saturating_mul(if terms > FAR.0 { TERM * FAR.1 } else { TERM })
 }
 
-/// A monomial in lexicographic order, the first variable greatest.
+/// Monomial in lexicographic order, the first variable greatest.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Lex(Monomial);
 
@@ -52,7 +52,7 @@ impl PartialOrd for Lex {
     }
 }
 
-/// Lexicographic order of monomials, the first variable greatest: one that products keep.
+/// Lexicographic order of monomials, the first variable greatest; products preserve it.
 pub fn lexicographic(a: &[(u32, u32)], b: &[(u32, u32)]) -> Ordering {
     for (x, y) in a.iter().zip(b) {
         let order = y.0.cmp(&x.0).then(x.1.cmp(&y.1));
@@ -101,7 +101,7 @@ fn without(f: &Field, p: &Polynomial, m: &[(u32, u32)]) -> Polynomial {
     out
 }
 
-/// A polynomial by what else a term holds: its coefficients along one variable.
+/// Coefficients along one variable, by the monomial in the other variables.
 fn along(p: &Polynomial, v: u32) -> BTreeMap<Lex, Vec<u64>> {
     let mut out: BTreeMap<Lex, Vec<u64>> = BTreeMap::new();
     for (m, c) in p.terms() {
@@ -115,7 +115,7 @@ fn along(p: &Polynomial, v: u32) -> BTreeMap<Lex, Vec<u64>> {
     out
 }
 
-/// The inverse of [`along`].
+/// Inverse of [`along`].
 fn joined(f: &Field, parts: &BTreeMap<Lex, Vec<u64>>, v: u32) -> Polynomial {
     let mut out = Polynomial::default();
     for (m, coefficients) in parts {
@@ -132,12 +132,12 @@ fn joined(f: &Field, parts: &BTreeMap<Lex, Vec<u64>>, v: u32) -> Polynomial {
 }
 
 impl Algebra {
-    /// A number that is not zero.
+    /// Random number that is not zero.
     fn number(&mut self) -> u64 {
         self.f.from_u64(1 + self.rng.below(self.f.modulus() - 1))
     }
 
-    /// Takes the work of keeping this many terms, which bounds their memory.
+    /// Takes the work of storing `terms` terms, which bounds their memory.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -156,7 +156,7 @@ impl Algebra {
     /// `a b`.
     ///
     /// # Errors
-    /// [`OverLimit`]; also of powers above 65536.
+    /// [`OverLimit`]; also for powers above 65536.
     pub fn product(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
         self.work.take(1 + work_of((a.len() as u64).saturating_mul(b.len() as u64)))?;
         if u64::from(a.highest_power()) + u64::from(b.highest_power()) > POWER {
@@ -187,7 +187,7 @@ impl Algebra {
         if let Some(c) = b.as_constant() {
             return Ok(Some(a.scaled(&f, f.inv(c))));
         }
-        // along one variable first, which shows most of what does not divide
+        // along one variable first, which excludes most cases without division
         let point = self.point(a, b);
         for v in b.variables() {
             let [x, y] = self.images(a, b, &point, v)?;
@@ -202,7 +202,7 @@ impl Algebra {
         while let Some((m, c)) = rest.last_key_value() {
             let Some(m) = ratio(&m.0, top) else { return Ok(None) };
             let c = f.mul(*c, inverse);
-            // the product, and its terms among the others
+            // the product, and the insertion of its terms
             self.copies([b, b])?;
             let mut step = Polynomial::default();
             step.put(&f, m, f.neg(c));
@@ -246,7 +246,7 @@ impl Algebra {
     /// [`OverLimit`].
     pub fn divisor(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
         let f = self.f;
-        // powers that all terms share, and what is left without them
+        // powers that all terms share, and the polynomials without them
         self.copies([a, a, b, b])?;
         if a.is_empty() || b.is_empty() {
             return Ok(self.monic(if a.is_empty() { b } else { a }));
@@ -262,7 +262,7 @@ impl Algebra {
         self.product(&common, &rest)
     }
 
-    /// The greatest common divisor of what no monomial divides.
+    /// The greatest common divisor of polynomials that no monomial divides.
     fn divisor_of_rest(&mut self, a: &Polynomial, b: &Polynomial) -> Result<Polynomial, OverLimit> {
         let f = self.f;
         let one = Polynomial::constant(f.one());
@@ -280,7 +280,7 @@ impl Algebra {
         if held.is_empty() {
             return Ok(one);
         }
-        // one of them, as a whole
+        // one of the two polynomials itself
         for (p, other) in [(a, b), (b, a)] {
             let whole =
                 p.variables().len() == held.len() && held.iter().all(|&(v, d)| p.degree_in(v) as usize == d);
@@ -306,7 +306,8 @@ impl Algebra {
         if divides { Ok(found) } else { Err(OverLimit) }
     }
 
-    /// The greatest common divisor of two polynomials in some variables, of which it has the given degrees.
+    /// The greatest common divisor of two polynomials in some variables, with the given degrees in
+    /// these.
     fn interpolated(
         &mut self,
         a: &Polynomial,
@@ -365,10 +366,10 @@ impl Algebra {
         let mut parts = BTreeMap::new();
         let mut own = Vec::new();
         for (m, mut list) in values {
-            // where a term is missing it is zero
+            // a missing term has the coefficient zero
             let missing: Vec<u64> = at.iter().copied().filter(|x| !list.iter().any(|y| y.0 == *x)).collect();
             list.extend(missing.into_iter().map(|x| (x, 0)));
-            // values where there is none, differences, and the common divisor with those before
+            // values, differences, and the common divisor with the previous coefficients
             self.work.take((points as u64).saturating_mul(points as u64).saturating_mul(INVERSE))?;
             let c = polynomial::interpolate(&f, &list);
             own = polynomial::gcd(&f, own, c.clone());
@@ -380,8 +381,8 @@ impl Algebra {
         Ok(self.monic(&joined(&f, &parts, v)))
     }
 
-    /// Factors with their powers: those that single variables, contents along a variable and repetition show;
-    /// of each the leading coefficient is one. Not all of them need be irreducible.
+    /// Factors with their powers, as found from single variables, contents along a variable and
+    /// repetition; each has leading coefficient one. Factors may be reducible.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -398,7 +399,7 @@ impl Algebra {
             match self.divisor_within(&p)? {
                 Some(d) => {
                     let rest = self.quotient(&p, &d)?.ok_or(OverLimit)?;
-                    // what both hold is a factor twice
+                    // a common divisor of both is a double factor
                     let both = self.divisor(&d, &rest)?;
                     for part in [d, rest] {
                         let part = self.quotient(&part, &both)?.ok_or(OverLimit)?;
@@ -414,7 +415,7 @@ impl Algebra {
         Ok(out)
     }
 
-    /// A divisor that is neither one nor the whole: a content along a variable, or what is there twice.
+    /// A divisor that is neither one nor the whole: a content along a variable, or a repeated factor.
     fn divisor_within(&mut self, p: &Polynomial) -> Result<Option<Polynomial>, OverLimit> {
         let f = self.f;
         for v in p.variables() {
@@ -466,7 +467,7 @@ mod tests {
         Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: Work::new(1 << 32) }
     }
 
-    /// A polynomial of some small terms.
+    /// Random polynomial of a few small terms.
     fn drawn(f: &Field) -> impl Strategy<Value = Polynomial> + use<> {
         let f = *f;
         let term = (prop::collection::vec((0u32..5, 1u32..3), 0..3), 1i64..20);
@@ -488,8 +489,7 @@ mod tests {
     }
 
     proptest! {
-        /// `gcd(a c, b c) / c` divides what `a` and `b` have in common, which is what they have at points
-        /// too.
+        /// The quotient `gcd(a c, b c) / c` divides the common divisor of `a` and `b`, also at points.
         #[test]
         fn common_divisors(
             a in drawn(&Field::new(P)),
@@ -503,7 +503,7 @@ mod tests {
             let (p, q) = (s.quotient(&x, &d).expect("work"), s.quotient(&y, &d).expect("work"));
             let (p, q) = (p.expect("it divides"), q.expect("it divides"));
             prop_assert!(s.quotient(&d, &c).expect("work").is_some(), "{d:?} without {c:?}");
-            // nothing is left in common: along no variable, at a random point
+            // no common divisor is left: along no variable, at a random point
             let point: Vec<u64> = (0..5).map(|_| s.number()).collect();
             for v in 0..5 {
                 let [p, q] = [&p, &q].map(|p| image(&s.f, p, &point, v));
@@ -512,7 +512,7 @@ mod tests {
             prop_assert_eq!(s.product(&p, &d).expect("work"), x);
         }
 
-        /// Factors give the whole again, and those drawn apart by their variables are told apart.
+        /// Factors multiply to the whole, and factors in different variables are separated.
         #[test]
         fn factors_multiply_to_the_whole(a in drawn(&Field::new(P)), b in drawn(&Field::new(P)), seed in any::<u64>()) {
             let mut s = algebra(seed);
@@ -547,8 +547,9 @@ mod tests {
         assert_eq!(s.product(&sum, &sum), Err(OverLimit));
     }
 
-    /// A pass over the terms is work, also where nothing is multiplied: copies without a power that all terms
-    /// share, images along a variable, a division by a number. Dense images are as long as the power is high.
+    /// Every pass over the terms counts as work, also without products: copies of polynomials whose
+    /// terms share no power, images along a variable, division by a number. Dense images are as long as
+    /// the power is high.
     #[test]
     fn what_is_copied_is_counted() {
         let mut s = algebra(3);
@@ -578,7 +579,7 @@ mod tests {
             s.divisor(&a, &b).expect("work");
         });
         assert!(images >= 1000 * 2000, "{images}");
-        // powers that no number of 32 bits holds are refused before, whatever work is left
+        // powers beyond 32 bits are refused at once, whatever work is left
         let high = power(40_000);
         assert_eq!(s.product(&high, &high), Err(OverLimit));
         assert_eq!(s.product(&power(u32::MAX), &high), Err(OverLimit));

@@ -255,7 +255,7 @@ pub fn nonzero_columns<'a>(n: usize, rows: impl Iterator<Item = &'a [u64]>) -> V
 /// Solves `sum_i y_i rows[i] = target` (each of shape n): a solution `y` with zeros for the rows that
 /// depend on earlier ones, or `None` when `target` is not in their span.
 pub fn express(field: Field, rows: &[&[u64]], target: &[u64]) -> Option<Vec<u64>> {
-    // columns that are zero everywhere say nothing
+    // columns that are zero everywhere give no condition
     let used = nonzero_columns(target.len(), rows.iter().copied().chain([target]));
     let short = |row: &[u64]| -> Vec<u64> { used.iter().map(|&c| row[c]).collect() };
     // echelon form of [rows | identity]: the right part remembers how each basis row was made
@@ -357,8 +357,8 @@ mod tests {
         rank
     }
 
-    /// Per column the others of all circuits through it: sets of columns that are dependent while every
-    /// smaller one is not.
+    /// Per column the other columns of all circuits through it: dependent sets of columns whose proper
+    /// subsets are all independent.
     fn companions_by_subsets(rows: &[Vec<i64>]) -> Vec<Vec<usize>> {
         let n = rows[0].len();
         let columns = |set: usize| (0..n).filter(move |c| set >> c & 1 == 1);
@@ -372,7 +372,7 @@ mod tests {
         (0..n).map(|c| (0..n).filter(|&d| d != c && together(c, d)).collect()).collect()
     }
 
-    /// Null vectors (0,1,1,0), (0,0,1,1): their difference holds columns 1 and 3 without 2.
+    /// Null vectors (0,1,1,0), (0,0,1,1): their difference contains columns 1 and 3 without 2.
     #[test]
     fn companions_are_more_than_a_basis_shows() {
         let mut v = Echelon::new(field(), 4);
@@ -390,14 +390,15 @@ mod tests {
         assert!(v.insert(&row([1, 2])));
         v.clear();
         assert_eq!((v.rank(), v.columns(), v.contains(&row([1, 2]))), (0, 2, false));
-        // the pivot of before is free again
+        // the former pivot is free again
         assert!(v.insert(&row([0, 3])) && v.insert(&row([1, 0])) && v.has_unit(0));
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
 
-        /// Full rows of large entries, with more pivots than products fit into one sum: at the largest prime.
+        /// Full rows of large entries at the largest prime, with more pivots than products fit into one
+        /// sum.
         #[test]
         fn wide_rows_of_large_entries(
             rank in 1usize..95,

@@ -1,8 +1,8 @@
-//! Elementary functions of balls. Every step is one of balls, so that what is left out is in the error of the
-//! result.
+//! Elementary functions of balls. All steps are ball operations, so truncation errors are in the error
+//! of the result.
 //!
-//! Sums of Taylor's series at an argument made small by halving, undone by squaring or by the double angle;
-//! inverse functions by a start in doubles and one series for the rest (Brent, Zimmermann 2010, "Modern
+//! Functions are Taylor sums at an argument reduced by halving, which squaring or the double angle
+//! undoes. Inverse functions start from doubles and add one series (Brent, Zimmermann 2010, "Modern
 //! Computer Arithmetic", chapter 4).
 
 use crate::Ball;
@@ -20,7 +20,7 @@ impl<const N: usize> Ball<N> {
         self.div(&Self::from_i64(n)).unwrap_or(Self::ZERO)
     }
 
-    /// How often to halve an argument: series then take about as many terms as there are halvings.
+    /// Number of halvings of an argument; series then take about as many terms.
     fn halvings(&self) -> i64 {
         let small = 8 + Self::BITS / 48;
         (self.bound_log2().max(-1e6) as i64 + small).max(0)
@@ -36,7 +36,7 @@ impl<const N: usize> Ball<N> {
             let factorial = if step == 1 { last } else { last * (last - 1) };
             term = term.mul(&x).over(sign * factorial);
             if term.is_zero() || term.bound_log2() < sum.bound_log2() - (Self::BITS + 8) as f64 {
-                // what follows is less than this term
+                // the remainder is less than this term
                 return sum.widened(term.bound_log2() + 1.0);
             }
             sum = sum.add(&term);
@@ -120,7 +120,7 @@ impl<const N: usize> Ball<N> {
         if y.is_zero() && !x.is_positive() {
             return None;
         }
-        // exponents aside, so that doubles hold them
+        // common exponent removed, so that doubles hold both
         let place = x.exponent_of_size().max(y.exponent_of_size());
         let (near_x, near_y) = (x.shifted(-place).to_f64(), y.shifted(-place).to_f64());
         let about = Self::from_f64(near_y.atan2(near_x));
@@ -154,9 +154,9 @@ mod tests {
     const BITS: usize = 640;
     const ROUND: RoundingMode = RoundingMode::None;
 
-    /// The same number in another arithmetic.
+    /// The same number in the other library.
     fn other<const N: usize>(x: &Ball<N>) -> BigFloat {
-        // digit by digit of 32 bits
+        // in digits of 32 bits
         let (mut out, mut rest) = (BigFloat::from_i32(0, BITS), *x);
         while !rest.is_zero() {
             let part = Ball::<N>::from_f64(rest.to_f64());
@@ -166,7 +166,7 @@ mod tests {
         out
     }
 
-    /// The distance to a number of the other arithmetic, as a binary logarithm.
+    /// Binary logarithm of the distance to a number of the other library.
     fn off<const N: usize>(x: &Ball<N>, y: &BigFloat) -> f64 {
         let off = other(x).sub(y, BITS, ROUND);
         let Some((words, _, sign, exponent, _)) = off.as_raw_parts() else { return f64::INFINITY };
@@ -179,8 +179,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
 
-        /// Against the functions of an independent library at twice the digits: the true value is in the
-        /// ball, and the ball is narrow.
+        /// Functions compared with those of an independent library at twice the digits: the ball
+        /// contains the true value and is narrow.
         #[test]
         fn functions_agree_with_another_library(m in any::<i64>(), place in -70i64..-56) {
             let mut consts = Consts::new().expect("constants");

@@ -20,10 +20,11 @@ pub struct Field {
 }
 
 impl Field {
-    /// How many products of two elements may be added to a settled sum: `p 2^64 + 8 p^2 < 2 p 2^64`.
+    /// Number of products of two elements that may be added to a settled sum: `p 2^64 + 8 p^2 < 2 p
+    /// 2^64`.
     pub const LAZY: usize = 8;
 
-    /// The field of the prime `p`; `p` must be an odd prime between 2^60 and 2^61 (the caller's duty).
+    /// The field of the prime `p`; the caller must pass an odd prime between 2^60 and 2^61.
     pub fn new(p: u64) -> Self {
         debug_assert!(p > 1 << 60 && p < 1 << 61 && p % 2 == 1);
         let mut inv = p; // Newton: doubles the number of right bits
@@ -64,7 +65,7 @@ impl Field {
         if a < 0 { self.neg(m) } else { m }
     }
 
-    /// The image of `num / den`; `den` must not be a multiple of `p` (true of any small one).
+    /// The image of `num / den`; `den` must not be a multiple of `p`.
     pub fn from_ratio(&self, num: i64, den: i64) -> u64 {
         self.mul(self.from_i64(num), self.inv(self.from_i64(den)))
     }
@@ -99,8 +100,8 @@ impl Field {
         self.redc(u128::from(a) * u128::from(b))
     }
 
-    /// An element that is `a b`, below `2p` but maybe not below p, for `a < 4p` and `b < 2p`:
-    /// `t < 8 p^2 <= p 2^64`.
+    /// An element equal to `a b`, below `2p` but not always below p, for `a < 4p` and `b < 2p`: `t < 8
+    /// p^2 <= p 2^64`.
     #[inline]
     pub(crate) fn loose_product(&self, a: u64, b: u64) -> u64 {
         let t = u128::from(a) * u128::from(b);
@@ -108,7 +109,7 @@ impl Field {
         ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64
     }
 
-    /// What is below `4p`, below `2p`.
+    /// Reduces a number below `4p` to one below `2p`.
     #[inline]
     pub(crate) fn loosely(&self, a: u64) -> u64 {
         a.min(a.wrapping_sub(2 * self.p))
@@ -160,7 +161,7 @@ impl Field {
         if sum >= bound { sum - bound } else { sum }
     }
 
-    /// The element that a settled sum plus at most [`Field::LAZY`] products stands for.
+    /// The element of a settled sum plus at most [`Field::LAZY`] products.
     #[inline]
     pub fn reduce(&self, sum: u128) -> u64 {
         self.redc(self.settle(sum))

@@ -4,20 +4,20 @@ use crate::divisor::Algebra;
 use crate::groebner::OverLimit;
 use crate::multivariate::Polynomial;
 
-/// Work of a power of a fraction that is kept, beside its terms.
+/// Work per power of a fraction that is stored, besides its terms.
 const POWER: u64 = 64;
 
 /// `numerator / denominator` without a common divisor; the denominator's leading coefficient is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fraction {
-    /// Above.
+    /// Numerator polynomial.
     pub numerator: Polynomial,
-    /// Below.
+    /// Denominator polynomial, with leading coefficient one.
     pub denominator: Polynomial,
 }
 
 impl Fraction {
-    /// The number of terms above and below.
+    /// Number of terms of numerator and denominator together.
     pub fn terms(&self) -> usize {
         self.numerator.len() + self.denominator.len()
     }
@@ -27,21 +27,21 @@ impl Fraction {
         self.numerator.is_empty()
     }
 
-    /// True if a variable occurs.
+    /// True if the variable `v` occurs.
     pub fn holds(&self, v: u32) -> bool {
         self.numerator.terms_with(v) > 0 || self.denominator.terms_with(v) > 0
     }
 }
 
 /// # Errors
-/// All of these end with [`OverLimit`] when the work is used up.
+/// All functions return [`OverLimit`] when the work is used up.
 impl Algebra {
     /// A polynomial as a fraction.
     pub fn whole(&self, numerator: Polynomial) -> Fraction {
         Fraction { numerator, denominator: Polynomial::constant(self.f.one()) }
     }
 
-    /// A fraction without a common divisor whose denominator still has any leading coefficient.
+    /// A fraction in lowest terms from a denominator with any leading coefficient.
     fn settled(&self, numerator: Polynomial, denominator: Polynomial) -> Fraction {
         let scale = self.f.inv(self.leading(&denominator));
         Fraction {
@@ -85,7 +85,7 @@ impl Algebra {
     /// # Errors
     /// [`OverLimit`].
     pub fn sum(&mut self, a: &Fraction, b: &Fraction) -> Result<Fraction, OverLimit> {
-        // only what the denominators share can cancel (Henrici 1956, doi:10.1145/320815.320818)
+        // only common divisors of the denominators can cancel (Henrici 1956, doi:10.1145/320815.320818)
         let common = self.divisor(&a.denominator, &b.denominator)?;
         let of_b = self.over(&b.denominator, &common)?;
         let of_a = self.over(&a.denominator, &common)?;
@@ -123,9 +123,9 @@ impl Algebra {
         if degree == 0 {
             return Ok(self.whole(p.clone()));
         }
-        // all powers are kept
+        // all powers are stored
         self.work.take(POWER * u64::from(degree))?;
-        // sum of c_k n^k d^(m-k), over d^m
+        // sum of c_k n^k d^(m-k), divided by d^m
         let mut powers = vec![[Polynomial::constant(self.f.one()), Polynomial::constant(self.f.one())]];
         for k in 0..degree as usize {
             let next = [
@@ -191,7 +191,8 @@ mod tests {
     use crate::groebner::Work;
     use crate::{Field, SplitMix64};
 
-    /// Random expressions: what comes out has the value of the operations on numbers, and is in lowest terms.
+    /// Random expressions: each result has the value of the operations on numbers, and is in lowest
+    /// terms.
     #[test]
     fn fractions_are_their_values() {
         let f = Field::new((1 << 60) + 33);

@@ -1,4 +1,4 @@
-//! Groebner bases in the field, and what they say of a zero-dimensional ideal.
+//! Groebner bases in the field, and properties of zero-dimensional ideals.
 //!
 //! The order is by weighted degree, then reverse lexicographic. Pairs are chosen by the criteria of Gebauer
 //! and Möller (1988, doi:10.1016/S0747-7171(88)80048-8); all pairs of the lowest degree are reduced at once,
@@ -9,27 +9,27 @@ use std::cmp::Ordering;
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, interrupt};
 
-/// What may be done: products of coefficients, counted down.
+/// Limit of work in products of coefficients, counted down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Work {
-    /// What is left.
+    /// Remaining work.
     pub left: u64,
-    /// True once more was asked for than was left. Without it [`OverLimit`] comes from a power above 255,
-    /// which no amount of work allows.
+    /// True once the limit was reached. Otherwise [`OverLimit`] is a power above 255, which no limit
+    /// allows.
     pub used_up: bool,
 }
 
-/// The work is beyond its limit.
+/// Error: the limit of work was reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OverLimit;
 
 impl Work {
-    /// So much of it.
+    /// Limit of `left` products.
     pub const fn new(left: u64) -> Self {
         Self { left, used_up: false }
     }
 
-    /// Takes so much.
+    /// Takes `amount` from the remaining work.
     ///
     /// # Errors
     /// [`OverLimit`] when less is left.
@@ -42,22 +42,22 @@ impl Work {
     }
 }
 
-/// Monomials by number, so that equal ones are the same.
+/// Monomials by number; equal monomials have the same number.
 #[derive(Debug, Clone)]
 struct Table {
     weights: Vec<u32>,
     exponents: Vec<u8>,
     degree: Vec<u32>,
-    /// A bit per variable modulo 64 that occurs.
+    /// Bit mask of the variables that occur, modulo 64.
     mask: Vec<u64>,
-    /// The sum of exponents times `keys`, so that the hash of a product is a sum.
+    /// Hash: the sum of exponents times `keys`, so that the hash of a product is a sum.
     hash: Vec<u64>,
     keys: Vec<u64>,
-    /// Open addressing by hash; a power of two of places, at most half of them taken.
+    /// Open addressing by hash; the size is a power of two, at most half of it is used.
     slots: Vec<u32>,
 }
 
-/// No monomial.
+/// Empty slot of the hash table.
 const EMPTY: u32 = u32::MAX;
 
 impl Table {
@@ -79,7 +79,7 @@ impl Table {
         &self.exponents[m as usize * n..(m as usize + 1) * n]
     }
 
-    /// The place of the monomial with this hash of which `is` holds, or the place where it goes.
+    /// The slot of the monomial with this hash for which `is` is true, or the slot where it goes.
     fn slot(&self, hash: u64, is: impl Fn(u32) -> bool) -> usize {
         let last = self.slots.len() - 1;
         let mut at = (hash >> 20) as usize & last;
@@ -123,7 +123,7 @@ impl Table {
         Ok(self.put(&dense))
     }
 
-    /// Exponent by exponent by a rule.
+    /// Combines two monomials exponent by exponent.
     fn combined(&mut self, a: u32, b: u32, rule: impl Fn(u8, u8) -> Option<u8>) -> Result<u32, OverLimit> {
         let both = self.of(a).iter().zip(self.of(b));
         let dense: Option<Vec<u8>> = both.map(|(&x, &y)| rule(x, y)).collect();
@@ -146,7 +146,7 @@ impl Table {
         self.combined(a, b, |x, y| Some(x.max(y)))
     }
 
-    /// `a / b`, where b divides a.
+    /// The quotient `a / b`, where b divides a.
     fn quotient(&mut self, a: u32, b: u32) -> Result<u32, OverLimit> {
         self.combined(a, b, u8::checked_sub)
     }
@@ -163,8 +163,8 @@ impl Table {
 
     fn compare(&self, a: u32, b: u32) -> Ordering {
         self.degree[a as usize].cmp(&self.degree[b as usize]).then_with(|| {
-            // of two monomials of one degree the one with less of the last variable in which they differ is
-            // larger
+            // of two monomials of one degree, the one with the smaller exponent in the last variable in
+            // which they differ is larger
             self.of(b).iter().rev().cmp(self.of(a).iter().rev())
         })
     }
@@ -179,22 +179,22 @@ struct Pair {
     j: usize,
 }
 
-/// A Groebner basis, or what was found of one.
+/// Groebner basis, or the part of it that was found.
 #[derive(Debug, Clone)]
 pub struct Basis {
     field: Field,
     table: Table,
     rows: Vec<Row>,
-    /// Whether no other leading monomial divides the row's.
+    /// True, by row, if no other leading monomial divides that of the row.
     active: Vec<bool>,
-    /// True if it is a Groebner basis: the work was enough.
+    /// True if it is a Groebner basis, found within the limit of work.
     complete: bool,
 }
 
 impl Basis {
-    /// The Groebner basis of the ideal of `input`, in as many variables as there are `weights`, by at most
-    /// `work`. Where that is not enough the basis is not [complete](Self::is_complete), but all of its
-    /// elements are in the ideal.
+    /// The Groebner basis of the ideal of `input`, with one variable per entry of `weights`. If `work`
+    /// is not sufficient the basis is not [complete](Self::is_complete), but all its elements are in
+    /// the ideal.
     pub fn new(f: &Field, weights: &[u32], input: &[Polynomial], work: &mut Work) -> Self {
         let mut out = Self {
             field: *f,
@@ -277,10 +277,10 @@ impl Basis {
         (0..self.rows.len()).find(|&i| self.active[i] && self.table.divides(self.rows[i][0].0, m))
     }
 
-    /// What is left of the rows when they are reduced by the basis and by each other: rows with leading
-    /// monomials that are no multiples of those of the basis, each another.
+    /// Remainders of the rows, reduced by the basis and by each other: rows with different leading
+    /// monomials that are no multiples of those of the basis.
     fn reduced(&mut self, rows: Vec<Row>, monic: bool, work: &mut Work) -> Result<Vec<Row>, OverLimit> {
-        // every monomial that may occur, and the row that removes it
+        // every monomial that may occur, with the row that removes it
         let mut place: Vec<usize> = Vec::new();
         let mut monomials: Vec<u32> = Vec::new();
         let mut removers: Vec<Row> = Vec::new();
@@ -367,7 +367,7 @@ impl Basis {
         Ok(out.map(|row| row.into_iter().map(|(c, x)| (monomials[c], x)).collect()).collect())
     }
 
-    /// Puts an element in: pairs by the criteria of Gebauer and Möller.
+    /// Adds an element, with its pairs by the criteria of Gebauer and Möller.
     fn insert(&mut self, row: Row, pairs: &mut Vec<Pair>, work: &mut Work) -> Result<(), OverLimit> {
         let (h, lead) = (self.rows.len(), row[0].0);
         let active: Vec<usize> = (0..h).filter(|&i| self.active[i]).collect();
@@ -403,7 +403,8 @@ impl Basis {
         Ok(())
     }
 
-    /// The remainder of a polynomial; of a complete basis it is zero exactly for what is in the ideal.
+    /// The remainder of a polynomial. For a complete basis it is zero exactly for elements of the
+    /// ideal.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -413,8 +414,8 @@ impl Basis {
         Ok(rest.first().map_or_else(Polynomial::default, |r| self.polynomial(r)))
     }
 
-    /// The monomials that are no multiples of leading ones, up to `most` of them: a basis of the quotient
-    /// ring. `None` when there are more.
+    /// The monomials that are no multiples of leading ones: a basis of the quotient ring. `None` if
+    /// there are more than `most`.
     fn standard(&mut self, most: usize) -> Result<Option<Vec<u32>>, OverLimit> {
         let n = self.table.weights.len();
         let one = self.table.put(&vec![0; n]);
@@ -440,8 +441,8 @@ impl Basis {
         Ok(Some(out))
     }
 
-    /// How many solutions there are with their multiplicity: the dimension of the quotient ring, if it is at
-    /// most `most`.
+    /// Number of solutions with multiplicity, the dimension of the quotient ring; `None` if it exceeds
+    /// `most`.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -449,8 +450,8 @@ impl Basis {
         Ok(self.standard(most)?.map(|m| m.len()))
     }
 
-    /// The minimal polynomial of an element in the quotient ring, constant term first, if its degree is at
-    /// most `most`.
+    /// The minimal polynomial of an element in the quotient ring, constant term first; `None` if its
+    /// degree exceeds `most`.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -462,7 +463,7 @@ impl Basis {
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let f = self.field;
         let mut power = self.remainder(&Polynomial::constant(f.one()), work)?;
-        // what is left of a power, and by which combination of powers
+        // remainder of a power, and the combination of powers that gives it
         let mut rows: Vec<(Polynomial, Vec<u64>)> = Vec::new();
         for k in 0..=most {
             let mut rest = power.clone();
@@ -504,7 +505,7 @@ mod tests {
         Field::new((1 << 60) + 33)
     }
 
-    /// `[(coefficient, exponents)]`
+    /// Polynomial from terms `(coefficient, exponents)`.
     fn polynomial(terms: &[(i64, Vec<u32>)]) -> Polynomial {
         let f = field();
         let mut out = Polynomial::default();
@@ -515,7 +516,8 @@ mod tests {
         out
     }
 
-    /// The textbook order, written down again: dense exponents of the leading term.
+    /// Leading term in the textbook order, implemented independently: dense exponents and the
+    /// coefficient.
     fn leading(p: &Polynomial, weights: &[u32]) -> Option<(Vec<u32>, u64)> {
         let dense = |m: &Monomial| {
             let mut out = vec![0u32; weights.len()];
@@ -539,7 +541,7 @@ mod tests {
         out
     }
 
-    /// Division step by step; zero when all of it goes.
+    /// Remainder of a division step by step.
     fn divided(mut p: Polynomial, by: &[Polynomial], weights: &[u32]) -> Polynomial {
         let f = field();
         'next: while let Some((lead, c)) = leading(&p, weights) {
@@ -556,7 +558,7 @@ mod tests {
         p
     }
 
-    /// Buchberger's criterion, and that the ideal holds what was put in; by division only.
+    /// True if Buchberger's criterion holds and the ideal contains the input; by division only.
     fn is_basis_of(basis: &Basis, input: &[Polynomial], weights: &[u32]) -> bool {
         let f = field();
         let elements = basis.elements();
@@ -578,7 +580,7 @@ mod tests {
     }
 
     proptest! {
-        /// Random ideals, of any dimension.
+        /// Random ideals of any dimension.
         #[test]
         fn what_is_called_a_basis_is_one(
             input in prop::collection::vec(terms(3), 1..4),
@@ -590,7 +592,7 @@ mod tests {
             prop_assert!(is_basis_of(&basis, &input, &weights));
         }
 
-        /// The equations of a few points: x runs through given numbers, y and z are polynomials of it.
+        /// Equations of a few points: x runs through given numbers, y and z are polynomials of it.
         #[test]
         fn solutions_are_counted(mut xs in prop::collection::vec(-9i64..10, 1..6), a in -3i64..4, b in 1i64..4) {
             let f = field();
@@ -610,7 +612,10 @@ mod tests {
             prop_assert_eq!(basis.dimension(50), Ok(Some(xs.len())));
             let mut values = |v: u32| {
                 let element = Polynomial::variable(&f, v);
-                let minimal = basis.minimal_polynomial(&element, 50, &mut ENOUGH.clone()).expect("work").expect("finite");
+                let minimal = basis
+                    .minimal_polynomial(&element, 50, &mut ENOUGH.clone())
+                    .expect("work")
+                    .expect("finite");
                 crate::polynomial::distinct_roots(&f, &minimal)
             };
             let found = [values(0), values(1), values(2)];
@@ -622,7 +627,7 @@ mod tests {
         }
     }
 
-    /// A case in which a published program was wrong, by hand: x y = 1 and y = -x^2/5 leave x^3 = -5.
+    /// A case in which a published program was wrong, by hand: x y = 1 and y = -x^2/5 give x^3 = -5.
     #[test]
     fn a_basis_by_hand() {
         let f = field();
@@ -642,7 +647,7 @@ mod tests {
         assert_eq!(Basis::new(&f, &[1, 1], &input[..1], &mut ENOUGH.clone()).dimension(5), Ok(None));
     }
 
-    /// Katsura's fourth system has sixteen solutions; with too little work nothing false is said.
+    /// Katsura's fourth system has sixteen solutions; with too little work no false statement results.
     #[test]
     fn work_ends() {
         let f = field();
@@ -677,7 +682,7 @@ mod tests {
         let mut short = Work::new(needed / 2);
         let part = Basis::new(&f, &[1; 5], &input, &mut short);
         assert!(!part.is_complete() && short.used_up);
-        // all that was found is in the ideal
+        // all elements found are in the ideal
         assert!(part.elements().iter().all(|p| divided(p.clone(), &basis.elements(), &[1; 5]).is_empty()));
     }
 }

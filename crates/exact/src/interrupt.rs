@@ -1,8 +1,9 @@
-//! Ends work for which nobody waits any longer.
+//! Interruption of long computations.
 //!
-//! The loops that take long call [`check`]; whoever runs them says with [`hearing`] whether they go on. An
-//! end unwinds the stack up to there, so that no result in between has to carry it. Without [`hearing`]
-//! nothing is asked, and no clock is read. No answer depends on it: there is either the whole answer or none.
+//! Long loops call [`check`]; the caller provides a callback with [`hearing`] that ends them. An
+//! interruption unwinds the stack up to there, so no intermediate result has to carry it. Without
+//! [`hearing`] no callback is called and no clock is read. Answers do not depend on interruption: there
+//! is either the whole answer or none.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -10,40 +11,40 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How it is known whether the work of a thread goes on.
-enum Hearing {
-    /// By asking, whenever the interval has passed.
-    Asked { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
-    /// By what another thread says.
-    Told(Arc<AtomicBool>),
+/// Source of the decision to continue, for the work of one thread.
+enum Cancellation {
+    /// Callback of this thread, called when the interval has passed.
+    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
+    /// Flag that another thread sets.
+    Flag(Arc<AtomicBool>),
 }
 
-/// What unwinds.
+/// Payload of the unwinding.
 struct Interrupted;
 
 thread_local! {
-    static HEARING: Cell<Option<Hearing>> = const { Cell::new(None) };
+    static CANCELLATION: Cell<Option<Cancellation>> = const { Cell::new(None) };
 }
 
-/// Runs `work`, and asks `goes_on` on this thread whenever `interval` has passed, at the next [`check`]. None
-/// if it said false; panics of the work go on.
+/// Runs `work` and calls `goes_on` on this thread whenever `interval` has passed, at the next
+/// [`check`]. Returns `None` if it returned false; panics of the work propagate.
 pub fn hearing<T>(
     interval: Duration,
     goes_on: impl FnMut() -> bool + 'static,
     work: impl FnOnce() -> T,
 ) -> Option<T> {
-    run(Hearing::Asked { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
+    run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
 }
 
-/// Runs `work` until `wanted` is false: None then. [`parts`] carries this to other threads.
+/// Runs `work` until `wanted` is false, then returns `None`. [`parts`] carries this to other threads.
 pub fn while_wanted<T>(wanted: Arc<AtomicBool>, work: impl FnOnce() -> T) -> Option<T> {
-    run(Hearing::Told(wanted), work)
+    run(Cancellation::Flag(wanted), work)
 }
 
-fn run<T>(own: Hearing, work: impl FnOnce() -> T) -> Option<T> {
-    let before = HEARING.replace(Some(own));
+fn run<T>(own: Cancellation, work: impl FnOnce() -> T) -> Option<T> {
+    let before = CANCELLATION.replace(Some(own));
     let done = catch_unwind(AssertUnwindSafe(work));
-    HEARING.set(before);
+    CANCELLATION.set(before);
     match done {
         Ok(done) => Some(done),
         Err(reason) if reason.is::<Interrupted>() => None,
@@ -51,43 +52,43 @@ fn run<T>(own: Hearing, work: impl FnOnce() -> T) -> Option<T> {
     }
 }
 
-/// Called by loops that take long, at least every tenth of a second. Does not return if the work is to end.
+/// Called by long loops, at least every tenth of a second. Does not return if the work must end.
 pub fn check() {
-    // what is asked may ask for other work on this thread
-    let Some(mut hearing) = HEARING.take() else { return };
+    // the callback may run other work on this thread
+    let Some(mut hearing) = CANCELLATION.take() else { return };
     let goes_on = match &mut hearing {
-        Hearing::Told(wanted) => wanted.load(Ordering::Relaxed),
-        Hearing::Asked { last, interval, .. } if last.elapsed() < *interval => true,
-        Hearing::Asked { goes_on, last, .. } => {
+        Cancellation::Flag(wanted) => wanted.load(Ordering::Relaxed),
+        Cancellation::Callback { last, interval, .. } if last.elapsed() < *interval => true,
+        Cancellation::Callback { goes_on, last, .. } => {
             let goes_on = goes_on();
             *last = Instant::now();
             goes_on
         }
     };
-    HEARING.set(Some(hearing));
+    CANCELLATION.set(Some(hearing));
     if !goes_on {
         resume_unwind(Box::new(Interrupted));
     }
 }
 
-/// What the parts of the work of this thread need to end with it on other threads.
+/// Handle with which the parts of this thread's work on other threads end with it.
 #[derive(Debug, Clone)]
-pub struct Parts(Option<Arc<AtomicBool>>);
+pub(crate) struct Parts(Option<Arc<AtomicBool>>);
 
-/// For the parts of the work of this thread.
-pub fn parts() -> Parts {
-    let hearing = HEARING.take();
+/// Handle for the parts of the work of this thread.
+pub(crate) fn parts() -> Parts {
+    let hearing = CANCELLATION.take();
     let wanted = match &hearing {
-        Some(Hearing::Told(wanted)) => Some(wanted.clone()),
+        Some(Cancellation::Flag(wanted)) => Some(wanted.clone()),
         _ => None,
     };
-    HEARING.set(hearing);
+    CANCELLATION.set(hearing);
     Parts(wanted)
 }
 
 impl Parts {
-    /// Runs a part on the thread that calls this. It ends with the whole.
-    pub fn part<T>(&self, work: impl FnOnce() -> T) -> T {
+    /// Runs a part on the calling thread. It ends with the whole.
+    pub(crate) fn part<T>(&self, work: impl FnOnce() -> T) -> T {
         match &self.0 {
             None => work(),
             Some(wanted) => match while_wanted(wanted.clone(), work) {
@@ -118,7 +119,7 @@ mod tests {
         let before = at.clone();
         let ended = hearing(Duration::ZERO, move || before.get() < 5, || count(100, &at));
         assert_eq!((ended, at.get()), (None, 5));
-        // nothing is left of it
+        // nothing remains after the interruption
         assert_eq!(count(100, &at), 99);
     }
 

@@ -19,13 +19,13 @@
 //! - [`dense`]: dependencies among the columns of a dense matrix;
 //! - [`reconstruct`]: rational functions of one variable through points;
 //! - [`certainty`]: the bound on the error probability;
-//! - [`interrupt`]: the end of work for which nobody waits any longer.
+//! - [`interrupt`]: interruption of long computations.
 //!
 //! Transcendental functions have no image in a prime field. Where they take part, the same algorithms run
 //! over real numbers of many digits with error bounds:
-//! - [`scalars`]: what a field and a row space are to these algorithms;
+//! - [`scalars`]: the interface of fields and row spaces for these algorithms;
 //! - [`ball`]: the numbers; `elementary`: their functions;
-//! - [`reals`]: row spaces over them, in which what is zero is told by a gap.
+//! - [`reals`]: row spaces over them, in which a gap separates zeros from other numbers.
 
 pub mod ball;
 pub mod certainty;
@@ -40,6 +40,7 @@ mod gcd;
 pub mod groebner;
 pub mod interrupt;
 pub mod multivariate;
+pub mod parallel;
 pub mod polynomial;
 pub mod prime;
 pub mod radical;

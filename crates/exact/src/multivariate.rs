@@ -54,12 +54,12 @@ fn binomial(n: u64, k: u64) -> u64 {
 }
 
 impl Polynomial {
-    /// A number.
+    /// A constant polynomial.
     pub fn constant(x: u64) -> Self {
         Self { terms: (x != 0).then(|| (Monomial::new(), x)).into_iter().collect() }
     }
 
-    /// A variable.
+    /// A single variable.
     pub fn variable(f: &Field, v: u32) -> Self {
         Self { terms: [(vec![(v, 1)], f.one())].into() }
     }
@@ -84,7 +84,7 @@ impl Polynomial {
         self.terms.keys().map(|m| m.iter().map(|p| p.1).sum()).max().unwrap_or(0)
     }
 
-    /// The number that it is, if it is one.
+    /// The number that it equals; `None` if it is not constant.
     pub fn as_constant(&self) -> Option<u64> {
         match self.terms.first_key_value() {
             None => Some(0),
@@ -108,7 +108,7 @@ impl Polynomial {
         self.terms.keys().flat_map(|m| m.iter().map(|p| p.1)).max().unwrap_or(0)
     }
 
-    /// What each power of a variable is multiplied with.
+    /// The coefficient of each power of a variable.
     pub fn split(&self, v: u32) -> BTreeMap<u32, Self> {
         let mut out: BTreeMap<u32, Self> = BTreeMap::new();
         for (m, &c) in &self.terms {
@@ -136,7 +136,7 @@ impl Polynomial {
         out
     }
 
-    /// In how many terms a variable occurs.
+    /// Number of terms in which a variable occurs.
     pub fn terms_with(&self, v: u32) -> usize {
         self.terms.keys().filter(|m| m.iter().any(|p| p.0 == v)).count()
     }
@@ -189,9 +189,9 @@ impl Polynomial {
         out
     }
 
-    /// Number of products of coefficients, and of terms that stay as they are, in
-    /// [`replaced`](Self::replaced) with a value of this many terms: exact where no two products of monomials
-    /// of the value are equal, otherwise an upper bound.
+    /// Number of products of coefficients, and of unchanged terms, in [`replaced`](Self::replaced) with
+    /// a value of `terms` terms. It is exact if no two products of monomials of the value are equal,
+    /// otherwise an upper bound.
     pub fn products_of_replaced(&self, v: u32, terms: usize) -> u64 {
         let (power, t) = (u64::from(self.degree_in(v)), terms as u64);
         // the power k has (k + t - 1 over k) terms; the sum of these for k < p is (p + t - 1 over t)
@@ -207,7 +207,7 @@ impl Polynomial {
         own.fold(powers, u64::saturating_add)
     }
 
-    /// With `value` in place of a variable.
+    /// The polynomial with `value` in place of a variable.
     pub fn replaced(&self, f: &Field, v: u32, value: &Self) -> Self {
         let mut powers = vec![Self::constant(f.one())];
         let mut out = Self::default();
@@ -230,7 +230,8 @@ impl Polynomial {
         out
     }
 
-    /// With other names for its variables; `None` where one has none. Names must keep the variables apart.
+    /// The polynomial with renamed variables; `None` if one has no name. Different variables need
+    /// different names.
     pub fn renamed(&self, name: impl Fn(u32) -> Option<u32>) -> Option<Self> {
         let monomial = |m: &Monomial| {
             let mut m: Monomial = m.iter().map(|&(v, e)| Some((name(v)?, e))).collect::<Option<_>>()?;
@@ -254,12 +255,12 @@ mod tests {
     use super::*;
 
     thread_local! {
-        /// Number of calls of [`Polynomial::put`]: one for each product of coefficients and each term that is
-        /// copied.
+        /// Number of calls of [`Polynomial::put`]: one for each product of coefficients and each term
+        /// that is copied.
         pub(super) static PUT: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
     }
 
-    /// Terms that `replaced` really puts, and the count made before.
+    /// Number of terms that `replaced` adds, and the number predicted.
     fn put_and_counted(p: &Polynomial, value: &Polynomial) -> (u64, u64) {
         let f = Field::new((1 << 60) + 33);
         let counted = p.products_of_replaced(0, value.len());
@@ -268,8 +269,8 @@ mod tests {
         (PUT.get(), counted)
     }
 
-    /// A sum of as many variables, the first of which is `x1`, and a polynomial with one term for each pair
-    /// of exponents: of `x0`, and of a variable that occurs nowhere else.
+    /// A sum of `terms` variables, the first of which is `x1`, and a polynomial with one term for each
+    /// exponent: of `x0` and of a variable that occurs nowhere else.
     fn sum_and_terms(terms: u32, exponents: &[u32]) -> (Polynomial, Polynomial) {
         let f = Field::new((1 << 60) + 33);
         let (mut value, mut p) = (Polynomial::default(), Polynomial::default());
@@ -281,8 +282,8 @@ mod tests {
         (value, p)
     }
 
-    /// Operations counted beforehand are those done, for sums of different variables: one power among many
-    /// low ones too.
+    /// The predicted number of operations equals the number done, for sums of different variables, also
+    /// with one power among many low ones.
     #[test]
     fn products_of_what_is_put_in() {
         let exponents: [&[u32]; 9] =
@@ -300,7 +301,7 @@ mod tests {
         assert_eq!(put_and_counted(&p, &value), (3 * 35 + 21 + 3, 3 * 35 + 21 + 3));
     }
 
-    /// Where products of monomials are equal, fewer are done than are counted.
+    /// Fewer operations are done than predicted if products of monomials are equal.
     #[test]
     fn equal_products_are_counted_apart() {
         let f = Field::new((1 << 60) + 33);
@@ -313,7 +314,7 @@ mod tests {
         assert_eq!(counted, 3 * (1 + 3 + 6 + 10 + 15 + 21) + 28 + 6);
     }
 
-    /// Counts that are too large for a number of 64 bits, long before the powers are formed.
+    /// Predictions beyond 64 bits saturate, long before the powers are formed.
     #[test]
     fn counts_beyond_64_bits_are_the_largest() {
         let f = Field::new((1 << 60) + 33);

@@ -129,8 +129,8 @@ pub fn root(f: &Field, a: &[u64], rng: &mut SplitMix64) -> Option<u64> {
     (linear.len() == 2).then(|| f.neg(f.mul(linear[0], f.inv(linear[1]))))
 }
 
-/// How many different roots a polynomial that is not zero has in the algebraic closure, where its degree is
-/// below the characteristic: its degree less that of the common divisor with its derivative.
+/// Number of different roots of a non-zero polynomial in the algebraic closure, if its degree is below
+/// the characteristic: its degree minus that of the common divisor with its derivative.
 pub fn distinct_roots(f: &Field, a: &[u64]) -> usize {
     let a = trim(a.to_vec());
     let slope = a.iter().enumerate().skip(1).map(|(k, &c)| f.mul(c, f.from_u64(k as u64)));

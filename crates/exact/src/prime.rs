@@ -2,12 +2,13 @@
 
 use crate::{Field, SplitMix64};
 
-/// Why a field could not be made.
+/// Error of the choice of a field.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PrimeError {
-    /// The order is not usable.
+    /// Order that is not usable.
     #[error(
-        "the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime factor but 2, 3 and 5"
+        "the order of the roots of unity is {found}; expected a multiple of 4 up to 2^42 with no prime \
+         factor but 2, 3 and 5"
     )]
     Order {
         /// The order that was asked for.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::{Field, RootField, gcd};
 
-/// Largest numerator and denominator that [`Radical::recover`] believes in.
+/// Largest numerator and denominator that [`Radical::recover`] accepts.
 const BOUND: u64 = 1 << 20;
 
 /// A rational number in lowest terms, with a positive denominator.
@@ -23,13 +23,14 @@ impl Ratio {
         Self { num: self.num / g, den: self.den / g }
     }
 
-    /// The rational number with numerator and denominator up to 2^20 whose image is `value`, if there is one.
+    /// The rational number with numerator and denominator up to 2^20 whose image is `value`; `None`
+    /// without one.
     pub fn recover(field: &Field, value: u64) -> Option<Self> {
         Self::within(field, value, BOUND)
     }
 
-    /// The rational number with numerator and denominator up to `bound` whose image is `value`, if there is
-    /// one.
+    /// The rational number with numerator and denominator up to `bound` whose image is `value`; `None`
+    /// without one.
     pub fn within(field: &Field, value: u64, bound: u64) -> Option<Self> {
         // half-extended Euclid (Wang 1981, doi:10.1145/800206.806398)
         let (mut r0, mut r1) = (field.modulus(), field.to_u64(value));
@@ -44,8 +45,8 @@ impl Ratio {
     }
 }
 
-/// The number `a + b sqrt 2 + c sqrt 3 + d sqrt 6` with rational coefficients: what the cosines and
-/// sines of multiples of 15 degrees generate.
+/// Number `a + b sqrt 2 + c sqrt 3 + d sqrt 6` with rational coefficients, the field of cosines and
+/// sines of multiples of 15 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Radical {
     /// Coefficients of 1, sqrt 2, sqrt 3, sqrt 6.
@@ -64,9 +65,9 @@ pub fn embeddings(order: u64) -> [u64; 4] {
 }
 
 impl Radical {
-    /// The number whose images under the four [`embeddings`] of `k` are `images`, if its coefficients
-    /// are small. Chance coincidence has a probability near 2^-19 per coefficient; the caller compares
-    /// with [`Radical::image`] in a second field.
+    /// The number whose images under the four [`embeddings`] of `k` are `images`; `None` if its
+    /// coefficients are not small. A coincidence has a probability near 2^-19 per coefficient; the
+    /// caller compares with [`Radical::image`] in a second field.
     pub fn recover(k: &RootField, images: [u64; 4]) -> Option<Self> {
         let f = &k.field;
         let quarter = f.from_ratio(1, 4);
@@ -103,7 +104,7 @@ impl Radical {
         self.coefficients.iter().zip(roots).map(|(q, r)| q.num as f64 / q.den as f64 * r).sum()
     }
 
-    /// How many of the four coefficients are not zero.
+    /// Number of the four coefficients that are not zero.
     pub fn terms(&self) -> usize {
         self.coefficients.iter().filter(|q| q.num != 0).count()
     }
@@ -210,7 +211,8 @@ mod tests {
     fn embeddings_are_units_that_move_the_square_roots_in_all_four_ways() {
         for order in [24, 72, 120, 360, 600, 3600, 1_800_000, 360_000_000_000] {
             let all = embeddings(order);
-            // sqrt 2 = 2 cos 45 and sqrt 3 = 2 cos 30 go by the residue modulo 8 and 12, so modulo 24
+            // sqrt 2 = 2 cos 45 and sqrt 3 = 2 cos 30 depend on the residue modulo 8 and 12, so modulo
+            // 24
             assert_eq!(all.map(|a| a % 24), [1, 5, 7, 11], "{order}");
             assert_eq!(all.map(|a| gcd(a, order)), [1; 4], "{order}");
         }
@@ -225,7 +227,8 @@ mod tests {
         let f = &k.field;
         let [_, r2, r3, r6] = square_roots(&k);
         assert_eq!([f.mul(r2, r2), f.mul(r3, r3), f.mul(r6, r6)], [2, 3, 6].map(|x| f.from_i64(x)));
-        // exp(2 pi i 5 / 8) = -exp(2 pi i / 8): 5 and 7 modulo 8 and 12 turn the signs (-, -), (+, -), (-, +)
+        // exp(2 pi i 5 / 8) = -exp(2 pi i / 8): 5 and 7 modulo 8 and 12 give the signs (-, -), (+, -),
+        // (-, +)
         let signs = [(1, 1), (-1, -1), (1, -1), (-1, 1)];
         for (a, (s2, s3)) in embeddings(120).into_iter().zip(signs) {
             let [_, c2, c3, _] = square_roots(&k.conjugate(a));

@@ -1,14 +1,14 @@
 //! Real numbers of `64 N` bits as a field, and row spaces over them.
 //!
-//! What differs from zero is proven to, by the error bound of its ball. That something is zero cannot be
-//! computed: it is taken to be when its ball holds zero and is narrow, and the [`Gap`] says how far apart the
-//! two kinds were. Where they were not far apart nothing is decided, and the caller takes more digits.
+//! The error bound of a ball proves that a number is not zero. No computation proves that a number is
+//! zero: it counts as zero if its ball contains zero and is narrow, and the [`Gap`] is the margin
+//! between the two kinds. If the margin is small nothing is decided, and the caller takes more digits.
 
 use std::cell::Cell;
 
 use crate::{Ball, BallSum, Gap, RowSpace, Scalars, interrupt};
 
-/// Largest numerator and denominator that [`Scalars::rational`] believes in.
+/// Largest numerator and denominator that [`Scalars::rational`] accepts.
 const SMALL: i64 = 1 << 20;
 
 /// The field of real numbers of `64 N` bits.
@@ -72,7 +72,7 @@ impl<const N: usize> Scalars for Reals<N> {
         sum.ball()
     }
     fn rational(&self, a: &Ball<N>) -> Option<(i64, i64)> {
-        // its continued fraction, as far as the numbers stay small
+        // its continued fraction, as long as the numbers stay small
         let (mut before, mut now) = ((0i64, 1i64), (1i64, 0i64));
         let mut rest = *a;
         for _ in 0..40 {
@@ -93,16 +93,16 @@ impl<const N: usize> Scalars for Reals<N> {
     }
 }
 
-/// A row space over the reals in reduced row-echelon form, with a one at every pivot.
+/// Row space over the reals in reduced row-echelon form, with a one at every pivot.
 ///
-/// Eliminating with rows that were eliminated before multiplies their errors by every small pivot on the way.
-/// So the rows that were given are kept, and with them the numbers (without errors of their own) that make
-/// the reduced ones of them, about: a new row is first reduced by the given ones, whose errors are those of
-/// the input, and what rounding leaves at the pivots, which is little, by the reduced ones. Where these have
-/// become wide they are made anew from the given ones: if `F = T G` is the identity at the pivots but for a
-/// matrix of norm d, the reduced rows differ from F by `2 d max |F|` at most (the a posteriori bound of Rump
-/// 2010, doi:10.1017/S096249291000005X). Bits are lost once for the condition of the rows then, not once for
-/// each pivot.
+/// Elimination with rows that were eliminated before multiplies their errors by every small pivot. So
+/// the given rows are kept, with the weights (numbers without errors of their own) that make the
+/// reduced rows of them, approximately. A new row is first reduced by the given rows, whose errors are
+/// those of the input; the small residues at the pivots are reduced by the reduced rows. When these
+/// have become wide they are recomputed from the given rows: if `F = T G` is the identity at the pivots
+/// up to a matrix of norm d, the reduced rows differ from F by `2 d max |F|` at most (the a posteriori
+/// bound of Rump 2010, doi:10.1017/S096249291000005X). Bits are then lost once for the condition of the
+/// rows, not once for each pivot.
 ///
 /// ```
 /// use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace};
@@ -118,25 +118,26 @@ impl<const N: usize> Scalars for Reals<N> {
 pub struct RealSpace<const N: usize> {
     columns: usize,
     rows: Vec<Vec<Ball<N>>>,
-    /// The independent rows as they came.
+    /// The independent rows as they were given.
     given: Vec<Vec<Ball<N>>>,
-    /// What makes the reduced rows of those, about: numbers without errors.
+    /// Weights that make the reduced rows of the given ones, approximately: numbers without errors.
     weights: Vec<Vec<Ball<N>>>,
     pivots: Vec<usize>,
     row_of: Vec<Option<usize>>,
     gap: Cell<Gap>,
-    /// Products that [`refine`](Self::refine) took.
+    /// Number of products that [`refine`](Self::refine) took.
     refined: u64,
 }
 
 impl<const N: usize> RealSpace<N> {
-    /// The largest exponent of a row; of one without digits that of one.
+    /// The largest exponent of a row; for a row without digits, 0.
     fn scale(row: &[Ball<N>]) -> f64 {
         let largest = row.iter().map(Ball::size_log2).fold(f64::NEG_INFINITY, f64::max);
         if largest == f64::NEG_INFINITY { 0.0 } else { largest }
     }
 
-    /// True if an entry counts as different from zero, in a row of this scale; the gap remembers.
+    /// True if an entry counts as different from zero, in a row of this scale; the gap records the
+    /// decision.
     fn differs(&self, entry: &Ball<N>, scale: f64) -> bool {
         if entry.is_exactly_zero() {
             return false;
@@ -151,7 +152,7 @@ impl<const N: usize> RealSpace<N> {
         !zero
     }
 
-    /// The row minus what the basis explains of it, and the numbers that take it from the given rows.
+    /// The residue of a row after reduction by the basis, and the weights of the given rows in it.
     fn reduced(&self, row: &[Ball<N>]) -> (Vec<Ball<N>>, Vec<Ball<N>>) {
         interrupt::check();
         let factors = self.pivots.iter().map(|&p| row[p].midpoint().neg());
@@ -171,14 +172,14 @@ impl<const N: usize> RealSpace<N> {
         (sums.iter().enumerate().map(of).collect(), taken)
     }
 
-    /// True if an entry of a reduced row is known too badly to be judged.
+    /// True if an entry of a reduced row is too uncertain to be judged.
     fn is_wide(&self) -> bool {
         let narrow = -0.75 * Ball::<N>::BITS as f64;
         let wide = |row: &Vec<Ball<N>>| row.iter().any(|x| x.radius_log2() - Self::scale(row) > narrow);
         self.rows.iter().any(wide)
     }
 
-    /// The reduced rows made anew from the given ones.
+    /// Recomputes the reduced rows from the given ones.
     fn refine(&mut self) {
         let products = self.rows.len() * self.rows.len() * self.columns;
         self.refined = self.refined.saturating_add(products as u64);
@@ -188,7 +189,7 @@ impl<const N: usize> RealSpace<N> {
         };
         let mut made: Vec<Vec<Ball<N>>> = self.weights.iter().map(made).collect();
         let one = Ball::from_i64(1);
-        // log2 of the sum of what differs from the identity, for each row
+        // log2 of the sum of the differences from the identity, for each row
         let off = |(i, row): (usize, &Vec<Ball<N>>)| {
             let of = |(j, &p): (usize, &usize)| if i == j { row[p].sub(&one) } else { row[p] }.bound_log2();
             let largest = self.pivots.iter().enumerate().map(of).fold(f64::NEG_INFINITY, f64::max);
@@ -376,7 +377,7 @@ mod tests {
     type Real = Ball<4>;
 
     proptest! {
-        /// Over the integers both kinds of spaces say the same.
+        /// Over the integers both kinds of spaces give the same results.
         #[test]
         fn the_same_as_modulo_a_prime(
             rows in prop::collection::vec(prop::collection::vec(-2i64..3, 6), 1..8),
@@ -385,7 +386,7 @@ mod tests {
             let f = Field::new((1 << 60) + 33);
             let mut prime = Echelon::new(f, 6);
             let mut real = RealSpace::new(Reals::<4>, 6);
-            // as real numbers: with a factor that no integer is
+            // as real numbers: with an irrational factor
             let factor = Real::from_i64(2).sqrt().expect("positive");
             for row in &rows {
                 let image: Vec<u64> = row.iter().map(|&x| f.from_i64(x)).collect();
@@ -416,8 +417,8 @@ mod tests {
         }
     }
 
-    /// Rows that are known to 20 digits less than they have are made anew, each time from all rows given: the
-    /// products are counted, 2 * 2 * 4 for the second row and 3 * 3 * 4 for the third.
+    /// Rows with an error of 20 digits above their last place are recomputed, each time from all given
+    /// rows. The products are counted: 2 * 2 * 4 for the second row and 3 * 3 * 4 for the third.
     #[test]
     fn rows_made_anew_are_counted() {
         let mut space = RealSpace::<4>::new(Reals, 4);
@@ -430,8 +431,8 @@ mod tests {
         assert_eq!((space.rank(), space.refined()), (3, 2 * 2 * 4 + 3 * 3 * 4));
     }
 
-    /// Rows `(1, x, x^2, ...)` whose pivots fall to 2^-70, eliminated in 256 bits: their products would be
-    /// far below any error.
+    /// Rows `(1, x, x^2, ...)` whose pivots fall to 2^-70, eliminated in 256 bits: the products of the
+    /// pivots would be far below any error.
     #[test]
     fn small_pivots_do_not_add_up() {
         let n = 20;
@@ -445,13 +446,13 @@ mod tests {
         let mut v = RealSpace::new(Reals::<4>, n);
         for (i, row) in rows.iter().enumerate() {
             assert!(v.insert(row) && v.rank() == i + 1);
-            // and what depends on them
+            // a dependent row
             let sum: Vec<Real> =
                 (0..n).map(|c| rows[..=i].iter().fold(Real::ZERO, |s, r| s.add(&r[c]))).collect();
             assert!(v.contains(&sum));
         }
         assert!(v.gap().nonzero < -55.0 && v.gap().zero < -128.0, "{:?}", v.gap());
-        // against the polynomial with these roots, which they are all orthogonal to
+        // against the polynomial with these roots, orthogonal to all rows
         let null = v.null_space().remove(0);
         for row in &rows {
             let value = Reals.dot(&Real::ZERO, row.iter().zip(&null));
@@ -473,10 +474,10 @@ mod tests {
         assert_eq!(rank(one.shifted(-60)), (true, true));
         // proven not to be zero, and nothing else is small
         assert_eq!(rank(one.shifted(-200)), (true, true));
-        // a quarter of the bits above what counts as zero, or not
+        // a quarter of the bits above the level of zeros, or less
         let gap = |nonzero: f64| Gap { nonzero, zero: -130.0 }.is_decisive(256);
         assert!(gap(-65.0) && !gap(-67.0));
-        // holds zero: clear where it is narrow
+        // contains zero: clear if it is narrow
         assert_eq!(rank(Real::ZERO.widened(-200.0)), (false, true));
         assert_eq!(rank(Real::ZERO.widened(-100.0)), (false, false));
         assert!(Gap { nonzero: -3.0, zero: -9.0 }.and(Gap::OPEN).zero == -9.0);

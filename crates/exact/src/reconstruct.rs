@@ -16,14 +16,14 @@ pub struct Abscissae {
 /// A rational function of one variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quotient {
-    /// Coefficients above, constant term first.
+    /// Coefficients of the numerator, constant term first.
     pub numerator: Vec<u64>,
-    /// Coefficients below, constant term first.
+    /// Coefficients of the denominator, constant term first.
     pub denominator: Vec<u64>,
 }
 
 impl Quotient {
-    /// Degrees above and below.
+    /// Degrees of numerator and denominator.
     pub fn degrees(&self) -> (usize, usize) {
         (self.numerator.len().saturating_sub(1), self.denominator.len().saturating_sub(1))
     }
@@ -41,10 +41,10 @@ impl Quotient {
 }
 
 impl Abscissae {
-    /// Points that confirm a reconstruction beyond those that determine it.
+    /// Number of points that confirm a reconstruction, beyond those that determine it.
     pub const SPARE: usize = 2;
 
-    /// `n` of them.
+    /// Abscissae `0, 1, ..., n - 1`.
     pub fn new(f: &Field, n: usize) -> Self {
         let mut vanishing = vec![f.one()];
         for k in 0..n as u64 {
@@ -117,7 +117,7 @@ impl Abscissae {
     }
 }
 
-/// `b p - a x^shift q`, without zeros at its end.
+/// The combination `b p - a x^shift q`, without trailing zeros.
 fn combined(f: &Field, (b, p): (u64, &[u64]), (a, q): (u64, &[u64]), shift: usize) -> Vec<u64> {
     let mut out = vec![0; p.len().max(q.len() + shift)];
     for (x, &c) in out.iter_mut().zip(p) {
@@ -135,7 +135,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A rational function is found again, up to a common factor, from its values.
+        /// A rational function is reconstructed, up to a common factor, from its values.
         #[test]
         fn functions_are_found(
             above in prop::collection::vec(1u64..1 << 60, 1..5),

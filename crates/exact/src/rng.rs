@@ -21,13 +21,13 @@ impl SplitMix64 {
     /// The stream of `seed` for one purpose and one input: it starts at the first 64 bits of SHA-256 (FIPS
     /// 180-4) of all three.
     ///
-    /// Primes drawn from a stream that does not know the input are constants that anybody can look up, and an
-    /// input can be built in which they divide what decides a rank. Here every change of the input changes
-    /// the primes, so that they cannot be aimed at: an input that is wrong with probability q takes about 1/q
-    /// trials. A weaker hash would be enough against accidents; SHA-256 is fixed by a standard, so the same
-    /// input has the same primes in every version, and nobody knows how to steer it.
+    /// Primes drawn from a stream that does not depend on the input are known constants, and an input
+    /// can be built in which they divide a deciding minor. Here every change of the input changes the
+    /// primes: an input that is wrong with probability q takes about 1/q trials. A weaker hash would
+    /// suffice against accidents. SHA-256 is fixed by a standard, so the same input has the same primes
+    /// in every version, and no attack on it is known.
     ///
-    /// `input` is hashed part by part, each with its length, so that parts cannot be shifted into each other.
+    /// `input` is hashed part by part, each with its length, so that the division into parts counts.
     ///
     /// ```
     /// use obsdeg_exact::SplitMix64;
@@ -65,7 +65,7 @@ impl SplitMix64 {
 mod tests {
     use super::*;
 
-    /// The start of a stream is a matter of record: by `printf` and `sha256sum`.
+    /// The start of a stream as computed by `printf` and `sha256sum`.
     #[test]
     fn streams_start_where_the_standard_says() {
         assert_eq!(SplitMix64::of(1, "verdicts", &["a", "bc"]).0, 0x83cf_5556_0392_a482);

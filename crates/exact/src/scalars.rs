@@ -4,11 +4,11 @@ use std::fmt::Debug;
 
 use crate::{Echelon, Field, Gap, Ratio};
 
-/// A field whose elements a series or a row space holds.
+/// Field whose elements a series or a row space contains.
 pub trait Scalars: Clone + Debug {
-    /// An element.
+    /// Element of the field.
     type Element: Copy + Debug + PartialEq;
-    /// A sum of products that is still to be reduced.
+    /// Sum of products before reduction.
     type Sum: Copy + Debug;
     /// Row spaces over the field.
     type Space: RowSpace<Field = Self, Element = Self::Element>;
@@ -19,7 +19,7 @@ pub trait Scalars: Clone + Debug {
     fn one(&self) -> Self::Element;
     /// The image of an integer.
     fn integer(&self, x: i64) -> Self::Element;
-    /// True if an element cannot be told from zero.
+    /// True if an element cannot be distinguished from zero.
     fn is_zero(&self, a: &Self::Element) -> bool;
     /// `a + b`.
     fn add(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
@@ -29,7 +29,7 @@ pub trait Scalars: Clone + Debug {
     fn neg(&self, a: &Self::Element) -> Self::Element;
     /// `a b`.
     fn mul(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
-    /// `1 / a`; `None` for what cannot be told from zero.
+    /// `1 / a`; `None` for an element that cannot be distinguished from zero.
     fn inverse(&self, a: &Self::Element) -> Option<Self::Element>;
     /// `start + sum a_i b_i`.
     fn dot<'a>(
@@ -50,9 +50,9 @@ pub trait Scalars: Clone + Debug {
         lanes: &[u32],
         row: &[Self::Element],
     );
-    /// What a sum stands for.
+    /// The value of a sum.
     fn reduce(&self, sum: &Self::Sum) -> Self::Element;
-    /// The small rational number that an element is, if it is one: `(numerator, denominator)`.
+    /// The element as a small rational number `(numerator, denominator)`; `None` if it is none.
     fn rational(&self, a: &Self::Element) -> Option<(i64, i64)>;
 }
 
@@ -60,7 +60,7 @@ pub trait Scalars: Clone + Debug {
 pub trait RowSpace: Clone + Debug {
     /// The field.
     type Field: Scalars<Element = Self::Element>;
-    /// Its elements.
+    /// Element of the field.
     type Element: Copy;
 
     /// The zero space of rows of length `columns`.
@@ -71,11 +71,11 @@ pub trait RowSpace: Clone + Debug {
     fn columns(&self) -> usize;
     /// The dimension.
     fn rank(&self) -> usize;
-    /// Adds a row; whether the rank grew.
+    /// Adds a row; true if the rank grew.
     fn insert(&mut self, row: &[Self::Element]) -> bool;
     /// True if a row lies in the space.
     fn contains(&self, row: &[Self::Element]) -> bool;
-    /// True if the unit vector of a column does.
+    /// True if the unit vector of a column lies in the space.
     fn has_unit(&self, column: usize) -> bool;
     /// True if a column is zero in every row.
     fn is_zero_column(&self, column: usize) -> bool;
@@ -85,14 +85,15 @@ pub trait RowSpace: Clone + Debug {
     fn pivot_columns(&self) -> Vec<usize>;
     /// A basis of the null space: one vector for each column that is no pivot, with a one there.
     fn null_space(&self) -> Vec<Vec<Self::Element>>;
-    /// Per column the others that share a null vector of minimal support with it ([`Echelon::companions`]).
+    /// Per column the others that share a null vector of minimal support with it
+    /// ([`Echelon::companions`]).
     fn companions(&self) -> Vec<Vec<usize>>;
-    /// How clear its decisions were; in an exact field nothing is open.
+    /// Margin of the decisions; exact fields have none.
     fn gap(&self) -> Gap {
         Gap::OPEN
     }
-    /// Products of numbers beyond those of an elimination so far: of rows that were made anew since their
-    /// errors were wide.
+    /// Number of products so far beyond those of an elimination, for rows recomputed because of wide
+    /// errors.
     fn refined(&self) -> u64 {
         0
     }

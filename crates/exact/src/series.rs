@@ -1,9 +1,9 @@
 //! Truncated power series over a prime field, and echelon form over them.
 //!
 //! `K[[T]]` is a discrete valuation ring: of two series the one of the smaller valuation (the exponent of
-//! its first non-zero coefficient) divides the other. So a module of vectors of series has an echelon form
-//! in which every pivot is an entry of least valuation among all entries that are left. Both the division
-//! and the elimination lose no precision then: all arithmetic is exact modulo `T^N`.
+//! its first non-zero coefficient) divides the other. So a module of vectors of series has an echelon
+//! form in which every pivot is an entry of least valuation among all remaining entries. Division and
+//! elimination then lose no precision: all arithmetic is exact modulo `T^N`.
 
 use crate::Field;
 
@@ -91,7 +91,7 @@ pub struct SeriesEchelon {
     rows: Vec<PivotRow>,
 }
 
-/// A row that is not reduced yet, with its entry of least valuation.
+/// Row that is not reduced yet, with its entry of least valuation.
 struct Pending {
     entries: Vec<u64>,
     /// `(valuation, column)`.
@@ -161,7 +161,7 @@ impl SeriesEchelon {
         true
     }
 
-    /// The rank as far as the precision shows it.
+    /// The rank up to the precision.
     pub fn rank(&self) -> usize {
         self.rows.len()
     }
@@ -184,13 +184,13 @@ impl SeriesEchelon {
         self.order_of_series(&constants)
     }
 
-    /// A basis of the functionals c with constant coefficients (shape: columns) for which `T^d c` is in the
-    /// module: the coefficients of c in the basis `T^-v_i r_i` of what it spans must have no powers below
-    /// `v_i - d`, and nothing may be left. As exact as [`Self::order`].
+    /// A basis of the functionals c with constant coefficients (shape: columns) for which `T^d c` is in
+    /// the module. The coefficients of c in the basis `T^-v_i r_i` of the span must have no powers
+    /// below `v_i - d`, and the residue must be zero. Exact under the condition of [`Self::order`].
     pub fn constants_of_order(&self, d: usize) -> Vec<Vec<u64>> {
         let (n, f) = (self.ring.precision, &self.ring.field);
         let known = n - self.largest_valuation();
-        // per column what must vanish
+        // conditions per column
         let conditions: Vec<Vec<u64>> = (0..self.columns)
             .map(|column| {
                 let mut rest = vec![0; self.columns * n];
@@ -217,7 +217,8 @@ impl SeriesEchelon {
         all.null_space()
     }
 
-    /// The same for a functional that is a series itself (shape of `c`: columns x N).
+    /// The order as [`Self::order`], for a functional that is a series itself (shape of `c`: columns x
+    /// N).
     pub fn order_of_series(&self, c: &[u64]) -> Option<usize> {
         let n = self.ring.precision;
         let largest = self.largest_valuation();
@@ -296,12 +297,14 @@ mod tests {
                 });
                 prop_assert_eq!(module.order(&unit), smallest);
             }
-            // combinations too: those of order d are the constants whose T^d multiple is a member
+            // combinations of order d are the constants whose T^d multiple is a member
             for d in 0..3 {
                 let found = module.constants_of_order(d);
                 let multiple = |c: &[u64]| c.iter().flat_map(|&x| r.monomial(x, d)).collect::<Vec<_>>();
                 prop_assert!(found.iter().all(|c| span.contains(&multiple(c))));
-                let members = (0..2).filter(|&c| module.order(&[0, 1].map(|j| if j == c { r.field.one() } else { 0 })).is_some_and(|k| k <= d));
+                let members = (0..2).filter(|&c| module
+                    .order(&[0, 1].map(|j| if j == c { r.field.one() } else { 0 }))
+                    .is_some_and(|k| k <= d));
                 let least = members.count();
                 let some = (-3i64..=3).any(|x| span.contains(&multiple(&[r.field.one(), r.field.from_i64(x)])));
                 prop_assert!(found.len() >= least.max(usize::from(some)));

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use crate::Field;
 
-/// Below this many coefficients the product is summed as it is written.
+/// Number of coefficients below which a product is summed directly.
 const SHORT: usize = 96;
 
 /// Products of polynomials whose lengths together are below a bound.
@@ -25,16 +25,16 @@ pub struct Transform {
     /// `roots[l][j]`: the j-th power of a primitive root of order `2^(l + 1)`, for j below `2^l`; none where
     /// the field lacks the roots.
     roots: Vec<Vec<u64>>,
-    /// The same of its inverse.
+    /// Powers of the inverse roots, as `roots`.
     inverses: Vec<Vec<u64>>,
-    /// What is known of factors by their keys, at one size.
+    /// Transforms of factors by their keys, at one size.
     spectra: HashMap<usize, Vec<u64>>,
     size: usize,
 }
 
 impl Transform {
-    /// For products of two polynomials of up to `length` coefficients; fast if 2^k divides p - 1 for the
-    /// first 2^k from twice the length on.
+    /// Transforms for products of two polynomials of up to `length` coefficients. They are fast if p -
+    /// 1 is divisible by the smallest power of two that is at least twice the length.
     pub fn new(f: Field, length: usize) -> Self {
         let size = (2 * length).next_power_of_two().max(2);
         let order = size as u64;
@@ -63,7 +63,7 @@ impl Transform {
         let (a, b) = (&a[..a.len().min(n)], &b[..b.len().min(n)]);
         let back: Vec<u64> = b.iter().rev().copied().collect();
         let coefficient = |k: usize| {
-            // a_j b_(k-j), both there
+            // a_j b_(k-j), for valid indices of both
             let (from, to) = ((k + 1).saturating_sub(b.len()), (k + 1).min(a.len()));
             if from >= to {
                 return 0;
@@ -74,8 +74,8 @@ impl Transform {
         (0..n).map(coefficient).collect()
     }
 
-    /// The first `n` coefficients of the product with each of several polynomials, which are known by a key:
-    /// what is asked for with a key again is the same polynomial.
+    /// The first `n` coefficients of the product with each of several polynomials, which are identified
+    /// by keys: equal keys must mean equal polynomials.
     pub fn products(&mut self, a: &[u64], factors: &[(usize, &[u64])], n: usize) -> Vec<Vec<u64>> {
         let a = &a[..a.len().min(n)];
         let size = (2 * n).next_power_of_two();
@@ -93,7 +93,7 @@ impl Transform {
             out
         };
         let spectrum = padded(a);
-        // n coefficients of one, size/2 of the other: nothing comes around
+        // n coefficients of one, size/2 of the other: no wrap-around
         let new = factors.iter().filter(|(key, _)| !self.spectra.contains_key(key));
         let new: Vec<_> = new.map(|(key, b)| (*key, padded(&b[..b.len().min(size / 2)]))).collect();
         self.spectra.extend(new);
@@ -108,7 +108,7 @@ impl Transform {
         factors.iter().map(product).collect()
     }
 
-    /// Values at the powers of the root, in the order of reversed bits, below 2p.
+    /// Values at the powers of the root, in bit-reversed order, below 2p.
     fn forward(&self, x: &mut [u64]) {
         let (f, p) = (&self.f, self.f.modulus());
         for l in (0..x.len().trailing_zeros() as usize).rev() {
@@ -123,7 +123,7 @@ impl Transform {
         }
     }
 
-    /// Undoes [`Transform::forward`].
+    /// Inverse of [`Transform::forward`].
     fn backward(&self, x: &mut [u64]) {
         let (f, p) = (&self.f, self.f.modulus());
         for l in 0..x.len().trailing_zeros() as usize {
@@ -174,7 +174,7 @@ mod tests {
                 t.spectra.clear();
                 let (one, other) = ((1, &b[..]), (2, &a[..]));
                 assert_eq!(t.products(&a, &[one, other], n)[0], slow, "{m} {k} {n}");
-                // a key that is known, and fewer coefficients
+                // a known key, with fewer coefficients
                 let less = (n - n / 8).max(1);
                 assert_eq!(t.products(&a, &[one], less), [&slow[..less]], "{m} {k} {n}");
             }

@@ -1,4 +1,4 @@
-//! Decimal degrees as exact parts of a full turn, and their cosines and sines in a field.
+//! Decimal degrees as exact fractions of a full turn, and their cosines and sines in a field.
 
 use crate::{RootField, gcd};
 
@@ -38,7 +38,7 @@ impl Turn {
     /// `(cos, sin)` as floating-point numbers, exact at multiples of 90 degrees.
     pub fn cos_sin_f64(self) -> (f64, f64) {
         const QUARTER: i64 = 90_000_000_000;
-        // what is left of the nearest quarter turn is exact, so that a small cosine or sine has all its
+        // the difference from the nearest quarter turn is exact, so a small cosine or sine has all its
         // digits
         let quarters = (self.nanodeg() + QUARTER / 2).div_euclid(QUARTER);
         let rest = self.nanodeg() - quarters * QUARTER;
@@ -55,14 +55,14 @@ impl Turn {
     }
 }
 
-/// The least order `n`, a multiple of 24, for which the n-th roots of unity hold every angle given.
+/// Least order `n`, a multiple of 24, for which the n-th roots of unity represent every given angle.
 pub fn common_order(angles: impl IntoIterator<Item = Turn>) -> u64 {
     let unit = angles.into_iter().fold(FULL_NANODEG as u64 / 24, |u, a| gcd(u, a.0.unsigned_abs()));
     FULL_NANODEG as u64 / unit
 }
 
 impl RootField {
-    /// The image of `exp(i angle)`; `None` when the order of this field does not hold the angle.
+    /// The image of `exp(i angle)`; `None` if the order of this field does not represent the angle.
     pub fn unit_circle(&self, angle: Turn) -> Option<u64> {
         let unit = FULL_NANODEG / self.order as i64;
         (angle.0 % unit == 0).then(|| self.field.pow(self.root, (angle.0 / unit) as u64))

@@ -28,32 +28,31 @@ create_exception!(
     "What is wrong with a request: `message`, and where, if it is in a text: `file`, `line`, `column` (counted from 1)."
 );
 
-/// An answer; it is written when that is asked for.
+/// An answer; formats are written on request.
 #[pyclass(frozen, module = "obsdeg._obsdeg")]
 struct Answer(Answered);
 
 #[pymethods]
 impl Answer {
-    /// True if nothing disagrees, and the model explains the records.
+    /// True if no check disagrees and the model explains the records.
     #[getter]
     fn passed(&self) -> bool {
         self.0.passed
     }
 
-    /// Name and version of the layout of the JSON; None of several answers, of a page and of a part of a
-    /// search.
+    /// Name and version of the JSON layout; None for several answers, a page or a part of a search.
     #[getter]
     fn layout(&self) -> Option<&str> {
         self.0.answer.layout()
     }
 
-    /// What the command line prints: `format` is table, json, markdown, csv or latex.
+    /// Text as the command line prints it; `format` is table, json, markdown, csv or latex.
     fn written(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format: Format = format.parse().map_err(|e| PyValueError::new_err(format!("{e}")))?;
         py.detach(|| self.0.answer.written(format)).map_err(raised)
     }
 
-    /// A list of the JSON as CSV.
+    /// One list of the JSON as CSV.
     #[pyo3(signature = (name=None))]
     fn table(&self, py: Python<'_>, name: Option<&str>) -> PyResult<String> {
         py.detach(|| self.0.answer.table(name)).map_err(raised)
@@ -64,7 +63,7 @@ impl Answer {
         py.detach(|| self.0.answer.fragment()).map_err(raised)
     }
 
-    /// Figures, series and schemes that were found, by their names.
+    /// Figures, series and found schemes, by file name.
     fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let files = py.detach(|| self.0.answer.files()).map_err(raised)?;
         let out = PyDict::new(py);
@@ -75,16 +74,16 @@ impl Answer {
     }
 }
 
-/// Answers a command; `request` is JSON, `progress` is called with (what, done, total, examined, best) ten
-/// times a second at most, and ends the work with the best so far where it returns False. A keyboard
-/// interrupt does too; it is raised where there is nothing so far.
+/// Answers a command. `request` is JSON. `progress` is called with (what, done, total, examined, best) at
+/// most ten times a second; if it returns False, the work ends with the best so far. So does a keyboard
+/// interrupt, which is raised if there is no partial result.
 #[pyfunction]
 #[pyo3(signature = (command, request, progress=None))]
 fn answer(py: Python<'_>, command: &str, request: &str, progress: Option<Py<PyAny>>) -> PyResult<Answer> {
-    heard(py, command, progress, |host| call(command, request, host))
+    with_progress(py, command, progress, |host| call(command, request, host))
 }
 
-/// Calibrates from records: each a name with the path of a file (CSV or Parquet), or with its bytes.
+/// Calibrates from records. Each is a name with the path of a file (CSV or Parquet), or with its bytes.
 #[pyfunction]
 #[pyo3(signature = (request, records, progress=None))]
 fn calibrate(
@@ -93,13 +92,13 @@ fn calibrate(
     records: Vec<(String, Option<Vec<u8>>)>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
-    heard(py, "calibrate", progress, move |host| {
+    with_progress(py, "calibrate", progress, move |host| {
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_calibrate(request, records, host)
     })
 }
 
-/// A record of a name: the file of that path (CSV or Parquet), or its bytes.
+/// Opens a record: the file at the path `name` (CSV or Parquet), or its bytes.
 fn record((name, bytes): (String, Option<Vec<u8>>)) -> Result<Record, Problem> {
     let unreadable = |e| Problem::input(format!("cannot read the record {name}: {e}"));
     let record = match bytes {
@@ -109,7 +108,7 @@ fn record((name, bytes): (String, Option<Vec<u8>>)) -> Result<Record, Problem> {
     record.map_err(|e| Problem::input(e.to_string()))
 }
 
-/// The noise of sensors at rest, from one record as `calibrate` has them.
+/// Noise of sensors at rest, from one record given as in `calibrate`.
 #[pyfunction]
 #[pyo3(signature = (request, records, progress=None))]
 fn allan(
@@ -118,14 +117,14 @@ fn allan(
     records: Vec<(String, Option<Vec<u8>>)>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
-    heard(py, "allan", progress, move |host| {
+    with_progress(py, "allan", progress, move |host| {
         let records = records.into_iter().map(record).collect::<Result<Vec<_>, Problem>>()?;
         call_allan(request, records, host)
     })
 }
 
-/// Seconds that a command takes when it is asked so many times from Rust, its JSON written or not: what the
-/// package adds to that is measured against it (`python/benches/overhead.py`).
+/// Seconds that `times` calls of a command take in Rust; `written`: true if the JSON is written too.
+/// Reference for the overhead of the package (`python/benches/overhead.py`).
 #[pyfunction]
 fn seconds(py: Python<'_>, command: &str, request: &str, times: u32, written: bool) -> PyResult<f64> {
     py.detach(|| {
@@ -142,10 +141,11 @@ fn seconds(py: Python<'_>, command: &str, request: &str, times: u32, written: bo
     .map_err(raised)
 }
 
-/// Between two times that Python hears of progress, or is asked whether a key was pressed.
+/// Time between two calls of `progress` or two checks for a keyboard interrupt.
 const INTERVAL: Duration = Duration::from_millis(100);
 
-/// Commands that work on several threads. Those with `true` end by themselves, with the best so far.
+/// Commands that work on several threads. `true`: the command ends by itself when asked, with the best so
+/// far.
 const PARALLEL: [(&str, bool); 6] = [
     ("calibrate", true),
     ("compare", false),
@@ -155,13 +155,13 @@ const PARALLEL: [(&str, bool); 6] = [
     ("simulate", false),
 ];
 
-/// The threads of parallel work, and the process that they belong to: of work that is cut short, and of work
-/// that ends by itself, which must not run beside it on one thread.
+/// Thread pools of parallel work, each with the process it belongs to. The first is for work that is cut
+/// short, the second for work that ends by itself: the two kinds of work must not share a thread.
 static THREADS: [Mutex<Option<(u32, &'static ThreadPool)>>; 2] = [const { Mutex::new(None) }; 2];
 
-/// The threads of this process. A process that began as a copy of another (`fork`) has none of its threads,
-/// and waits for ever for what they are given; it has new ones here. This needs the lock of the interpreter,
-/// under which Python forks: no copy is made while the mutex is held.
+/// Thread pool of this process. A forked process has none of its parent's threads and would wait for ever for
+/// their results, so it makes a new pool. The interpreter's lock is held here and during a fork: no process
+/// is forked while the mutex is locked.
 fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
     let failed = |why: String| PyRuntimeError::new_err(format!("no threads: {why}"));
     let mut threads = THREADS[usize::from(ends)].lock().map_err(|e| failed(e.to_string()))?;
@@ -170,7 +170,7 @@ fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
         Some((owner, pool)) if owner == process => Ok(pool),
         _ => {
             let pool = ThreadPoolBuilder::new().build().map_err(|e| failed(e.to_string()))?;
-            // for the life of the process; that of the process before cannot be ended here
+            // lives as long as the process; the parent's pool cannot be ended here
             let pool: &'static ThreadPool = Box::leak(Box::new(pool));
             *threads = Some((process, pool));
             Ok(pool)
@@ -178,9 +178,9 @@ fn threads(_py: Python<'_>, ends: bool) -> PyResult<&'static ThreadPool> {
     }
 }
 
-/// Works without the lock of the interpreter. Ten times a second whoever called hears how far it is, and is
-/// asked whether a key was pressed and the work goes on.
-fn heard(
+/// Works without the interpreter's lock. Ten times a second Python receives the progress and is asked for a
+/// keyboard interrupt and for the return value of `progress`.
+fn with_progress(
     py: Python<'_>,
     command: &str,
     progress: Option<Py<PyAny>>,
@@ -192,7 +192,7 @@ fn heard(
     }
 }
 
-/// Asks Python: a key pressed is an error, a `progress` that says False is false.
+/// Asks Python: a keyboard interrupt is an error; false if `progress` returns False.
 fn goes_on(progress: Option<&Py<PyAny>>, now: Option<Now>) -> PyResult<bool> {
     Python::attach(|py| {
         py.check_signals()?;
@@ -202,12 +202,12 @@ fn goes_on(progress: Option<&Py<PyAny>>, now: Option<Now>) -> PyResult<bool> {
     })
 }
 
-/// Work that was ended and has no answer.
+/// Error of work that was ended without an answer.
 fn interrupted() -> PyErr {
     PyKeyboardInterrupt::new_err("interrupted; there is no answer")
 }
 
-/// Short work, which no other thread is begun for: it asks Python itself.
+/// Short work on this thread, which asks Python itself.
 fn in_this_thread(
     py: Python<'_>,
     command: &str,
@@ -236,8 +236,8 @@ fn in_this_thread(
     }
 }
 
-/// Work on all threads; this one, which may be the only one that hears of keys, asks Python. Where the work
-/// `ends` by itself it is told so, and gives what it has; else it is cut short.
+/// Work on all threads. This thread asks Python, since only the main thread receives keyboard interrupts.
+/// With `ends`, the work ends by itself and gives its partial result; otherwise it is cut short.
 fn in_threads(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -248,7 +248,7 @@ fn in_threads(
     let wanted = Arc::new(AtomicBool::new(true));
     let last: Mutex<Option<Now>> = Mutex::new(None);
     let going = |now: Now| {
-        // of several at once one is enough
+        // of several reports at a time one is enough
         if let Ok(mut last) = last.try_lock() {
             *last = Some(now);
         }
@@ -265,7 +265,7 @@ fn in_threads(
         std::thread::scope(|scope| {
             let (send, receive) = channel();
             scope.spawn(move || {
-                // nobody listens only if this function has ended
+                // the receiver is gone only if this function has returned
                 let _ = send.send(pool.install(answered));
             });
             let mut inside = None;
@@ -302,7 +302,7 @@ fn in_threads(
     match (done, inside) {
         (None, _) => Err(PyRuntimeError::new_err("the work ended without an answer")),
         (Some(Some(Ok(answer))), None) => Ok(Answer(answer)),
-        // the best so far
+        // the partial result
         (Some(Some(Ok(answer))), Some(e)) if e.is_instance_of::<PyKeyboardInterrupt>(py) => {
             Ok(Answer(answer))
         }
@@ -312,7 +312,7 @@ fn in_threads(
     }
 }
 
-/// A problem as Python has it.
+/// A problem as a Python exception.
 fn raised(problem: Problem) -> PyErr {
     match problem.kind {
         Kind::Interrupted => PyKeyboardInterrupt::new_err(problem.message),
@@ -342,7 +342,7 @@ fn raised(problem: Problem) -> PyErr {
     }
 }
 
-/// The extension module.
+/// Extension module `obsdeg._obsdeg`.
 #[pymodule]
 fn _obsdeg(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("ProblemError", m.py().get_type::<ProblemError>())?;

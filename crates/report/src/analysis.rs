@@ -32,12 +32,12 @@ fn positions(positions: &[PositionReport]) -> Block {
     Block::table("", columns, positions.iter().map(row))
 }
 
-/// A name or an expression in program notation.
+/// Cell with a name or an expression in program notation, and its LaTeX.
 fn expression(text: &str) -> Cell {
     Cell::formula(text, latex::expression(text))
 }
 
-/// The unknowns, then the combinations: what each is, its verdict, and how it is solved.
+/// Tables of the unknowns and of the combinations: name, verdict, solution.
 fn verdicts(a: &Analysis) -> [Block; 2] {
     let dwell = words::dwell_matters(a).then(|| left("with dwell"));
     let columns = |first: &[Column], last| {
@@ -81,7 +81,7 @@ fn verdicts(a: &Analysis) -> [Block; 2] {
     ]
 }
 
-/// A direction that Z does not see.
+/// Direction that Z does not observe.
 pub(crate) fn null_vector(v: &[Component]) -> Typeset {
     let component = |c: &Component| {
         let value = c.coefficient.as_ref().map_or_else(|| "?".into(), |k| latex::expression(k));

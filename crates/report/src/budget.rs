@@ -13,7 +13,7 @@ use crate::visible;
 
 /// Colours of the families; samples are grey.
 const COLORS: [&str; 6] = [ORANGE, BLUE, GREEN, AMBER, PURPLE, SKY];
-/// Bars of a picture; further budgets stand in the CSV.
+/// Largest number of bars in a picture; the CSV has all budgets.
 const BARS: usize = 40;
 /// Widths of names, bars and texts, and the height of a bar, in pixels.
 const NAMES: f64 = 70.0;

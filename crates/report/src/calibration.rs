@@ -1,4 +1,4 @@
-//! A calibration from recorded data.
+//! Documents, tables and CSV of a calibration from recorded data.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
@@ -9,10 +9,10 @@ use obsdeg_calibration::answer::{
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::{Answer, ReportError, Table, omitted, stated, words};
 
-/// How many outliers are listed.
+/// Largest number of listed outliers.
 const LISTED: usize = 20;
 
-/// A factor of sigma in words.
+/// Sentence part on sigmas that are wrong by a factor.
 fn sigmas(factor: f64) -> String {
     if factor >= 1.0 {
         format!("sigmas are {factor:.2} times too small")
@@ -21,12 +21,12 @@ fn sigmas(factor: f64) -> String {
     }
 }
 
-/// ` of FILE`, where there are several records.
+/// ` of FILE` if there are several records, else empty.
 fn of(record: &str, records: &[RecordReport]) -> String {
     if records.len() > 1 { format!(" of {record}") } else { String::new() }
 }
 
-/// What one axis is off by.
+/// Error of one axis that explains the lengths of the specific force.
 fn cause(c: &ForceCause) -> String {
     let besides = c.besides.map_or_else(String::new, |b| {
         format!(", beside {} too long at all positions alike (scale or gravity)", number(b))
@@ -46,22 +46,22 @@ fn cause(c: &ForceCause) -> String {
     }
 }
 
-/// A part by which a clock is fast.
+/// Relative rate error of a clock in percent, with `fast` or `slow`.
 fn part(fast: f64) -> String {
     format!("{:.2} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
 }
 
-/// From this part on an error of the clock is large.
+/// Relative rate error from which a clock error is large.
 const CLOCK: f64 = 0.1;
 
-/// True if durations and rates tell of the same clock: a quarter of its error is what drifts that follow take
-/// of it.
+/// True if durations and rates show the same clock. Drifts that follow the clock take up a quarter of its
+/// error, so the two may differ by that.
 pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
     let both = by_durations.zip(by_earth);
     both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
 }
 
-/// What is known of the clock of a record.
+/// Sentence on the offset and the rate of a record's clock.
 fn clock(c: &Clock) -> String {
     let begins = match (c.offset_s, c.offset_sigma_s) {
         (Some(at), Some(sigma)) => format!(
@@ -75,7 +75,7 @@ fn clock(c: &Clock) -> String {
     format!("{begins}{}", rates(c))
 }
 
-/// What is known of the rate of the clock of a record.
+/// Sentence on the rate of a record's clock.
 fn rates(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
@@ -87,7 +87,8 @@ fn rates(c: &Clock) -> String {
             number(100.0 * e.sigma)
         ),
         Some(e) => format!(
-            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong by as much or more{held}",
+            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong \
+             by as much or more{held}",
             300.0 * e.sigma
         ),
         None => format!(
@@ -99,14 +100,20 @@ fn rates(c: &Clock) -> String {
 pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     match f {
         Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => "the iteration did NOT settle: the estimates are where it was given up. Check the times and attitudes of the scheme against the run (--dry-run shows how the record is read); state priors of the drifts under [simulation]; add positions".into(),
+        Finding::NotSettled => {
+            "the iteration did NOT settle: the estimates are where it was given up. Check the times and \
+             attitudes of the scheme against the run (--dry-run shows how the record is read); state priors \
+             of the drifts under [simulation]; add positions"
+                .into()
+        }
         Finding::Force { record, length_g, alike, least, most, causes } => {
             let of = of(record, records);
             if *alike {
                 let or =
                     causes.iter().map(|c| format!(" (or of {} alone: these positions do not tell)", c.axis));
                 return format!(
-                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
+                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of \
+                     {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
                     number(length_g - 1.0),
                     or.collect::<String>()
                 );
@@ -117,7 +124,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             );
             if causes.is_empty() {
                 return format!(
-                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the positions), and no unknown of the scheme explains them (K0 and K1 would)"
+                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the \
+                     positions), and no unknown of the scheme explains them (K0 and K1 would)"
                 );
             }
             let each: Vec<String> = causes.iter().map(cause).collect();
@@ -129,10 +137,13 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             let place = format!("column `{column}`{}, lines {} to {}", of(record, records), lines.0, lines.1);
             match kind_of_cells {
                 CellKind::Code => format!(
-                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and were left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside them, and \
+                     were left out; if that is a code of missing values, state `missing = [{value}]` under \
+                     [record]"
                 ),
                 CellKind::Stuck => format!(
-                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, and were left out; check whether the output is stuck"
+                    "{place}: {count} {cells} repeat the value {value} of the row before to the last digit, \
+                     and were left out; check whether the output is stuck"
                 ),
             }
         }
@@ -144,14 +155,20 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                 by_earth.as_ref().map(|e| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma)));
             match (held, rates) {
                 (Some(held), Some(rates)) if is_clock(*by_durations, by_earth.as_ref()) => format!(
-                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are off by that part, those that the earth rate tells by more"
+                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
+                     off by that part, those that the earth rate tells by more"
                 ),
                 (held, Some(rates)) => format!(
-                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as by a clock that is {rates}{}; another latitude or rate of turns, or an error that no unknown explains, look the same, and are likelier where positions last as in the scheme",
+                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as \
+                     by a clock that is {rates}{}; another latitude or rate of turns, or an error that no \
+                     unknown explains, look the same, and are likelier where positions last as in the \
+                     scheme",
                     held.map_or_else(String::new, |held| format!(", while {held}"))
                 ),
                 (held, None) => format!(
-                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from positions that were held so much longer or shorter: by a clock drifts are off by that part or more, else the scheme has other times than its run",
+                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from \
+                     positions that were held so much longer or shorter: by a clock drifts are off by that \
+                     part or more, else the scheme has other times than its run",
                     held.unwrap_or_default()
                 ),
             }
@@ -175,12 +192,14 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             )
         }
         Finding::Correlated { record, channel, probability } => format!(
-            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too small by what that hides",
+            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too \
+             small by what that hides",
             of(record, records),
             number(*probability)
         ),
         Finding::Temperature { record, channel, correlation, probability } => format!(
-            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, probability {}), which no unknown of the scheme explains",
+            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, \
+             probability {}), which no unknown of the scheme explains",
             of(record, records),
             number(*probability)
         ),
@@ -190,7 +209,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             )
         }
         Finding::Repeatability { chi_square } => format!(
-            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they changed between the runs, or sigmas are too small",
+            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they \
+             changed between the runs, or sigmas are too small",
             number(*chi_square)
         ),
         Finding::SecondPath { difference } => format!(
@@ -209,8 +229,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
     }
 }
 
-/// Sentence that no estimate stands at the drifts of the record, with which nothing is wrong then; `None` if
-/// estimates stand.
+/// Sentence that the record leaves all unknowns open at its drifts, so that no estimate is given; `None` if
+/// estimates are given. Nothing else is wrong with such a record.
 fn left_open(c: &Calibration) -> Option<String> {
     if !c.quantities.iter().chain(&c.combinations).any(|e| e.left_open) {
         return None;
@@ -228,14 +248,16 @@ fn left_open(c: &Calibration) -> Option<String> {
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };
     Some(format!(
-        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma describes the errors then, so no estimate is given. State priors of the drifts as small as is true (`priors` under [simulation]), or add positions"
+        "at these drifts {who} all unknowns open: over what the positions do not determine, {why}. No sigma \
+         describes the errors then, so no estimate is given. State priors of the drifts as small as is true \
+         (`priors` under [simulation]), or add positions"
     ))
 }
 
-/// From this factor of sigma on, what is left open shows.
+/// Factor of sigma from which the effect of unknowns that are left open is printed.
 const HELD: f64 = 1.05;
 
-/// Why there is no estimate, or what is to be said of it.
+/// Verdict on an unknown: the source of its estimate, or the reason why there is none.
 fn verdict(e: &Estimated) -> String {
     let bent = e.open_sigma.filter(|_| e.determined && e.held_factor.is_some_and(|f| f > HELD));
     match (e.determined, e.degree) {
@@ -275,7 +297,7 @@ fn row(e: &Estimated, totals: bool) -> Vec<String> {
     out
 }
 
-/// The column of the force among those of a position.
+/// Index of the specific force among the columns of a position.
 const FORCE: usize = 4;
 
 fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> {
@@ -295,10 +317,10 @@ fn position(p: &PositionFit, record: Option<usize>, force: bool) -> Vec<String> 
     out
 }
 
-/// Most gaps that are listed.
+/// Largest number of listed gaps.
 const GAPS: usize = 5;
 
-/// Where rows are missing, the longest first, in the order of time.
+/// The longest gaps between rows, in the order of time; `None` without gaps.
 pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
     let mut all: Vec<&Gap> = of.iter().collect();
     let length = |g: &Gap| g.to_s - g.from_s;
@@ -324,7 +346,7 @@ pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
     (!each.is_empty()).then(|| format!("rows are missing for {}{more}", each.join(", ")))
 }
 
-/// What says where samples were taken.
+/// Source of the times at which positions begin and end.
 pub(crate) fn by_what(by: PositionsBy) -> &'static str {
     match by {
         PositionsBy::Labels => {
@@ -335,12 +357,13 @@ pub(crate) fn by_what(by: PositionsBy) -> &'static str {
             "the column `position`, which agrees with the timeline of the scheme: that says when they begin and end"
         }
         PositionsBy::Static => {
-            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what is between two"
+            "intervals at rest that were found, as many as the scheme has: a turn is in the middle of what \
+             is between two"
         }
     }
 }
 
-/// What was read, a sentence for each record.
+/// Sentence on each record: its rows, times and positions.
 fn records(c: &Calibration) -> Vec<String> {
     let of = |r: &RecordReport| {
         let mut out = format!(
@@ -411,7 +434,7 @@ fn assumed(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// The moment whose psi is estimated.
+/// Time at which the estimated psi holds.
 fn moment(records: &[RecordReport]) -> String {
     let by_rows = |r: &RecordReport| matches!(r.positions_by, PositionsBy::Labels | PositionsBy::Static);
     let start = "the start of the scheme's first position";
@@ -431,7 +454,8 @@ fn next_run(n: &NextRun) -> String {
     );
     if n.required_sigma == 0.0 {
         return format!(
-            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of the bench too, or make them smaller."
+            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of \
+             the bench too, or make them smaller."
         );
     }
     let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
@@ -447,12 +471,13 @@ fn next_run(n: &NextRun) -> String {
         )
     } else {
         format!(
-            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then} only."
+            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes \
+             it {then} only."
         )
     }
 }
 
-/// The mode of the estimates: data alone or priors as stated, the box of what is left open and its effect,
+/// Mode of the estimates: data alone or with stated priors, the unknowns that are left open and their effect,
 /// the curvature.
 fn mode(c: &Calibration) -> Vec<String> {
     let listed = |of: &[(String, f64, String)]| {
@@ -471,7 +496,8 @@ fn mode(c: &Calibration) -> Vec<String> {
     }];
     if !c.assumed.held.is_empty() {
         out.push(format!(
-            "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 times as much into the others).",
+            "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 \
+             times as much into the others).",
             listed(&c.assumed.held)
         ));
         let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
@@ -486,14 +512,16 @@ fn mode(c: &Calibration) -> Vec<String> {
             format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (HELD - 1.0))
         } else {
             format!(
-                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors under [simulation] or more positions make it smaller.",
+                "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors \
+                 under [simulation] or more positions make it smaller.",
                 all.join(", ")
             )
         });
     }
     out.push(match c.curvature.kappa {
         Some(k) if c.curvature.from_refits => format!(
-            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from data and priors with errors drawn anew.",
+            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from \
+             data and priors with errors drawn anew.",
             number(k),
             c.curvature.refits - c.curvature.failed
         ),
@@ -503,7 +531,7 @@ fn mode(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// A difference that is rounding alone has no digits.
+/// Number, at least 1e-9: smaller differences are rounding.
 fn rounding(x: f64) -> String {
     if x < 1e-9 { "1e-9".into() } else { number(x) }
 }
@@ -512,7 +540,7 @@ fn is_whole(x: f64) -> bool {
     (x - x.round()).abs() < 0.05
 }
 
-/// With a tenth where there is one.
+/// Number with one decimal, or without if that is zero.
 pub(crate) fn tenths(x: f64) -> String {
     if is_whole(x) { format!("{x:.0}") } else { format!("{x:.1}") }
 }
@@ -522,7 +550,8 @@ fn fit(c: &Calibration) -> Vec<String> {
     let per = f.factor * f.factor;
     let mut out = vec![
         format!(
-            "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled sigmas are times {:.3}{}",
+            "chi-square {} on {} degrees of freedom{}: {} each (band of 99.9 % {:.4} to {:.4}); rescaled \
+             sigmas are times {:.3}{}",
             number(f.chi_square),
             tenths(f.degrees_of_freedom),
             if is_whole(f.degrees_of_freedom) {
@@ -538,7 +567,8 @@ fn fit(c: &Calibration) -> Vec<String> {
         ),
         format!("{} linearisations along the whole run", f.passes),
         format!(
-            "second path, a filter with the same wide prior: at the end of a record within {} sigma, its sigmas within {} of themselves",
+            "second path, a filter with the same wide prior: at the end of a record within {} sigma, its \
+             sigmas within {} of themselves",
             rounding(c.second_path.difference),
             rounding(c.second_path.sigma_difference)
         ),
@@ -555,7 +585,7 @@ fn fit(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// The conditions that nobody states, which sigmas and requirements rest on; `None` where all are stated.
+/// Conditions that are not stated but affect sigmas and requirements; `None` if all are stated.
 fn by_default(a: &Assumed) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", a.latitude_deg),
@@ -601,8 +631,9 @@ impl Answer for Calibration {
         columns.extend([right("predicted"), right("prior"), left("status")]);
         let total = if totals { "total: with the bench and what a suspected error changes; " } else { "" };
         let heading = format!(
-            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and with the noise of the record; \
-             prior: what that of the program would do, in sigma and to sigma, where none is stated)"
+            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and \
+             with the noise of the record; prior: what that of the program would do, in sigma and to sigma, \
+             where none is stated)"
         );
         let mut blocks =
             vec![Block::table(heading, columns.clone(), self.quantities.iter().map(|e| row(e, totals)))];
@@ -665,7 +696,9 @@ impl Answer for Calibration {
             ]
         });
         blocks.push(Block::table(
-            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: probability of correlations like these; temperature: correlation with it, and the probability of that)",
+            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: \
+             probability of correlations like these; temperature: correlation with it, and the probability \
+             of that)",
             columns,
             rows,
         ));
@@ -699,25 +732,24 @@ impl Answer for Calibration {
         }
     }
 
-    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
+    /// Lists of the JSON, then coefficients and covariance of all estimates.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Unknowns and combinations.
+    /// Table of unknowns and combinations.
     fn main_table(&self) -> &'static str {
         COEFFICIENTS
     }
 }
 
-/// The table of unknowns and combinations.
+/// Name of the table of unknowns and combinations.
 pub(crate) const COEFFICIENTS: &str = "coefficients";
 
-/// The tables of a calibration with two more: unknowns and combinations one below the other, and the
-/// covariance.
+/// Adds two tables to those of a calibration: unknowns with combinations below them, and the covariance.
 pub(crate) fn with_coefficients(mut tables: Vec<Table>, covariance: &CovarianceTable) -> Vec<Table> {
     let of = |name: &str| tables.iter().find(|t| t.name == name);
-    // both are lists of the same objects
+    // `quantities` and `combinations` are lists of the same objects
     let both: Vec<&Table> = ["quantities", "combinations"].into_iter().filter_map(of).collect();
     let columns = both.first().map(|t| t.columns.clone()).unwrap_or_default();
     let rows = both.iter().flat_map(|t| t.rows.clone()).collect();
@@ -736,7 +768,7 @@ pub fn covariance_csv(t: &CovarianceTable) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(columns).chain(rows))
 }
 
-/// Estimates and sigmas with the covariance of all.
+/// Table of estimates, sigmas and their covariance.
 fn covariance_table(t: &CovarianceTable) -> Table {
     let head = ["name", "unit", "estimate", "sigma"].map(String::from).into_iter();
     let columns = head.chain(t.names.iter().map(|n| format!("covariance with {n}"))).collect();
@@ -748,7 +780,7 @@ fn covariance_table(t: &CovarianceTable) -> Table {
     Table { name: "covariance".into(), columns, rows: (0..t.names.len()).map(row).collect() }
 }
 
-/// The residuals of all measurements, as CSV.
+/// Residuals of all measurements as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].

@@ -40,9 +40,9 @@ pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
     Ok(files)
 }
 
-/// Points of a series at each position that has some: nothing is drawn across a slew.
+/// Points of a series, split by position: no line crosses a slew.
 fn by_position<'s>(series: &'s ResidualSeries, positions: &[&PositionFit]) -> Vec<&'s [(f64, f64, f64)]> {
-    // ends are rounded to the rows of a record
+    // ends of positions are rounded to rows of the record, so only their starts decide
     let place = |p: &(f64, f64, f64)| positions.iter().take_while(|q| q.start_s <= p.0).count();
     series.points.chunk_by(|a, b| place(a) == place(b)).collect()
 }
@@ -117,12 +117,12 @@ pub(crate) fn whiteness_figure(series: &ResidualSeries) -> Figure {
     }
 }
 
-/// Bars of three sigma about the estimates by family: as the fit has it, as predicted, and as required.
-/// Estimates are in the names along x, since sigmas are small beside them.
+/// Bars of three sigma about the estimates by family: fitted, predicted, required. The names along x have the
+/// estimates, since sigmas are small beside them.
 pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
     let mut families: Vec<(String, Vec<&Estimated>)> = Vec::new();
     for e in c.quantities.iter().filter(|e| e.determined) {
-        // D_FX, GM_XY, psi_x (record 2)
+        // names such as D_FX, GM_XY, psi_x (record 2)
         let name = e.name.split(' ').next().unwrap_or(&e.name);
         let family = name.trim_end_matches(['X', 'Y', 'Z', 'x', 'y', 'z']).trim_end_matches('_');
         match families.iter_mut().find(|f| f.0 == family) {
@@ -137,7 +137,7 @@ pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
 }
 
 /// Label, colour and stroke of bars, their shift along x, and the sigma that they show.
-type Kind = (&'static str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>);
+type BarSeries = (&'static str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>);
 
 /// A bar from `low` to `high` at `at`, with ends.
 fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [f64; 2]) -> Line {
@@ -146,7 +146,7 @@ fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [
     line(label, color, stroke, points.to_vec())
 }
 
-/// Name and estimate, with the decimals that sigma leaves.
+/// Name and estimate, with decimals down to the second digit of sigma.
 fn named(e: &Estimated) -> String {
     let Some((x, sigma)) = e.estimate.zip(e.sigma) else { return e.name.clone() };
     // two digits of sigma
@@ -157,7 +157,7 @@ fn named(e: &Estimated) -> String {
 fn family_figure(family: &str, own: &[&Estimated]) -> Figure {
     let last = own.len() as f64 + 0.5;
     let mut lines = vec![line("", BLACK, Stroke::Dotted, vec![(0.5, 0.0), (last, 0.0)])];
-    let kinds: [Kind; 3] = [
+    let kinds: [BarSeries; 3] = [
         ("+-3 sigma of the estimate (rescaled)", BLUE, Stroke::Solid, 0.0, |e| e.sigma_rescaled),
         ("+-3 predicted sigma", ORANGE, Stroke::Dashed, 0.2, |e| e.predicted_sigma),
         ("+-3 required sigma", GREEN, Stroke::DashDot, -0.2, |e| e.required_sigma),
@@ -212,7 +212,7 @@ mod tests {
         }
     }
 
-    /// Two positions with a slew from 20 to 40 s: points of the first and of the second are apart.
+    /// Two positions with a slew from 20 to 40 s: their points are in separate lines.
     #[test]
     fn series_are_drawn_by_position() {
         let position = |start_s: f64, end_s: f64| PositionFit {

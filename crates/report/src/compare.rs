@@ -1,4 +1,4 @@
-//! Schemes side by side.
+//! Comparison of schemes.
 
 use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity};
 use obsdeg_evidence::requirements::{Requirements, Worst};
@@ -15,7 +15,7 @@ fn list(items: &[String]) -> String {
     if items.is_empty() { "-".into() } else { items.join(" ") }
 }
 
-/// `15 of 15`; how it is counted where accuracy orders are not computed.
+/// `15 of 15`; with the words `by derivatives` if accuracy orders are not computed.
 pub(crate) fn rank([rank, unknowns]: [usize; 2], with_dwell: bool) -> String {
     format!("{rank} of {unknowns}{}", if with_dwell { "" } else { " by derivatives" })
 }
@@ -31,7 +31,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
     }
 }
 
-/// Columns that say nothing where no requirement is stated.
+/// Columns that are empty if no requirement is stated.
 pub(crate) const REQUIREMENTS: [&str; 4] =
     ["requirements; worst margin", "met without", "required", "margin"];
 
@@ -138,7 +138,7 @@ fn excitation(q: &Quantity) -> String {
     q.excitation.iter().map(short).collect::<Vec<_>>().join(" ")
 }
 
-/// Predicted sigmas beside those of full attitudes, where the small-angle model does not hold at the scheme's
+/// Predicted sigmas beside those of full attitudes, if the small-angle model does not hold at the scheme's
 /// own drifts.
 pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     let large = || schemes.iter().filter(|r| r.validity.as_ref().is_some_and(|v| !v.holds));
@@ -163,8 +163,9 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
             number(v.largest_psi_deg)
         ))
     };
-    let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised along the run of \
-                 the drifts that are stated; an unknown that is not determined at small angles may be seen by large ones";
+    let means = "full attitudes: sigma at the end of a filter that carries them, with the prior, linearised \
+                 along the run of the drifts that are stated; an unknown that is not determined at small \
+                 angles may be seen by large ones";
     vec![
         Block::table("Sigma at the drifts that are stated", columns, rows),
         Block::list(
@@ -174,7 +175,7 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
     ]
 }
 
-/// The answer on every scheme; then the carry, and what nobody states.
+/// Answer on every scheme, then the carry and the conditions that are not stated.
 fn lead(c: &Comparison) -> Vec<String> {
     let of = |text: String, r: &ComparedScheme| match c.schemes.len() {
         1 => stated::capital(&text),
@@ -218,7 +219,7 @@ impl Answer for Comparison {
     }
 
     fn document(&self) -> Document {
-        // where nothing is required there is nothing to be met
+        // without requirements their columns would be empty
         let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
         let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
         let mut blocks =
@@ -315,8 +316,9 @@ impl Answer for Comparison {
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
             .into(),
-        "observable without, met without: positions you can drop (one at a time) so that what is observable stays so, and so \
-         that every requirement is met; only by: positions without which the unknown is not observable"
+        "observable without, met without: positions you can drop (one at a time) so that what is observable \
+         stays so, and so that every requirement is met; only by: positions without which the unknown is not \
+         observable"
             .into(),
         format!("seed {}", self.seed),
     ]);

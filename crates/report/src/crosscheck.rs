@@ -1,4 +1,4 @@
-//! The cross-check of exact verdicts and filter.
+//! Cross-check of exact verdicts against a filter.
 
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_evidence::crosscheck::{
@@ -10,7 +10,7 @@ use crate::document::{Block, Document, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
 use crate::words::{self, at_most, band};
 
-/// The mark of a check.
+/// Mark of the outcome of a check.
 fn mark(outcome: Agreement) -> String {
     match outcome {
         Agreement::Agrees => "pass",
@@ -25,7 +25,7 @@ fn passed(pass: bool) -> String {
     mark(if pass { Agreement::Agrees } else { Agreement::Disagrees })
 }
 
-/// The gravest of some outcomes.
+/// The gravest of several outcomes.
 fn gravest(outcomes: impl IntoIterator<Item = Agreement>) -> Agreement {
     let order = [Agreement::Disagrees, Agreement::NotResolvable, Agreement::Agrees];
     let found: Vec<Agreement> = outcomes.into_iter().collect();
@@ -57,7 +57,8 @@ fn by_derivatives(c: &CrossCheck) -> Block {
         ]
     };
     Block::table(
-        "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was at the start of each",
+        "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was \
+         at the start of each",
         [
             left("unknown"),
             left("status"),
@@ -88,8 +89,8 @@ fn by_unknown(c: &CrossCheck) -> Block {
         ]
     };
     Block::table(
-        "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) against log dwell; b. factor on sigma \
-         (psi: of the end) for a prior variance times 100",
+        "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) \
+         against log dwell; b. factor on sigma (psi: of the end) for a prior variance times 100",
         [
             left("unknown"),
             right("accuracy order"),
@@ -129,7 +130,7 @@ fn by_direction(c: &CrossCheck) -> Block {
     )
 }
 
-/// What is not of one unknown or direction: item b's count, and c to f.
+/// Checks of the whole scheme: the number of directions of item b, and items c to f.
 fn whole(c: &CrossCheck) -> Block {
     let row = |evidence: String, predicted: String, measured: String, band: String, pass: bool| {
         vec![evidence, predicted, measured, band, passed(pass)]
@@ -198,18 +199,19 @@ fn fits(d: &MonteCarlo) -> bool {
     d.white && d.statistics.iter().all(|s| s.pass)
 }
 
-/// What a reader must know before the rows.
+/// First lines: warnings and the numbers of outcomes.
 fn lead(c: &CrossCheck) -> Vec<String> {
     let mut out: Vec<String> = warning(&c.conditions).into_iter().collect();
     let Counts { agree, disagree, not_resolvable, not_tested } = c.counts;
     out.push(format!(
-        "checks: {agree} agree, {disagree} disagree, {not_resolvable} not resolvable, {not_tested} not tested; {} of {} accuracy orders measured",
+        "checks: {agree} agree, {disagree} disagree, {not_resolvable} not resolvable, {not_tested} not \
+         tested; {} of {} accuracy orders measured",
         c.orders.measured, c.orders.of
     ));
     if c.timeline.iter().any(|t| t.slew) {
         out.push(
-            "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of finite duration moves psi by \
-             drifts of its own; d knows of the slews"
+            "a, b, c and f are taken with instantaneous repositioning, as the exact verdicts: a slew of \
+             finite duration moves psi by drifts of its own; d knows of the slews"
                 .into(),
         );
     }

@@ -2,9 +2,9 @@
 
 use crate::{ReportError, visible};
 
-/// A field: a text that a spreadsheet would take for a formula has an apostrophe before it, as one types it
-/// there. Numbers are left alone, and so is what begins with a sign and holds nothing but what formulas and
-/// directions of ours do (`-D_FX`, `+x,-z`): no function with a text, no other program.
+/// Field of a CSV file. A text that a spreadsheet would take for a formula gets an apostrophe before it, as
+/// one types it there. Numbers stay as they are. So do texts that begin with a sign and have only the
+/// characters of formulas and directions (`-D_FX`, `+x,-z`): these can call no function and no program.
 fn field(text: &str) -> String {
     let text = visible(text);
     let ours = |c: char| c.is_alphanumeric() || " _+-*/^()[].,'@".contains(c);

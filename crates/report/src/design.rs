@@ -1,4 +1,4 @@
-//! Schemes that were found.
+//! Documents and figures of found schemes.
 
 use obsdeg_core::model::Carry;
 use obsdeg_design::design::{BiasPoint, Certificate, Design, Found, PartsReport, SearchReport, Weight};
@@ -17,13 +17,15 @@ fn criterion(name: &str) -> &'static str {
             "A: root of the mean variance of the coefficients (psi is estimated with them and does not count)"
         }
         "D" => {
-            "D: geometric mean of the principal sigmas of the coefficients (psi is estimated with them and does not count)"
+            "D: geometric mean of the principal sigmas of the coefficients (psi is estimated with them and \
+             does not count)"
         }
         "E" => {
             "E: largest principal sigma of the coefficients (psi is estimated with them and does not count)"
         }
         "margin" => {
-            "margin: largest sigma over what is required, of psi too where every coefficient is asked for; up to 1 all requirements are met"
+            "margin: largest sigma over what is required, of psi too where every coefficient is asked for; \
+             up to 1 all requirements are met"
         }
         _ => "worst: largest sigma of a coefficient (psi is estimated with them and does not count)",
     }
@@ -49,7 +51,7 @@ fn route(f: &Found) -> String {
     out.join(" ")
 }
 
-/// `0.5 (psi_y)`, and what has none.
+/// `0.5 (psi_y)`, and the unknowns without a margin.
 fn margin(r: &Requirements) -> String {
     let unseen: Vec<&str> =
         r.missed.iter().filter(|m| m.why != Miss::TooLarge).map(|m| m.name.as_str()).collect();
@@ -57,8 +59,7 @@ fn margin(r: &Requirements) -> String {
     none.or_else(|| stated::worst_margin(r)).unwrap_or_else(|| "-".into())
 }
 
-/// The answer: the first scheme with what becomes of the requirements; then the carry, and what nobody
-/// states.
+/// First lines: the first scheme and its requirements, then the carry and the conditions that are not stated.
 fn lead(d: &Design) -> Vec<String> {
     let mut out = Vec::new();
     if let (Some(s), Some(first)) = (&d.search, d.found.first()) {
@@ -79,8 +80,9 @@ fn lead(d: &Design) -> Vec<String> {
         out.extend(d.omitted.as_ref().and_then(|o| omitted::lead(o, first.requirements.with_bench, met)));
         out.extend(s.ranked.map(|n| {
             format!(
-                "The search does not count what is not estimated under these conditions: the {n} schemes of least sigma were ranked by their total \
-                 uncertainty. No bound and no proof counts, and a scheme with a larger sigma may have a smaller total."
+                "The search does not count what is not estimated under these conditions: the {n} schemes of \
+                 least sigma were ranked by their total uncertainty. No bound and no proof counts, and a \
+                 scheme with a larger sigma may have a smaller total."
             )
         }));
         if first.requirements.any_missed() {
@@ -105,12 +107,12 @@ fn lead(d: &Design) -> Vec<String> {
     out
 }
 
-/// The parts of a search, unless every block of them was searched again.
+/// The parts of a search; `None` if every block of them was searched again.
 fn by_parts(s: &SearchReport) -> Option<&PartsReport> {
     s.parts.as_ref().filter(|parts| !parts.is_repeated())
 }
 
-/// The parts that an answer was put together from, and what was checked of them.
+/// Sentence on the merged parts and on the blocks of them that were searched again.
 fn parts(p: &PartsReport) -> String {
     let again = match (p.searched_again, p.is_repeated()) {
         (_, true) => format!("all {} blocks of starts were searched again with the same result", p.blocks),
@@ -121,7 +123,8 @@ fn parts(p: &PartsReport) -> String {
         ),
     };
     format!(
-        "put together from {} parts, searched by version {}: what they list was evaluated again, their starts and counts add up; {again}",
+        "put together from {} parts, searched by version {}: what they list was evaluated again, their \
+         starts and counts add up; {again}",
         p.parts,
         p.versions.join(", ")
     )
@@ -133,7 +136,7 @@ fn dwells(f: &Found) -> String {
     if listed.is_empty() { String::new() } else { format!(" ({} s)", listed.join(", ")) }
 }
 
-/// The first scheme of those that were searched, in words.
+/// Name of the scheme that a refined or divided one started from: the first of the search.
 fn searched(d: &Design) -> &'static str {
     match (d.found.iter().any(|f| f.refined), d.found.iter().any(|f| !f.dwells_s.is_empty())) {
         (false, false) => "the first",
@@ -212,8 +215,10 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         let unrefined = searched(d);
         let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
         format!(
-            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all sequences of {} of them within the constraints none has a \
-             smaller worst degree, or the same and a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left open",
+            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all \
+             sequences of {} of them within the constraints none has a smaller worst degree, or the same and \
+             a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left \
+             open",
             d.candidates.len(),
             if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
             s.positions
@@ -224,7 +229,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         )
     } else if s.ties.is_some() {
         format!(
-            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a probability of up to {}",
+            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a \
+             probability of up to {}",
             words::at_most(d.error_bound)
         )
     } else if s.interrupted {
@@ -236,7 +242,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
         let by = match rounded {
             true => {
-                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on the grid of rounded angles"
+                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on \
+                 the grid of rounded angles"
             }
             false => "coordinate exchange from random starts",
         };
@@ -247,7 +254,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     out.extend(s.parts.as_ref().map(parts));
     if d.found.iter().any(|f| f.image_of.is_some()) {
         out.push(
-            "images of a scheme listed before them are that scheme in other platform axes (coefficients renamed): what is true of one is true of all"
+            "images of a scheme listed before them are that scheme in other platform axes (coefficients \
+             renamed): what is true of one is true of all"
                 .into(),
         );
     }
@@ -256,24 +264,31 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     }
     if s.lost > 0 {
         out.push(format!(
-            "{} of them are observable by the exact verdict (of repositioning at once), but their samples{} do not determine what is required, as \
-             far as double precision tells: they count as worse than all others",
+            "{} of them are observable by the exact verdict (of repositioning at once), but their samples{} \
+             do not determine what is required, as far as double precision tells: they count as worse than \
+             all others",
             s.lost,
             if s.conditions.slew_rate_deg_s.is_some() { " with the slews" } else { "" }
         ));
     }
     out.extend(s.ties.map(|t| match t.sequences {
-        1 => format!("no other sequence is as good (worst degree equal, criterion within {:e} of it)", t.within),
+        1 => format!(
+            "no other sequence is as good (worst degree equal, criterion within {:e} of it)",
+            t.within
+        ),
         n => format!(
-            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within {:e} of it)",
+            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within \
+             {:e} of it)",
             t.within
         ),
     }));
     out.push(
         if s.order_matters && d.carry == Carry::Reset {
-            "orders of the same positions are different schemes: the noise of Z is correlated from one to the next; a position may be repeated"
+            "orders of the same positions are different schemes: the noise of Z is correlated from one to \
+             the next; a position may be repeated"
         } else if s.order_matters {
-            "orders of the same positions are different schemes: the dwell lets psi move in between; a position may be repeated"
+            "orders of the same positions are different schemes: the dwell lets psi move in between; a \
+             position may be repeated"
         } else {
             "the order of positions does not matter under reset carry; a position may be repeated"
         }
@@ -283,19 +298,21 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
         out.push(
             match s.degree_floor {
                 Some(_) => {
-                    "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at once; only what is observable so \
-                     is listed, and its samples determine it with the slews; what slews alone would determine is not sought"
+                    "degrees, accuracy orders, ranks and the fewest positions are those of repositioning at \
+                     once; only what is observable so is listed, and its samples determine it with the \
+                     slews; what slews alone would determine is not sought"
                 }
                 None => {
-                    "degrees, accuracy orders and ranks are those of turns fast against the earth rate, in which torquer errors act; only what \
-                     is observable so is listed, and its samples determine it with the slews"
+                    "degrees, accuracy orders and ranks are those of turns fast against the earth rate, in \
+                     which torquer errors act; only what is observable so is listed, and its samples \
+                     determine it with the slews"
                 }
             }
             .into(),
         );
         out.push(
-            "half turns are tried in both directions, which are different schemes: the axis about which they are right-handed stands \
-             before the position"
+            "half turns are tried in both directions, which are different schemes: the axis about which they \
+             are right-handed stands before the position"
                 .into(),
         );
     }
@@ -305,41 +322,43 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     };
     out.push(match s.degree_floor {
         Some(floor) => format!(
-            "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the criterion, {by}"
+            "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the \
+             criterion, {by}"
         ),
         None => format!(
-            "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered by the criterion alone, {by}; what is \
-             listed is observable by the exact verdict"
+            "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered \
+             by the criterion alone, {by}; what is listed is observable by the exact verdict"
         ),
     });
     out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
     out
 }
 
-/// The criterion of the first scheme of those that were searched; not a number where there is none.
+/// Criterion of the first scheme of the search; not a number if there is none.
 fn first_value(d: &Design) -> f64 {
     d.found.iter().find(|f| !f.refined && f.dwells_s.is_empty()).map_or(f64::NAN, |f| f.value)
 }
 
-/// The criterion of the first scheme that was searched, how far it is above the bound for the candidates, and
-/// above that for all attitudes.
+/// Criterion of the first scheme of the search: its excess over the bound for the candidates, and over that
+/// for all attitudes.
 fn first_above(d: &Design, c: &Certificate) -> (Excess, Option<Excess>) {
     let first = first_value(d);
     let every = c.everywhere.as_ref().map(|e| Excess::new(first, e.best_possible, e.within_percent));
     (Excess::new(first, c.best_possible, c.within_percent), every)
 }
 
-/// How good the best can be.
+/// Sentences on the bound of the criterion, and on how close to it the found schemes are.
 fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     let Some(c) = &s.certificate else {
         let why = match s.order_matters {
             _ if s.conditions.accelerometer_bias.is_some() => {
-                "not known: the noise of Z is correlated from position to position, so the information of a scheme is no sum over its positions, and \
-                 no bound is computed"
+                "not known: the noise of Z is correlated from position to position, so the information of a \
+                 scheme is no sum over its positions, and no bound is computed"
                     .into()
             }
             true => format!(
-                "not known: under {} carry the information of a scheme is no sum over its positions, and no bound is computed",
+                "not known: under {} carry the information of a scheme is no sum over its positions, and no \
+                 bound is computed",
                 d.carry
             ),
             false if s.interrupted => "not known: interrupted".into(),
@@ -355,15 +374,16 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     };
     let mut out = vec![
         format!(
-            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of whatever degrees, has a criterion below {bound}; \
-             {first}, of {value}, is {beyond} ({} {:.6} at least)",
+            "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of \
+             whatever degrees, has a criterion below {bound}; {first}, of {value}, is {beyond} ({} {:.6} at \
+             least)",
             s.positions,
             if s.criterion == "D" { "D-efficiency" } else { "efficiency, the square of the ratio," },
             (c.efficiency * 1e6).floor() / 1e6
         ),
         format!(
-            "the bound is by optimal weights of the candidates (approximate design theory), as if positions could be divided: those listed would \
-             reach {}, and this way of bounding gives no more",
+            "the bound is by optimal weights of the candidates (approximate design theory), as if positions \
+             could be divided: those listed would reach {}, and this way of bounding gives no more",
             number(c.attained)
         ),
     ];
@@ -373,9 +393,11 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         return out;
     };
     out.push(format!(
-        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a criterion below {}{}; {first}, of {}, is {} above that, \
-         and what lies between is left open: so few positions may not reach the bound (attitudes that add most are sought on a net; between \
-         its points what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for rounding)",
+        "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a \
+         criterion below {}{}; {first}, of {}, is {} above that, and what lies between is left open: so few \
+         positions may not reach the bound (attitudes that add most are sought on a net; between its points \
+         what they add is bounded as a trigonometric polynomial, and a part of 1e-8 is assumed for \
+         rounding)",
         s.positions,
         above.bound,
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
@@ -396,27 +418,32 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
     match &every.rounded {
         Some(rounded) => {
             out.push(format!(
-                "the candidates are the cardinal attitudes, and those of weights and of schemes near them with angles rounded to {} deg; every \
-                 criterion listed is that of the angles as they are listed",
+                "the candidates are the cardinal attitudes, and those of weights and of schemes near them \
+                 with angles rounded to {} deg; every criterion listed is that of the angles as they are \
+                 listed",
                 rounded.step_deg
             ));
             out.push(match &rounded.finer {
                 Some(finer) => {
                     let cost = Excess::new(first_value(d), finer.value, 0.0);
                     format!(
-                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was found, and here {}, at {}",
+                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was \
+                         found, and here {}, at {}",
                         cost.percent,
                         cost.bound,
                         cost.value,
                         finer.angles.join(" ")
                     )
                 }
-                None => "rounding costs nothing that was found: no better scheme with angles in hundredths of a degree".into(),
+                None => "rounding costs nothing that was found: no better scheme with angles in hundredths \
+                         of a degree"
+                    .into(),
             });
         }
         None if ratio > FAR => out.push(format!(
-            "these candidates cost: weights on other attitudes, as if positions could be divided, would reach a criterion {ratio:.2} times smaller than any scheme of these has \
-             (--candidates free or --refine look for them; so few positions may not come near it)"
+            "these candidates cost: weights on other attitudes, as if positions could be divided, would \
+             reach a criterion {ratio:.2} times smaller than any scheme of these has (--candidates free or \
+             --refine look for them; so few positions may not come near it)"
         )),
         None => {}
     }
@@ -435,7 +462,7 @@ fn weights(list: &[Weight]) -> String {
     groups.map(group).collect::<Vec<_>>().join("; ")
 }
 
-/// Candidates whose best is so many times worse than what other attitudes could do are said to cost.
+/// Factor of the criterion from which the candidates are said to be worse than other attitudes.
 const FAR: f64 = 1.1;
 
 /// The answer of `design --minimum` in a sentence.
@@ -474,7 +501,8 @@ fn minimum(d: &Design) -> Vec<String> {
     out.extend((m.positions.is_some() && !m.proven).then_some(chance));
     if m.counting_bound > 1 {
         out.push(format!(
-            "fewer than {} cannot do: a position adds at most {} independent derivative rows{}, and {} coefficients are required",
+            "fewer than {} cannot do: a position adds at most {} independent derivative rows{}, and {} \
+             coefficients are required",
             m.counting_bound,
             m.rows_per_position,
             if d.carry == Carry::Reset { " besides those that its own psi takes" } else { "" },
@@ -488,7 +516,7 @@ fn minimum(d: &Design) -> Vec<String> {
     out
 }
 
-/// What the sigmas rest on.
+/// Conditions of the sigmas, one sentence each.
 fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     let c = &s.conditions;
     let slews = c.slew_rate_deg_s.map_or_else(
@@ -510,7 +538,10 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
             none(&s.drift_noise),
             s.prior.as_ref().map_or_else(
                 || "none".into(),
-                |p| format!("{p} (deg, deg/h, ... as stated; counted in sigmas and the bound, not in what is observable)")
+                |p| format!(
+                    "{p} (deg, deg/h, ... as stated; counted in sigmas and the bound, not in what is \
+                     observable)"
+                )
             )
         ),
         format!(
@@ -521,7 +552,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     ]
 }
 
-/// The front of sigma against bias; nothing where the search counts no bench.
+/// Front of sigma against bias; `None` if the search counts no bench.
 fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
     let row = |p: &BiasPoint| vec![p.positions.join(" "), number(p.sigma), number(p.bias), number(p.total)];
     let unit = s.unit.as_ref().map_or_else(|| "over what is required".into(), |u| format!("in {u}"));
@@ -529,7 +560,7 @@ fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
         true => "of all sequences",
         false => "by exchange with other sizes of the bench, not proven",
     };
-    // the largest sigma and the largest bias of the best may be those of different coefficients
+    // the largest sigma and the largest bias of the best scheme may belong to different coefficients
     let best = d.found.first().filter(|f| !d.bias_front.iter().any(|p| p.positions == f.positions));
     let best = best.map_or("", |_| "; the best by the total is not on it");
     let heading = format!(
@@ -603,7 +634,7 @@ fn candidates(names: &[String]) -> String {
     format!("{} candidates: {}", names.len(), shortened(names))
 }
 
-/// At most thirty names.
+/// Names, at most thirty of them.
 fn shortened(names: &[String]) -> String {
     const SHOWN: usize = 30;
     let more =
@@ -611,7 +642,7 @@ fn shortened(names: &[String]) -> String {
     format!("{}{more}", names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(" "))
 }
 
-/// What no scheme is below, by total time.
+/// Lower bound of the criterion over total time.
 pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
     Line {
         label: "no scheme of the candidates in equal dwells is below".into(),
@@ -621,13 +652,13 @@ pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
     }
 }
 
-/// Between two times the bound is that of the longer: more time is never worse.
+/// Steps of a bound: between two times the bound of the longer holds, since more time is never worse.
 pub(crate) fn bound_steps(bound: &[[f64; 2]]) -> Vec<(f64, f64)> {
     let steps = bound.windows(2).flat_map(|w| [(w[0][0], w[0][1]), (w[0][0], w[1][1])]);
     steps.chain(bound.last().map(|p| (p[0], p[1]))).collect()
 }
 
-/// The front of total time against the criterion; none when there is no search.
+/// Front of total time against the criterion; empty without a search.
 pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
     let Some(search) = d.search.as_ref().filter(|_| !d.front.is_empty()) else { return Ok(Vec::new()) };
     // lines per number of positions, and the front itself as steps

@@ -1,5 +1,5 @@
-//! What a result says, in no format: headings, tables, lists, formulas, pictures. Text from files is escaped
-//! where it is written.
+//! Content of a result, independent of the format: headings, tables, lists, formulas, pictures. Each format
+//! escapes texts from files when it writes them.
 
 use std::borrow::Cow;
 
@@ -10,9 +10,9 @@ use crate::panels::Panels;
 
 /// A part of a document.
 pub(crate) enum Block {
-    /// A table; an empty heading is none.
+    /// Table; without a heading if that is empty.
     Table { heading: String, columns: Vec<Column>, rows: Vec<Vec<Cell>> },
-    /// Lines, wrapped; an empty heading is none.
+    /// Lines, wrapped; without a heading if that is empty.
     List { heading: String, lines: Vec<String> },
     /// The heading of a part (level 1) or of a section of it (level 2).
     Section { level: usize, title: String },
@@ -22,9 +22,9 @@ pub(crate) enum Block {
     Formulas { heading: String, lines: Vec<Typeset> },
     /// A picture.
     Picture(Picture),
-    /// What a reader must know first, a box for each scheme or model.
+    /// Status of each scheme or model, in boxes at the beginning.
     Status(Vec<Status>),
-    /// A part (level 1) that may be folded away; no other holds one.
+    /// Part (level 1) that may be folded away; folds are not nested.
     Fold { title: String, blocks: Vec<Block> },
 }
 
@@ -38,7 +38,7 @@ impl Block {
         Self::Table { heading: heading.into(), columns: columns.into(), rows: rows.collect() }
     }
 
-    /// The table without the columns of these names.
+    /// Table without the columns of these names.
     pub(crate) fn without(self, names: &[&str]) -> Self {
         let Self::Table { heading, columns, rows } = self else { return self };
         let kept: Vec<bool> = columns.iter().map(|c| !names.contains(&c.name.as_ref())).collect();
@@ -53,12 +53,12 @@ impl Block {
         Self::List { heading: heading.into(), lines }
     }
 
-    /// A list, if it has lines.
+    /// List; `None` without lines.
     pub(crate) fn list_if_any(heading: impl Into<String>, lines: Vec<String>) -> Option<Self> {
         (!lines.is_empty()).then(|| Self::list(heading, lines))
     }
 
-    /// Formulas, if there are any.
+    /// Formulas; `None` without any.
     pub(crate) fn formulas(
         heading: impl Into<String>,
         lines: impl IntoIterator<Item = Typeset>,
@@ -72,7 +72,7 @@ impl Block {
 #[derive(Clone)]
 pub(crate) struct Column {
     pub(crate) name: Cow<'static, str>,
-    /// Numbers are set flush right.
+    /// True for numbers, which are set flush right.
     pub(crate) number: bool,
 }
 
@@ -90,9 +90,9 @@ pub(crate) fn right(name: impl Into<Cow<'static, str>>) -> Column {
 #[derive(Clone)]
 pub(crate) struct Cell {
     pub(crate) text: String,
-    /// The same as LaTeX, if it is a formula.
+    /// LaTeX of a formula; `None` for texts.
     pub(crate) latex: Option<String>,
-    /// What it means, if that is graded; the text says it too.
+    /// Grade of the content; `None` if it is not graded. The text says the same.
     pub(crate) grade: Option<Grade>,
 }
 
@@ -125,38 +125,38 @@ pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>
     })
 }
 
-/// The state of one scheme or model at a glance.
+/// Status of one scheme, model or calibration.
 pub(crate) struct Status {
-    /// Whose it is.
+    /// Name of the scheme, model or calibration.
     pub(crate) title: String,
-    /// A row per question.
-    pub(crate) rows: Vec<Finding>,
-    /// What to do about it.
+    /// Answers, one per question.
+    pub(crate) rows: Vec<StatusRow>,
+    /// Recommended actions.
     pub(crate) actions: Vec<String>,
 }
 
-/// The answer to one question.
-pub(crate) struct Finding {
+/// Answer to one question of a status.
+pub(crate) struct StatusRow {
     pub(crate) what: &'static str,
     pub(crate) grade: Grade,
     pub(crate) text: String,
 }
 
-/// What an answer means.
+/// Grade of an answer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Grade {
-    /// As it should be.
+    /// Requirements are met and checks pass.
     Good,
-    /// It limits what the rest is worth.
+    /// Limits the validity of other answers.
     Limited,
-    /// What was asked for is not there.
+    /// A requirement or a check is not met.
     Missed,
-    /// Nobody knows: not computed, not taken.
+    /// Not computed or not measured.
     Open,
 }
 
 impl Grade {
-    /// Its name on pages.
+    /// Name of the grade on pages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -177,9 +177,9 @@ impl Grade {
 }
 
 impl Status {
-    /// The box as a table, for formats that have no boxes.
+    /// Status as a table, for formats without boxes.
     fn table(&self) -> Block {
-        let row = |f: &Finding| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
+        let row = |f: &StatusRow| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
         let action = |text: &String| ["Recommended action", "", text].map(String::from).to_vec();
         let columns = [left("question"), left("status"), left("finding")];
         let rows = self.rows.iter().map(row).chain(self.actions.iter().map(action));
@@ -200,20 +200,20 @@ pub(crate) struct Picture {
     pub(crate) drawing: Drawing,
 }
 
-/// What is drawn.
+/// Content of a picture.
 pub(crate) enum Drawing {
     /// Curves, which a page may make interactive.
     Curves(Box<Figure>),
-    /// A picture as it is, SVG.
+    /// SVG.
     Still(String),
-    /// The same, of which white is nothing: a page in the dark turns it round.
+    /// SVG on white, whose colours a dark page inverts.
     Map(String),
-    /// Positions, which stand side by side as far as there is room.
+    /// Positions side by side, as many as fit.
     Panels(Panels),
 }
 
 impl Picture {
-    /// True if it stands by itself.
+    /// True if the picture takes the full width.
     pub(crate) fn is_wide(&self) -> bool {
         matches!(self.drawing, Drawing::Panels(_))
     }
@@ -227,7 +227,7 @@ impl Picture {
     }
 }
 
-/// What a result says, in no format: a title and its parts.
+/// Content of a result, independent of the format: title, first lines and blocks.
 pub struct Document {
     pub(crate) title: String,
     pub(crate) lead: Vec<String>,
@@ -242,7 +242,7 @@ pub(crate) fn number(x: f64) -> String {
     } else if !(1e-3..1e5).contains(&magnitude) {
         format!("{x:.3e}")
     } else {
-        // the exponent behind rounding: 0.99999 is 1.000
+        // exponent of the rounded number: 0.99999 is 1.000
         let rounded = format!("{magnitude:.3e}");
         let exponent = rounded.split_once('e').and_then(|(_, e)| e.parse::<i32>().ok()).unwrap_or(0);
         let decimals = (3 - exponent).clamp(0, 6) as usize;
@@ -250,7 +250,7 @@ pub(crate) fn number(x: f64) -> String {
     }
 }
 
-/// An estimate with the digits that its standard deviation leaves: two of those that are uncertain.
+/// Estimate rounded to the second digit of its standard deviation.
 pub(crate) fn estimate(x: Option<f64>, sigma: Option<f64>) -> String {
     let (Some(x), Some(sigma)) = (x, sigma) else { return optional(x) };
     let decimals = 1.0 - sigma.log10().floor();
@@ -261,41 +261,41 @@ pub(crate) fn estimate(x: Option<f64>, sigma: Option<f64>) -> String {
     }
 }
 
-/// Three decimals, without trailing zeros.
+/// Number with at most three decimals, without trailing zeros.
 pub(crate) fn short(x: f64) -> String {
     let text = format!("{x:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// A number, or a dash.
+/// Number, or a dash for `None`.
 pub(crate) fn optional(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), number)
 }
 
-/// A block, or pictures that stand together.
-pub(crate) enum Part<'a> {
+/// A block, or pictures that follow each other.
+pub(crate) enum BlockGroup<'a> {
     Block(&'a Block),
     Pictures(Vec<&'a Picture>),
 }
 
-/// Blocks, with pictures that follow each other taken together unless they are wide.
-pub(crate) fn parts(blocks: &[Block]) -> Vec<Part<'_>> {
-    let mut out: Vec<Part<'_>> = Vec::new();
+/// Blocks, with successive pictures grouped unless they are wide.
+pub(crate) fn parts(blocks: &[Block]) -> Vec<BlockGroup<'_>> {
+    let mut out: Vec<BlockGroup<'_>> = Vec::new();
     for block in blocks {
         match (block, out.last_mut()) {
-            (Block::Picture(p), Some(Part::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
+            (Block::Picture(p), Some(BlockGroup::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
                 list.push(p)
             }
-            (Block::Picture(p), _) => out.push(Part::Pictures(vec![p])),
-            (block, _) => out.push(Part::Block(block)),
+            (Block::Picture(p), _) => out.push(BlockGroup::Pictures(vec![p])),
+            (block, _) => out.push(BlockGroup::Block(block)),
         }
     }
     out
 }
 
 impl Document {
-    /// The same with status boxes as tables and nothing folded.
+    /// The document with status boxes as tables and without folds.
     pub(crate) fn plain(mut self) -> Self {
         let tables = |b: Block| match b {
             Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
@@ -309,7 +309,7 @@ impl Document {
         self
     }
 
-    /// The same with all pictures in `folder`.
+    /// The document with all pictures in `folder`.
     pub(crate) fn with_pictures_in(mut self, folder: &str) -> Self {
         for block in &mut self.blocks {
             if let Block::Picture(p) = block {
@@ -331,8 +331,8 @@ impl Document {
 mod tests {
     use super::*;
 
-    /// One document in every format: a formula is code in Markdown, math in LaTeX and text elsewhere, a
-    /// heading that is empty is none, and columns of sentences share the line.
+    /// One document in every format. A formula is code in Markdown, math in LaTeX and text elsewhere. Empty
+    /// headings are left out, and columns of sentences share the line.
     #[test]
     fn a_formula_in_every_format() {
         let columns = [left("what"), right("how many")];
@@ -351,8 +351,10 @@ mod tests {
         );
         assert_eq!(
             crate::latex::document(&d),
-            "% needs the packages amsmath, booktabs and longtable\n\\paragraph{T}\n\\begin{itemize}\n\\item so\n\\end{itemize}\n\\begin{longtable}{lr}\n\\toprule\nwhat & how many \\\\\n\\midrule\n\\endhead\n\
-             $D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
+            "% needs the packages amsmath, booktabs and longtable\n\\paragraph{T}\n\\begin{itemize}\n\\item \
+             so\n\\end{itemize}\n\\begin{longtable}{lr}\n\\toprule\nwhat & how many \\\\\n\\midrule\n\
+             \\endhead\n$D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\
+             \\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
         );
         let table = crate::table::document(&d, crate::Layout::default());
         let lines: Vec<&str> = table.lines().collect();
@@ -370,7 +372,7 @@ mod tests {
             let spec =
                 latex.split("longtable}{").nth(1).and_then(|t| t.split("}\n").next()).unwrap_or_default();
             let wrapped = spec.matches("linewidth").count();
-            // one sentence of 90 characters has room
+            // a single sentence of 90 characters fits
             let expected = if sentences == 1 { 0 } else { sentences };
             assert_eq!(wrapped, expected, "{spec}");
             let shares = spec.split("p{").skip(1).filter_map(|t| t.split('\\').next()?.parse::<f64>().ok());

@@ -1,9 +1,8 @@
-//! How far a criterion is above a bound: two figures, and the percentage that follows from them as they are
-//! printed.
+//! Excess of a criterion over a bound: two figures, and the percentage that follows from the printed figures.
 
 use crate::document::number;
 
-/// A criterion, a bound that it is not below, and how far it is above.
+/// A criterion, a lower bound of it, and the excess over the bound.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Excess {
     /// The criterion, to six digits.
@@ -15,8 +14,8 @@ pub struct Excess {
 }
 
 impl Excess {
-    /// Of a criterion and a bound, both above 0; `at_most_percent` is what is known of the excess, with
-    /// whatever rounding hides.
+    /// Excess of a criterion over a bound, both above 0. `at_most_percent` is a known upper limit of the
+    /// excess, which rounded figures may hide.
     ///
     /// ```
     /// use obsdeg_report::Excess;
@@ -31,14 +30,14 @@ impl Excess {
     }
 }
 
-/// A number above 0 to six digits.
+/// Number above 0 with six digits.
 fn six(x: f64, rounded: impl Fn(f64) -> f64) -> String {
     if !(x.is_finite() && x > 0.0) {
         return number(x);
     }
     let digits = 5 - x.log10().floor() as i32;
     let unit = 10f64.powi(digits.abs());
-    // what is a decimal number of six digits is not a step below itself
+    // a decimal number of six digits stays as it is
     let scaled = if digits < 0 { x / unit } else { x * unit };
     let near = (scaled - scaled.round()).abs() < 1e-14 * scaled;
     let whole = if near { scaled.round() } else { rounded(scaled) };
@@ -49,7 +48,7 @@ fn six(x: f64, rounded: impl Fn(f64) -> f64) -> String {
     }
 }
 
-/// A percentage rounded up to three digits, and to a millionth at the finest: `0.0213 %`.
+/// Percentage rounded up to three digits, in steps of at least 1e-6: `0.0213 %`.
 fn upward(percent: f64) -> String {
     const FINEST: f64 = 1e-6;
     if percent <= FINEST {
@@ -64,8 +63,7 @@ fn upward(percent: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Whatever the figures, the percentage is that of the figures as they are printed, by no more than a
-    /// unit of its last digit above.
+    /// The percentage is that of the printed figures, or at most a unit of its last digit above.
     #[test]
     fn percentages_follow_from_the_figures() {
         let mut seed = 7u64;
@@ -87,7 +85,7 @@ mod tests {
                 "{told:?} {value} {bound}"
             );
             assert!(of(percent) >= of_figures - 1e-6 * unit - 1e-9, "{told:?} {of_figures}");
-            // below a thousandth of a percent six digits are too few: the excess that is known counts
+            // below 0.001 % six digits are too few: the known excess counts
             let most = of_figures.max(100.0 * (value / bound - 1.0)).max(1e-6);
             assert!(of(percent) <= most + unit * 1.001, "{told:?} {of_figures}");
         }

@@ -1,4 +1,4 @@
-//! Pictures: the only module that names the plotting library. SVG is the master, PNG is made from it.
+//! Pictures: the only module that names the plotting library. PNG is made from SVG.
 
 use std::sync::{Arc, OnceLock};
 
@@ -10,7 +10,7 @@ use resvg::{tiny_skia, usvg};
 
 use crate::visible;
 
-/// Colours that stay apart for colour-blind readers (Okabe and Ito).
+/// Colours that colour-blind readers can distinguish (Okabe and Ito).
 pub(crate) const BLACK: &str = "#000000";
 pub(crate) const BLUE: &str = "#0072B2";
 pub(crate) const SKY: &str = "#56B4E9";
@@ -20,12 +20,12 @@ pub(crate) const PURPLE: &str = "#CC79A7";
 pub(crate) const AMBER: &str = "#E69F00";
 pub(crate) const GREY: &str = "#999999";
 
-/// A text in a picture, which is XML.
+/// Text of a picture, which is XML, without control characters.
 fn shown(text: &str) -> String {
     visible(text).into_owned()
 }
 
-/// How a line is drawn.
+/// Stroke of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stroke {
     Solid,
@@ -34,8 +34,7 @@ pub(crate) enum Stroke {
     Dotted,
 }
 
-/// Colour and stroke of the `i`-th of many curves: 18 that differ, none of them black or dotted as references
-/// are.
+/// Colour and stroke of curve number `i`: 18 different styles, none black or dotted, since references are.
 pub(crate) fn style(i: usize) -> (&'static str, Stroke) {
     const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, SKY, PURPLE, AMBER];
     let stroke = [Stroke::Solid, Stroke::Dashed, Stroke::DashDot][i / COLORS.len() % 3];
@@ -45,7 +44,7 @@ pub(crate) fn style(i: usize) -> (&'static str, Stroke) {
 /// A curve.
 #[derive(Debug, Clone)]
 pub(crate) struct Line {
-    /// In the legend; empty for none.
+    /// Label in the legend; empty for none.
     pub(crate) label: String,
     pub(crate) color: &'static str,
     pub(crate) stroke: Stroke,
@@ -59,7 +58,7 @@ pub(crate) struct Band {
     pub(crate) points: Vec<(f64, f64, f64)>,
 }
 
-/// Axes with what is drawn between them.
+/// Axes with curves, bands and marks.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Figure {
     pub(crate) title: String,
@@ -67,30 +66,30 @@ pub(crate) struct Figure {
     pub(crate) y_label: String,
     pub(crate) bands: Vec<Band>,
     pub(crate) lines: Vec<Line>,
-    /// Vertical lines: boundaries between positions.
+    /// Positions of vertical lines, which separate positions.
     pub(crate) marks: Vec<f64>,
-    /// Range of the horizontal axis, if not that of the data.
+    /// Range of the horizontal axis; `None` for that of the data.
     pub(crate) x_range: Option<(f64, f64)>,
-    /// Range of the vertical axis, if not that of the data.
+    /// Range of the vertical axis; `None` for that of the data.
     pub(crate) y_range: Option<(f64, f64)>,
-    /// Both axes logarithmic.
+    /// True if both axes are logarithmic.
     pub(crate) log: bool,
-    /// The vertical axis logarithmic.
+    /// True if the vertical axis is logarithmic.
     pub(crate) log_y: bool,
-    /// Both axes are those of whole numbers.
+    /// True if both axes have whole numbers.
     pub(crate) orders: bool,
     /// Names along x, at 1, 2, ...; empty for numbers.
     pub(crate) x_names: Vec<String>,
 }
 
-/// Width and height of one figure.
+/// Width and height of one figure, in pixels.
 const SIZE: (f64, f64) = (640.0, 400.0);
-/// Left and right of the axes: the labels of the axes are wider than the library takes them for.
+/// Left and right margins in pixels: labels of the axes are wider than the library assumes.
 const MARGINS: (f64, f64) = (88.0, 28.0);
-/// Longer titles are broken.
+/// Number of characters from which a title is broken.
 const TITLE: usize = 48;
 pub(crate) const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
-/// How the library's ids of clips begin.
+/// Beginning of the library's ids of clips.
 pub(crate) const CLIP: &str = "kuva-clip-";
 
 impl Figure {
@@ -125,7 +124,7 @@ impl Figure {
             .with_height(SIZE.1)
             .with_font_family(FONT)
             .with_title_wrap(TITLE)
-            // powers of ten are narrower than the library takes them for, other numbers wider
+            // powers of ten are narrower than the library assumes, other numbers wider
             .with_y_label_offset(if self.log || self.log_y { 7.0 } else { -7.0 }, 0.0)
             .with_legend_box(false);
         layout.force_margin_left = Some(MARGINS.0);
@@ -135,7 +134,7 @@ impl Figure {
             layout = layout.with_legend_position(LegendPosition::OutsideBottomCenter);
             layout.force_margin_right = Some(MARGINS.1);
         }
-        // an axis without anything above zero has no logarithm
+        // an axis without positive values cannot be logarithmic
         let anything = |of: fn(&(f64, f64)) -> f64| {
             self.lines.iter().flat_map(|l| &l.points).any(|p| of(p) > 0.0 && of(p).is_finite())
         };
@@ -144,7 +143,7 @@ impl Figure {
         }
         if self.log && anything(|p| p.0) && anything(|p| p.1) {
             layout = layout.with_log_scale();
-            // plain numbers where they are short
+            // plain numbers if all of them are short
             let short = |p: &(f64, f64)| (0.01..1e4).contains(&p.1);
             if !self.lines.iter().flat_map(|l| &l.points).all(short) {
                 layout = layout.with_y_tick_format(TickFormat::Sci);
@@ -180,7 +179,7 @@ impl Figure {
         layout
     }
 
-    /// The figure as SVG.
+    /// SVG of the figure.
     pub(crate) fn svg(&self) -> String {
         let plots = self.plots();
         let layout = self.layout(&plots);
@@ -188,8 +187,8 @@ impl Figure {
     }
 }
 
-/// The ids of clips, which the library numbers through a process, numbered through the picture: it is the
-/// same whenever it is drawn.
+/// Renumbers the ids of clips from 0. The library numbers them through the process, so that a picture would
+/// differ from run to run.
 fn numbered(svg: &str) -> String {
     let mut parts = svg.split(CLIP);
     let mut out = parts.next().unwrap_or_default().to_string();
@@ -219,8 +218,8 @@ pub(crate) fn grid(figures: &[Figure], columns: usize, title: &str) -> String {
     numbered(&SvgBackend::new().render_scene(&scene))
 }
 
-/// A matrix: rows (from the top) and columns named, entries from `low` to 1; signed ones are blue to orange,
-/// others white to blue.
+/// SVG of a matrix with named rows (from the top) and columns. Entries are from `low` to 1; colours are blue
+/// to orange if `low` is negative, else white to blue.
 pub(crate) fn heat(
     title: &str,
     rows: &[String],
@@ -228,7 +227,7 @@ pub(crate) fn heat(
     values: Vec<Vec<f64>>,
     low: f64,
 ) -> String {
-    // the library stretches colours over the data; here they mean low to 1
+    // the library scales colours to the data; here they belong to the range from low to 1
     let (rows, values): (Vec<String>, Vec<Vec<f64>>) =
         rows.iter().map(|row| shown(row)).zip(values).rev().unzip();
     let columns: Vec<String> = columns.iter().map(|column| shown(column)).collect();
@@ -266,7 +265,7 @@ fn diverging(t: f64) -> String {
     format!("rgb({r},{g},{b})")
 }
 
-/// Why a picture could not be drawn.
+/// Reason why a picture could not be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
 pub struct FigureError(String);
@@ -282,7 +281,7 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     FONTS.get_or_init(load).clone()
 }
 
-/// An SVG, read.
+/// Parses an SVG.
 pub(crate) fn tree(svg: &str) -> Result<usvg::Tree, FigureError> {
     let options =
         usvg::Options { fontdb: fonts(), font_family: "DejaVu Sans".into(), ..usvg::Options::default() };
@@ -320,7 +319,7 @@ mod tests {
         let one = figure(2.0).svg();
         assert_eq!(one, figure(2.0).svg());
         assert!(one.contains(&format!("id=\"{CLIP}0\"")) && one.contains(&format!("(#{CLIP}0)")), "{one}");
-        // panels have clips of their own
+        // each panel has clips of its own
         let both = grid(&[figure(2.0), figure(3.0)], 2, "both");
         assert_eq!(both, grid(&[figure(2.0), figure(3.0)], 2, "both"));
         for i in 0..2 {

@@ -1,4 +1,4 @@
-//! Which figures a result has.
+//! Figures of simulated runs and cross-checks.
 
 use obsdeg_evidence::simulation::{Series, Traces};
 
@@ -8,12 +8,12 @@ use crate::figure::{
 };
 use obsdeg_evidence::crosscheck::{CrossCheck, HistoryPoint, SlopeCurve};
 
-/// A file: its name and its bytes.
+/// Name and content of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
     /// Name inside the folder.
     pub name: String,
-    /// Contents.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 
@@ -23,35 +23,35 @@ impl File {
     }
 }
 
-/// An SVG and the PNG made of it.
+/// SVG of a figure, and the PNG made from it.
 pub(crate) fn picture(name: &str, svg: String) -> Result<[File; 2], FigureError> {
     let png = png(&svg)?;
     Ok([File::new(format!("{name}.svg"), svg), File::new(format!("{name}.png"), png)])
 }
 
-/// At most this many points a curve: more cannot be seen.
+/// Largest number of points of a curve: no screen shows more.
 const POINTS: usize = 1000;
 
-/// At most this many figures in the grid of all.
+/// Largest number of figures in the grid of all.
 const GRID: usize = 30;
 
-/// A name that any file system takes.
+/// File name that every file system accepts.
 pub(crate) fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || "_-".contains(c) { c } else { '_' };
     name.replace(" - ", "-").replace('*', "").chars().map(plain).collect()
 }
 
-/// What the paper draws, figure 2 to figure 10.
+/// Unknowns of the paper's figures 2 to 10, in their order.
 const PAPER: [&str; 9] = ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
 
-/// At most so many samples after the start, the last among them: the prior at the start would hide what the
-/// data say.
+/// Indices of at most `most` samples after the start, the last sample included. The start is left out: the
+/// prior there would hide the rest.
 fn settled(record: &Traces, most: usize) -> Vec<usize> {
     let stride = record.time.len().div_ceil(most).max(1);
     (1..record.time.len()).filter(|k| k % stride == 0 || k + 1 == record.time.len()).collect()
 }
 
-/// Where positions end.
+/// Times at which positions end.
 fn boundaries(record: &Traces) -> Vec<f64> {
     (1..record.position.len())
         .filter(|&k| record.position[k] != record.position[k - 1])
@@ -87,7 +87,7 @@ fn curve(record: &Traces, i: usize) -> Figure {
         let width = 3.0 * series.sigma[k] / scale;
         (record.time[k], estimate[k] / scale - width, estimate[k] / scale + width)
     };
-    // a long name is in the title alone
+    // the title alone has a long name
     let name = &record.names[i];
     let shown = if name.len() > 16 { "value" } else { name };
     Figure {
@@ -106,9 +106,9 @@ fn curve(record: &Traces, i: usize) -> Figure {
     }
 }
 
-/// The error of one series (estimate minus truth) with +-3 sigma around zero, that of the linear filter on
-/// the same measurements over it, and the offset that an unknown psi leaves. The axis is that of the second
-/// half of the last position: errors before it leave the picture.
+/// Error of one series (estimate minus truth) with +-3 sigma around zero, the error of the linear filter on
+/// the same measurements, and the offset that an unknown psi leaves. The axis fits the second half of the
+/// last position: earlier errors leave the picture.
 pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
     let (scale, unit) = (record.scales[i], &record.units[i]);
     let settled = settled(record, most);
@@ -151,8 +151,8 @@ pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
     }
 }
 
-/// The offset of an unknown that outputs determine only together with a psi: the error of that psi at the
-/// start, carried over by their combination. The paper's is D_FZ, off by `wN*psi_y(0)`.
+/// Offset of an unknown that outputs determine only together with a psi: the error of psi at the start,
+/// transferred by their combination. In the paper D_FZ is off by `wN*psi_y(0)`.
 fn offset(record: &Traces, i: usize) -> Option<(String, f64)> {
     if record.determined.get(i).copied().unwrap_or(true) {
         return None;
@@ -173,7 +173,7 @@ fn offset(record: &Traces, i: usize) -> Option<(String, f64)> {
     psi.starts_with("psi_").then(|| (format!("{sign}{factor}(error of {psi} at t = 0)"), offset))
 }
 
-/// The truth and the estimate with some air: the band of the prior would hide them.
+/// Range of truth and estimate with a margin; the band of the prior would hide them.
 fn window(series: &Series, scale: f64) -> (f64, f64) {
     let values = || series.truth.iter().chain(&series.estimate).map(|x| x / scale);
     let (low, high) = values().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
@@ -182,8 +182,8 @@ fn window(series: &Series, scale: f64) -> (f64, f64) {
     (low - air, high + air)
 }
 
-/// The name of a series, and whether it shows the prior alone; a filter with full attitudes may learn it from
-/// large angles.
+/// Name of a series, with a remark if it shows the prior alone. A filter with full attitudes may determine
+/// such an unknown from large angles.
 pub(crate) fn series_title(record: &Traces, i: usize) -> String {
     let determined = record.determined.get(i).copied().unwrap_or(false);
     let prior = match (determined, &record.linear) {
@@ -194,8 +194,8 @@ pub(crate) fn series_title(record: &Traces, i: usize) -> String {
     format!("{}{prior}", record.names[i])
 }
 
-/// Two figures per unknown and combination, the estimate and its error; those of all unknowns in one, and
-/// what the paper draws as figures 2 to 10, in its order.
+/// Two figures per unknown and combination, the estimate and its error. Grids show the figures of all
+/// unknowns, and those of the paper's figures 2 to 10 in its order.
 ///
 /// # Errors
 /// [`FigureError`].
@@ -209,7 +209,7 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
     let estimates: Vec<Figure> = all().map(|i| curve(record, i)).collect();
     let errors: Vec<Figure> = all().map(|i| error_figure(record, i, POINTS)).collect();
     let mut files = Vec::new();
-    // a name of an unknown has no dot
+    // names of unknowns have no dot
     for (figures, end, title) in [
         (estimates, "", "Truth, estimate and +-3 sigma"),
         (errors, ".error", "Error (estimate minus truth) and +-3 sigma"),
@@ -232,10 +232,10 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
     Ok(files)
 }
 
-/// Sigma against the dwell for unknowns of one unit, with a reference slope per order; the styles are those
-/// from `first` on.
+/// Sigma against the dwell for unknowns of one unit, with a reference slope per order. Styles are numbered
+/// from `first`.
 pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> Figure {
-    // what stays at a diffuse prior would squeeze the rest
+    // without unknowns that stay at a diffuse prior, which would compress the rest
     let any = curves.iter().any(|c| c.accuracy_order.is_some());
     let mut curves: Vec<&SlopeCurve> =
         curves.iter().copied().filter(|c| c.accuracy_order.is_some() || !any).collect();
@@ -247,7 +247,7 @@ pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> 
         lines.push(line(format!("{}, {what}", c.name), color, stroke, c.points.clone()));
         let ends = curves.get(i + 1).is_none_or(|next| next.accuracy_order != c.accuracy_order);
         let Some(d) = c.accuracy_order.filter(|_| ends) else { continue };
-        // beside the first curve of the order, at its middle
+        // twice as high as the middle of the first curve of this order
         let Some(of) = curves.iter().find(|of| of.accuracy_order == c.accuracy_order) else { continue };
         let (t0, s0) = of.points[of.points.len() / 2];
         let slope = -(d as f64 + 0.5);
@@ -264,7 +264,7 @@ pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> 
     }
 }
 
-/// A mean over time with the bands in which a right filter's stays.
+/// Mean over time with the bands that a right filter's mean stays in.
 pub(crate) fn history_figure(
     c: &CrossCheck,
     title: &str,

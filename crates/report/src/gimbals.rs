@@ -1,11 +1,11 @@
-//! Gimbal limits in words: angles beyond them, and what turns do on their way.
+//! Gimbal limits in words: angles beyond them, and gimbal angles during turns.
 
 use obsdeg_core::model::{GimbalReport, GimbalStop, GimbalTurn};
 
 use crate::document::{Block, short as deg};
 use crate::words;
 
-/// Names of the Euler angles, with what each gimbal turns about.
+/// Names of the Euler angles, with the axis of each gimbal.
 pub(crate) const NAMES: [&str; 3] =
     ["alpha (outer, about North)", "beta (middle)", "gamma (inner, about Z_p)"];
 
@@ -62,8 +62,8 @@ fn turn(t: &GimbalTurn) -> Option<String> {
             deg(*after_deg)
         ),
         (Some(GimbalStop { gimbal: None, at_deg, after_deg }), _) => format!(
-            "cannot be made: after {} deg of it, at beta = {} deg, alpha and gamma would have to turn more than 100 times as fast as the \
-             platform{instead}",
+            "cannot be made: after {} deg of it, at beta = {} deg, alpha and gamma would have to turn more \
+             than 100 times as fast as the platform{instead}",
             deg(*after_deg),
             deg(*at_deg)
         ),
@@ -79,12 +79,12 @@ fn turn(t: &GimbalTurn) -> Option<String> {
     Some(format!("{} {what}", named(t)))
 }
 
-/// Gimbal limits and turns of a scheme, where it states limits.
+/// Gimbal limits and turns of a scheme; `None` without limits.
 pub(crate) fn block(report: Option<&GimbalReport>) -> Option<Block> {
     Block::list_if_any("Gimbals", lines(report))
 }
 
-/// The limits, and what turns do on their way; nothing without limits.
+/// Lines on limits and turns; empty without limits.
 pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     let Some(report) = report else { return Vec::new() };
     let mut lines = vec![format!("limits: {}; gimbals: {}", report.limits, NAMES.join(", "))];
@@ -104,9 +104,11 @@ pub(crate) fn lines(report: Option<&GimbalReport>) -> Vec<String> {
     lines.extend(listed);
     lines.extend(instead.then(|| {
         match report.beyond.is_empty() {
-            true => "Write `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, gamma one after another".into(),
-            false => "Write the angles within the limits (first lines) and `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, \
-                      gamma one after another"
+            true => "Write `path = \"gimbals\"` in the scheme file to turn gimbal by gimbal: alpha, beta, \
+                     gamma one after another"
+                .into(),
+            false => "Write the angles within the limits (first lines) and `path = \"gimbals\"` in the \
+                      scheme file to turn gimbal by gimbal: alpha, beta, gamma one after another"
                 .into(),
         }
     }));

@@ -1,5 +1,4 @@
-//! One self-contained HTML page: tables and formulas that read without scripts, pictures that answer the
-//! pointer with them.
+//! One self-contained HTML page. Tables and formulas need no scripts; with scripts, pictures are interactive.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -10,7 +9,7 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::document::{
-    Block, Document, Drawing, Finding, Part, Picture, Status, Typeset, parts, table_of_page,
+    Block, BlockGroup, Document, Drawing, Picture, Status, StatusRow, Typeset, parts, table_of_page,
 };
 use crate::figure::{CLIP, Figure, Line, Stroke};
 use crate::{ReportError, visible};
@@ -25,7 +24,7 @@ const FONT: &[u8] = include_bytes!("../assets/math.woff2");
 
 /// The document as a page.
 pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
-    // what stands before the first part
+    // blocks before the first part
     let first = d.blocks.iter().position(|b| matches!(b, Block::Section { .. } | Block::Fold { .. }));
     let (front, rest) = d.blocks.split_at(first.unwrap_or(d.blocks.len()));
     let mut ids = 0;
@@ -48,7 +47,7 @@ pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
     Ok(page)
 }
 
-/// The templates, which escape whatever is no markup of their own.
+/// Templates, which escape every text that is not their own markup.
 fn environment() -> Result<Environment<'static>, ReportError> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
@@ -61,8 +60,7 @@ fn environment() -> Result<Environment<'static>, ReportError> {
     Ok(environment)
 }
 
-/// The document as a part of somebody else's page: tables, lists and formulas that read without scripts and
-/// without a style of their own.
+/// Document as a part of another page: tables, lists and formulas that need no scripts and no style.
 pub(crate) fn fragment(d: &Document) -> Result<String, ReportError> {
     let blocks = listed(&d.blocks, &mut 0);
     Ok(environment()?.get_template("fragment")?.render(context! {
@@ -80,13 +78,13 @@ fn has_curves(blocks: &[Block]) -> bool {
     })
 }
 
-/// What the template needs of blocks; a fold is its beginning, what it holds, and its end. `ids` counts what
-/// links lead to.
+/// Blocks as data for the template. A fold becomes its beginning, its blocks and its end. `ids` counts the
+/// targets of links.
 fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
     let mut out = Vec::new();
     for part in parts(blocks) {
         *ids += 1;
-        if let Part::Block(Block::Fold { title, blocks }) = &part {
+        if let BlockGroup::Block(Block::Fold { title, blocks }) = &part {
             out.push(json!({ "kind": "fold", "level": 1, "title": title, "id": format!("section-{ids}") }));
             out.extend(listed(blocks, ids));
             out.push(json!({ "kind": "end" }));
@@ -97,14 +95,14 @@ fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
     out
 }
 
-/// What the template needs of a block.
-fn block(i: usize, part: &Part<'_>) -> Json {
+/// One block as data for the template.
+fn block(i: usize, part: &BlockGroup<'_>) -> Json {
     let b = match part {
-        Part::Pictures(pictures) => {
+        BlockGroup::Pictures(pictures) => {
             let pictures: Vec<Json> = pictures.iter().map(|p| picture(p)).collect();
             return json!({ "kind": "pictures", "pictures": pictures });
         }
-        Part::Block(b) => b,
+        BlockGroup::Block(b) => b,
     };
     match b {
         Block::Section { level, title } => {
@@ -117,10 +115,13 @@ fn block(i: usize, part: &Part<'_>) -> Json {
             let lines: Vec<Json> = lines.iter().map(formula).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        // in groups, and in parts
+        // pictures come in groups, folds are taken apart by `listed`
         Block::Picture(_) | Block::Fold { .. } => Json::Null,
         Block::Status(boxes) => {
-            let row = |f: &Finding| json!({ "what": f.what, "grade": f.grade.name(), "mark": f.grade.mark(), "text": f.text });
+            let row = |f: &StatusRow| {
+                let (grade, mark) = (f.grade.name(), f.grade.mark());
+                json!({ "what": f.what, "grade": grade, "mark": mark, "text": f.text })
+            };
             let of = |s: &Status| {
                 let rows: Vec<Json> = s.rows.iter().map(row).collect();
                 json!({ "title": s.title, "rows": rows, "actions": s.actions })
@@ -150,18 +151,18 @@ fn picture(p: &Picture) -> Json {
     json!({ "name": p.name, "class": class, "caption": p.caption, "svg": svg, "panels": panels, "plot": plot })
 }
 
-/// MathML; program notation where the LaTeX is none.
+/// MathML of a formula, with program notation in case the LaTeX cannot be converted.
 fn formula(f: &Typeset) -> Json {
     json!({ "text": f.text, "mathml": lines(&f.latex, LONG) })
 }
 
-/// LaTeX as MathML that may break before its signs, where it is longer than so many bytes.
+/// MathML of LaTeX, in pieces that break before signs if it is longer than `long` bytes.
 pub(crate) fn lines(latex: &str, long: usize) -> Option<String> {
     let pieces: Option<Vec<String>> = terms(latex, long).iter().map(|piece| mathml(piece)).collect();
     pieces.map(|p| p.join(" "))
 }
 
-/// LaTeX as MathML.
+/// MathML of LaTeX.
 pub(crate) fn mathml(latex: &str) -> Option<String> {
     let storage = Storage::new();
     let parser = Parser::new(latex, &storage);
@@ -171,11 +172,11 @@ pub(crate) fn mathml(latex: &str) -> Option<String> {
     (!failed).then_some(out)
 }
 
-/// From here on a formula of a report may break.
+/// Length in bytes from which a formula of a report may break.
 const LONG: usize = 120;
 
-/// A formula longer than that before each of its plus and minus signs: browsers break lines between formulas,
-/// not in them.
+/// Splits a formula longer than `long` bytes before its plus and minus signs: browsers break lines between
+/// formulas, not inside.
 fn terms(latex: &str, long: usize) -> Vec<String> {
     let mut out = vec![String::new()];
     let (mut depth, mut escaped) = (0usize, false);
@@ -219,23 +220,23 @@ fn inlined(p: &Picture) -> String {
     in_page_colors(&svg)
 }
 
-/// Black is the colour of the page's text; the page has others for the rest in the dark.
+/// Black becomes the colour of the page's text; for other colours a dark page has rules of its own.
 fn in_page_colors(svg: &str) -> String {
     svg.replace("\"#000000\"", "\"currentColor\"").replace("\"black\"", "\"currentColor\"")
 }
 
-/// So many significant digits.
+/// Number rounded to `digits` significant digits.
 fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
 
-/// Curves for the plotting library: a table of its own for each, x strictly increasing.
+/// Curves as data of the interactive plots: tables with strictly increasing x, one per run of equal x.
 fn curves(f: &Figure) -> Json {
     let all = || f.lines.iter().flat_map(|l| l.points.iter().map(|p| p.0));
     let (low, high) = all().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
     let step = (high - low).abs().max(f64::MIN_POSITIVE) * 1e-5;
     let mut series = Vec::new();
-    // x, then the values of all series in a row that share it
+    // x, then the values of all successive series with the same x
     let mut tables: Vec<Vec<Vec<f64>>> = Vec::new();
     let mut bands = Vec::new();
     let mut add =
@@ -270,7 +271,8 @@ fn curves(f: &Figure) -> Json {
         add(&l.label, l.color, dash(l), 1.6, &mut l.points.iter().copied());
     }
     json!({
-        "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label), "log_x": f.log, "log_y": f.log || f.log_y,
+        "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label),
+        "log_x": f.log, "log_y": f.log || f.log_y,
         "orders": f.orders, "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })

@@ -28,11 +28,12 @@ pub(crate) fn escape(text: &str) -> String {
     out
 }
 
-/// A document to be compiled by itself.
+/// Document to be compiled alone.
 pub(crate) fn alone(d: &Document) -> String {
     format!(
-        "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\\usepackage[margin=15mm]{{geometry}}\n\
-         \\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\\footnotesize\n{}\\end{{document}}\n",
+        "\\documentclass[a4paper]{{article}}\n\\usepackage{{amsmath,booktabs,graphicx,longtable}}\n\
+         \\usepackage[margin=15mm]{{geometry}}\n\\title{{{}}}\n\\date{{}}\n\\begin{{document}}\n\\maketitle\n\
+         \\footnotesize\n{}\\end{{document}}\n",
         escape(&d.title),
         body(d)
     )
@@ -51,13 +52,14 @@ fn cell(cell: &Cell) -> String {
     cell.latex.as_ref().map_or_else(|| escape(&cell.text), |formula| format!("${formula}$"))
 }
 
-/// Characters on a line of a table, and those that the space between two columns takes.
+/// Characters on a line of a table, and those of the space between two columns.
 const LINE: usize = 112;
 const BETWEEN: usize = 3;
-/// What is shorter is never wrapped.
+/// Width in characters up to which a column is never wrapped.
 const SHORT: usize = 12;
 
-/// How wide every column is at most, in characters: texts are wrapped until all fit the line.
+/// Largest width of every column in characters: columns of texts are limited until all fit the line. `None`
+/// is unlimited.
 fn widths(columns: &[Column], rows: &[Vec<Cell>]) -> Vec<Option<usize>> {
     let natural = |k: usize| {
         let cells = rows.iter().map(|r| r[k].text.chars().count());
@@ -68,13 +70,13 @@ fn widths(columns: &[Column], rows: &[Vec<Cell>]) -> Vec<Option<usize>> {
     let taken = |most: usize| -> usize {
         natural.iter().zip(columns).map(|(w, c)| if c.number { *w } else { (*w).min(most) }).sum()
     };
-    // the widest that the texts may be
+    // largest width of texts that fits
     let most = (SHORT..=LINE).rev().find(|&most| taken(most) <= room).unwrap_or(SHORT);
     let wrapped = |(w, c): (usize, &Column)| (!c.number && w > most).then_some(most);
     natural.into_iter().zip(columns).map(wrapped).collect()
 }
 
-/// A longtable; columns of texts are wrapped where the line is too short for them, and share it.
+/// Longtable; columns of texts are wrapped if the line is too short.
 fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
     let widths = widths(columns, rows);
     let spec = columns.iter().zip(widths).map(|(column, width)| match (column.number, width) {
@@ -119,7 +121,8 @@ fn body(d: &Document) -> String {
                 out.push_str(&items(lines.iter().map(|l| format!("${}$", l.latex))));
             }
             Block::Picture(p) => out.push_str(&format!(
-                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
+                "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,\
+                 keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
                 p.name,
                 escape(&p.caption)
             )),

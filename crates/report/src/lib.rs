@@ -1,4 +1,4 @@
-//! Results as text: tables, JSON, Markdown, CSV, LaTeX. Pure formatting: nothing is computed here.
+//! Results as text: tables, JSON, Markdown, CSV, LaTeX, pages. This crate only formats: it computes nothing.
 //!
 //! ```
 //! use obsdeg_core::analysis::{AnalysisOptions, analyze};
@@ -92,11 +92,11 @@ pub enum Format {
     Latex,
 }
 
-/// Not a format.
+/// Error for a word that names no format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is not a format; expected table, json, markdown, csv or latex")]
 pub struct FormatError {
-    /// The text found.
+    /// The word.
     pub found: String,
 }
 
@@ -126,94 +126,95 @@ impl fmt::Display for Format {
     }
 }
 
-/// How a table is laid out.
+/// Layout of a table on a terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Layout {
-    /// Columns of the terminal; `None` for no limit.
+    /// Width in characters; `None` for no limit.
     pub width: Option<u16>,
     /// True if headings and verdicts are styled with ANSI codes.
     pub color: bool,
-    /// True if there is nothing but ASCII: lines are drawn so, and other characters written as `\u{e9}`.
+    /// True if only ASCII is written: lines are drawn in ASCII, and other characters written as `\u{e9}`.
     pub ascii: bool,
 }
 
-/// An expression of an answer, in program notation, as MathML; `None` where it cannot be typeset.
+/// MathML of an expression in program notation; `None` if it cannot be typeset.
 pub fn mathml(expression: &str) -> Option<String> {
     html::mathml(&latex::expression(expression))
 }
 
-/// A solution in an answer as MathML: its terms, each a coefficient, an observation and a station; `None`
-/// where it cannot be typeset.
+/// MathML of a solution from its terms, each a coefficient, an observation and a station; `None` if it cannot
+/// be typeset.
 pub fn solution_mathml(terms: &[[&str; 3]]) -> Option<String> {
     html::lines(&latex::solution_of(terms), 0)
 }
 
-/// Why a result could not be written.
+/// Reason why a result could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// JSON.
+    /// JSON failed.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// No such table.
+    /// The answer has no table of this name.
     #[error("no table `{asked}` in this answer; expected one of {}", known.join(", "))]
     NoTable {
-        /// What was asked for.
+        /// Requested name.
         asked: String,
-        /// The tables that there are.
+        /// Names of the tables of the answer.
         known: Vec<String>,
     },
-    /// CSV.
+    /// CSV failed.
     #[error("cannot write CSV: {0}")]
     Csv(#[from] csv::Error),
-    /// Parquet.
+    /// Parquet failed.
     #[error("cannot write Parquet: {0}")]
     Parquet(#[from] parquet::errors::ParquetError),
-    /// A picture.
+    /// A picture could not be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// No typesetter in this build.
+    /// This build has no typesetter.
     #[error(
-        "this program was built without PDF; build it with `--features pdf`, or write HTML (-o review.html) and print it from a browser"
+        "this program was built without PDF; build it with `--features pdf`, or write HTML (-o review.html) \
+         and print it from a browser"
     )]
     NoPdf,
-    /// The typesetter refused.
+    /// The typesetter failed.
     #[error("cannot typeset: {0}")]
     Typeset(String),
-    /// A page.
+    /// The template of the page failed.
     #[error("cannot write the page: {0}")]
     Page(#[from] minijinja::Error),
 }
 
 /// A result that can be written in every text format.
 pub trait Answer: serde::Serialize {
-    /// Name and version of the layout of its JSON (`obsdeg.analysis/1`); none of a list of answers.
+    /// Name and version of the JSON layout (`obsdeg.analysis/1`); `None` for a list of answers.
     fn layout(&self) -> Option<&str> {
         None
     }
 
-    /// What it says, in no format.
+    /// Content, independent of the format.
     fn document(&self) -> Document;
 
-    /// The answer in sentences, where it has some that stand alone: the first is the answer.
+    /// Answer in sentences that can stand alone, the answer itself first; empty for results without such.
     fn sentences(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Its tables: what is listed in its JSON.
+    /// Tables of the answer: the lists in its JSON.
     ///
     /// # Errors
-    /// Those of its serialisation.
+    /// Errors of the serialisation.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         Ok(tables::of_json(&serde_json::to_value(self)?))
     }
 
-    /// The table that is meant when none is named.
+    /// Name of the table that is written if none is named.
     fn main_table(&self) -> &'static str {
         "quantities"
     }
 }
 
-/// Answers on several files, by their names.
+/// Answers on several files, with the names of the files.
 pub struct Several<A>(pub Vec<(String, A)>);
 
 impl<A: Answer> serde::Serialize for Several<A> {
@@ -266,7 +267,7 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
     })
 }
 
-/// A result as JSON, and nothing else.
+/// Result as JSON.
 ///
 /// # Errors
 /// [`ReportError::Json`].
@@ -283,8 +284,7 @@ pub fn fragment(answer: &impl Answer) -> Result<String, ReportError> {
     html::fragment(&answer.document())
 }
 
-/// A table of a result as CSV; the main one where none is named. Of a list with nothing in it nothing is
-/// written.
+/// Table of a result as CSV; the main table if `table` is `None`. The text is empty for an empty list.
 ///
 /// # Errors
 /// [`ReportError::NoTable`], and when a serializer fails.
@@ -325,13 +325,13 @@ pub enum ReviewFormat {
     Pdf,
 }
 
-/// The folder of the pictures of a text whose file has this name without its ending: beside it, and its own.
+/// Name of the folder of the pictures beside a text file; `stem` is the file's name without its ending.
 pub fn picture_folder(stem: &str) -> String {
     let plain = |c: char| if c.is_alphanumeric() || "_-.".contains(c) { c } else { '_' };
     format!("{}_figures", stem.chars().map(plain).collect::<String>())
 }
 
-/// What a report was made by and of.
+/// Origin of a report: command, files and certificates.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Origin {
     /// The command that gives the same answer.

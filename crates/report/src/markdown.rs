@@ -3,7 +3,7 @@
 use crate::document::{Block, Cell, Document};
 use crate::visible;
 
-/// Text in a table cell or paragraph, with what Markdown would read as markup escaped.
+/// Text of a table cell or paragraph, with Markdown's markup characters escaped.
 fn escape(text: &str) -> String {
     let mut out = String::new();
     for c in visible(text).chars() {
@@ -15,13 +15,13 @@ fn escape(text: &str) -> String {
     out
 }
 
-/// A line of a table.
+/// Row of a table.
 fn row(cells: impl Iterator<Item = String>) -> String {
     format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
-/// A formula as code between more backticks than it has in a row; the bar is escaped, since tables split at
-/// bars even in code.
+/// Formula as code, between one more backtick than its longest run of backticks. Bars are escaped, since
+/// tables split at bars even in code.
 fn code(text: &str) -> String {
     if text.is_empty() {
         return String::new();

@@ -12,16 +12,16 @@ use obsdeg_evidence::simulation::si_per_shown;
 use crate::document::{Block, left, number, right};
 use crate::words;
 
-/// Most budgets that a document prints in full: those with the least margin, or the largest share of the
-/// bench.
+/// Largest number of budgets that a document prints in full: those with the least margin, or with the largest
+/// share of the bench.
 const BUDGETS: usize = 3;
-/// Lines of a budget, and silent errors, that an answer prints; a report and the JSON have all.
+/// Largest number of lines of a printed budget and of listed silent errors; a report and the JSON have all.
 const LINES: usize = 6;
-/// Silent errors that a calibration names in its first sentence.
+/// Largest number of silent errors that a calibration names in its first sentence.
 const SILENT: usize = 12;
-/// Smallest bound on a probability that is printed.
+/// Smallest printed bound on a probability.
 const SMALLEST: f64 = 1e-300;
-/// Percent of the squared total from which on a source has a line of its own in a printed budget.
+/// Share of the squared total, in percent, from which a source has a line of its own in a printed budget.
 const LEAST: f64 = 0.05;
 
 /// A number with two significant digits: sizes need no more.
@@ -45,15 +45,16 @@ fn below(x: f64) -> String {
 }
 
 /// Largest size of an error that counts as small: 0.05 g, 5 % of a rate or a scale, 0.05 rad. Beyond it the
-/// change of first order says nothing.
+/// change of first order does not hold.
 const SMALL: f64 = 0.05;
 
-/// True if a change of first order holds up to this size.
+/// True if changes of first order hold up to this size.
 fn is_small(size: f64, unit: &str) -> bool {
     size * si_per_shown(unit) < SMALL
 }
 
-/// Limits of families (name, size, unit, and what else there is to say), those of no small size by name only.
+/// Limits of families (name, size, unit, remark); a family whose limit is not small is listed by its name
+/// only.
 fn limits<'a>(all: impl Iterator<Item = (&'a str, f64, &'a str, String)>) -> Option<String> {
     let (small, other): (Vec<_>, Vec<_>) = all.partition(|(_, size, unit, _)| is_small(*size, unit));
     let limit = |(family, size, unit, more): &(&str, f64, &str, String)| {
@@ -135,7 +136,7 @@ pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
     (blocks(&alone, ""), budgets.map(|b| budget(b, "", usize::MAX)).collect())
 }
 
-/// Sigma, bias and total of the worst drift coefficient under every carry; nothing without a bench.
+/// Sigma, bias and total of the worst drift coefficient under every carry; `None` without a bench.
 fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
     let columns = [left("carry"), left("worst"), right("sigma"), right("bias"), right("total"), left("unit")];
     let row = |c: &CarryUncertainty| {
@@ -167,7 +168,7 @@ fn advice(of: &OmittedEffects) -> Vec<String> {
     of.advice.iter().map(advised).collect()
 }
 
-/// One change, as it was tried.
+/// Line on one change that was tried.
 pub(crate) fn advised(a: &Advice) -> String {
     let what = match a.kind {
         AdviceKind::Estimate => format!("Estimate {} too (add to `terms` of the scheme)", a.what),
@@ -203,7 +204,7 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
         vec![source, kind, value, sensitivity, format!("{} {}", number(contribution), b.unit), percent]
     };
     let large = b.lines.iter().take_while(|l| l.percent >= LEAST).count().min(most);
-    // the samples, and one small source alone, stand by themselves
+    // the samples, and a single small source, have lines of their own
     let alone = b.lines.len() - large == 1;
     let shown = |(i, l): (usize, &BudgetLine)| alone || i < large || l.source == SAMPLES;
     let (shown, rest): (Vec<_>, Vec<_>) = b.lines.iter().enumerate().partition(|&line| shown(line));
@@ -228,8 +229,8 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
     Block::table(heading, columns, rows)
 }
 
-/// Budgets that are printed: the largest totals over requirement first, then those in which the samples have
-/// the smallest share.
+/// Printed budgets: the largest totals over requirement first, then those with the smallest share of the
+/// samples.
 fn printed(budgets: &[Budget]) -> Vec<&Budget> {
     let over = |b: &Budget| b.requirement.map_or(0.0, |r| b.total / r);
     let share = |b: &Budget| {
@@ -242,7 +243,7 @@ fn printed(budgets: &[Budget]) -> Vec<&Budget> {
     out
 }
 
-/// Conditions and meaning of the figures.
+/// Conditions and meaning of the figures, one sentence each.
 fn conditions(of: &OmittedEffects) -> Vec<String> {
     let mut out = vec![
         "worst change: of a drift coefficient, all terms of the family one unit large (root of the sum of squares), \
@@ -253,12 +254,12 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
             .into(),
         match of.attitudes {
             true => {
-                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each position by itself, \
-                 about each platform axis"
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitude: each \
+                 position by itself, about each platform axis"
             }
             false => {
-                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitudes are not computed for rotating \
-                 positions, nor for more than 64"
+                "latitude, azimuth, earth_rate, gravity: stated value minus true value; attitudes are not \
+                 computed for rotating positions, nor for more than 64"
             }
         }
         .into(),
@@ -273,8 +274,8 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
     }
     out.extend(of.correlated_noise.as_ref().map(|c| {
         format!(
-            "the correlated noise of the accelerometers makes the sigmas of drift coefficients {} to {} times as large as the white noise \
-             alone ({}, the most); it is counted in them",
+            "the correlated noise of the accelerometers makes the sigmas of drift coefficients {} to {} \
+             times as large as the white noise alone ({}, the most); it is counted in them",
             number(c.smallest),
             number(c.largest),
             c.unknown
@@ -294,14 +295,15 @@ fn conditions(of: &OmittedEffects) -> Vec<String> {
     out.extend(first_lines(silent.collect()));
     if of.priors {
         out.push(
-            "exact changes by silent errors are those by the samples alone: the stated priors hold part of them back, as the figures per unit say"
+            "exact changes by silent errors are those by the samples alone: the stated priors hold part of \
+             them back, as the figures per unit say"
                 .into(),
         );
     }
     out
 }
 
-/// The first lines of what silent errors change, and the names of those that are left out.
+/// First lines on changes by silent errors, and the names of the errors without a line.
 fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
     let shown = if all.len() == LINES + 1 { all.len() } else { LINES };
     let left: Vec<&str> = all.iter().skip(shown).map(|(name, _)| *name).collect();
@@ -311,8 +313,8 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
     all.into_iter().take(shown).map(|(_, line)| line).chain(more).collect()
 }
 
-/// The sentences of the first lines: what the bench does not count, and which sizes of errors that it does
-/// not state would use up a margin.
+/// First sentences: errors that the bench does not count, and sizes of errors without a stated size that
+/// would use up a margin.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
     let estimated = of.estimated.join(", ");
     let (is, does) = match of.estimated.len() {
@@ -329,7 +331,7 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
         (false, false) => Some(format!("No size of the bench counts: {estimated} {is} estimated.")),
         (true, _) => not_counted,
     };
-    // a family of which the bench states every term, zero too, counts as stated
+    // a family counts as stated if the bench states every term, also with size zero
     let open = |f: &&FamilyEffect| of.terms.iter().any(|t| t.family == f.family && t.size.is_none());
     let limit = |f: &'_ FamilyEffect| {
         let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| u.size);
@@ -357,7 +359,7 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
     Some(stated.into_iter().chain([met]).collect::<Vec<_>>().join(" "))
 }
 
-/// The silent errors of a calibration, as the condition of "consistent"; nothing where none changes a
+/// The silent errors of a calibration, as the condition of "consistent"; empty if none changes a
 /// coefficient.
 pub(crate) fn silent(of: &Omitted) -> String {
     if of.silent.is_empty() {
@@ -376,11 +378,11 @@ pub(crate) fn silent(of: &Omitted) -> String {
     format!("; silent here: {}{more}", listed.join("; "))
 }
 
-/// What a calibration says of errors that it does not estimate.
+/// Sentences of a calibration on errors that it does not estimate.
 pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     let mut out = vec![format!(
-        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a chance of at most 1 % \
-         where nothing is wrong",
+        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has \
+         a chance of at most 1 % where nothing is wrong",
         of.tried
     )];
     let Some(s) = &of.suspicion else {
@@ -407,7 +409,7 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
             false => format!("below {SMALLEST:e}"),
         }
     ));
-    // answers of before name the others of the first error alone
+    // older answers name indistinguishable errors for the first error only
     let of_first = s.errors.iter().all(|e| e.indistinguishable.is_empty()).then_some(&s.indistinguishable);
     for (e, first) in s.errors.iter().zip(of_first.into_iter().map(Some).chain(std::iter::repeat(None))) {
         let others = first.unwrap_or(&e.indistinguishable);
@@ -423,7 +425,7 @@ pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     out
 }
 
-/// Advice on how errors become known: terms to add to the scheme, or errors to measure.
+/// Advice for estimating errors: terms to add to the scheme, or errors to measure.
 pub(crate) fn estimated_by(errors: &[String]) -> String {
     let (mut terms, mut others) = (Vec::new(), Vec::new());
     for name in errors {
@@ -442,8 +444,8 @@ pub(crate) fn estimated_by(errors: &[String]) -> String {
     add.into_iter().chain(measure).collect::<Vec<_>>().join("; ")
 }
 
-/// Conditions of the requirements of a calibration: suspected errors, and sizes of what the bench does not
-/// state.
+/// Conditions of the requirements of a calibration: suspected errors, and sizes of errors that the bench does
+/// not state.
 pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
     let Some(r) = &c.requirements else { return Vec::new() };
     let mut out = Vec::new();
@@ -464,8 +466,8 @@ pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// Estimate with suspected errors among the unknowns; a range where others of the same residuals change it
-/// otherwise.
+/// Estimate with suspected errors among the unknowns. It is a range if indistinguishable errors give
+/// different values.
 fn change(c: &SuspectedChange, others: usize, with: &str) -> String {
     let (unknown, unit, estimate) = (&c.unknown, &c.unit, number(c.estimate));
     let [lowest, highest] = [c.lowest, c.highest].map(number);
@@ -475,7 +477,8 @@ fn change(c: &SuspectedChange, others: usize, with: &str) -> String {
             format!("with any of these, {unknown} is {lowest} {unit}, not {estimate}")
         }
         _ => format!(
-            "with one of these, {unknown} is between {lowest} and {highest} {unit}, by which of them it is, not {estimate}"
+            "with one of these, {unknown} is between {lowest} and {highest} {unit}, by which of them it is, \
+             not {estimate}"
         ),
     }
 }
@@ -500,7 +503,7 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
                 }
             }
         }
-        // a whole family by its name
+        // a complete family is listed by its name
         let named = families.into_iter().map(|(family, names, all)| match names.len() == all {
             true => family.to_string(),
             false => names.join(", "),
@@ -534,7 +537,7 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
 mod tests {
     use super::below;
 
-    /// Three digits, never above the number itself.
+    /// Three digits, never above the number.
     #[test]
     fn limits_are_rounded_down() {
         let shown = [3.0799, 3.36, 0.0999999, 0.00336, 12345.9, 99.99, 4.567e-7, 2e9].map(below);

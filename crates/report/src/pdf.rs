@@ -17,26 +17,26 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::document::{Block, Document, Part, parts, table_of_page};
+use crate::document::{Block, BlockGroup, Document, parts, table_of_page};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
 
-/// Fonts for text and formulas (Libertinus, New Computer Modern), and for pictures (DejaVu).
+/// Fonts of texts and formulas (Libertinus, New Computer Modern), and of pictures (DejaVu).
 static FONTS: LazyLock<Vec<Font>> = LazyLock::new(|| {
     let own = [dejavu::sans::regular(), dejavu::sans::bold()];
     typst_assets::fonts().chain(own).flat_map(|data| Font::iter(Bytes::new(data))).collect()
 });
 
-/// One document and its pictures.
-struct Desk {
+/// Input of the typesetter: one document, its pictures and the fonts.
+struct TypstInput {
     library: LazyHash<Library>,
     book: LazyHash<FontBook>,
     source: Source,
     files: HashMap<FileId, Bytes>,
 }
 
-impl World for Desk {
+impl World for TypstInput {
     fn library(&self) -> &LazyHash<Library> {
         &self.library
     }
@@ -75,13 +75,13 @@ fn file_id(name: &str) -> Result<FileId, ReportError> {
     Ok(RootedPath::new(VirtualRoot::Project, path).intern())
 }
 
-/// The document as PDF.
+/// PDF of the document.
 pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
     let mut files = HashMap::new();
     for p in d.pictures() {
         files.insert(file_id(&format!("{}.svg", p.name))?, Bytes::from_string(p.svg()));
     }
-    let desk = Desk {
+    let desk = TypstInput {
         library: LazyHash::new(Library::default()),
         book: LazyHash::new(FontBook::from_fonts(FONTS.iter())),
         source: Source::new(file_id("review.typ")?, source(d)?),
@@ -96,7 +96,7 @@ pub(crate) fn pages(d: &Document) -> Result<Vec<u8>, ReportError> {
     typst_pdf::pdf(&pages, &options).map_err(|e| refused(&e))
 }
 
-/// A string of the typesetter's language: nothing in it is markup.
+/// Text as a string of the typesetter's language, without markup.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", visible(text).replace('\\', "\\\\").replace('"', "\\\""))
 }
@@ -114,15 +114,15 @@ fn source(d: &Document) -> Result<String, ReportError> {
     })?)
 }
 
-fn part(part: Part<'_>) -> Json {
+fn part(part: BlockGroup<'_>) -> Json {
     let block = match part {
-        Part::Pictures(pictures) => {
+        BlockGroup::Pictures(pictures) => {
             let of = |p: &&crate::document::Picture| json!({ "name": p.name, "caption": p.caption });
             let width = if pictures.iter().any(|p| p.is_wide()) { "100%" } else { "11cm" };
             let pictures: Vec<Json> = pictures.iter().map(of).collect();
             return json!({ "kind": "pictures", "pictures": pictures, "width": width });
         }
-        Part::Block(block) => block,
+        BlockGroup::Block(block) => block,
     };
     match block {
         Block::Section { level, title } => json!({ "kind": "section", "level": level, "title": title }),
@@ -133,7 +133,7 @@ fn part(part: Part<'_>) -> Json {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
-        // pictures are in groups, a status is a table by now, and nothing is folded
+        // pictures come in groups, a status is a table here, and folds are taken apart
         Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => Json::Null,
     }
 }

@@ -1,8 +1,8 @@
 //! Pictures of positions: the platform's axes, g and the earth rate at each, in an axonometric view of North,
 //! Up, East.
 //!
-//! Of right-handed axes North, Up, East the picture shows North to the right, Up upwards and East towards the
-//! reader, turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above:
+//! The axes North, Up, East are right-handed. The picture shows North to the right, Up upwards and East
+//! towards the reader. It is turned by [`AZIMUTH_DEG`] about Up and seen from [`ELEVATION_DEG`] above:
 //! `right = n cos a - e sin a`, `near = n sin a + e cos a`, `up = u cos h - near sin h`, and towards the
 //! reader `u sin h + near cos h`.
 
@@ -16,17 +16,16 @@ use crate::figures::File;
 use crate::panels::{Panel, Panels, WIDTH, escaped};
 use crate::{visible, words};
 
-/// The view.
+/// Azimuth and elevation of the view, in deg.
 const AZIMUTH_DEG: f64 = 40.0;
 const ELEVATION_DEG: f64 = 20.0;
 
-/// Height of a panel without its lines of text, and of one of these.
+/// Height of a panel without its lines of text, and of one line, in pixels.
 const HEIGHT: f64 = 232.0;
 const LINE: f64 = 14.0;
-/// One, in pixels.
+/// Length of a unit vector, in pixels.
 const UNIT: f64 = 70.0;
-/// A vector of n on the sheet, in pixels from the origin (right, down), and how far it points towards the
-/// reader.
+/// Projection of a vector of n: pixels from the origin (right, down), and its component towards the reader.
 fn seen([n, u, e]: [f64; 3]) -> ([f64; 2], f64) {
     let ((sa, ca), (sh, ch)) = (AZIMUTH_DEG.to_radians().sin_cos(), ELEVATION_DEG.to_radians().sin_cos());
     let near = n * sa + e * ca;
@@ -38,7 +37,7 @@ fn component(x: f64) -> f64 {
     (x * 1e12).round() / 1e12 + 0.0
 }
 
-/// `North`, or `(0.766, -0.5, 0.403)`.
+/// Direction in words: `North`, or `(0.766, -0.5, 0.403)`.
 fn direction(v: [f64; 3]) -> String {
     const NAMES: [[&str; 2]; 3] = [["North", "South"], ["Up", "Down"], ["East", "West"]];
     match v.iter().position(|x| component(x.abs()) == 1.0) {
@@ -63,7 +62,8 @@ fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
     if length < 8.0 {
         let _ = write!(
             out,
-            "<circle class=\"tip\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{w}\"{opacity} />"
+            "<circle class=\"tip\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"5\" fill=\"none\" stroke=\"{color}\" \
+             stroke-width=\"{w}\"{opacity} />"
         );
     } else {
         let [a, b] = [x / length, y / length];
@@ -71,8 +71,9 @@ fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
         let dash = if towards < -1e-9 && !wide { " stroke-dasharray=\"4 3\"" } else { "" };
         let _ = write!(
             out,
-            "<line x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{color}\" stroke-width=\"{w}\"{dash}{opacity} />\
-             <path class=\"tip\" d=\"M{:.2} {:.2}L{:.2} {:.2}L{:.2} {:.2}Z\" fill=\"{color}\"{opacity} />",
+            "<line x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{color}\" \
+             stroke-width=\"{w}\"{dash}{opacity} /><path class=\"tip\" d=\"M{:.2} {:.2}L{:.2} {:.2}L{:.2} \
+             {:.2}Z\" fill=\"{color}\"{opacity} />",
             a * base,
             b * base,
             a * tip,
@@ -84,13 +85,13 @@ fn arrow(out: &mut String, name: &str, v: [f64; 3], color: &str, wide: bool) {
         );
     }
     let [a, b] = if length < 8.0 { [0.8, 0.6] } else { [x / length, y / length] };
-    // wide arrows have their names behind those of the axes that they may lie along
+    // names of wide arrows lie beyond those of axes, which may have the same direction
     let at = length + if wide { 27.0 } else { 13.0 };
     label(out, [a * at, b * at], name, color, !wide);
     out.push_str("</g>");
 }
 
-/// A text around a point.
+/// Text centred on a point.
 fn label(out: &mut String, [x, y]: [f64; 2], text: &str, color: &str, bold: bool) {
     let weight = if bold { " font-weight=\"bold\"" } else { "" };
     let _ = write!(
@@ -100,7 +101,7 @@ fn label(out: &mut String, [x, y]: [f64; 2], text: &str, color: &str, bold: bool
     );
 }
 
-/// North, Up, East behind everything else.
+/// Axes North, Up, East, behind everything else.
 fn geographic(out: &mut String) {
     for (name, v) in [("N", [1.0, 0.0, 0.0]), ("U", [0.0, 1.0, 0.0]), ("E", [0.0, 0.0, 1.0])] {
         let ([x, y], _) = seen(v);
@@ -108,7 +109,8 @@ fn geographic(out: &mut String) {
         let [a, b] = [x / length, y / length];
         let _ = write!(
             out,
-            "<line data-geographic=\"{name}\" x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{GREY}\" stroke-width=\"1\" />",
+            "<line data-geographic=\"{name}\" x1=\"0\" y1=\"0\" x2=\"{:.2}\" y2=\"{:.2}\" stroke=\"{GREY}\" \
+             stroke-width=\"1\" />",
             a * (length + 26.0),
             b * (length + 26.0)
         );
@@ -129,7 +131,7 @@ fn plate(out: &mut String, [x, _, z]: &[[f64; 3]; 3]) {
     );
 }
 
-/// How the position is reached: `after 180 deg about N`, or the shortest turn; a line for each turn.
+/// Slew path to the position, a line for each turn: `after 180 deg about N`, or the shortest turn.
 fn ways(pose: &Pose) -> Vec<String> {
     let Some(way) = &pose.way else { return Vec::new() };
     let how = if way.stated { "after" } else { "shortest turn" };
@@ -139,7 +141,7 @@ fn ways(pose: &Pose) -> Vec<String> {
     }
 }
 
-/// Lines that fit a panel: ` about` begins another one where there is no room.
+/// Lines broken before ` about ` if they are too long for a panel.
 fn broken(lines: Vec<String>) -> Vec<String> {
     let fits = |line: &str| line.chars().count() <= 34;
     let halves = |line: String| match line.split_once(" about ") {
@@ -149,7 +151,7 @@ fn broken(lines: Vec<String>) -> Vec<String> {
     lines.into_iter().flat_map(halves).collect()
 }
 
-/// The pictures of positions. The earth rate is that of the latitude, in degrees.
+/// Panels of positions. The earth rate is that at `latitude_deg`.
 pub(crate) fn panels(poses: &[Pose], latitude_deg: f64) -> Panels {
     let texts: Vec<Vec<String>> = poses.iter().map(texts).collect();
     let lines = texts.iter().map(Vec::len).max().unwrap_or(0) as f64;
@@ -160,7 +162,7 @@ pub(crate) fn panels(poses: &[Pose], latitude_deg: f64) -> Panels {
     Panels { panels: panels.collect(), height: HEIGHT + LINE * (lines + 1.0) }
 }
 
-/// The lines below the name.
+/// Lines below the name of a position.
 fn texts(pose: &Pose) -> Vec<String> {
     let angles = format!("{} deg", pose.angles.join(", "));
     let turning = pose.rotation.as_deref().and_then(|r| r.split_once(':'));
@@ -168,7 +170,7 @@ fn texts(pose: &Pose) -> Vec<String> {
     std::iter::once(angles).chain(broken(ways(pose))).chain(turning).collect()
 }
 
-/// What a panel shows, in words.
+/// Description of a panel.
 fn title(pose: &Pose) -> String {
     let axes = match &pose.attitude {
         None => format!("angles {}, not drawn", pose.angles.join(", ")),
@@ -206,7 +208,7 @@ fn body(pose: &Pose, texts: &[String], latitude_deg: f64, top: f64) -> String {
         plate(&mut out, &axes);
         let mut drawn: Vec<_> =
             ["X_p", "Y_p", "Z_p"].into_iter().zip(axes).zip([BLUE, ORANGE, GREEN]).collect();
-        // what is nearer is drawn later
+        // vectors that are nearer to the reader are drawn later
         drawn.sort_by(|a, b| seen(a.0.1).1.total_cmp(&seen(b.0.1).1));
         for ((name, v), color) in drawn {
             arrow(&mut out, name, v, color, false);
@@ -216,7 +218,7 @@ fn body(pose: &Pose, texts: &[String], latitude_deg: f64, top: f64) -> String {
     out
 }
 
-/// What the pictures of all positions show.
+/// Caption of the pictures of all positions.
 pub(crate) fn caption(poses: &[Pose], latitude_deg: f64, by_default: bool) -> String {
     let default = if by_default { ", which the scheme does not state" } else { "" };
     let turning =
@@ -225,12 +227,13 @@ pub(crate) fn caption(poses: &[Pose], latitude_deg: f64, by_default: bool) -> St
     let guessed =
         if guessed { "; how a position is reached is not stated, so the shortest turn is given" } else { "" };
     format!(
-        "The platform at every position{turning}: X_p, Y_p, Z_p in North, Up, East, with a plate across Y_p; wide: g, which is down (the \
-         specific force is up), and \u{3c9}, the earth rate at latitude {latitude_deg} deg{default}; dashed: away from the reader{guessed}"
+        "The platform at every position{turning}: X_p, Y_p, Z_p in North, Up, East, with a plate across Y_p; \
+         wide: g, which is down (the specific force is up), and \u{3c9}, the earth rate at latitude \
+         {latitude_deg} deg{default}; dashed: away from the reader{guessed}"
     )
 }
 
-/// The positions of a scheme as one picture, `positions.svg`: axes, g and earth rate at each, and the turns
+/// Picture of the positions of a scheme, `positions.svg`: axes, g and earth rate at each, and the turns
 /// between them.
 pub fn position_figure(scheme: &Scheme) -> File {
     let latitude_deg = latitude_of(scheme).map_or(0.0, |l| l.degrees());
@@ -252,12 +255,12 @@ mod tests {
         text.split_whitespace().map(|x| x.parse().expect("a number")).collect()
     }
 
-    /// What stands between two texts, every time.
+    /// Every text between two texts.
     fn between<'a>(text: &'a str, before: &str, after: &str) -> Vec<&'a str> {
         text.split(before).skip(1).filter_map(|rest| rest.split(after).next()).collect()
     }
 
-    /// Arrows by name: the vector that they are said to be, and where their tips are drawn.
+    /// Arrows by name: their stated vectors, and the places of their tips.
     fn arrows(panel: &str) -> Vec<(&str, Vec<f64>, [f64; 2])> {
         between(panel, "<g data-name=\"", "</g>")
             .into_iter()
@@ -276,8 +279,7 @@ mod tests {
             .collect()
     }
 
-    /// Platform axis `j` in n: a passive matrix Mx(a) turns what it multiplies by -a about x, and so for y
-    /// and z.
+    /// Platform axis `j` in n. A passive matrix Mx(a) rotates a vector by -a about x, and so for y and z.
     fn by_quaternions(angles_deg: [f64; 3], j: usize) -> [f64; 3] {
         let about = |k: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(k, -angles_deg[k].to_radians()));
         (about(0) * about(1) * about(2) * Vector3::ith(j, 1.0)).into()
@@ -289,7 +291,7 @@ mod tests {
         let texts = angles.map(|a| a.map(|x| x.to_string()).join(","));
         let drawn = panels(&scheme(&texts.each_ref().map(String::as_str), "48").poses(), 48.0);
         for (panel, angles) in drawn.each().zip(angles) {
-            // the sheet is linear: a vector lies where North, Up and East of the picture itself put it
+            // the projection is linear: a vector lies where the picture's own North, Up and East put it
             let ray = |name: &str| {
                 let line = between(
                     &panel,
@@ -321,7 +323,7 @@ mod tests {
                     "{name} {vector:?} {expected:?}"
                 );
                 let at: [f64; 2] = std::array::from_fn(|c| (0..3).map(|k| expected[k] * sheet[k][c]).sum());
-                // wide arrows go on beyond what they stand for
+                // the tips of wide arrows lie beyond their vectors
                 let length = at[0].hypot(at[1]);
                 let beyond = if name.ends_with("_p") { 1.0 } else { (length + 13.0) / length };
                 assert!((0..2).all(|c| (tip[c] - beyond * at[c]).abs() < 0.05), "{name} {tip:?} {at:?}");

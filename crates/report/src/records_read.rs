@@ -1,4 +1,4 @@
-//! How records are read, before anything is estimated.
+//! Report on how records are read, before any estimate.
 
 use obsdeg_calibration::platform::{RecordRead, RecordsRead};
 
@@ -6,10 +6,10 @@ use crate::Answer;
 use crate::calibration::{by_what, gaps, tenths};
 use crate::document::{Block, Document, left, number, right};
 
-/// How many cells are listed.
+/// Largest number of listed cells.
 const LISTED: usize = 20;
 
-/// What was read, in sentences.
+/// Sentences on a record: rows, times, positions.
 fn read(r: &RecordRead) -> Vec<String> {
     let mut out = vec![
         format!(

@@ -1,5 +1,5 @@
-//! First lines: the answer of `analyze` in one sentence and what resolves the unknowns that are not
-//! observable, the position that `compare` would drop.
+//! First lines. Of `analyze`: the answer in one sentence, and remedies for unknowns that are not observable.
+//! Of `compare`: the position to drop.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status;
@@ -11,16 +11,16 @@ use obsdeg_evidence::requirements::Worst;
 use crate::stated::worst_sigma;
 use crate::words::names;
 
-/// A sigma that grows by no more than this factor is the same.
+/// Largest factor of a sigma that counts as no growth.
 const SAME: f64 = 1.001;
 
-/// The first line of `compare` of one scheme: the position that can go, or that none can.
+/// First line of `compare` for one scheme: the position to drop, or that none can be dropped.
 pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
     if r.drop_one.len() < 2 {
         return None;
     }
     let met = r.requirements.stated > 0 && r.requirements.all_met();
-    // psi of single positions is named anew without one of them
+    // without a position, psi of single positions is numbered anew
     let missed_here = |name: &str| name.contains('@') || r.requirements.missed.iter().any(|m| m.name == name);
     let keeps =
         |d: &&DropOne| d.lost.is_empty() && d.requirements.missed.iter().all(|m| missed_here(&m.name));
@@ -93,7 +93,7 @@ pub(crate) fn of_model(a: &SystemAnalysis) -> Vec<String> {
     if !several.is_empty() {
         answer.push_str(&format!("; several solutions: {}", names(several)));
     }
-    // without a number they are determined near a generic point only
+    // without a number of solutions they are determined near a generic point only
     let open = a.quantities.iter().filter(|q| {
         q.degree.is_some() && matches!(q.number_of_solutions, None | Some(NumberOfSolutions::Undecided(_)))
     });
@@ -118,12 +118,12 @@ pub(crate) fn to_resolve_in_model(a: &SystemAnalysis) -> Vec<String> {
 /// All unknowns with their degrees.
 struct Unknowns<'a> {
     all: Vec<(&'a str, Option<usize>)>,
-    /// True if constraints say something of them besides the outputs.
+    /// True if constraints on the unknowns add to the outputs.
     constrained: bool,
 }
 
 impl Unknowns<'_> {
-    /// `gamma is determined; S, I are not: know one of them`.
+    /// Sentence such as `gamma is determined; S, I are not: know one of them`.
     fn answer(&self, remedies: &Remedies, upto: &str) -> String {
         let of = |seen: bool| self.all.iter().filter(move |q| q.1.is_some() == seen).map(|q| q.0);
         let (seen, open): (Vec<&str>, Vec<&str>) = (of(true).collect(), of(false).collect());
@@ -156,7 +156,7 @@ fn verb(count: usize) -> &'static str {
     if count == 1 { "is" } else { "are" }
 }
 
-/// The one change of a remedy; `None` where it needs two.
+/// Change of a remedy with a single one; `None` for two.
 fn single(r: &Remedy) -> Option<&Change> {
     match &r.changes[..] {
         [one] => Some(one),
@@ -169,13 +169,13 @@ fn resolves(r: &Remedy, name: &str) -> bool {
     r.resolves.iter().any(|x| x.name == name)
 }
 
-/// Single changes, another carry left out, that alone settle all of `open`.
+/// Alternatives of single changes that resolve all of `open`, without changes of the carry.
 fn whole(remedies: &Remedies, open: &[&str]) -> Option<String> {
     let settles = |r: &&Remedy| {
         let given = single(r).and_then(Change::known);
         open.iter().all(|name| given == Some(name) || resolves(r, name))
     };
-    let mut group = Group { names: open.to_vec(), ..Group::default() };
+    let mut group = RemedyGroup { names: open.to_vec(), ..RemedyGroup::default() };
     for r in remedies.remedies.iter().filter(settles) {
         match single(r) {
             Some(Change::Known { name }) => group.known.push(name),
@@ -199,20 +199,20 @@ fn either(parts: &[String]) -> String {
     }
 }
 
-/// Unknowns that the same changes resolve.
+/// Unknowns that the same changes resolve, with these changes.
 #[derive(Default)]
-struct Group<'a> {
+struct RemedyGroup<'a> {
     names: Vec<&'a str>,
     known: Vec<&'a str>,
     outputs: Vec<&'a str>,
     attitude: Option<&'a Remedy>,
     carries: Vec<&'a Remedy>,
     two: Option<&'a Remedy>,
-    /// Only as outputs of their own.
+    /// True if each becomes observable only as an output of its own.
     themselves: bool,
 }
 
-impl<'a> Group<'a> {
+impl<'a> RemedyGroup<'a> {
     /// The remedies of one unknown.
     fn of(remedies: &'a Remedies, name: &'a str) -> Self {
         let mut group = Self { names: vec![name], ..Self::default() };
@@ -228,7 +228,7 @@ impl<'a> Group<'a> {
         if group.settled() || !group.carries.is_empty() {
             group.two = None;
         }
-        // of unknowns that determine each other every one is listed
+        // of unknowns that determine each other, each is listed
         let tried = remedies.remedies.iter().filter_map(single).filter_map(Change::known).any(|w| w == name);
         if tried && !group.known.is_empty() {
             group.known.push(name);
@@ -242,7 +242,7 @@ impl<'a> Group<'a> {
         group
     }
 
-    /// Takes an unknown in that has the same remedies, the carry left out; false where it has others.
+    /// Adds an unknown with the same remedies apart from the carry; false if its remedies differ.
     fn join(&mut self, other: &Self) -> bool {
         let same = (&self.known, &self.outputs, self.attitude, self.two, self.themselves)
             == (&other.known, &other.outputs, other.attitude, other.two, other.themselves)
@@ -255,7 +255,7 @@ impl<'a> Group<'a> {
         same
     }
 
-    /// True if one change besides another carry is enough.
+    /// True if one change other than the carry is enough.
     fn settled(&self) -> bool {
         !self.known.is_empty() || !self.outputs.is_empty() || self.attitude.is_some() || self.themselves
     }
@@ -263,7 +263,7 @@ impl<'a> Group<'a> {
     /// The alternatives in words.
     fn parts(&self) -> Vec<String> {
         let one_of = |list: &[&str]| {
-            // of one unknown its own value is no news
+            // for a single unknown, its own value is no remedy worth naming
             let own = |name: &&str| list.len() > 1 && self.names == [*name];
             let others: Vec<&str> = list.iter().copied().filter(|name| !own(name)).collect();
             match others[..] {
@@ -302,7 +302,7 @@ impl<'a> Group<'a> {
         out
     }
 
-    /// The highest degree that one of the alternatives leads to, and whether it is that of all.
+    /// Highest degree by these remedies, and true if all give that degree.
     fn degrees(&self, remedies: &Remedies) -> Option<(usize, bool)> {
         let shown = |r: &&Remedy| match single(r) {
             Some(Change::Known { name }) => self.known.contains(&name.as_str()),
@@ -322,8 +322,8 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Changes that are made together, in the imperative: `add a position NWU and one USE`. Lines are
-/// alternatives, so that none numbers the positions it adds.
+/// Changes that are made together, in the imperative: `add a position NWU and one USE`. Added positions have
+/// no numbers, since lines are alternatives.
 pub(crate) fn changes(list: &[Change]) -> String {
     let mut before = "";
     let mut one = |c: &Change| {
@@ -341,23 +341,23 @@ pub(crate) fn changes(list: &[Change]) -> String {
     list.iter().map(&mut one).collect::<Vec<_>>().join(" and ")
 }
 
-/// A line for each group of unknowns that the same changes resolve, in the order of the unknowns; `others`
-/// and `two` say what was tried.
+/// A line for each group of unknowns that the same changes resolve, in the order of the unknowns. `others`
+/// and `two` name the changes that were tried.
 fn lines<'a>(
     remedies: &'a Remedies,
     others: &str,
     two: &str,
     unknowns: impl Iterator<Item = &'a str>,
 ) -> Vec<String> {
-    let mut groups: Vec<Group<'a>> = Vec::new();
+    let mut groups: Vec<RemedyGroup<'a>> = Vec::new();
     let resolved = |name: &str| remedies.remedies.iter().any(|r| resolves(r, name));
     for name in unknowns.filter(|name| resolved(name)) {
-        let group = Group::of(remedies, name);
+        let group = RemedyGroup::of(remedies, name);
         if !groups.iter_mut().any(|g| g.join(&group)) {
             groups.push(group);
         }
     }
-    let line = |g: &Group<'_>| {
+    let line = |g: &RemedyGroup<'_>| {
         let degree = match g.degrees(remedies) {
             Some((k, true)) => format!("; degree {k}"),
             Some((k, false)) => format!("; degree at most {k}"),

@@ -1,4 +1,4 @@
-//! The design review: its sections in the order in which a review asks for them.
+//! Design review: its sections in the order of a review.
 
 mod actions;
 mod calibrated;
@@ -22,12 +22,14 @@ use crate::document::{Block, Document, Typeset, left, number, optional, right};
 use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
-/// What a calibration changes of the review of its scheme.
-const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle model holds, are of a platform with these estimates in place of the \
-    values that the scheme states (of several calibrations those of the last); what is not determined has the values of the scheme.";
+/// Note on the effect of a calibration on the review of its scheme.
+const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
+                          model holds, are of a platform with these estimates in place of the values that \
+                          the scheme states (of several calibrations those of the last); what is not \
+                          determined has the values of the scheme.";
 
-/// A review as one document: of one scheme or model its status, a picture of the unknowns and its sections;
-/// of several the comparison first, and every part folded below it.
+/// Review as one document. A single scheme or model has its status, a picture of the unknowns and its
+/// sections. Several have the comparison first and every part folded below it.
 pub(crate) fn document(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],
@@ -123,12 +125,15 @@ fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
     }
     blocks.push(section(1, "How to check this without obsdeg"));
     let steps = [
-        "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a certificate: a JSON file that proves them.",
-        "obsdeg analyze SCHEME.toml --certificate c.json writes it. The same verdicts give the same bytes, whatever the seed.",
+        "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a \
+         certificate: a JSON file that proves them.",
+        "obsdeg analyze SCHEME.toml --certificate c.json writes it. The same verdicts give the same bytes, \
+         whatever the seed.",
         "The digest below identifies the file: sha256sum c.json.",
-        "python3 tools/verify_certificate.py c.json SCHEME.toml checks it with the standard library of Python alone; obsdeg verify c.json \
-         SCHEME.toml with a crate that shares no code with the engine.",
-        "The chapter Certificates of the book specifies the file and the check, so that you can write a checker of your own.",
+        "python3 tools/verify_certificate.py c.json SCHEME.toml checks it with the standard library of \
+         Python alone; obsdeg verify c.json SCHEME.toml with a crate that shares no code with the engine.",
+        "The chapter Certificates of the book specifies the file and the check, so that you can write a \
+         checker of your own.",
         "Predicted sigmas, the run and the evidence by a filter are not part of a certificate.",
     ];
     blocks.push(Block::list("", steps.map(String::from).to_vec()));
@@ -161,9 +166,9 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
             "are exact and of repositioning at once"
         };
         let text = format!(
-            "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be told apart, formulas and the fewest \
-             positions {exact}; predicted sigmas, requirements and the run are with the slews, by which psi moves and which may determine \
-             more, or less."
+            "Turning between these positions takes time. Degrees, accuracy orders, ranks, what cannot be \
+             told apart, formulas and the fewest positions {exact}; predicted sigmas, requirements and the \
+             run are with the slews, by which psi moves and which may determine more, or less."
         );
         blocks.push(Block::Text(text));
     }
@@ -190,7 +195,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     blocks.push(section(level, "Assumptions and certainty"));
     let mut assumed = words::assumptions(a);
-    // carry, latitude and observation are said above
+    // carry, latitude and observation are stated above
     assumed
         .extend(stated::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
@@ -202,7 +207,7 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     blocks.push(Block::list("", assumed));
 }
 
-/// `with derivatives up to order 2 (D_FY, D_IY)`: names where only some need as many.
+/// `with derivatives up to order 2 (D_FY, D_IY)`: names if only some unknowns need that order.
 fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usize>)>) -> String {
     let all: Vec<_> = all.collect();
     let names: Vec<&str> = all.iter().filter(|q| q.1 == Some(worst)).map(|q| q.0).collect();
@@ -213,7 +218,7 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
     }
 }
 
-/// Effects of errors that the scheme does not estimate, and the budgets with a bench.
+/// Effects of errors that the scheme does not estimate; with a bench also the budgets.
 fn not_estimated(blocks: &mut Vec<Block>, review: &ComparedScheme, id: &str) {
     let (effects, budgets) = omitted::in_full(&review.omitted);
     blocks.extend(effects);
@@ -269,10 +274,10 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
     .without(&left_out(review))
 }
 
-/// Column of total uncertainties.
+/// Title of the column of total uncertainties.
 const TOTAL: &str = "total with the bench";
 
-/// Columns that say nothing where no requirement, or no bench, is stated.
+/// Columns that are empty without requirements or without a bench.
 fn left_out(review: &ComparedScheme) -> Vec<&'static str> {
     let required: &[&str] = if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS };
     let bench = review.conditions.bench.is_none().then_some(TOTAL);
@@ -413,23 +418,29 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
-    blocks.push(Block::table("Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where one is not observable)", [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")], review.sensitivity.iter().map(row)));
+    blocks.push(Block::table(
+        "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where \
+         one is not observable)",
+        [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
+        review.sensitivity.iter().map(row),
+    ));
     blocks.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
     blocks.extend(pictures::latitudes(s, &format!("{id}_latitude")));
     blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
 }
 
-/// How few cardinal attitudes observe every coefficient.
+/// Sentence on the smallest number of cardinal attitudes that make every coefficient observable.
 fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
     let all = s.alternatives.all.as_ref()?;
     Some(match (all.positions, all.never.is_empty()) {
         (Some(k), _) => format!(
-            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry (exhaustive search), for instance {}",
+            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry \
+             (exhaustive search), for instance {}",
             review.carry,
             all.witness.join(", ")
         ),
         (None, false) => format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", ")),
-        // of larger sets nothing is known
+        // larger sets were not searched
         (None, true) => format!(
             "no set of {} of the 24 cardinal attitudes determines every coefficient",
             all.none_of.last()?[0]
@@ -446,7 +457,8 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
                 format!("all {k} positions are needed to observe {}", alternatives.required.join(", "))
             }
             Some(k) => format!(
-                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is another question",
+                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
+                 another question",
                 s.positions.len(),
                 kept.witness.join(", "),
                 alternatives.required.join(", ")
@@ -461,8 +473,8 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
     ) {
         let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
         lines.push(format!(
-            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} (optimal weights); the best found has {value}, \
-             at most {percent} above",
+            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} \
+             (optimal weights); the best found has {value}, at most {percent} above",
             alternatives.front_positions,
             number(best.dwell_s),
             alternatives.required.join(", "),
@@ -523,7 +535,7 @@ fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
             && !is_list(b, "Assumed")
             && !is_list(b, "Validity of the small-angle model")
     };
-    // predicted sigmas stand among the unknowns, and a sheet has room for so many columns
+    // the unknowns' table has the predicted sigmas, and a page has no room for more columns
     blocks.extend(run.blocks.into_iter().filter(kept).map(|b| b.without(&["predicted"])));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
         .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)

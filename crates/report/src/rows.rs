@@ -1,4 +1,4 @@
-//! Charts of rows: a name, a remark, marks on an axis that all rows share, and a text that says the same.
+//! Charts of rows: a name, a remark, marks on an axis that all rows share, and a text with the same content.
 
 use std::fmt::Write;
 
@@ -6,44 +6,44 @@ use crate::document::Grade;
 use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
 use crate::visible;
 
-/// One row.
+/// Row of a chart.
 pub(crate) struct Row {
     pub(crate) name: String,
     pub(crate) remark: String,
-    /// Where its marks are, one of each series; `None`: nowhere.
+    /// Values of its marks, one per series; `None` for no mark.
     pub(crate) marks: Vec<Option<f64>>,
-    /// Where its own line is, if it has one.
+    /// Value of a line of its own; `None` without one.
     pub(crate) limit: Option<f64>,
-    /// What its marks mean, in words.
+    /// Meaning of its marks in words.
     pub(crate) text: String,
     pub(crate) grade: Grade,
 }
 
 /// A chart.
 pub(crate) struct Chart {
-    /// Above the remarks.
+    /// Heading of the remarks.
     pub(crate) remark: &'static str,
-    /// Along the axis.
+    /// Label of the axis.
     pub(crate) label: String,
-    /// True if the axis is that of orders, 0, 1, 2; logarithmic otherwise.
+    /// True if the axis has orders, 0, 1, 2; false if it is logarithmic.
     pub(crate) orders: bool,
-    /// A line through all rows: better is to the right of it.
+    /// Value of a line through all rows; larger values are better.
     pub(crate) threshold: Option<f64>,
-    /// Names of the series where there are several.
+    /// Names of the series; empty for a single one.
     pub(crate) series: Vec<String>,
     pub(crate) rows: Vec<Row>,
 }
 
-/// Left of the axis: names and remarks; the axis; texts. In pixels.
+/// Widths of names, remarks, axis and texts, and the height of a row, in pixels.
 const NAMES: f64 = 96.0;
 const REMARKS: f64 = 52.0;
 const AXIS: f64 = 200.0;
 const TEXTS: f64 = 122.0;
 const ROW: f64 = 19.0;
-/// Between the marks of two series in a row.
+/// Distance between the marks of two series in a row, in pixels.
 const APART: f64 = 7.0;
 
-/// Colours of series, each with a shape of its own.
+/// Colours of series; each series also has a shape of its own.
 const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER];
 
 impl Chart {
@@ -63,10 +63,10 @@ impl Chart {
         }
     }
 
-    /// How a mark is drawn: a disc where there is one series, else a shape of the series.
+    /// Draws a mark: a disc for a single series, else the shape of the series.
     fn mark(&self, out: &mut String, series: usize, x: f64, y: f64, grade: Grade) {
         if self.series.is_empty() {
-            // hollow where it is missed: not by colour alone
+            // a missed mark is hollow, so that colour is not needed
             let (fill, stroke) = match grade {
                 Grade::Good => (BLUE, BLUE),
                 Grade::Missed => ("none", ORANGE),
@@ -94,7 +94,7 @@ impl Chart {
     pub(crate) fn svg(&self) -> String {
         let count = self.series.len().max(1);
         let height = ROW.max(APART * (count as f64 + 1.0));
-        // names are cut by the width of the text column where no row has a text
+        // without any text its column is left out, but for a margin
         let texts = if self.rows.iter().all(|r| r.text.is_empty()) { 16.0 } else { TEXTS };
         let left = NAMES + REMARKS;
         let legend = self.series.iter().filter(|s| !s.is_empty()).count() as f64 * 16.0;
@@ -106,8 +106,8 @@ impl Chart {
             left + AXIS * ((share - low) / (high - low)).clamp(0.0, 1.0)
         };
         let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" font-family=\"{FONT}\" font-size=\"11\">\
-             <rect width=\"100%\" height=\"100%\" fill=\"white\" />",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" \
+             font-family=\"{FONT}\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />",
             bottom + 6.0
         );
         for (i, name) in self.series.iter().enumerate() {
@@ -123,7 +123,8 @@ impl Chart {
             let x = at(if self.orders { tick } else { 10f64.powf(tick) });
             let _ = write!(
                 out,
-                "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" stroke-width=\"0.5\" />",
+                "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" \
+                 stroke-width=\"0.5\" />",
                 top - 4.0
             );
             text(&mut out, x, top - 10.0, "middle", &power(tick, self.orders));
@@ -136,7 +137,8 @@ impl Chart {
             if let Some(limit) = row.limit {
                 let _ = write!(
                     out,
-                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" stroke-width=\"2\" />",
+                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" \
+                     stroke-width=\"2\" />",
                     at(limit),
                     y - height / 2.0 + 2.0,
                     y + height / 2.0 - 2.0
@@ -147,7 +149,8 @@ impl Chart {
                 if let Some(threshold) = self.threshold {
                     let _ = write!(
                         out,
-                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" stroke-width=\"2\" />",
+                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" \
+                         stroke-width=\"2\" />",
                         at(threshold),
                         at(x)
                     );
@@ -158,7 +161,8 @@ impl Chart {
         if let Some(threshold) = self.threshold {
             let _ = write!(
                 out,
-                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" stroke-width=\"1.5\" />",
+                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" \
+                 stroke-width=\"1.5\" />",
                 at(threshold),
                 top - 4.0
             );
@@ -168,7 +172,7 @@ impl Chart {
     }
 }
 
-/// `0.01`, `1`, `1e5`; an order as it is.
+/// Label of the axis: `0.01`, `1`, `1e5`, or an order.
 fn power(x: f64, order: bool) -> String {
     match (order, x as i32) {
         (true, k) => k.to_string(),
@@ -179,7 +183,7 @@ fn power(x: f64, order: bool) -> String {
 }
 
 fn text(out: &mut String, x: f64, y: f64, anchor: &str, text: &str) {
-    // what is longer than its place is said in full in the tables
+    // the tables have the full text
     let short: String = if text.chars().count() > 44 {
         text.chars().take(43).chain(['\u{2026}']).collect()
     } else {
@@ -238,7 +242,7 @@ mod tests {
         let svg = chart(true, vec![row(Some(0.0), Grade::Good), row(Some(2.0), Grade::Good)]).svg();
         assert_eq!(discs(&svg), [left, right]);
         assert!(svg.contains(">2</text>") && !svg.contains(">0.5</text>"));
-        // nothing to draw is an axis
+        // a chart without marks has an axis
         assert!(chart(false, vec![row(None, Grade::Open)]).svg().contains(">10</text>"));
     }
 

@@ -86,7 +86,9 @@ impl Answer for SensorNoiseReport {
         let mut lead: Vec<String> = self.columns.iter().map(resolved).collect();
         lead.extend(self.columns.iter().filter(|c| !c.explained).map(|c| {
             format!(
-                "NOT explained: white noise, flicker noise and a random walk do not give the deviations of `{}` (probability {}). Do not use its coefficients; look for a trend, vibration, temperature or a coarse resolution of the output.",
+                "NOT explained: white noise, flicker noise and a random walk do not give the deviations of \
+                 `{}` (probability {}). Do not use its coefficients; look for a trend, vibration, \
+                 temperature or a coarse resolution of the output.",
                 c.column,
                 number(c.probability)
             )

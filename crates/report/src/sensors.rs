@@ -1,20 +1,21 @@
 //! Sets of outputs of a model.
 
-use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors};
+use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors, Unattainable};
 
 use crate::Answer;
 use crate::document::{Block, Document, left, right};
+use crate::stated::capital;
 use crate::words;
 
-/// Most members of the groups of a proof that are shown.
+/// Largest number of candidates in the groups of a printed proof.
 const MEMBERS: usize = 24;
 
-/// A number, and what it counts: `1 output`, `2 outputs`.
+/// Number with the word that it counts: `1 output`, `2 outputs`.
 fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-/// Members of a set.
+/// Outputs of a set.
 fn set(outputs: &[String]) -> String {
     match outputs.is_empty() {
         true => "none".into(),
@@ -22,24 +23,18 @@ fn set(outputs: &[String]) -> String {
     }
 }
 
-/// A text that begins a sentence.
-fn capital(text: &str) -> String {
-    let mut rest = text.chars();
-    rest.next().map_or_else(String::new, |first| first.to_uppercase().chain(rest).collect())
-}
-
-/// A cost without zeros at its end.
+/// Cost without trailing zeros.
 fn cost(cost: f64) -> String {
     let text = format!("{cost:.6}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// True if some cost is not one.
+/// True if a cost differs from one.
 fn has_costs(s: &Sensors) -> bool {
     s.candidates.iter().any(|c| c.cost != 1.0)
 }
 
-/// What a set costs, in words: `2 outputs`, `cost 2.5`.
+/// Cost of a set in words: `2 outputs`, `cost 2.5`.
 fn price(s: &Sensors, f: &FrontSet) -> String {
     match has_costs(s) {
         true => format!("cost {}", cost(f.cost)),
@@ -47,7 +42,7 @@ fn price(s: &Sensors, f: &FrontSet) -> String {
     }
 }
 
-/// The unknowns that the sets are about: `all 34 unknowns`, `k1, k2`.
+/// Unknowns that the sets make observable: `all 34 unknowns`, `k1, k2`.
 fn about(s: &Sensors) -> String {
     let (required, all) = (s.required.len(), s.quantities.len());
     match required {
@@ -57,7 +52,7 @@ fn about(s: &Sensors) -> String {
     }
 }
 
-/// The answer in sentences, the first one being the answer.
+/// Sentences, the answer first.
 fn sentences(s: &Sensors) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(first) = s.front.first() {
@@ -97,17 +92,17 @@ fn sentences(s: &Sensors) -> Vec<String> {
         ));
     }
     if !s.unattainable.is_empty() {
-        let word = |u: &obsdeg_design::sensors::Unattainable| match u.degree {
-            Some(k) => format!("{} (degree {k} with all)", u.name),
-            None => u.name.clone(),
+        let word = |u: &Unattainable| match u.degree {
+            Some(k) => format!("{} (degree {k} with all candidates)", u.name),
+            None => format!("{} (not observable with all candidates)", u.name),
         };
         let list: Vec<String> = s.unattainable.iter().map(word).collect();
-        out.push(format!("No set of the candidates does that for {}", list.join(", ")));
+        out.push(format!("No set of the candidates reaches {}", list.join(", ")));
     }
     out
 }
 
-/// What proves that a set of the front is the cheapest.
+/// Proof that a set of the front is the cheapest.
 fn proof(s: &Sensors, f: &FrontSet) -> String {
     let asked = match s.max_degree.is_empty() {
         true => String::new(),
@@ -132,37 +127,41 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
     };
     let judged = match f.examined {
         0 => String::new(),
-        n => format!("; the {} that do and are cheaper fail one by one", count(n, "set")),
+        n => format!("; the {} of this kind that cost less fail one by one", count(n, "set")),
     };
     match shown.is_empty() {
         true => format!("{}: nothing is cheaper", price(s, f)),
         false => format!(
-            "{}: every set {goal} holds a candidate of {}{more}, since all candidates outside one of these groups fail together{judged}",
+            "{}: every set {goal} contains a candidate of {}{more}, because all candidates outside any of \
+             these groups fail together{judged}",
             price(s, f),
             shown.join(", of ")
         ),
     }
 }
 
-/// What the answer rests on.
+/// Conditions and limits of the answer.
 fn validity(s: &Sensors) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(s.stopped.as_ref().map(|reason| format!("the search ended early: {reason}")));
     out.push(match (s.minimal_sets, s.complete_to) {
         (Some(n), _) => format!(
-            "{}; an output more never raises a degree, so every set that does holds one of them",
-            count(n, "minimal set")
+            "{}: every set that makes {} observable contains one of them, because an additional output \
+             never raises a degree",
+            count(n, "minimal set"),
+            about(s)
         ),
         (None, Some(most)) if most > 0 => format!(
-            "at least {}: all with up to {} are found, not all of more outputs",
+            "at least {}: those of up to {} are all found, larger ones are not",
             count(s.minimal_sets_found, "minimal set"),
             count(most, "output")
         ),
-        _ => "minimal sets were not all found".into(),
+        _ => "minimal sets were not searched".into(),
     });
     if !s.closed {
         out.push(format!(
-            "derivatives of some outputs are looked at up to order {} without a proven end: what is not observable is so up to there",
+            "derivatives of some outputs are computed up to order {} without a proven end: \
+             \"not observable\" means up to this order",
             s.last_order
         ));
     }

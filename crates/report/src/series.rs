@@ -22,16 +22,16 @@ fn suffix(unit: &str) -> String {
     if plain.is_empty() { plain } else { format!("_{plain}") }
 }
 
-/// A column after the position.
-struct Column {
+/// Column of a time series.
+struct SeriesColumn {
     name: String,
     unit: String,
     values: Vec<f64>,
 }
 
-fn columns(record: &Traces) -> Vec<Column> {
+fn columns(record: &Traces) -> Vec<SeriesColumn> {
     let name = format!("t{}", suffix(&record.time_unit));
-    let mut out = vec![Column { name, unit: record.time_unit.clone(), values: record.time.clone() }];
+    let mut out = vec![SeriesColumn { name, unit: record.time_unit.clone(), values: record.time.clone() }];
     for (i, name) in record.names.iter().enumerate() {
         let (series, scale) = (&record.series[i], record.scales[i]);
         for (what, values) in
@@ -39,13 +39,13 @@ fn columns(record: &Traces) -> Vec<Column> {
         {
             let unit = record.units[i].clone();
             let name = format!("{}_{what}{}", file_name(name), suffix(&unit));
-            out.push(Column { name, unit, values: values.iter().map(|x| x / scale).collect() });
+            out.push(SeriesColumn { name, unit, values: values.iter().map(|x| x / scale).collect() });
         }
     }
     out
 }
 
-/// A run as CSV: one row per sample, the position by its number from 1.
+/// Run as CSV: one row per sample, with the number of the position from 1.
 ///
 /// # Errors
 /// [`ReportError::Csv`].
@@ -60,9 +60,9 @@ pub fn series_csv(record: &Traces) -> Result<String, ReportError> {
     crate::csv_text::write(std::iter::once(header).chain(rows))
 }
 
-/// The same as Parquet (snappy). Its metadata say what it belongs to: `obsdeg.version`, `obsdeg.seed`,
-/// `obsdeg.units` (JSON, unit by column) and `obsdeg.summary_sha256`, the digest of the summary of the run as
-/// JSON, which holds all its conditions.
+/// Run as Parquet (snappy). Its metadata are `obsdeg.version`, `obsdeg.seed`, `obsdeg.units` (JSON, unit by
+/// column) and `obsdeg.summary_sha256`: the digest of the run's summary as JSON, which has all its
+/// conditions.
 ///
 /// # Errors
 /// [`ReportError::Parquet`], [`ReportError::Json`].
@@ -91,7 +91,7 @@ pub fn series_parquet(record: &Traces, summary: &impl Answer) -> Result<Vec<u8>,
         column.typed::<Int32Type>().write_batch(&positions, None, None)?;
         column.close()?;
     }
-    for Column { values, .. } in &columns {
+    for SeriesColumn { values, .. } in &columns {
         if let Some(mut column) = group.next_column()? {
             column.typed::<DoubleType>().write_batch(values, None, None)?;
             column.close()?;
@@ -101,7 +101,7 @@ pub fn series_parquet(record: &Traces, summary: &impl Answer) -> Result<Vec<u8>,
     Ok(writer.into_inner()?)
 }
 
-fn metadata(columns: &[Column], summary: &impl Answer) -> Result<Vec<KeyValue>, ReportError> {
+fn metadata(columns: &[SeriesColumn], summary: &impl Answer) -> Result<Vec<KeyValue>, ReportError> {
     let text = written(summary, Format::Json, Layout::default())?;
     let digest: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
     let json: Value = serde_json::from_str(&text)?;

@@ -11,7 +11,7 @@ use obsdeg_evidence::simulation::{
 use crate::document::{Block, Document, left, number, optional, right};
 use crate::{Answer, gimbals, omitted, stated, words};
 
-/// What a run assumes, a sentence each.
+/// Assumptions of a run, one sentence each.
 pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> Vec<String> {
     let truth = match c.truth {
         Truth::Linear => "linear: the model of the filter itself",
@@ -59,13 +59,13 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
     out
 }
 
-/// A density, or what it is between the shortest and the longest step.
+/// Density of the random drift, or its range over the steps.
 fn density(c: &ConditionsReport) -> String {
     let [low, high] = c.drift_noise_density_deg_sqrt_h.map(number);
     if low == high { format!("{low} deg/sqrt(h)") } else { format!("{low} to {high} deg/sqrt(h)") }
 }
 
-/// The random drift as it was given; a bias of one step as a density too.
+/// Random drift as it was given; a bias held for one step also as a density.
 fn drift_noise(c: &ConditionsReport) -> String {
     match c.drift_noise_step_s {
         Some(_) => format!("{} held for one step: {}", c.drift_noise, density(c)),
@@ -73,12 +73,12 @@ fn drift_noise(c: &ConditionsReport) -> String {
     }
 }
 
-/// Says that a bias of one step was given for another step.
+/// Warning that a bias held for one step was given for steps of another length.
 pub(crate) fn warning(c: &ConditionsReport) -> Option<String> {
     let step = c.drift_noise_step_s.filter(|_| c.drift_noise_differs)?;
     Some(format!(
-        "warning: the random drift, {} held for one step, was given for steps of {step} s; with the steps here its density is another, {}: \
-         a density in deg/sqrt(h) does not depend on them",
+        "warning: the random drift, {} held for one step, was given for steps of {step} s; with the steps \
+         here its density is another, {}: a density in deg/sqrt(h) does not depend on them",
         c.drift_noise,
         density(c)
     ))
@@ -89,7 +89,7 @@ fn number_short(x: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
 
-/// Why the small-angle model holds or does not, with its figures.
+/// Sentences on whether the small-angle model holds, with its figures.
 pub(crate) fn validity(v: &Validity, c: &ConditionsReport) -> Vec<String> {
     let drifts = stated::drifts(c);
     let ratio = v.neglected_g / v.accelerometer_noise_g;
@@ -116,7 +116,7 @@ pub(crate) fn validity(v: &Validity, c: &ConditionsReport) -> Vec<String> {
     ]
 }
 
-/// Which filter ran, and why.
+/// Filter that ran, and the reason for it.
 pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
     let (what, passes) = match f.kind {
         FilterKind::Linear => ("linear: small angles, gains known beforehand".into(), String::new()),
@@ -136,7 +136,11 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
     };
     let mut out = vec![format!("{what}{passes}; {why}")];
     if f.kind != FilterKind::Linear {
-        out.push("verdicts and degrees are those of small angles; what a filter learns beyond them comes of the attitudes that drift reached".into());
+        out.push(
+            "verdicts and degrees are those of small angles; what a filter learns beyond them comes of the \
+             attitudes that drift reached"
+                .into(),
+        );
     }
     if !f.trusted {
         let why = match f.kind {
@@ -144,23 +148,22 @@ pub(crate) fn filter(f: &FilterReport) -> Vec<String> {
             _ => "it is linearised before the drifts are known",
         };
         out.push(format!(
-            "do not trust the sigmas of this filter where the small-angle model does not hold, at the truth or within the prior of psi: {why}; \
-             one run that is consistent does not show that they are right; the iterated filter (--filter iterated) is linearised along the \
-             whole run"
+            "do not trust the sigmas of this filter where the small-angle model does not hold, at the truth \
+             or within the prior of psi: {why}; one run that is consistent does not show that they are \
+             right; the iterated filter (--filter iterated) is linearised along the whole run"
         ));
     }
     out
 }
 
-/// What the linear filter makes of the same measurements.
+/// Row on the linear filter's estimate from the same measurements.
 fn linear(e: &Estimate) -> Option<Vec<String>> {
     let l = e.linear?;
     let [error, sigma, own] = [l.error, l.sigma, e.sigma].map(number);
     Some(vec![e.name.clone(), e.unit.clone(), own, sigma, error, format!("{:.2}", l.error / l.sigma)])
 }
 
-/// Outcome of an unknown; of one whose sigma alone meets its requirement and whose total with the bench does
-/// not, that.
+/// Outcome of an unknown. `missed by the bench` if sigma alone meets the requirement and the total does not.
 fn outcome(e: &Estimate) -> &'static str {
     match (e.outcome, e.required_sigma) {
         (Outcome::Converging, Some(required)) if e.sigma <= required => "missed by the bench",
@@ -175,7 +178,7 @@ fn row(e: &Estimate) -> Vec<String> {
     out
 }
 
-/// `0.1 deg/h`, one for every unit, or by name where they differ.
+/// Requirements such as `0.1 deg/h`: one per unit, or by name if they differ.
 fn requirements(quantities: &[Estimate]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for q in quantities {
@@ -190,7 +193,7 @@ fn requirements(quantities: &[Estimate]) -> Vec<String> {
     out
 }
 
-/// On whose prior rests what the samples do not determine, a line for all that rest on each other.
+/// Sentences on estimates that rest on priors, one for each group of unknowns that share them.
 fn priors(quantities: &[Estimate], filter: FilterKind) -> Vec<String> {
     let mut groups: BTreeMap<Vec<usize>, Vec<&str>> = BTreeMap::new();
     for (i, q) in quantities.iter().enumerate().filter(|(_, q)| !q.prior_of.is_empty()) {
@@ -203,25 +206,29 @@ fn priors(quantities: &[Estimate], filter: FilterKind) -> Vec<String> {
     };
     let mut out: Vec<String> = groups.into_iter().map(line).collect();
     if filter != FilterKind::Linear && !out.is_empty() {
-        let text = "this is said of small angles: with the full attitudes of this filter other priors may bear on these estimates too";
+        let text = "this is said of small angles: with the full attitudes of this filter other priors may \
+                    bear on these estimates too";
         out.push(text.into());
     }
     out
 }
 
-/// Advice where one run is consistent and says little.
-pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the small-angle model does not hold, at the truth or within the prior of psi, and the \
-     filter is not linearised along the whole run. Use the iterated filter (--filter iterated)";
+/// Advice for a consistent run of a filter whose model is not valid.
+pub(crate) const NOT_TRUSTED: &str = "Do not trust the filter's sigmas, although this run is consistent: the \
+                                      small-angle model does not hold, at the truth or within the prior of \
+                                      psi, and the filter is not linearised along the whole run. Use the \
+                                      iterated filter (--filter iterated)";
 
-/// The answer: what becomes of the requirements by prediction and in the run; then the carry, and what nobody
-/// states.
+/// First lines: requirements by prediction and in the run, then the carry and the conditions that are not
+/// stated.
 fn lead(s: &Simulation) -> Vec<String> {
     let [predicted, run] = [stated::requirements(&s.requirements), stated::run(&s.run, &s.conditions)]
         .map(|t| stated::capital(&t));
     let mut out = vec![format!("{predicted}."), format!("{run}.")];
     if !s.consistency.consistent {
         let whose = if stated::drifts_by_default(&s.conditions) && s.conditions.states_priors() {
-            ", which is the paper's, against the priors that are stated: state the drifts (--value) or leave this run out of account"
+            ", which is the paper's, against the priors that are stated: state the drifts (--value) or leave \
+             this run out of account"
         } else {
             ""
         };
@@ -251,7 +258,7 @@ impl Answer for Simulation {
         let table =
             |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);
-        // torquer errors act in slews, which verdicts then take as fast
+        // torquer errors act in slews, which the verdicts assume to be fast
         let torqued = self.quantities.iter().any(|q| q.name.starts_with("GS_") || q.name.starts_with("GM_"));
         let degree = if torqued && self.timeline.iter().any(|t| t.slew) {
             "exact verdict of turns fast against the earth rate, - not observable; outcome: with the slews"
@@ -288,8 +295,8 @@ impl Answer for Simulation {
         }
         let mut consistency = words::consistency(&self.consistency);
         if self.consistency.consistent && !self.filter.trusted {
-            consistency[0] = "this run is consistent with its truth, which says little of this filter (see Filter): the errors of many runs \
-                              decide (obsdeg crosscheck)"
+            consistency[0] = "this run is consistent with its truth, which says little of this filter (see \
+                              Filter): the errors of many runs decide (obsdeg crosscheck)"
                 .into();
         }
         blocks.push(Block::list("Consistency", consistency));

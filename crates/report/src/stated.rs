@@ -1,4 +1,4 @@
-//! Sentences on what is stated and what is not: requirements, conditions, carry.
+//! Sentences on requirements, on conditions that are stated or not, and on the carry.
 
 use obsdeg_core::model::Carry;
 use obsdeg_evidence::requirements::{Basis, Miss, Requirements, Worst};
@@ -9,10 +9,10 @@ use obsdeg_evidence::simulation::{
 use crate::document::number;
 use crate::words::{self, accelerometer_bias, gyro_noise, names};
 
-/// Largest part by which the sigmas of a run may differ from the predicted ones to be called equal to them.
+/// Largest relative difference at which sigmas of a run count as equal to the predicted ones.
 const EQUAL: f64 = 0.01;
 
-/// A sentence with its first letter large.
+/// Sentence with its first letter in upper case.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
@@ -35,12 +35,12 @@ pub(crate) fn missed(r: &Requirements) -> String {
     reasons.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
 }
 
-/// `0.06798 (psi_y)`; `None` when nothing has a margin.
+/// Smallest margin such as `0.06798 (psi_y)`; `None` if nothing has a margin.
 pub(crate) fn worst_margin(r: &Requirements) -> Option<String> {
     r.worst.as_ref().map(|w| format!("{} ({})", number(w.margin), w.name))
 }
 
-/// Whose margin is the smallest: ` of the others` where some that are missed have none.
+/// ` of the others` for a smallest margin if some missed unknowns have none.
 pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
     if r.leaves_out() { " of the others" } else { "" }
 }
@@ -73,7 +73,7 @@ pub(crate) fn requirements(r: &Requirements) -> String {
     )
 }
 
-/// Outcome of the requirements in a run, and the reasons why its sigmas differ from the predicted ones.
+/// Outcome of the requirements in a run, and the reasons for differences from the predicted sigmas.
 pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
     let verdict = match r.requirements.stated {
         0 => "in this run".into(),
@@ -103,7 +103,7 @@ fn listed(parts: &[String]) -> String {
     }
 }
 
-/// `3.92`, `0.0012`: three digits are enough for a ratio.
+/// Ratio with two decimals, or two digits if it is very small or large: `3.92`, `1.2e-03`.
 fn ratio(x: f64) -> String {
     if (0.01..1000.0).contains(&x) { format!("{x:.2}") } else { format!("{x:.1e}") }
 }
@@ -116,29 +116,31 @@ fn reason(why: RunDiffers, c: &ConditionsReport) -> String {
     }
 }
 
-/// A carry by its name with what it assumes of the platform.
+/// Name of a carry, with its assumption on the platform.
 pub(crate) fn carry(c: Carry) -> &'static str {
     match c {
         Carry::Platform => {
-            "platform carry: psi goes on unchanged in platform axes from position to position, as in the paper; a platform that is torqued from \
-             one to the next has inertial carry"
+            "platform carry: psi goes on unchanged in platform axes from position to position, as in the \
+             paper; a platform that is torqued from one to the next has inertial carry"
         }
         Carry::Inertial => {
-            "inertial carry: psi goes on in geographic axes from position to position, as on a platform that is torqued from one to the next"
+            "inertial carry: psi goes on in geographic axes from position to position, as on a platform that \
+             is torqued from one to the next"
         }
         Carry::Reset => {
-            "reset carry: the platform is levelled and aligned anew at every position, so that each has a psi of its own"
+            "reset carry: the platform is levelled and aligned anew at every position, so that each has a \
+             psi of its own"
         }
     }
 }
 
-/// `0.002237 deg/h/g (D_SX)`.
+/// Sigma such as `0.002237 deg/h/g (D_SX)`.
 pub(crate) fn worst_sigma(w: &Worst) -> String {
     sigma_of(&w.name, w.sigma_dph)
 }
 
-/// The sigma of a drift coefficient with its unit: zero-order coefficients and components of the drift are
-/// rates, those with one letter more are per g, with two per g^2.
+/// Sigma of a drift coefficient with its unit. Zero-order coefficients and components of the drift are rates;
+/// coefficients with one more letter are per g, with two more per g^2.
 pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
     let terms = name.strip_prefix("D_").map_or("", |rest| &rest[..rest.len().saturating_sub(1)]);
     let unit = match terms {
@@ -149,12 +151,12 @@ pub(crate) fn sigma_of(name: &str, sigma_dph: f64) -> String {
     format!("{} {unit} ({name})", number(sigma_dph))
 }
 
-/// Name of the largest figure of drift coefficients: a total with a bench.
+/// Name of the largest figure of drift coefficients: the total with a bench, else sigma.
 pub(crate) fn worst(r: &Requirements) -> &'static str {
     if r.with_bench { "worst total" } else { "worst sigma" }
 }
 
-/// The same scheme under the other carries, in one line; empty where nothing was judged.
+/// The same scheme under the other carries, in one line; `None` if none was judged.
 pub(crate) fn other_carries(carries: &[OtherCarry]) -> Option<String> {
     let of = |o: &OtherCarry| {
         let Some(r) = &o.requirements else {
@@ -187,20 +189,26 @@ pub(crate) fn predicted(m: &MeasurementReport) -> String {
     format!("sigma: information of all samples, {prior}, {drift}; psi at the end{bench}")
 }
 
-/// The same of several schemes, whose conditions may differ.
+/// Conditions of the predicted sigmas of several schemes, which may differ.
 pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementReport>) -> String {
     let all: Vec<&MeasurementReport> = all.into_iter().collect();
     let mut said: Vec<String> = all.iter().map(|m| predicted(m)).collect();
     said.dedup();
     match said.len() {
         1 => said.remove(0),
-        _ if all.iter().any(|m| m.bench.is_some()) => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end; worst sigma: of schemes with a bench the total uncertainty".into(),
-        _ => "sigma: information of all samples, with the priors and the random drift that each scheme states; psi at the end".into(),
+        _ if all.iter().any(|m| m.bench.is_some()) => "sigma: information of all samples, with the priors \
+                                                       and the random drift that each scheme states; psi at \
+                                                       the end; worst sigma: of schemes with a bench the \
+                                                       total uncertainty"
+            .into(),
+        _ => "sigma: information of all samples, with the priors and the random drift that each scheme \
+              states; psi at the end"
+            .into(),
     }
 }
 
-/// Values of the conditions that nobody states, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None`
-/// where all are stated.
+/// Values of conditions that are not stated, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None` if
+/// all are stated.
 fn chosen(m: &MeasurementReport) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", m.latitude_deg),
@@ -214,14 +222,14 @@ fn chosen(m: &MeasurementReport) -> Option<String> {
     (!listed.is_empty()).then(|| listed.join(", "))
 }
 
-/// The conditions of predicted sigmas that nobody states, in a sentence; `None` where all are stated.
+/// Sentence on conditions of predicted sigmas that are not stated; `None` if all are stated.
 pub(crate) fn by_default(m: &MeasurementReport) -> Option<String> {
     chosen(m).map(|listed| format!("not stated, chosen by the program: {listed}"))
 }
 
-/// The conditions of a run that nobody states, in a sentence; `None` where all are stated.
+/// Sentence on conditions of a run that are not stated; `None` if all are stated.
 pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> Option<String> {
-    // unknowns that the paper does not have, each with a value and a prior of the program
+    // the paper lacks the other unknowns, whose values and priors the program chooses
     let of_paper = |name: &str| {
         name.starts_with("psi")
             || ["D_F", "D_I", "D_O", "D_S"].contains(&&name[..name.len().saturating_sub(1)])
@@ -257,17 +265,17 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> 
     (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
 }
 
-/// True if nobody states the drifts of a run, which has those of the paper then.
+/// True if the drifts of a run are not stated, so that they are those of the paper.
 pub(crate) fn drifts_by_default(c: &ConditionsReport) -> bool {
     c.by_default.iter().any(|key| key == "values")
 }
 
-/// ` times 0.001`: the factor on drifts; empty where it is one.
+/// Factor on drifts such as ` times 0.001`; empty if it is one.
 fn scaled(c: &ConditionsReport) -> String {
     if c.drift_scale == 1.0 { String::new() } else { format!(" times {}", c.drift_scale) }
 }
 
-/// The drifts of a run: those that are stated, or the paper's, with the factor on them.
+/// Drifts of a run: the stated ones or the paper's, with the factor on them.
 pub(crate) fn drifts(c: &ConditionsReport) -> String {
     match drifts_by_default(c) {
         true => format!("the drifts of the paper{} (11 to 13 deg/h; none are stated)", scaled(c)),
@@ -275,7 +283,7 @@ pub(crate) fn drifts(c: &ConditionsReport) -> String {
     }
 }
 
-/// Conditions that predicted sigmas rest on, a sentence each, behind that of [`predicted`].
+/// Conditions of predicted sigmas, one sentence each, in addition to that of [`predicted`].
 pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
     let by = if m.latitude_by_default { " (chosen here: the scheme names none)" } else { "" };
     let azimuth = m.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
@@ -283,9 +291,9 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         || "repositioning at once unless a position says otherwise".into(),
         |r| {
             format!(
-                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, accuracy orders and ranks: of \
-                 repositioning at once, with torquer errors of turns fast against the earth rate; what has a sigma: with the slews, in \
-                 floating point)"
+                "slews at {r} deg/s unless a position says otherwise, Z not used meanwhile (degrees, \
+                 accuracy orders and ranks: of repositioning at once, with torquer errors of turns fast \
+                 against the earth rate; what has a sigma: with the slews, in floating point)"
             )
         },
     );

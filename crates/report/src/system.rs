@@ -1,4 +1,4 @@
-//! Any system.
+//! Verdicts, runs and evidence on any system.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
@@ -11,7 +11,7 @@ use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvid
 use crate::document::{Block, Document, Typeset, left, number, right};
 use crate::{Answer, latex, resolve, why, words};
 
-/// Longest solving expression that a reader is shown.
+/// Length in bytes up to which a solving expression is printed.
 const READABLE: usize = 240;
 
 fn explanation(q: &SystemQuantity, constrained: bool) -> String {
@@ -27,8 +27,8 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
     }
 }
 
-/// What verdicts rest on, in a sentence. Real numbers give no probability: a number that is not zero is
-/// proven to be so, one that holds zero is taken to be.
+/// Certainty of verdicts in a sentence. Real numbers give no probability: a number that differs from zero is
+/// proven to do so, one whose ball contains zero is assumed to be zero.
 fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
         (Some(bound), _) => {
@@ -39,10 +39,12 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
                 || "what counts as zero is so exactly".into(),
                 |x| format!("what counts as zero is less than 10^{x:.0} of its row; a judgement by this gap"),
             );
-            // no "-0"
+            // + 0.0 avoids "-0"
             let least = d.nonzero_log10.round() + 0.0;
             format!(
-                "functions by their true values at two random real points, with {} and {} digits, that agree: what counts as different from zero is proven to be (at least 10^{least} relative to the largest number of its row), {zero}; no probability belongs to it; seed {seed}",
+                "functions by their true values at two random real points, with {} and {} digits, that \
+                 agree: what counts as different from zero is proven to be (at least 10^{least} relative to \
+                 the largest number of its row), {zero}; no probability belongs to it; seed {seed}",
                 d.digits[0], d.digits[1]
             )
         }
@@ -50,7 +52,7 @@ fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) 
     }
 }
 
-/// Number of solutions of an observable unknown, and the place of its expression.
+/// Number of solutions of an observable unknown, and a reference to its expression.
 fn solutions(q: &SystemQuantity) -> String {
     let words = q.identifiability_words();
     match (&q.number_of_solutions, &q.solution) {
@@ -60,12 +62,14 @@ fn solutions(q: &SystemQuantity) -> String {
     }
 }
 
-/// What the numbers of solutions rest on, and why some are missing.
+/// Conditions of the numbers of solutions, and reasons why some are missing.
 fn counting(a: &SystemAnalysis) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(order) = a.counting_order {
         out.push(format!(
-            "solutions without an expression are counted by elimination, complex ones too, with derivatives up to order {order} at a random point modulo each prime; no bound on the probability of an error is derived"
+            "solutions without an expression are counted by elimination, complex ones too, with derivatives \
+             up to order {order} at a random point modulo each prime; no bound on the probability of an \
+             error is derived"
         ));
     }
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -96,7 +100,7 @@ fn values_of(c: &SystemCombination) -> String {
     }
 }
 
-/// Combinations with their verdicts; `unproven` is the order up to which was looked, where no end is proven.
+/// Combinations with their verdicts. `unproven` is the largest order of derivatives if the end is not proven.
 fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> Block {
     let row = |c: &SystemCombination| {
         let verdict = match (c.degree, unproven) {
@@ -146,7 +150,7 @@ impl Answer for SystemAnalysis {
     fn document(&self) -> Document {
         let units = self.quantities.iter().any(|q| !q.unit.is_empty());
         let mut order: Vec<_> = self.quantities.iter().collect();
-        // best first, what has no degree last
+        // best first, unknowns without a degree last
         order.sort_by_key(|q| (q.status, q.degree));
         let rows = order.iter().map(|q| {
             let mut row = vec![q.name.clone(), q.kind.clone()];
@@ -199,7 +203,7 @@ impl Answer for SystemAnalysis {
                 moved.join(", ")
             )
         }));
-            // beyond the bound a derivative may change
+            // derivatives of higher order than the bound may change
             let heading = match self.rests_on_bound {
                 true => {
                     format!("No derivative up to order {} changes at the start when you", self.last_order)
@@ -216,7 +220,8 @@ impl Answer for SystemAnalysis {
         let mut assumed = Vec::new();
         if self.missing_functions > 0 {
             assumed.push(format!(
-                "identifiable combinations are not all listed: {} independent one{} more of unobservable unknowns exist, and no short sum of products of powers was found",
+                "identifiable combinations are not all listed: {} independent one{} more of unobservable \
+                 unknowns exist, and no short sum of products of powers was found",
                 self.missing_functions,
                 if self.missing_functions == 1 { "" } else { "s" }
             ));
@@ -230,13 +235,13 @@ impl Answer for SystemAnalysis {
                 time => format!("t = {time}, where the run begins"),
             };
             format!(
-                "the equations or known inputs depend on the time: judged at {at}; segments after the first, if there are any, at a generic \
-                 time{}; `time` in the file sets another, or \"generic\"",
+                "the equations or known inputs depend on the time: judged at {at}; segments after the first, \
+                 if there are any, at a generic time{}; `time` in the file sets another, or \"generic\"",
                 if time == "generic" { String::new() } else { side_in_time(self) }
             )
         }));
         if !self.constraints.is_empty() {
-            // linear ones hold in one way, products in that of the factor taken
+            // a linear constraint holds in one way, a product by the factor that was chosen
             let left = |c: &String| {
                 let factor = self.constraint_factors.iter().find(|w| w.constraint == *c);
                 factor.map_or(c.clone(), |w| w.factor.clone())
@@ -255,14 +260,16 @@ impl Answer for SystemAnalysis {
                 "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
                 self.constraints.join(", "),
                 match several {
-                    true => "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are those of one: state that one to choose",
+                    true => "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are \
+                             those of one: state that one to choose",
                     false => "",
                 }
             ));
             assumed.extend(self.constraint_factors.iter().map(|w| {
                 let others: Vec<String> = w.others.iter().map(|o| format!("{o} = 0")).collect();
                 format!(
-                    "{} holds where {} = 0 or where {}: all that is said is of {} = 0, {}; state another one in its place to choose it",
+                    "{} holds where {} = 0 or where {}: all that is said is of {} = 0, {}; state another one \
+                     in its place to choose it",
                     w.constraint,
                     w.factor,
                     others.join(" or where "),
@@ -281,20 +288,23 @@ impl Answer for SystemAnalysis {
         )
     } else if self.rests_on_bound {
         format!(
-            "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what is not observable rests on it (--order sets another)",
+            "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what \
+             is not observable rests on it (--order sets another)",
             self.bound
         )
     } else if self.rank == self.unknowns {
         format!("everything is observable with derivatives up to order {}", self.last_order)
     } else {
         format!(
-            "starts, inputs, jumps or the time are special, yet no order above {} can add anything: the rank is that of a generic point, or nothing moves",
+            "starts, inputs, jumps or the time are special, yet no order above {} can add anything: the rank \
+             is that of a generic point, or nothing moves",
             self.last_order
         )
     });
         assumed.push(
-            "observable and degree are meant locally: around a generic point no other value gives the same outputs up to that order; how many \
-             values there are in all is said where it was decided, and the expression of an only one may use derivatives of higher orders"
+            "observable and degree are meant locally: around a generic point no other value gives the same \
+             outputs up to that order; how many values there are in all is said where it was decided, and \
+             the expression of an only one may use derivatives of higher orders"
                 .into(),
         );
         if !self.branches.is_empty() {
@@ -307,7 +317,9 @@ impl Answer for SystemAnalysis {
         assumed.extend(self.note.clone());
         if let Some(count @ 1..) = self.independent_functions {
             assumed.push(format!(
-                "the values of {count} functions, derivatives counted, are algebraically independent at a generic point (by Ax's theorem, from the rank of the gradients of their arguments), so that random values stand for them"
+                "the values of {count} functions, derivatives counted, are algebraically independent at a \
+                 generic point (by Ax's theorem, from the rank of the gradients of their arguments), so that \
+                 random values stand for them"
             ));
         }
         assumed.push(match (&self.primes, self.error_bound) {
@@ -331,10 +343,11 @@ impl Answer for SystemAnalysis {
     }
 }
 
-/// When the run of a model that holds the time begins.
+/// Sentence on the start of a run of a model that depends on time.
 fn begins_at(time: f64) -> String {
     format!(
-        "the equations or known inputs depend on the time: the run begins at t = {time} (1 where the file says \"generic\")"
+        "the equations or known inputs depend on the time: the run begins at t = {time} (1 where the file \
+         says \"generic\")"
     )
 }
 
@@ -373,7 +386,8 @@ impl Answer for SystemRun {
         let beyond: Vec<&str> = self.quantities.iter().filter(beyond).map(|e| e.name.as_str()).collect();
         if !beyond.is_empty() {
             consistency.push(format!(
-            "{}: not observable, yet the filter trusts its estimate: linearised anew at every step, it takes up information that is not there",
+            "{}: not observable, yet the filter trusts its estimate: linearised anew at every step, it takes \
+             up information that is not there",
             beyond.join(", ")
         ));
         }
@@ -471,16 +485,24 @@ impl Answer for SystemEvidence {
         blocks.push(Block::list(heading, null));
         let mut how = vec![
             format!(
-                "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to {} long)",
+                "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling \
+                 rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to \
+                 {} long)",
                 number(self.duration)
             ),
-            "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is observable, 10 for what is not".into(),
-            "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is observable and leaves more than a hundredth of its diffuse prior, and directions seen with less than 1e-9 of the best and more than 1e-12".into(),
+            "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is \
+             observable, 10 for what is not"
+                .into(),
+            "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is \
+             observable and leaves more than a hundredth of its diffuse prior, and directions seen with less \
+             than 1e-9 of the best and more than 1e-12"
+                .into(),
             certainty(self.error_bound, self.digits, self.seed),
         ];
         how.extend(self.seen_up_to.map(|order| {
             format!(
-                "not seen: by no derivative up to order {order}; samples that see it by higher ones speak neither for nor against the verdict"
+                "not seen: by no derivative up to order {order}; samples that see it by higher ones speak \
+                 neither for nor against the verdict"
             )
         }));
         how.extend(self.time.map(begins_at));

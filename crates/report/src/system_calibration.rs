@@ -8,20 +8,23 @@ use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, Table, words};
 
-/// How many of many are listed.
+/// Largest number of listed items.
 const LISTED: usize = 20;
 
 fn finding(f: &SystemFinding) -> String {
     match f {
         SystemFinding::Interrupted => {
-            "interrupted: the estimates are where the best iteration was then, from the starts that were tried so far".into()
+            "interrupted: the estimates are where the best iteration was then, from the starts that were \
+             tried so far"
+                .into()
         }
         SystemFinding::NotSettled => {
             "no start settled: the estimates are where the iteration was given up".into()
         }
         SystemFinding::Noise { chi_square, factor } if *factor >= 1.0 => {
             format!(
-                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small, or the model leaves something out",
+                "chi-square is {} per degree of freedom: sigmas are {factor:.2} times too small, or the \
+                 model leaves something out",
                 number(*chi_square)
             )
         }
@@ -31,7 +34,8 @@ fn finding(f: &SystemFinding) -> String {
             1.0 / factor
         ),
         SystemFinding::Correlated { output, probability } => format!(
-            "the residuals of {output} are not independent of each other (probability {}): the model leaves something out, or sigmas are too small",
+            "the residuals of {output} are not independent of each other (probability {}): the model leaves \
+             something out, or sigmas are too small",
             number(*probability)
         ),
         SystemFinding::Outlier { output, line, sigmas } => {
@@ -60,7 +64,7 @@ fn row(e: &SystemEstimated) -> Vec<String> {
     ]
 }
 
-/// Sentence on the starts that did not lead to the solution.
+/// Sentence on the starts that did not lead to the solution; `None` if all did.
 fn other_starts(of: &OtherStarts) -> Option<String> {
     let mut out = Vec::new();
     let mut say = |count: usize, what: String| {
@@ -125,7 +129,8 @@ impl Answer for SystemCalibration {
         )];
         if self.starts.0 < self.starts_at_most {
             fit.push(format!(
-                "{} of {} starts were made: no other solution was to be expected by then (Boender and Rinnooy Kan 1987)",
+                "{} of {} starts were made: no other solution was to be expected by then (Boender and \
+                 Rinnooy Kan 1987)",
                 self.starts.0, self.starts_at_most
             ));
         }
@@ -166,7 +171,8 @@ impl Answer for SystemCalibration {
             ]
         });
         blocks.push(Block::table(
-            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as all others have it)",
+            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as \
+             all others have it)",
             columns,
             rows,
         ));
@@ -189,39 +195,49 @@ impl Answer for SystemCalibration {
         }
         let mut read: Vec<String> = Vec::new();
         read.extend(self.intervals.map(|n| {
-            format!("{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of its samples", self.samples)
+            format!(
+                "{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of \
+                 its samples",
+                self.samples
+            )
         }));
         read.push(format!(
-            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} times the usual steps of integration; seed {}",
+            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} \
+             times the usual steps of integration; seed {}",
             self.rows, self.substeps, self.seed
         ));
         if let Some(t) = self.begins {
             read.push(format!(
-                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with its first row"
+                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with \
+                 its first row"
             ));
         }
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
         }
         if self.shared {
-            read.push("the calibration before rests on the same record, by another model: what both models take of it counts twice".into());
+            read.push(
+                "the calibration before rests on the same record, by another model: what both models take of \
+                 it counts twice"
+                    .into(),
+            );
         }
         blocks.push(Block::list("Read", read));
         Document { title: format!("Calibration: {}", self.name), lead, blocks }
     }
 
-    /// The lists of the JSON; the coefficients and the covariance of all that has an estimate.
+    /// Lists of the JSON, then coefficients and covariance of all estimates.
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         Ok(with_coefficients(crate::tables::of_json(&serde_json::to_value(self)?), &self.covariance))
     }
 
-    /// Unknowns and combinations.
+    /// Table of unknowns and combinations.
     fn main_table(&self) -> &'static str {
         COEFFICIENTS
     }
 }
 
-/// The residuals of all measurements, as CSV.
+/// Residuals of all measurements as CSV.
 ///
 /// # Errors
 /// [`ReportError::Csv`].

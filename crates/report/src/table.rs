@@ -7,10 +7,10 @@ use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, Tab
 use crate::document::{Block, Column, Document};
 use crate::{Layout, visible};
 
-/// One line under the header, nothing else.
+/// Table with one line under the header and no other.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
-/// A section heading; an empty one is none.
+/// Section heading; nothing if it is empty.
 fn heading(out: &mut String, text: &str, layout: Layout) {
     if text.is_empty() {
         return;
@@ -35,7 +35,7 @@ fn paragraph(out: &mut String, text: &str, layout: Layout) {
     }
 }
 
-/// Lines of the width, broken between words, behind an indent of the first and one of the others.
+/// Lines of the layout's width, broken between words, with one indent for the first and another for the rest.
 fn wrapped(text: &str, layout: Layout, first: &str, others: &str) -> Vec<String> {
     let width = layout.width.map_or(usize::MAX, usize::from).max(20);
     let (mut lines, mut line, mut empty) = (Vec::new(), String::from(first), true);
@@ -78,11 +78,11 @@ fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell
     }
 }
 
-/// Columns whose words are graded.
+/// Columns whose words are coloured by grade.
 const GRADED: [&str; 4] = ["status", "verdict", "outcome", "finding"];
 
-/// A mark without width that stands for a colour, its code, and the words that have it; what they say is
-/// never said by colour alone.
+/// Colours: a mark without width that stands for the colour, its code, and the words that have it. No
+/// information is in a colour alone.
 const COLOURS: [(char, &str, &[&str]); 3] = [
     ('\u{2062}', "\u{1b}[32m", &["observable", "agree", "agrees", "ok", "met", "consistent"]),
     (
@@ -100,7 +100,7 @@ const COLOURS: [(char, &str, &[&str]); 3] = [
 /// The mark of the end of a colour.
 const END: char = '\u{2061}';
 
-/// Every word of a graded text in marks, so that it may be wrapped.
+/// A graded text with every word between marks, so that it can be wrapped.
 fn marked(text: &str) -> Cow<'_, str> {
     match COLOURS.iter().find(|(.., words)| words.contains(&text)) {
         Some((mark, ..)) => {
@@ -133,14 +133,14 @@ pub(crate) fn document(d: &Document, layout: Layout) -> String {
                 heading(&mut out, title, layout);
                 lines.iter().for_each(|line| paragraph(&mut out, &line.text, layout));
             }
-            // a status is a table by now
+            // a status is a table here
             Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => {}
         }
     }
     if layout.ascii { in_ascii(&out) } else { out }
 }
 
-/// Lines drawn with ASCII, other characters by their numbers.
+/// Text in ASCII: drawn lines as ASCII, other characters by their numbers.
 ///
 /// ```
 /// assert_eq!(obsdeg_report::in_ascii("\u{2500} 5 \u{b5}g"), "- 5 \\u{b5}g");

@@ -1,22 +1,21 @@
-//! The tables of an answer: the lists of objects in its JSON, one row each, under the names that they have
-//! there.
+//! Tables of an answer: the lists of objects in its JSON, one row per object, with the names of the JSON.
 
 use serde_json::{Map, Value};
 
 /// A table with a row per object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table {
-    /// The way to the list in the JSON: `quantities`, `schemes.quantities`.
+    /// Path of the list in the JSON: `quantities`, `schemes.quantities`.
     pub name: String,
-    /// The way to each field of the objects: `solution.text`.
+    /// Path of each field of the objects: `solution.text`.
     pub columns: Vec<String>,
-    /// Texts in the order of the columns: numbers with all their digits, nothing for what is missing, lists
-    /// of words and numbers with semicolons between them.
+    /// Texts in the order of the columns: numbers with all their digits, empty texts for missing values,
+    /// lists of words and numbers with semicolons between them.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table of rows that have fields of their own each.
+    /// Table of rows whose fields may differ.
     fn of(name: String, rows: &[Vec<(String, String)>]) -> Self {
         let mut columns: Vec<String> = Vec::new();
         for (column, _) in rows.iter().flatten() {
@@ -24,7 +23,7 @@ impl Table {
                 columns.push(column.clone());
             }
         }
-        // what is an object in one row may be nothing in another
+        // a field that is an object in one row may be null in another
         let below =
             |c: &String| columns.iter().any(|d| d.strip_prefix(c).is_some_and(|d| d.starts_with('.')));
         let objects: Vec<String> = columns.iter().filter(|c| below(c)).cloned().collect();
@@ -36,21 +35,21 @@ impl Table {
         Self { name, columns, rows }
     }
 
-    /// Its rows by column.
+    /// Rows as fields with the names of their columns.
     fn fields(self) -> Vec<Vec<(String, String)>> {
         let Self { columns, rows, .. } = self;
         rows.into_iter().map(|row| columns.iter().cloned().zip(row).collect()).collect()
     }
 }
 
-/// True if the way leads to an empty list.
+/// True if the value at `path` is an empty list.
 pub(crate) fn is_empty_list(answer: &Value, path: &str) -> bool {
     let pointer = format!("/{}", path.replace('.', "/"));
     answer.pointer(&pointer).is_some_and(|v| v.as_array().is_some_and(Vec::is_empty))
 }
 
-/// The tables of an answer: its own fields, then every list of objects in it, however deep. A list within a
-/// list has the name of the object that it belongs to in its first column.
+/// Tables of an answer: its own fields, then every list of objects in it, at any depth. The table of a nested
+/// list has the name of the outer object in its first column.
 pub(crate) fn of_json(answer: &Value) -> Vec<Table> {
     let mut out = Vec::new();
     if let Value::Object(fields) = answer {
@@ -94,7 +93,7 @@ fn walk(
             Value::Array(items) if items.iter().any(|v| v.is_object() || v.is_array()) => {
                 list(items, &path(table, key), keys, out);
             }
-            // of what, nobody knows
+            // an empty list shows no type of items
             Value::Array(items) if items.is_empty() => {}
             Value::Array(items) => {
                 let words: Vec<String> = items.iter().map(text).collect();
@@ -105,7 +104,7 @@ fn walk(
     }
 }
 
-/// A list of objects, or of lists of them.
+/// Adds a list of objects, or of lists of objects.
 fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Table>) {
     let at = out.len();
     let mut rows = Vec::new();
@@ -153,7 +152,7 @@ fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Ta
     merge(out, below);
 }
 
-/// Adds tables to those of the same name.
+/// Appends tables to those of the same name.
 fn merge(to: &mut Vec<Table>, more: Vec<Table>) {
     for table in more {
         match to.iter().position(|t| t.name == table.name) {
@@ -189,7 +188,10 @@ mod tests {
             "rank": [1, 2],
             "at": { "latitude_deg": 28.2, "by": null },
             "schemes": [
-                { "name": "a", "worst": null, "missed": [], "quantities": [{ "name": "x", "sigma": 1.5e-300 }, { "name": "y", "degree": 2 }] },
+                {
+                    "name": "a", "worst": null, "missed": [],
+                    "quantities": [{ "name": "x", "sigma": 1.5e-300 }, { "name": "y", "degree": 2 }],
+                },
                 { "name": "b", "worst": { "name": "x" }, "quantities": [{ "name": "x", "sigma": null }] },
             ],
             "null_space": [[{ "name": "x" }], [{ "name": "y" }]],

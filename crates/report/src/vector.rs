@@ -8,11 +8,11 @@ use resvg::usvg::{ClipPath, FillRule, Group, LineCap, LineJoin, Node, Paint, Pat
 
 use crate::figure::{FigureError, tree};
 
-/// Points in a pixel.
+/// Points per pixel.
 const POINTS: f32 = 0.75;
 
-/// What is drawn, and the opacities that it needs, in thousandths.
-struct Sheet {
+/// Content of the page, and its opacities in thousandths.
+struct PdfPage {
     content: Content,
     opacities: Vec<[u16; 2]>,
 }
@@ -24,8 +24,8 @@ struct Sheet {
 pub(crate) fn pdf(svg: &str) -> Result<Vec<u8>, FigureError> {
     let tree: Tree = tree(svg)?;
     let (width, height) = (tree.size().width() * POINTS, tree.size().height() * POINTS);
-    let mut sheet = Sheet { content: Content::new(), opacities: Vec::new() };
-    // y is upwards there
+    let mut sheet = PdfPage { content: Content::new(), opacities: Vec::new() };
+    // y is upwards in PDF
     sheet.content.transform([POINTS, 0.0, 0.0, -POINTS, 0.0, height]);
     sheet.group(tree.root(), 1.0);
     let drawn = miniz_oxide::deflate::compress_to_vec_zlib(&sheet.content.finish(), 6);
@@ -51,7 +51,7 @@ pub(crate) fn pdf(svg: &str) -> Result<Vec<u8>, FigureError> {
     Ok(out.finish())
 }
 
-/// Of an opacity.
+/// PDF resource name of a graphics state, which sets an opacity.
 fn name(i: usize) -> String {
     format!("o{i}")
 }
@@ -60,7 +60,7 @@ fn matrix(t: Transform) -> [f32; 6] {
     [t.sx, t.ky, t.kx, t.sy, t.tx, t.ty]
 }
 
-/// A colour; that of the first stop of a gradient, of which pictures have none.
+/// Colour of a paint. Pictures have no gradients (their first stop counts) and no patterns (grey).
 fn color(paint: &Paint) -> [f32; 3] {
     let found = match paint {
         Paint::Color(c) => Some(*c),
@@ -71,8 +71,8 @@ fn color(paint: &Paint) -> [f32; 3] {
     found.map_or([0.5; 3], |c| [c.red, c.green, c.blue].map(|x| f32::from(x) / 255.0))
 }
 
-impl Sheet {
-    /// A group; what lies over each other in it is taken as drawn one by one.
+impl PdfPage {
+    /// Draws a group; overlapping parts are drawn one by one, each with the opacity.
     fn group(&mut self, group: &Group, opacity: f32) {
         self.content.save_state();
         self.content.transform(matrix(group.transform()));
@@ -85,7 +85,7 @@ impl Sheet {
                 Node::Group(g) => self.group(g, opacity),
                 Node::Path(p) if p.is_visible() => self.path(p, opacity),
                 Node::Text(t) => self.group(t.flattened(), opacity),
-                // pictures of the program hold none
+                // pictures of the program have no invisible paths and no images
                 Node::Path(_) | Node::Image(_) => {}
             }
         }
@@ -157,7 +157,8 @@ impl Sheet {
                     last = (p.x, p.y);
                 }
                 PathSegment::QuadTo(c, p) => {
-                    // a parabola as a cubic: two thirds of the way to its control point
+                    // parabola as a cubic: its control points are two thirds of the way to that of the
+                    // parabola
                     let toward = |from: f32, to: f32| from + (to - from) * 2.0 / 3.0;
                     let [x1, y1] = [toward(last.0, c.x), toward(last.1, c.y)];
                     let [x2, y2] = [toward(p.x, c.x), toward(p.y, c.y)];
@@ -182,8 +183,9 @@ mod tests {
 
     #[test]
     fn a_picture_is_one_page_of_outlines() {
-        let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='40' height='20'><rect x='0' y='0' width='40' height='20' fill='#fff' opacity='0.5'/>\
-                   <text x='2' y='12' font-family='DejaVu Sans' font-size='10'>so</text></svg>";
+        let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='40' height='20'><rect x='0' y='0' \
+                   width='40' height='20' fill='#fff' opacity='0.5'/><text x='2' y='12' font-family='DejaVu \
+                   Sans' font-size='10'>so</text></svg>";
         let bytes = pdf(svg).expect("an SVG");
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.starts_with("%PDF-1.7") && text.contains("/MediaBox [0 0 30 15]"), "{text}");

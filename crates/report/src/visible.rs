@@ -1,11 +1,10 @@
-//! What a reader would not see, written out.
+//! Texts with invisible characters written out.
 
 use std::borrow::Cow;
 
-/// The text on one line, with everything in it that is not text written out, as in `\u{1b}`: control
-/// characters, which move the cursor of a terminal, colour it or ring its bell, and are not allowed in
-/// pictures and pages; marks that turn the direction of writing, so that a text reads otherwise than it is;
-/// what is no character. Line breaks and tabs become blanks.
+/// Text on one line, with characters that a reader cannot see written out, as `\u{1b}`. These are control
+/// characters, which may act on a terminal and are not allowed in pictures and pages; marks that change the
+/// direction of writing; and code points that are no characters. Line breaks and tabs become blanks.
 ///
 /// ```
 /// use obsdeg_report::visible;
@@ -33,7 +32,7 @@ fn hidden(c: char) -> bool {
         || matches!(c, '\u{fff9}'..='\u{fffb}' | '\u{fffe}' | '\u{ffff}')
 }
 
-/// JSON with the same characters as `\u001b`, which reads as what it was.
+/// JSON with the same characters as `\u001b`, which parses to the original text.
 pub(crate) fn json(answer: &impl serde::Serialize) -> Result<String, serde_json::Error> {
     let text = serde_json::to_string_pretty(answer)?;
     let is_hidden = |c: char| c != '\n' && hidden(c);
@@ -57,7 +56,9 @@ mod tests {
         for text in ["D_FX", "µ ω ½ 惯性平台 é", "a\\u{1b}", "𝛼 \u{1f600}"] {
             assert_eq!(visible(text), text);
         }
-        for c in "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\u{2066}\u{2069}\u{ffff}".chars() {
+        let characters = "\0\u{7}\u{8}\u{1b}\u{7f}\u{85}\u{9b}\u{9d}\u{61c}\u{200e}\u{200f}\u{2028}\u{202a}\u{202e}\
+                          \u{2066}\u{2069}\u{ffff}";
+        for c in characters.chars() {
             assert_eq!(visible(&format!("a{c}b")), format!("a\\u{{{:x}}}b", u32::from(c)));
         }
     }

@@ -1,4 +1,4 @@
-//! The fewest positions where the way between them counts.
+//! Fewest positions where the slew path between them counts.
 
 use obsdeg_design::design::Walks;
 
@@ -6,7 +6,7 @@ use crate::Answer;
 use crate::document::{Block, Document, left, right};
 use crate::words::{at_most, reasons};
 
-/// What was examined, and what that says.
+/// Sentences on the examined slew sequences and their consequence.
 fn examined(w: &Walks) -> Vec<String> {
     let mut out = vec![format!(
         "a position adds at most {} independent rows, and {} coefficients are required: fewer than {} are never enough",

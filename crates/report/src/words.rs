@@ -20,7 +20,7 @@ pub(crate) fn degree(d: Option<usize>) -> String {
     d.map_or_else(|| "-".into(), |k| k.to_string())
 }
 
-/// An accuracy order in a table: why there is none beside a degree is said there.
+/// Accuracy order in a table, with the reason if there is none beside a degree.
 pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, computed: bool) -> String {
     match (degree, order) {
         (_, Some(k)) => k.to_string(),
@@ -30,8 +30,7 @@ pub(crate) fn accuracy_order(degree: Option<usize>, order: Option<usize>, comput
     }
 }
 
-/// What the dwell makes of a degree, where it is something else; empty where the accuracy order is the
-/// degree.
+/// Remark on the effect of the dwell on a degree; empty if the accuracy order equals the degree.
 pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usize>) -> String {
     match (degree, order) {
         _ if !a.has_accuracy_orders => String::new(),
@@ -41,7 +40,7 @@ pub(crate) fn with_dwell(a: &Analysis, degree: Option<usize>, order: Option<usiz
     }
 }
 
-/// True if a row of the answer has something to say of the dwell.
+/// True if the dwell changes a row of the answer.
 pub(crate) fn dwell_matters(a: &Analysis) -> bool {
     let unknowns = a.quantities.iter().map(|q| (q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (c.degree, c.accuracy_order));
@@ -72,7 +71,7 @@ pub(crate) fn rank(a: &Analysis) -> String {
     )
 }
 
-/// `not told from D_FZ, D_OY`; a long list is cut, and says so (JSON and CSV hold all of it).
+/// `not told from D_FZ, D_OY`; a long list is cut and says so (JSON and CSV have all of it).
 pub(crate) fn not_told_from(partners: &[String]) -> String {
     const SHOWN: usize = 8;
     let more = partners.len().saturating_sub(SHOWN);
@@ -80,7 +79,7 @@ pub(crate) fn not_told_from(partners: &[String]) -> String {
     format!("not told from {}{tail}", partners[..partners.len() - more].join(", "))
 }
 
-/// What stands beside the verdict on an unknown: its solution, its partners, or why there is neither.
+/// Remark beside the verdict on an unknown: its solution or its partners, then its degree elsewhere.
 pub(crate) fn explanation(q: &Quantity) -> String {
     let mut out = match (&q.solution, q.status) {
         (Some(s), _) => s.text.clone(),
@@ -113,20 +112,20 @@ pub(crate) fn difference(d: &Difference) -> String {
     format!("{} {} -> {}", d.name, verdict(&d.here), verdict(&d.there))
 }
 
-/// Unknowns that change alike, with the positions that their names hold.
-struct Change<'a> {
+/// Unknowns that change alike, with the positions in their names.
+struct DifferenceGroup<'a> {
     of: &'a Difference,
     names: Vec<(&'a str, Vec<&'a str>)>,
 }
 
-/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: those that change alike
-/// together.
+/// `D_FX, D_FZ inseparable -> degree 1; psi_x@1 to @7 degree 1 -> degree 2`: unknowns with the same change
+/// are grouped.
 fn differences(all: &[Difference]) -> String {
-    let mut groups: Vec<Change<'_>> = Vec::new();
+    let mut groups: Vec<DifferenceGroup<'_>> = Vec::new();
     for d in all {
         let place = groups.iter().position(|g| (g.of.here, g.of.there) == (d.here, d.there));
         let place = place.unwrap_or_else(|| {
-            groups.push(Change { of: d, names: Vec::new() });
+            groups.push(DifferenceGroup { of: d, names: Vec::new() });
             groups.len() - 1
         });
         let (name, position) = d.name.split_once('@').unwrap_or((&d.name, ""));
@@ -142,24 +141,24 @@ fn differences(all: &[Difference]) -> String {
         [first, .., last] if consecutive(positions) => format!("{name}@{first} to @{last}"),
         _ => format!("{name}@{}", positions.join(", @")),
     };
-    let group = |g: &Change<'_>| {
+    let group = |g: &DifferenceGroup<'_>| {
         let names: Vec<String> = g.names.iter().map(named).collect();
         format!("{} {} -> {}", names.join(", "), verdict(&g.of.here), verdict(&g.of.there))
     };
     groups.iter().map(group).collect::<Vec<_>>().join("; ")
 }
 
-/// True if numbers in words follow each other.
+/// True if numbers, given as texts, follow each other.
 fn consecutive(positions: &[&str]) -> bool {
     let numbers: Option<Vec<usize>> = positions.iter().map(|p| p.parse().ok()).collect();
     numbers.is_some_and(|n| n.windows(2).all(|pair| pair[1] == pair[0] + 1))
 }
 
-/// Why candidates leave coefficients unobservable, where the terms themselves say so.
+/// Reasons why candidates leave coefficients unobservable, if the terms give them.
 pub(crate) fn reasons(terms: &str, candidates: &[String]) -> Vec<String> {
     let attitudes: Result<Vec<_>, _> = candidates.iter().map(|c| parse_attitude(c)).collect();
     let (Ok(unknowns), Ok(attitudes)) = (terms.parse(), attitudes) else { return Vec::new() };
-    // what a carry means is no reason
+    // inertial: notes on the meaning of another carry would be no reasons
     term_notes(&Scheme { carry: Carry::Inertial, unknowns, ..Scheme::of_angles(attitudes) })
 }
 
@@ -173,8 +172,9 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
     let mut out: Vec<String> = a.carries.iter().map(line).collect();
     if a.carries.iter().flat_map(|c| &c.differs).any(|d| d.name.contains('@')) {
         out.push(
-            "psi of one position (psi_x@2) is an unknown of reset carry alone: under the other carry the same quantity, psi in the axes of c \
-             where that position begins, is judged as a combination of its unknowns"
+            "psi of one position (psi_x@2) is an unknown of reset carry alone: under the other carry the \
+             same quantity, psi in the axes of c where that position begins, is judged as a combination of \
+             its unknowns"
                 .into(),
         );
     }
@@ -193,7 +193,7 @@ pub(crate) fn gyros(geometry: &Geometry) -> String {
     format!("gyros {}", parts.join(", "))
 }
 
-/// What was assumed, a sentence each.
+/// Assumptions, one sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let carry = match a.carry {
         Carry::Platform => {
@@ -221,7 +221,8 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
             "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
         }
         (Frame::N, true) => {
-            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; primes are time derivatives"
+            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; \
+             primes are time derivatives"
         }
         (Frame::Platform, false) => {
             "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives"
@@ -248,35 +249,38 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         let inputs = ["X", "Y", "Z"].iter().zip(a.geometry.accelerometers.inputs());
         let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
         out.push(format!(
-            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific force f = -g",
+            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific \
+             force f = -g",
             inputs.join(", ")
         ));
     }
     if has(Source::Rate) {
         out.push(
-            "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, GM_XY that of gyro X times the \
-             torqued rate along the input axis of gyro Y; at a position that is the earth rate, in a rotation that of the turn besides"
+            "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, \
+             GM_XY that of gyro X times the torqued rate along the input axis of gyro Y; at a position that \
+             is the earth rate, in a rotation that of the turn besides"
                 .into(),
         );
     }
     if a.positions.iter().any(|p| !p.turns.is_empty()) {
         out.push(
-            "on the way to a position the torqued rate is that of the slew, fast against the earth rate: the listed turns leave torquer errors \
-             in psi^n, with pi as a number of its own"
+            "on the way to a position the torqued rate is that of the slew, fast against the earth rate: the \
+             listed turns leave torquer errors in psi^n, with pi as a number of its own"
                 .into(),
         );
     }
     let turns = a.positions.iter().any(|p| p.rotation.is_some());
     if turns && has_others {
         out.push(
-            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these errors share: at almost any rate; psi in n \
-             moves in it, by drift and by what torquer errors leave"
+            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these \
+             errors share: at almost any rate; psi in n moves in it, by drift and by what torquer errors \
+             leave"
                 .into(),
         );
     } else if turns {
         out.push(
-            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric polynomials of degree m); psi in n \
-             goes on through it"
+            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric \
+             polynomials of degree m); psi in n goes on through it"
                 .into(),
         );
     }
@@ -286,8 +290,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
         let rate = s.rate.as_deref().unwrap_or_default();
         out.push(format!(
-            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: derivatives of Z there are those of the \
-             turning platform, and {rate} is the rate of that angle in rad/s",
+            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: \
+             derivatives of Z there are those of the turning platform, and {rate} is the rate of that angle \
+             in rad/s",
             s.label, s.position
         ));
     }
@@ -301,7 +306,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     }
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
         out.push(
-            "solutions take psi as it is carried from station to station: what the dwells change in it is not in them".into(),
+            "solutions take psi as it is carried from station to station: what the dwells change in it is \
+             not in them"
+                .into(),
         );
     }
     if a.measured_azimuth {
@@ -319,7 +326,7 @@ pub(crate) fn angles(p: &PositionReport) -> String {
     }
 }
 
-/// The accuracy orders that differ from the degrees, a sentence for each pair of them.
+/// Accuracy orders that differ from the degrees, one sentence for each pair of order and degree.
 pub(crate) fn accuracy(a: &Analysis) -> Vec<String> {
     let unknowns = a.quantities.iter().map(|q| (&q.name, q.degree, q.accuracy_order));
     let combinations = a.combinations.iter().map(|c| (&c.expression, c.degree, c.accuracy_order));
@@ -362,7 +369,7 @@ pub(crate) fn at_most(bound: f64) -> String {
     }
 }
 
-/// How certain the verdicts and solutions are.
+/// Sentence on the certainty of verdicts and solutions.
 pub(crate) fn certainty(a: &Analysis) -> String {
     let c = &a.certainty;
     let mut out = format!(
@@ -415,8 +422,8 @@ pub(crate) fn null_vector(v: &[Component]) -> String {
     format!("{}{turned}", v.iter().map(part).collect::<Vec<_>>().join(", "))
 }
 
-/// True if a direction is of psi and the misalignments of gyros and accelerometers alone, of each the odd
-/// part: what a rotation of the platform axes does to them.
+/// True if a direction is a rotation of the platform axes: only psi and misalignments of gyros and
+/// accelerometers change, these by antisymmetric parts.
 fn rotates_the_axes(v: &[Component]) -> bool {
     let number = |name: &str| {
         let found = v.iter().find(|c| c.name == name);
@@ -434,15 +441,15 @@ fn rotates_the_axes(v: &[Component]) -> bool {
     only && of("psi_") && of("GM_") && of("M_") && odd("GM") && odd("M")
 }
 
-/// What the list of degenerate angles holds.
+/// Note on the list of degenerate angles.
 pub(crate) fn loci(loci: &[obsdeg_core::solution::Locus]) -> String {
     let held = match loci.is_empty() {
         true => "none was found: a determinant would vanish there, and",
         false => "a determinant vanishes there, and",
     };
     format!(
-        "({held} at a random point of each, in two prime fields, ranks or verdicts differ from those above; what needs two equations at \
-         once is not sought; degrees that are not whole are rounded)"
+        "({held} at a random point of each, in two prime fields, ranks or verdicts differ from those above; \
+         what needs two equations at once is not sought; degrees that are not whole are rounded)"
     )
 }
 
@@ -453,7 +460,7 @@ pub(crate) fn locus(l: &obsdeg_core::solution::Locus) -> String {
     format!("{}: rank profile {}{changes}", l.condition, list(&l.rank_profile))
 }
 
-/// At most a dozen names.
+/// Names, at most a dozen of them.
 pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     const SHOWN: usize = 12;
     let all: Vec<&str> = names.into_iter().collect();
@@ -463,7 +470,7 @@ pub(crate) fn names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     format!("{}{tail}", all[..shown].join(", "))
 }
 
-/// What a run makes of an unknown.
+/// Outcome of an unknown in a run.
 pub(crate) fn outcome(o: Outcome) -> &'static str {
     match o {
         Outcome::Reached => "reached",
@@ -480,14 +487,13 @@ pub(crate) fn outcome(o: Outcome) -> &'static str {
 /// The columns of [`estimate`].
 pub(crate) const ESTIMATE: [&str; 6] = ["degree", "truth", "estimate", "error", "sigma", "in sigma"];
 
-/// The degree of an unknown, its true value, its estimate, the error and sigma of that, and the error in
-/// sigma.
+/// Degree, true value, estimate, error and sigma of an unknown, and the error in sigma.
 pub(crate) fn estimate(d: Option<usize>, values: [f64; 4], in_sigma: f64) -> [String; 6] {
     let [truth, estimate, error, sigma] = values.map(number);
     [degree(d), truth, estimate, error, sigma, format!("{in_sigma:.2}")]
 }
 
-/// Why a review has no evidence by a filter.
+/// Reason why a review has no evidence by a filter.
 pub(crate) fn no_evidence(e: &SimulationError) -> String {
     match e {
         SimulationError::CrosscheckRotation => {
@@ -497,7 +503,7 @@ pub(crate) fn no_evidence(e: &SimulationError) -> String {
     }
 }
 
-/// What speaks against a run.
+/// Findings against the consistency of a run.
 pub(crate) fn doubts(c: &Consistency) -> String {
     let of = |d: &Doubt| match d {
         Doubt::NoNumber => "a figure of the run is no number".into(),
@@ -515,7 +521,7 @@ pub(crate) fn doubts(c: &Consistency) -> String {
     c.doubts.iter().map(of).collect::<Vec<String>>().join("; ")
 }
 
-/// `1.7..2.3`.
+/// Band such as `1.7..2.3`.
 pub(crate) fn band((low, high): (f64, f64)) -> String {
     format!("{}..{}", number(low), number(high))
 }
@@ -530,13 +536,14 @@ fn left_out(c: &Consistency) -> String {
     match c.unresolved_directions {
         0 => held,
         k => format!(
-            "{held}; without {} that are not resolvable: the filter claims to know them more than a million times better than any unknown",
+            "{held}; without {} that are not resolvable: the filter claims to know them more than a million \
+             times better than any unknown",
             directions(k)
         ),
     }
 }
 
-/// Whether a run is credible, and its figures.
+/// Sentences on the consistency of a run, with its figures.
 pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
     vec![
         if c.consistent {
@@ -564,7 +571,7 @@ pub(crate) fn accelerometer_bias(b: &AccelerometerBias) -> String {
     )
 }
 
-/// What the datasheet of the gyros adds.
+/// Noise of the gyros by their datasheet.
 pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
     let listed = [
         (g.angle_random_walk_deg_sqrt_h, "angle random walk", "deg/sqrt(h)"),
@@ -584,15 +591,16 @@ pub(crate) fn gyro_noise(g: &GyroNoise) -> String {
     let states = if g.rate_random_walk_dph_sqrt_h.is_none() && g.bias_instability_dph.is_none() {
         ""
     } else {
-        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the start of the run"
+        "; the biases are states of filter and truth, and D_F is the constant part: the walk counts from the \
+         start of the run"
     };
     format!("gyros (X, Y, Z where they differ): {}{markov}{states}", parts.join(", "))
 }
 
-/// The cells of a noise floor: sigma with the scheme's dwells, the least, and where it is reached.
+/// Columns of a noise floor: sigma with the scheme's dwells, the least sigma, and the dwell that reaches it.
 pub(crate) const FLOOR: [&str; 3] = ["sigma now", "least sigma", "no better beyond [s]"];
 
-/// Those of one coefficient.
+/// Cells of the noise floor of one coefficient.
 pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
     let dwell = match c.reached {
         Some(Reached::StillFalls) => "still falls".into(),
@@ -602,16 +610,18 @@ pub(crate) fn floor(c: &CoefficientFloor) -> [String; 3] {
     [optional(c.sigma), optional(c.least_sigma), dwell]
 }
 
-/// What a noise floor is.
+/// Notes on the meaning of a noise floor.
 pub(crate) const FLOOR_MEANS: [&str; 3] = [
-    "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and random drift: now, and the least over all dwells \
-     in proportion to these",
-    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the least; the shortest: of those \
-     looked at, so that shorter ones may do as well or better; still falls: not before a quarter of the longest",
-    "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes its bias away from there",
+    "sigma of the linear filter, as far as the small-angle model holds, without a prior, with noise of Z and \
+     random drift: now, and the least over all dwells in proportion to these",
+    "no better beyond: the shortest such dwell (mean of the positions) at which sigma is within 5 % of the \
+     least; the shortest: of those looked at, so that shorter ones may do as well or better; still falls: \
+     not before a quarter of the longest",
+    "every coefficient is a constant: D_F is the bias at the start of the run, and the walk of a gyro takes \
+     its bias away from there",
 ];
 
-/// Of which dwells and of what noise.
+/// Dwells and noise of a noise floor.
 pub(crate) fn floor_of(f: &NoiseFloor) -> [String; 2] {
     let [low, high] = f.dwells_s.map(number);
     let drift = if f.drift_noise_deg_sqrt_h > 0.0 {
@@ -648,7 +658,7 @@ pub(crate) fn turn(t: &Turn) -> String {
 mod tests {
     use super::*;
 
-    /// What is printed is no smaller than the bound, and at most a digit above.
+    /// The printed bound is no smaller than the bound, and at most a digit above.
     #[test]
     fn bounds_are_rounded_up() {
         let cases = [(8.4e-23, "9e-23"), (8e-23, "8e-23"), (9.5e-5, "1e-4"), (9.001e-1, "1e0"), (0.0, "0e0")];

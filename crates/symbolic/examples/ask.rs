@@ -1,6 +1,6 @@
-//! One request to the worker: cos(a) x = 1, sqrt(2) y = cos(a). The first argument is the program that holds
-//! the engine: `obsdeg`, unless another is given (`target/debug/obsdeg`). A worker that cannot be had is an
-//! answer too.
+//! One request to the worker: cos(a) x = 1, sqrt(2) y = cos(a). The first argument is the program that
+//! contains the engine (default `obsdeg`; for example `target/debug/obsdeg`). If the worker is not
+//! available, the example prints the reason.
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use std::sync::Arc;

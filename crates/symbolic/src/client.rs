@@ -1,4 +1,4 @@
-//! The worker process as seen from the program: start, wait for its turn, ask, give up.
+//! Client of the worker process: start, wait for its turn, requests, failure.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
@@ -9,19 +9,19 @@ use std::time::{Duration, Instant};
 
 use crate::protocol::{Order, PREFIX, Request, Response};
 
-/// The longest line of a worker, in bytes.
+/// Largest length of a line of a worker, in bytes.
 const MAX_LINE: usize = 4 << 20;
-/// The most that a worker may print besides its answers, in bytes.
+/// Largest output of a worker besides its answers, in bytes.
 const MAX_BANNER: usize = 64 << 10;
-/// How long another process may hold the lock before that is said.
+/// Time that another process may hold the lock before the wait is reported.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Called while the worker waits.
+/// Callback for a worker that waits for its turn.
 #[derive(Clone)]
 pub struct Waiting(pub Arc<dyn Fn() + Send + Sync>);
 
 impl Waiting {
-    /// Nobody is told.
+    /// Callback that does nothing.
     pub fn silent() -> Self {
         Self(Arc::new(|| {}))
     }
@@ -33,65 +33,65 @@ impl std::fmt::Debug for Waiting {
     }
 }
 
-/// How to start the worker.
+/// Configuration of the worker.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// The program, normally this binary.
+    /// Program of the worker, normally this binary.
     pub program: PathBuf,
-    /// Its arguments, normally the hidden subcommand.
+    /// Arguments of the program, normally the hidden subcommand.
     pub arguments: Vec<String>,
-    /// How many [`UNIT`](crate::protocol::UNIT)s of work one answer may take.
+    /// Largest work per answer, in [`UNIT`](crate::protocol::UNIT)s.
     pub limit: u64,
-    /// Longest time, over all requests, that other processes of this user may keep the worker from its turn.
+    /// Longest time, over all requests, that the worker may wait for other processes of this user.
     pub wait: Duration,
     /// Called once when the worker has waited a second for its turn.
     pub waiting: Waiting,
 }
 
-/// Why there is no answer.
+/// Error of a request.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WorkerError {
-    /// The lock cannot be had.
+    /// Lock file that cannot be used.
     #[error("{reason}")]
     Lock {
-        /// The file, and what is wrong with it.
+        /// Path of the file, and its fault.
         reason: String,
     },
-    /// Others held the engine for the whole of [`WorkerConfig::wait`].
+    /// Lock held by others for the whole of [`WorkerConfig::wait`].
     #[error("another process of this user held the symbolic engine for more than {seconds} s")]
     Busy {
-        /// Seconds waited.
+        /// Time waited, in s.
         seconds: u64,
     },
-    /// The process did not start.
+    /// Process that did not start.
     #[error("cannot start the symbolic worker {program}: {reason}")]
     Start {
-        /// The program.
+        /// Path of the program.
         program: PathBuf,
-        /// What the system says.
+        /// Error message of the system.
         reason: String,
     },
-    /// The process ended without an answer.
+    /// Process that ended without an answer.
     #[error(
         "the symbolic worker ended before it answered; is another Symbolica process of this user running?"
     )]
     Ended,
-    /// More work than the limit.
+    /// Work beyond the limit.
     #[error("{}", over_limit(*limit))]
     OverLimit {
-        /// The limit.
+        /// Limit of work, in units.
         limit: u64,
     },
-    /// The answer makes no sense.
+    /// Answer that does not follow the protocol.
     #[error("the symbolic worker answered with something else: {found}")]
     Garbled {
-        /// The start of the answer, or what is wrong with it.
+        /// Start of the answer, or its fault.
         found: String,
     },
-    /// The job itself failed.
+    /// Job that failed.
     #[error("{reason}")]
     Failed {
-        /// Why.
+        /// Reason in words.
         reason: String,
     },
 }
@@ -103,17 +103,17 @@ fn over_limit(limit: u64) -> String {
     }
 }
 
-struct Running {
+struct WorkerProcess {
     child: Child,
     input: Option<ChildStdin>,
     lines: Receiver<Vec<u8>>,
-    /// Bytes of what was no answer.
+    /// Number of bytes that were no answer.
     chatter: usize,
 }
 
-impl Drop for Running {
+impl Drop for WorkerProcess {
     fn drop(&mut self) {
-        self.input.take(); // end of input: the worker leaves by itself, whatever it is doing
+        self.input.take(); // end of input: the worker ends by itself at any point
         let patience = Instant::now() + Duration::from_millis(500);
         while Instant::now() < patience {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
@@ -121,50 +121,50 @@ impl Drop for Running {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        // it does not leave: nothing more can be done about an error here
+        // the worker has not ended by itself; errors are ignored here
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// A worker that starts with the first request; from then on no other has its turn until this one rests.
-/// After work beyond its limit it starts afresh with the next one; after any other failure of the process it
+/// Worker process, started with the first request. It keeps its turn until [`Self::rest`]. After work
+/// beyond its limit it starts again with the next request; after any other failure of the process it
 /// stays down and repeats the reason.
 pub struct Worker {
     config: WorkerConfig,
-    /// Time that may still be spent on waiting for others.
+    /// Remaining time for waits for other processes.
     patience: Duration,
-    running: Option<Running>,
+    running: Option<WorkerProcess>,
     failure: Option<WorkerError>,
     banner: Vec<String>,
 }
 
 impl Worker {
-    /// A worker that is not started yet.
+    /// Worker that is not started yet.
     pub fn new(config: WorkerConfig) -> Self {
         Self { patience: config.wait, config, running: None, failure: None, banner: Vec::new() }
     }
 
-    /// What the engine printed besides its answers.
+    /// Lines that the engine printed besides its answers.
     pub fn banner(&self) -> &[String] {
         &self.banner
     }
 
-    /// The last failure of the process.
+    /// Last failure of the process; `None` if it never failed.
     pub fn failure(&self) -> Option<&WorkerError> {
         self.failure.as_ref()
     }
 
-    /// Ends the process, so that another may take its turn; it starts again with the next request.
+    /// Ends the process, so that another may take its turn; the next request starts it again.
     pub fn rest(&mut self) {
         self.running = None;
     }
 
-    /// Sends one request and waits for its answer: the expressions, and whether a check held. With a limit of
-    /// 0 no process starts, and nobody is waited for.
+    /// Sends one request and waits for its answer: the expressions, and true if a check held. With a
+    /// limit of 0 no process starts.
     ///
     /// # Errors
-    /// [`WorkerError::Failed`] when the job failed; anything else when the process did, now or before.
+    /// [`WorkerError::Failed`] if the job failed; any other error if the process did, now or before.
     pub fn ask(&mut self, request: &Request) -> Result<(Vec<String>, bool), WorkerError> {
         if self.config.limit == 0 {
             return Err(self.down(WorkerError::OverLimit { limit: 0 }));
@@ -181,10 +181,10 @@ impl Worker {
         }
     }
 
-    /// Ends the process and remembers why.
+    /// Ends the process and stores the reason.
     fn down(&mut self, error: WorkerError) -> WorkerError {
         if let Some(running) = &mut self.running {
-            let _ = running.child.kill(); // already failing: the first error is the one to tell
+            let _ = running.child.kill(); // already failing: the first error is the one to report
         }
         self.running = None;
         self.failure = Some(error.clone());
@@ -210,8 +210,8 @@ impl Worker {
         }
     }
 
-    /// Waits until the worker holds the lock; says so once after [`PATIENCE`]; gives up after
-    /// [`WorkerConfig::wait`].
+    /// Waits until the worker holds the lock. Calls the callback once after [`PATIENCE`]; gives up
+    /// after [`WorkerConfig::wait`].
     fn take_turn(&mut self) -> Result<(), WorkerError> {
         let mut since: Option<Instant> = None;
         let mut said = false;
@@ -238,7 +238,7 @@ impl Worker {
         }
     }
 
-    /// The next thing that the worker says; `None` when it says nothing for so long.
+    /// Next response of the worker; `None` if none arrives within `patience`.
     fn response(&mut self, patience: Option<Duration>) -> Result<Option<Response>, WorkerError> {
         let Some(running) = &mut self.running else { return Err(WorkerError::Ended) };
         loop {
@@ -273,7 +273,7 @@ fn garbled(found: String) -> WorkerError {
     WorkerError::Garbled { found }
 }
 
-fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
+fn start(config: &WorkerConfig) -> Result<WorkerProcess, WorkerError> {
     let mut child = Command::new(&config.program)
         .args(&config.arguments)
         .stdin(Stdio::piped())
@@ -282,7 +282,7 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
         .spawn()
         .map_err(|e| WorkerError::Start { program: config.program.clone(), reason: e.to_string() })?;
     let input = child.stdin.take();
-    // a worker that talks without end waits for us, and no line is longer than one that is refused
+    // a worker with endless output is blocked, and no line exceeds the refused length
     let (sender, lines) = sync_channel(1);
     if let Some(output) = child.stdout.take() {
         std::thread::spawn(move || {
@@ -301,7 +301,7 @@ fn start(config: &WorkerConfig) -> Result<Running, WorkerError> {
             }
         });
     }
-    Ok(Running { child, input, lines, chatter: 0 })
+    Ok(WorkerProcess { child, input, lines, chatter: 0 })
 }
 
 #[cfg(test)]
@@ -309,7 +309,7 @@ mod tests {
     use super::*;
     use crate::protocol::{Job, System};
 
-    /// A request that one expression answers.
+    /// Request with one expression as its answer.
     fn request() -> Request {
         let system = System { matrix: vec![vec!["1".into()]], right: vec!["x".into()], outputs: vec![] };
         Request {
@@ -320,7 +320,7 @@ mod tests {
         }
     }
 
-    /// A worker that is a shell script.
+    /// Worker that is a shell script.
     fn scripted(script: &str) -> Worker {
         Worker::new(WorkerConfig {
             program: "/bin/sh".into(),
@@ -341,7 +341,7 @@ mod tests {
             assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], true)));
         }
         assert_eq!(worker.banner(), ["banner"]);
-        // the process may rest between two questions
+        // the process may rest between two requests
         worker.rest();
         assert_eq!(worker.ask(&request()), Ok((vec!["x".into()], true)));
     }
@@ -378,7 +378,7 @@ mod tests {
         }
     }
 
-    /// Work beyond the limit ends the process, and the next question starts another.
+    /// Work beyond the limit ends the process, and the next request starts another.
     #[test]
     fn work_beyond_the_limit_is_told_each_time() {
         let mut worker = scripted(&format!("{READY} echo 'obsdeg:\"over_limit\"'; exec sleep 60"));
@@ -387,7 +387,7 @@ mod tests {
         }
     }
 
-    /// Whoever holds the lock is waited for, however long it takes, and that is said once.
+    /// The worker waits for the lock as long as allowed, and reports the wait once.
     #[test]
     fn a_long_wait_is_said() {
         static SAID: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
@@ -404,7 +404,7 @@ mod tests {
         assert_eq!(SAID.load(std::sync::atomic::Ordering::Relaxed), 1);
     }
 
-    /// The time for waiting is that of all requests together; then nobody waits again, and nothing starts.
+    /// The time for waiting is shared by all requests; afterwards no worker waits or starts.
     #[test]
     fn a_wait_ends() {
         let mut worker = scripted("echo 'obsdeg:\"waiting\"'; exec sleep 60");
@@ -414,16 +414,16 @@ mod tests {
             assert_eq!(worker.ask(&request()), Err(WorkerError::Busy { seconds: 1 }));
         }
         assert!(start.elapsed() >= Duration::from_secs(1) && start.elapsed() < Duration::from_secs(30));
-        // what was waited for the first turn is gone for the second; the wait is counted from when it is
-        // heard of
-        let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo 'obsdeg:\"over_limit\"'";
+        // the wait for the first turn leaves less time for the second; it counts from its report on
+        let turn = "echo 'obsdeg:\"waiting\"'; sleep 1; echo 'obsdeg:\"ready\"'; read line; echo \
+            'obsdeg:\"over_limit\"'";
         let mut worker = scripted(turn);
         (worker.config.wait, worker.patience) = (Duration::from_secs(1000), Duration::from_secs(1000));
         assert!(matches!(worker.ask(&request()), Err(WorkerError::OverLimit { .. })));
         assert!(worker.patience <= Duration::from_millis(999_500), "{:?}", worker.patience);
     }
 
-    /// Without work that is allowed nothing starts, so that nobody is waited for.
+    /// With a limit of zero nothing starts, so no wait occurs.
     #[test]
     fn a_limit_of_zero_starts_nothing() {
         let folder = std::env::temp_dir().join(format!("obsdeg-limit-{}", std::process::id()));

@@ -3,9 +3,10 @@
 //! The engine is Symbolica. Without a licence key it prints a banner on stdout and allows one process
 //! per user, so it runs in a worker process: the same binary under a hidden subcommand that calls
 //! [`worker::serve`]. The worker waits for the lock of its user before it touches the engine, holds it
-//! until it ends, and ends with whoever started it. [`client::Worker`] starts it and turns a refusal, a
-//! crash, work beyond its limit or nonsense into an error that the caller prints in place of the
-//! solution. This is the only crate that names Symbolica, and no thread but the worker's touches it.
+//! until it ends, and ends with the process that started it. [`client::Worker`] starts it and turns a
+//! refusal, a crash, work beyond its limit or an invalid answer into an error that the caller prints in
+//! place of the solution. This is the only crate that names Symbolica, and only the worker's thread
+//! calls it.
 //!
 //! ```
 //! use std::time::Duration;
@@ -19,7 +20,7 @@
 //! };
 //! let job = Job::Derive { dynamics: oscillator, order: 2 };
 //! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
-//! // a program that is not there costs an answer, nothing else
+//! a missing program is an error, without further effect
 //! let config = WorkerConfig {
 //!     program: "no/such/program".into(),
 //!     arguments: vec![],

@@ -4,18 +4,19 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
-/// The lock file, opened but not locked. It is created if need be, never through a symbolic link, and never
-/// anything but a regular file of this user: in a folder for all users a name may have been taken by another.
+/// Opens the lock file without locking it, and creates it if needed. It never follows a symbolic link
+/// and accepts only a regular file of this user: in a folder for all users, another user may have taken
+/// the name.
 ///
 /// # Errors
-/// What the system says, or what the file is.
+/// Errors of the system, or the fault of the file.
 pub fn open(path: &Path) -> Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     #[cfg(unix)]
     {
         use std::os::unix::fs::OpenOptionsExt;
-        // a pipe is opened at once, to be refused
+        // a pipe opens without waiting and is then refused
         let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
         options.mode(0o600).custom_flags(flags.bits() as i32);
     }
@@ -31,11 +32,11 @@ pub fn open(path: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Waits for the lock, as long as it takes; `waiting` is called before, if it is held by another process. The
-/// lock lasts until the file is closed: the system does that at the end of the process, however it ends.
+/// Waits for the lock without a time limit; calls `waiting` first if another process holds it. The lock
+/// lasts until the file is closed: the system does that at the end of the process in any case.
 ///
 /// # Errors
-/// What the system says.
+/// Errors of the system.
 pub fn wait(file: &File, waiting: impl FnOnce() -> Result<()>) -> Result<()> {
     match file.try_lock() {
         Ok(()) => return Ok(()),
@@ -73,16 +74,16 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         std::fs::create_dir(at("folder")).expect("made");
         assert!(open(&at("folder")).is_err());
-        // through a link nothing is created, nor opened
+        // through a link no file is created or opened
         std::os::unix::fs::symlink(at("target"), at("link")).expect("made");
         assert!(open(&at("link")).is_err() && !at("target").exists());
         std::fs::write(at("target"), "").expect("written");
         assert!(open(&at("link")).is_err());
-        // a pipe that nobody writes to does not hold up
+        // a pipe without a writer does not block
         let made = std::process::Command::new("mkfifo").arg(at("pipe")).status().expect("mkfifo");
         assert!(made.success());
         assert_eq!(open(&at("pipe")).expect_err("a pipe").to_string(), "it is no regular file");
-        // root may open what belongs to others
+        // root may open files of others
         if rustix::process::geteuid().is_root() {
             std::os::unix::fs::chown(at("target"), Some(12345), None).expect("given away");
             assert_eq!(

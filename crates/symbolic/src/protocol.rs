@@ -1,26 +1,26 @@
-//! What travels between the program and its worker: one JSON object per line.
+//! Protocol between the program and its worker: one JSON object per line.
 
 use serde::{Deserialize, Serialize};
 
-/// Starts every answer of the worker, so that a banner is told from an answer.
+/// Prefix of every answer of the worker, which distinguishes it from a banner.
 pub const PREFIX: &str = "obsdeg:";
 
-/// The unit of work: so many products of terms, about half a second.
+/// Unit of work: number of products of terms that take about half a second.
 pub const UNIT: u64 = 5_000_000;
 
-/// Seconds of processor time that go with a unit of work: what cannot be counted ends there.
+/// Processor time per unit of work, in s: the limit for work that cannot be counted.
 pub const SECONDS_PER_UNIT: u64 = 2;
 
-/// What the program sends: a request, and how many [`UNIT`]s of work its answer may take.
+/// Request with its limit of work.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Order {
-    /// Units of work.
+    /// Largest work of the answer, in [`UNIT`]s.
     pub limit: u64,
-    /// What is asked.
+    /// Request of the program.
     pub request: Request,
 }
 
-/// A job and the numbers it is about: rational functions of `symbols` and of the cosines and sines of
+/// Job with the field of its numbers: rational functions of `symbols` and of the cosines and sines of
 /// `angles`, extended by square roots.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
@@ -28,74 +28,75 @@ pub struct Request {
     pub symbols: Vec<String>,
     /// Square roots `g` with `g^2` given, such as `r_2` with `2`.
     pub generators: Vec<(String, String)>,
-    /// Angles: `alpha` announces `c_alpha` and `s_alpha` (and `t_alpha`, the tangent of its half).
+    /// Angles: `alpha` declares `c_alpha` and `s_alpha` (and `t_alpha`, the tangent of its half).
     pub angles: Vec<String>,
-    /// What to do.
+    /// Job to do.
     pub job: Job,
 }
 
-/// What to do.
+/// Job of the worker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Job {
     /// Solve `M x = b` and answer with `x`, or `P x`; verify `x` by substitution if asked.
     Solve {
-        /// The system.
+        /// Linear system to solve.
         system: System,
-        /// How the solution is checked against the dynamics.
+        /// Check of the solution against the dynamics; `None` for no check.
         check: Option<Check>,
     },
     /// Differentiate the outputs along the dynamics up to `order`; answer output by output, order by
     /// order.
     Derive {
-        /// The system.
+        /// Dynamics and outputs.
         dynamics: Dynamics,
-        /// Highest order.
+        /// Highest order of derivatives.
         order: usize,
     },
     /// The irreducible factors of one maximal minor of a matrix of rational functions of the symbols.
     MinorFactors {
-        /// The matrix.
+        /// Entries of the matrix, row by row.
         matrix: Vec<Vec<String>>,
     },
 }
 
-/// A linear system in text.
+/// Linear system as text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct System {
-    /// `M`, row by row: rational functions of whatever is announced.
+    /// Matrix `M`, row by row: rational functions of the declared names.
     pub matrix: Vec<Vec<String>>,
-    /// `b`.
+    /// Right side `b`.
     pub right: Vec<String>,
-    /// `P`; empty for the identity.
+    /// Matrix `P`; empty for the identity.
     pub outputs: Vec<Vec<String>>,
 }
 
-/// `x' = f(x)`, `z = h(x)`, polynomial in the states with coefficients in symbols and generators.
+/// Dynamics `x' = f(x)`, `z = h(x)`, polynomial in the states with coefficients in symbols and
+/// generators.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dynamics {
-    /// The states.
+    /// Names of the states.
     pub states: Vec<String>,
-    /// `f`, one per state.
+    /// Right sides `f`, one per state.
     pub equations: Vec<String>,
-    /// `h`.
+    /// Outputs `h`.
     pub outputs: Vec<String>,
 }
 
-/// A claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified
-/// by differentiating and substituting.
+/// Claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified by
+/// differentiating and substituting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Check {
-    /// The local system of every segment.
+    /// Local system of every segment.
     pub dynamics: Dynamics,
-    /// The unknowns.
+    /// Names of the unknowns.
     pub unknowns: Vec<String>,
-    /// Per segment, the states as linear expressions in the unknowns.
+    /// States of each segment as linear expressions in the unknowns.
     pub segments: Vec<Vec<String>>,
-    /// Per `x_i`, its terms.
+    /// Terms of each `x_i`.
     pub terms: Vec<Vec<CheckTerm>>,
-    /// The claimed combination: per unknown, a rational function of symbols and generators and one
-    /// of the symbols to multiply it with.
+    /// Claimed combination: per unknown, a rational function of symbols and generators, and a factor
+    /// that is one of the symbols.
     pub target: Vec<(String, String)>,
 }
 
@@ -104,16 +105,16 @@ pub struct Check {
 pub struct CheckTerm {
     /// Factor: a rational function of the symbols.
     pub factor: String,
-    /// Index of the segment.
+    /// Index of the segment, from 0.
     pub segment: usize,
-    /// Index of the output.
+    /// Index of the output, from 0.
     pub output: usize,
-    /// Derivative order.
+    /// Order of the derivative.
     pub order: usize,
 }
 
 impl Request {
-    /// How many expressions answer it, where that does not depend on their values.
+    /// Number of expressions in the answer; `None` if it depends on their values.
     pub fn answers(&self) -> Option<usize> {
         match &self.job {
             Job::Solve { system, .. } if system.outputs.is_empty() => {
@@ -126,31 +127,31 @@ impl Request {
     }
 }
 
-/// What the worker says.
+/// Response of the worker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Response {
     /// Another process holds the lock; the worker waits for it.
     Waiting,
-    /// The lock is held: requests are answered.
+    /// Lock obtained: requests are answered.
     Ready,
-    /// There is no lock to be had.
+    /// Lock file that cannot be used.
     Unusable {
-        /// Why.
+        /// Reason in words.
         reason: String,
     },
-    /// The work of a request was beyond its limit.
+    /// Work beyond the limit of the request.
     OverLimit,
-    /// Expressions, in the order that the job states, and whether the check, if any, held.
+    /// Expressions, in the order that the job states, with the result of the check.
     Values {
-        /// The expressions.
+        /// Expressions of the answer.
         values: Vec<String>,
-        /// True when a check was asked for and held.
+        /// True if a check was asked for and held.
         verified: bool,
     },
-    /// The job failed.
+    /// Job that failed.
     Failed {
-        /// Why.
+        /// Reason in words.
         reason: String,
     },
 }

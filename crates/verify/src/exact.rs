@@ -1,4 +1,4 @@
-//! The check in exact arithmetic: numbers `sum q sqrt(r) wN^a wU^b` with rational `q`.
+//! Check in exact arithmetic: numbers `sum q sqrt(r) wN^a wU^b` with rational `q`.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,8 @@ use crate::file::{Certificate, Functional, Number, RowName};
 use crate::problem::{Matrix, ORDERS, Problem, Ring, TURN};
 use crate::{Claim, Refused, need};
 
-/// Exact numbers, with the rates of a problem.
-struct Exact {
+/// Ring of exact numbers, with the rates of a problem.
+struct ExactRing {
     rates: [Number; 2],
 }
 
@@ -23,7 +23,7 @@ fn radicals<const N: usize>(terms: [(i64, i64, u8); N]) -> Number {
     Number(terms.into_iter().map(|(p, q, r)| ((r, 0, 0), rational(p, q))).collect())
 }
 
-impl Ring for Exact {
+impl Ring for ExactRing {
     type Element = Number;
     fn zero(&self) -> Number {
         Number::default()
@@ -78,7 +78,7 @@ impl Ring for Exact {
         self.rates.clone()
     }
     fn left(&self, _: &Problem, _: &[Matrix<Number>]) -> Vec<Matrix<Number>> {
-        // refused before: certificates with slews are modular
+        // certificates with slews are modular, so slews are refused earlier
         Vec::new()
     }
 }
@@ -104,7 +104,7 @@ pub(crate) fn check(
     let power = |zero: bool, a, b| {
         if zero { Number::default() } else { Number([((1, a, b), rational(1, 1))].into()) }
     };
-    let ring = Exact { rates: [power(problem.pole, 1, 0), power(problem.equator, 0, 1)] };
+    let ring = ExactRing { rates: [power(problem.pole, 1, 0), power(problem.equator, 0, 1)] };
     let sparse = |row: Vec<Number>| -> Row<'_> {
         problem.names.iter().map(String::as_str).zip(row).filter(|(_, x)| !ring.is_zero(x)).collect()
     };
@@ -144,11 +144,12 @@ pub(crate) fn check(
     Ok(())
 }
 
-/// Every null vector is 1 at its free unknown, 0 at the others, and taken to 0 by all rows up to its order.
+/// Checks that every null vector is 1 at its free unknown, 0 at the others, and orthogonal to all rows
+/// up to its order.
 fn null_vectors(
     problem: &Problem,
     file: &Certificate,
-    ring: &Exact,
+    ring: &ExactRing,
     rows: &BTreeMap<RowName, Row<'_>>,
 ) -> Result<(), Refused> {
     let levels = file.null_vectors.as_deref().unwrap_or_default();

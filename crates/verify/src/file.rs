@@ -1,4 +1,4 @@
-//! The file as it is laid out: exactly the keys of the specification, each once.
+//! Reader of certificate files: exactly the keys of the specification, each once.
 
 use std::collections::BTreeMap;
 
@@ -75,7 +75,7 @@ pub(crate) struct Claimed {
     pub witness: Witness,
 }
 
-/// Status, degree and witness of a functional: claimed by the certificate, or found by the checker.
+/// Status, degree and witness of a functional, as claimed by the certificate or found by the checker.
 #[derive(Serialize, Default)]
 pub(crate) struct Witness {
     pub status: String,
@@ -114,7 +114,7 @@ impl<'de> Deserialize<'de> for Claimed {
 }
 
 impl Witness {
-    /// Refuses unless everything but the coefficients is as found.
+    /// Refuses a claim that differs from `found` in anything but the coefficients.
     pub(crate) fn compare(&self, name: &str, found: &Self) -> Result<(), Refused> {
         same(&format!("{name}, status"), &self.status, &found.status)?;
         same(&format!("{name}, degree"), &self.degree, &found.degree)?;
@@ -187,7 +187,7 @@ impl<'de> Deserialize<'de> for Functional {
 }
 
 impl Functional {
-    /// The unknown itself.
+    /// The functional of one unknown.
     pub(crate) fn unit(name: &str) -> Self {
         let one = BigRational::from_integer(BigInt::from(1));
         Self([(name.to_string(), Number([((1, 0, 0), one)].into()))].into())

@@ -21,7 +21,7 @@ use problem::Problem;
 /// Largest certificate, in bytes.
 const MOST_BYTES: usize = 16_000_000;
 
-/// Reason why a certificate is not accepted: the place, what the certificate says, what is found.
+/// Reason why a certificate is not accepted: the place, the certificate's value and the value found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refused {
     text: String,
@@ -33,7 +33,7 @@ impl Refused {
         Self { text, unreadable: false }
     }
 
-    /// The same where what was given beside the certificate cannot be used.
+    /// Refusal whose reason lies in the input beside the certificate.
     fn unreadable(self) -> Self {
         Self { unreadable: true, ..self }
     }
@@ -44,13 +44,13 @@ impl Refused {
     }
 }
 
-/// Part of the certificate of an optimum that is searched again.
+/// Choice of the blocks of an optimum's certificate that are searched again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Replay {
-    /// Number of blocks, chosen at random; none: all where these are at most two million sequences, otherwise
-    /// as many blocks as these fill.
+    /// Number of blocks, chosen at random. `None`: all blocks if they have at most two million
+    /// sequences in total, otherwise as many as this number covers.
     pub blocks: Option<usize>,
-    /// Seed of the choice; none: a number of the system.
+    /// Seed of the choice; `None` for a random number of the system.
     pub seed: Option<u64>,
 }
 
@@ -62,7 +62,7 @@ impl std::fmt::Display for Refused {
 
 impl std::error::Error for Refused {}
 
-/// A refusal: the place, what was expected there, what was found.
+/// Refusal with the place, the expectation and the value found.
 fn refusal(place: &str, expected: &str, found: impl std::fmt::Display) -> Refused {
     Refused::new(format!("{place}: expected {expected}; found {}", short(&found.to_string())))
 }
@@ -72,7 +72,7 @@ fn need(holds: bool, place: &str, expected: &str, found: impl std::fmt::Display)
     if holds { Ok(()) } else { Err(refusal(place, expected, found)) }
 }
 
-/// Refuses unless the certificate says what is found.
+/// Refuses a certificate whose value differs from the one found.
 fn same<T: serde::Serialize>(place: &str, certificate: &T, found: &T) -> Result<(), Refused> {
     let text = |value: &T| serde_json::to_string(value).unwrap_or_default();
     let (says, found) = (text(certificate), text(found));
@@ -91,8 +91,9 @@ fn short(text: &str) -> String {
     if beginning.len() < text.len() { beginning + "..." } else { beginning }
 }
 
-/// Checks a certificate, and that it is of the scheme of a file (TOML) if one is given. Returns one sentence
-/// per unknown and combination, then the rank, the assumptions and whether a scheme was compared.
+/// Checks a certificate, and its problem against a scheme file (TOML) if one is given. Returns one
+/// sentence per unknown and combination, then the rank, the assumptions and whether a scheme was
+/// compared.
 ///
 /// # Errors
 /// [`Refused`] with the reason.
@@ -100,7 +101,7 @@ pub fn verify(certificate: &[u8], scheme: Option<&str>) -> Result<Vec<String>, R
     verify_with(certificate, scheme, &Replay::default())
 }
 
-/// The same, with what is searched again where the certificate is that of an optimum.
+/// Checks a certificate as [`verify`]; `replay` chooses the blocks of an optimum to search again.
 ///
 /// # Errors
 /// [`Refused`] with the reason.
@@ -131,18 +132,18 @@ pub fn verify_with(
     }
 }
 
-/// The key that says which layout a file has.
+/// Layout key of a file.
 #[derive(serde::Deserialize)]
 struct Layout {
     layout: String,
 }
 
-/// JSON with the keys of a layout.
+/// Reads JSON with the keys of a layout.
 fn parsed<'de, T: serde::Deserialize<'de>>(certificate: &'de [u8]) -> Result<T, Refused> {
     serde_json::from_slice(certificate).map_err(|e| Refused::new(short(&format!("certificate: {e}"))))
 }
 
-/// Refuses lists in place of objects, which the reader would take for the values of their keys.
+/// Refuses lists in place of objects, which the reader would accept as the values of the keys.
 fn objects(value: &serde_json::Value) -> Result<(), Refused> {
     let object = |place: String, value: &serde_json::Value| {
         need(value.is_object(), &place, "an object", short(&value.to_string()))
@@ -202,7 +203,7 @@ fn of_scheme(certificate: &[u8], scheme: Option<&str>) -> Result<Vec<String>, Re
     Ok(sentences(&problem, &claims, file.basis.len(), &how, scheme.is_some()))
 }
 
-/// Refuses unless what a certificate says is what the rows say modulo a prime.
+/// Refuses a certificate that differs from the rows modulo a prime.
 fn compare(
     found: &Judged,
     ranks: &[usize],
@@ -227,7 +228,7 @@ fn by_primes(count: usize, bound: f64) -> String {
     format!("modulo {count} primes (wrong with probability below {})", rounded_up(bound))
 }
 
-/// One digit and an exponent, never below the number.
+/// Number with one digit and an exponent, rounded up.
 fn rounded_up(x: f64) -> String {
     let shown = format!("{x:.0e}");
     match shown.split_once('e') {
@@ -242,10 +243,10 @@ fn rounded_up(x: f64) -> String {
     }
 }
 
-/// A claim by the name of what it is about.
+/// Claim with the name of its functional.
 type Claim<'a> = (String, &'a Witness);
 
-/// Everything that is claimed: the functionals (every unknown, then the combinations), and the claims.
+/// All claims with their functionals: every unknown, then the combinations.
 fn claims<'a>(
     file: &'a Certificate,
     problem: &Problem,
@@ -271,7 +272,7 @@ fn claims<'a>(
     Ok((functionals, claims))
 }
 
-/// Sentence on what was verified of one functional.
+/// Sentence on the verified result of one functional.
 fn sentence((name, claim): &Claim<'_>, how: &str) -> String {
     let hidden = claim.hidden_by.as_deref().unwrap_or_default();
     match (claim.degree, claim.excited_by) {
@@ -304,7 +305,8 @@ fn sentences(problem: &Problem, claims: &[Claim<'_>], rank: usize, how: &str, co
     if let Some(fewest) = problem.fewest_positions(seen) {
         let as_few = if fewest == problem.positions.len() { " This one has as few." } else { "" };
         out.push(format!(
-            "Counting: no scheme of fewer than {fewest} positions makes {seen} coefficients observable under {} carry.{as_few}",
+            "Counting: no scheme of fewer than {fewest} positions makes {seen} coefficients observable \
+             under {} carry.{as_few}",
             problem.carry
         ));
     }

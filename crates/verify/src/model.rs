@@ -11,7 +11,7 @@ use crate::{Claim, Refused, by_primes, compare, need, no_coefficients, parsed, r
 
 pub(crate) const LAYOUT: &str = "obsdeg.model-certificate/1";
 
-/// Longest text of a subexpression before it gets a name of its own.
+/// Length of a subexpression's text above which it gets a name of its own.
 const LONG: usize = 200;
 
 #[derive(Deserialize)]
@@ -45,14 +45,14 @@ enum RawOperation {
     Binary(String, usize, usize),
 }
 
-/// An operation of the program; operands are indices of slots, then of operations before it.
+/// Operation of the program; operands are indices of slots, then of operations before it.
 enum Operation {
-    /// Numerator, denominator, and both as text.
+    /// Numerator, denominator, and the fraction as text.
     Number(BigInt, BigUint, String),
     Binary(char, usize, usize),
 }
 
-/// A model, checked.
+/// Checked model.
 struct Model {
     raw: RawModel,
     /// States and parameters, then constants, then inputs.
@@ -115,8 +115,8 @@ pub(crate) fn verify(certificate: &[u8], compared: bool) -> Result<Vec<String>, 
     Ok(out)
 }
 
-/// True for at most 256 letters, digits and `_ [ ] , . @ '`, a letter or `_` first: such a name can not pass
-/// for an expression or for a sentence of the answer.
+/// True for at most 256 letters, digits and `_ [ ] , . @ '`, with a letter or `_` first: such a name
+/// cannot pass for an expression or for a sentence of the answer.
 fn is_name(name: &str) -> bool {
     let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
     first && name.chars().count() <= 256 && name.chars().all(|c| c.is_alphanumeric() || "_[],.@'".contains(c))
@@ -181,8 +181,8 @@ impl Model {
         Ok(Self { raw, slots, unknowns, program })
     }
 
-    /// The derivatives of the Taylor coefficients of all outputs by the unknowns, of orders 0 to `last`, at a
-    /// random point modulo `p`.
+    /// Derivatives of the Taylor coefficients of all outputs with respect to the unknowns, of orders 0
+    /// to `last`, at a random point modulo `p`.
     fn rows(
         &self,
         p: u64,
@@ -242,7 +242,7 @@ impl Model {
         Ok(rows)
     }
 
-    /// Bound on the probability that one prime misleads, with rows of orders 0 to `last`.
+    /// Bound on the probability that one prime gives a wrong result, with rows of orders 0 to `last`.
     fn error_bound(&self, last: usize) -> f64 {
         let mut sizes = vec![Size { degrees: [1.0, 0.0], bits: [0.0, 0.0] }; self.slots.len()];
         for operation in &self.program {
@@ -261,7 +261,7 @@ impl Model {
             .chain(self.raw.outputs.iter().map(|o| &o.1))
             .map(|&node| sizes[node])
             .collect();
-        // the common denominator, and the numerators over it
+        // the common denominator, and the numerators above it
         let common = |part: fn(&Size) -> [f64; 2]| {
             let denominator: f64 = used.iter().map(|s| part(s)[1]).sum();
             let over = |s: &Size| part(s)[0] + denominator - part(s)[1];
@@ -283,7 +283,7 @@ impl Model {
         last as f64 * (1.0 + n) * (n * degree / two60 + prime)
     }
 
-    /// The equations in words of the model, long subexpressions by names of their own.
+    /// Equations in the names of the model; long subexpressions have names of their own.
     fn equations(&self) -> Vec<String> {
         let (mut texts, mut out) = (self.slots.clone(), Vec::new());
         for operation in &self.program {
@@ -318,7 +318,7 @@ fn number(place: &str, text: &str) -> Result<Operation, Refused> {
     }
 }
 
-/// The Taylor coefficients of a value, and their derivatives by the unknowns; none stands for zeros.
+/// Taylor coefficients of a value, and their derivatives with respect to the unknowns; empty for zeros.
 #[derive(Default)]
 struct Series {
     values: Vec<u64>,
@@ -336,7 +336,7 @@ fn scaled(factor: u64, v: &[u64], p: u64) -> Vec<u64> {
     v.iter().map(|&x| times(factor, x, p)).collect()
 }
 
-/// `out + factor v`.
+/// Adds `factor v` to `out`.
 fn add(out: &mut Vec<u64>, factor: u64, v: &[u64], p: u64) {
     if factor != 0 && !v.is_empty() {
         out.resize(v.len(), 0);
@@ -346,7 +346,7 @@ fn add(out: &mut Vec<u64>, factor: u64, v: &[u64], p: u64) {
     }
 }
 
-/// The coefficient `k` of `c = a kind b`, whose lower ones are known; `None` where a divisor is 0.
+/// Coefficient `k` of `c = a kind b`, with the lower ones known; `None` where a divisor is 0.
 fn term(kind: char, (a, b, c): (&Series, &Series, &Series), k: usize, p: u64) -> Option<(u64, Vec<u64>)> {
     let (mut value, mut dual) = (0, Vec::new());
     match kind {
@@ -384,8 +384,8 @@ fn term(kind: char, (a, b, c): (&Series, &Series, &Series), k: usize, p: u64) ->
     Some((value, dual))
 }
 
-/// Bounds of a quotient of polynomials with integer coefficients, numerator then denominator: degrees, and
-/// binary logarithms of the sums of the magnitudes of the coefficients.
+/// Bounds for a quotient of polynomials with integer coefficients, numerator then denominator: degrees,
+/// and binary logarithms of the sums of the absolute coefficients.
 #[derive(Clone, Copy)]
 struct Size {
     degrees: [f64; 2],

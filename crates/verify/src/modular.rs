@@ -1,13 +1,13 @@
-//! The check modulo primes: random fields, and what the rows say in one of them.
+//! Check modulo primes: random fields, and ranks and witnesses in one of them.
 
 use num_bigint::BigInt;
 use sha2::{Digest, Sha256};
 
 use crate::file::{Functional, Number, RowName, Witness};
-use crate::problem::{About, Matrix, Problem, Ring, Slew, Source, TURN, times as product};
+use crate::problem::{Matrix, Problem, Ring, Slew, Source, TURN, TurnAxis, times as product};
 use crate::{Refused, need, refusal};
 
-/// Numbers that whoever wrote the certificate did not choose: SHA-256 of it, with a counter.
+/// Random numbers that the writer of a certificate cannot choose: SHA-256 of it, with a counter.
 pub(crate) struct Randomness {
     seed: [u8; 32],
     count: u64,
@@ -70,7 +70,7 @@ fn gcd(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-/// Order of the roots of unity that hold all angles.
+/// Order of the roots of unity that represent all angles.
 fn order_of(problem: &Problem) -> u64 {
     let turns = problem.slews.iter().flatten().map(|s| &s.angle);
     let angles = problem.positions.iter().flatten().chain(&problem.latitude).chain(turns);
@@ -83,7 +83,7 @@ pub(crate) struct PrimeField {
     z: u64,
     order: u64,
     rates: [u64; 2],
-    /// The image of pi.
+    /// Image of pi.
     pi: u64,
     /// Images of the square roots of 1, 2, 3, 6 at these indices.
     roots: [u64; 7],
@@ -145,7 +145,7 @@ impl PrimeField {
 }
 
 impl PrimeField {
-    /// `a I + b [u x] + c u u^T`.
+    /// Matrix `a I + b [u x] + c u u^T`.
     fn mixed(&self, u: &[u64], [a, b, c]: [u64; 3]) -> Matrix<u64> {
         let mut out = vec![vec![0; 3]; 3];
         for i in 0..3 {
@@ -165,19 +165,19 @@ impl PrimeField {
         out
     }
 
-    /// The axis of a turn in c, from the attitude `a` to `to`; zero where the attitudes give none.
+    /// Axis of a turn in c, from the attitude `a` to `to`; zero if the attitudes determine none.
     fn axis(&self, turn: &Slew, a: &Matrix<u64>, to: &Matrix<u64>) -> Vec<u64> {
         let back: Matrix<u64> = (0..3).map(|i| a.iter().map(|row| row[i]).collect()).collect();
         let unit = |i: usize| (0..3).map(|j| u64::from(i == j)).collect::<Vec<u64>>();
         let v = match &turn.about {
-            About::Platform(i) => return unit(*i),
-            About::Middle(gamma) => {
+            TurnAxis::Platform(i) => return unit(*i),
+            TurnAxis::Middle(gamma) => {
                 let (cos, sin) = self.cos_sin(*gamma);
                 return vec![self.neg(&sin), cos, 0];
             }
-            About::Geographic(i) => unit(*i),
-            About::Direction(v) => v.iter().map(|x| self.image(x)).collect(),
-            About::Shortest => {
+            TurnAxis::Geographic(i) => unit(*i),
+            TurnAxis::Direction(v) => v.iter().map(|x| self.image(x)).collect(),
+            TurnAxis::Shortest => {
                 let (r, sin) = (product(self, to, &back), self.cos_sin(turn.angle).1);
                 let half = self.inverse(self.add(&sin, &sin));
                 let difference =
@@ -189,7 +189,7 @@ impl PrimeField {
         product(self, &back, &column).into_iter().flatten().collect()
     }
 
-    /// Refuses slews whose axes have not the length 1, or that do not lead from position to position.
+    /// Refuses slews whose axes do not have length 1, or that do not lead from position to position.
     pub(crate) fn check_slews(&self, problem: &Problem) -> Result<(), Refused> {
         let attitudes = problem.attitudes(self);
         for (i, turns) in problem.slews.iter().enumerate() {
@@ -206,7 +206,7 @@ impl PrimeField {
         Ok(())
     }
 
-    /// The attitude behind a turn: `A exp([u x] phi)`.
+    /// Attitude after a turn: `A exp([u x] phi)`.
     fn turned(&self, a: &Matrix<u64>, turn: &Slew, u: &[u64]) -> Matrix<u64> {
         let (cos, sin) = self.cos_sin(turn.angle);
         product(self, a, &self.mixed(u, [cos, sin, self.add(&1, &self.neg(&cos))]))
@@ -283,15 +283,15 @@ pub(crate) struct Judged {
     pub witnesses: Vec<Witness>,
 }
 
-/// `v - factor e`.
+/// Subtracts `factor e` from `v`.
 pub(crate) fn subtract(v: &mut [u64], factor: u64, e: &[u64], p: u64) {
     for (x, &y) in v.iter_mut().zip(e).filter(|(_, y)| **y != 0) {
         *x = (*x + p - times(factor, y, p)) % p;
     }
 }
 
-/// The images of functionals, as long as a row. Refused is an entry that is 0 at the latitude of the problem,
-/// such as `wN - wU` at 45 deg.
+/// Images of functionals, as long as a row. Entries that are 0 at the latitude of the problem are
+/// refused, such as `wN - wU` at 45 deg.
 pub(crate) fn images(
     problem: &Problem,
     field: &PrimeField,
@@ -310,8 +310,8 @@ pub(crate) fn images(
     functionals.iter().map(dense).collect()
 }
 
-/// Goes through rows modulo `p` from the lowest order up: basis rows, pivots, ranks, and the witness of every
-/// functional.
+/// Processes rows modulo `p` from the lowest order up: basis rows, pivots, ranks, and the witness of
+/// every functional.
 pub(crate) fn judge(
     p: u64,
     names: &[String],
@@ -320,7 +320,7 @@ pub(crate) fn judge(
 ) -> Judged {
     let n = names.len();
     let mut witnesses: Vec<Witness> = functionals.iter().map(|_| Witness::default()).collect();
-    // reduced echelon form; the columns beyond n say how a row is made of basis rows
+    // reduced echelon form; the columns beyond n hold the combination of basis rows
     let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
     let (mut basis, mut ranks) = (Vec::new(), Vec::new());
     for k in 0..=rows.iter().map(|r| r.0.1).max().unwrap_or(0) {
@@ -378,11 +378,11 @@ pub(crate) fn judge(
     Judged { basis, ranks, witnesses }
 }
 
-/// Number of primes that make a false claim pass with a probability below 1e-12, at least 2, and that
-/// probability, where one prime misleads with a probability of at most `each`.
+/// Number of primes, at least 2, with which a false claim passes with a probability below 1e-12, and
+/// that probability; `each` bounds the probability for one prime.
 ///
 /// # Errors
-/// Eight primes do not suffice.
+/// [`Refused`] if eight primes do not suffice.
 pub(crate) fn primes(each: f64) -> Result<(usize, f64), Refused> {
     let of = |count: usize| each.powi(count as i32);
     let count = (2..=8).find(|&count| of(count) < 1e-12);
@@ -390,16 +390,16 @@ pub(crate) fn primes(each: f64) -> Result<(usize, f64), Refused> {
     count.map_or_else(|| Err(refusal("problem", expected, "a larger one")), |count| Ok((count, of(count))))
 }
 
-/// Bound on the probability that one prime misleads.
+/// Bound on the probability that one prime gives a wrong result.
 pub(crate) fn error_bound(problem: &Problem, levels: usize, functionals: &[Functional]) -> f64 {
     let terms = |c: &Functional| c.0.values().map(|x| x.0.len()).sum::<usize>();
     let t = functionals[problem.names.len()..].iter().map(terms).max().unwrap_or(0) as f64;
-    // of every turn that its axis has length 1, and that it leads to the position
+    // decisions for every turn: its axis has length 1, and it leads to the position
     let turns: usize = problem.slews.iter().map(Vec::len).sum();
     chance_of(problem, problem.names.len(), levels * (1 + functionals.len()) + 2 * turns, t)
 }
 
-/// The same of so many decisions about unknowns, for `n` of these.
+/// Bound as [`error_bound`] for `decisions` decisions about `n` unknowns.
 pub(crate) fn chance(problem: &Problem, n: usize, decisions: usize) -> f64 {
     chance_of(problem, n, decisions, 0.0)
 }
@@ -415,7 +415,7 @@ fn chance_of(problem: &Problem, n: usize, decisions: usize, t: f64) -> f64 {
     decisions as f64 * ((5.0 * n + 40.0) / two60 + prime)
 }
 
-/// Increase of the binary logarithm of the norm of a row by turns: denominators and sizes.
+/// Increase of the binary logarithm of the norm of a row by turns: denominators and absolute values.
 fn of_turns(problem: &Problem) -> f64 {
     let half = TURN as u64 / 2;
     let turns: Vec<&Slew> = problem.slews.iter().flatten().collect();
@@ -425,28 +425,28 @@ fn of_turns(problem: &Problem) -> f64 {
     let common = turns.iter().fold(half, |g, turn| gcd(g, turn.angle.unsigned_abs()));
     let largest = turns.iter().map(|turn| turn.angle.unsigned_abs()).max().unwrap_or(0);
     let denominators: BigInt = turns.iter().fold(BigInt::from(1), |all, turn| match &turn.about {
-        About::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
+        TurnAxis::Direction(v) => v.iter().flat_map(|x| x.0.values()).fold(all, |all, q| lcm(all, q.denom())),
         _ => all,
     });
-    // exponents of 2 and of the common denominator that make integers of an attitude, and the largest of a
+    // exponents of 2 and of the common denominator that make an attitude integer, and the largest of a
     // jump
     let (mut two, mut own) = (0, 0);
     for turns in &problem.slews {
         let mut attitude = (3, 0);
         for turn in turns {
             let axis = match turn.about {
-                About::Platform(_) => (0, 0),
-                About::Middle(_) => (1, 0),
-                About::Geographic(_) => attitude,
-                About::Direction(_) => (attitude.0, attitude.1 + 1),
-                About::Shortest => (6, 0),
+                TurnAxis::Platform(_) => (0, 0),
+                TurnAxis::Middle(_) => (1, 0),
+                TurnAxis::Geographic(_) => attitude,
+                TurnAxis::Direction(_) => (attitude.0, attitude.1 + 1),
+                TurnAxis::Shortest => (6, 0),
             };
             two = two.max(attitude.0 + 1 + 3 * axis.0);
             own = own.max(attitude.1 + 3 * axis.1);
             attitude = (attitude.0 + 1 + 2 * axis.0, attitude.1 + 2 * axis.1);
         }
     }
-    let shortest = turns.iter().filter(|turn| matches!(turn.about, About::Shortest)).count();
+    let shortest = turns.iter().filter(|turn| matches!(turn.about, TurnAxis::Shortest)).count();
     f64::from(two)
         + f64::from(own) * (denominators - BigInt::from(1)).bits() as f64
         + 3.0 * shortest as f64
@@ -472,21 +472,21 @@ mod tests {
     use super::*;
     use crate::file::{RawAxis, RawGyro, RawProblem, RawTurn};
 
-    type Exact = Vec<Vec<BigRational>>;
+    type ExactMatrix = Vec<Vec<BigRational>>;
 
     fn rational(p: i64, q: i64) -> BigRational {
         BigRational::new(p.into(), q.into())
     }
 
-    fn product_of(a: &Exact, b: &Exact) -> Exact {
+    fn product_of(a: &ExactMatrix, b: &ExactMatrix) -> ExactMatrix {
         let entry = |row: &[BigRational], j: usize| {
             row.iter().zip(b).fold(rational(0, 1), |sum, (x, row)| sum + x * &row[j])
         };
         a.iter().map(|row| (0..3).map(|j| entry(row, j)).collect()).collect()
     }
 
-    /// `a 1 + b [u x] + c u u^T`.
-    fn mixed(u: &[BigRational], [a, b, c]: [i64; 3]) -> Exact {
+    /// Matrix `a 1 + b [u x] + c u u^T`.
+    fn mixed(u: &[BigRational], [a, b, c]: [i64; 3]) -> ExactMatrix {
         let [a, b, c] = [a, b, c].map(|x| rational(x, 1));
         let skew = [
             [None, Some((2, -1)), Some((1, 1))],
@@ -502,15 +502,15 @@ mod tests {
         (0..3).map(|i| (0..3).map(|j| entry(i, j)).collect()).collect()
     }
 
-    /// The axis of length 1 with denominator `m^2 + n^2`.
+    /// Axis of length 1 with denominator `m^2 + n^2`.
     fn direction(m: i64, n: i64) -> Vec<BigRational> {
         let q = m * m + n * n;
         vec![rational(m * m - n * n, q), rational(2 * m * n, q), rational(0, 1)]
     }
 
-    /// Half turns about rational directions, in exact arithmetic: the denominators of what the turns leave
-    /// (`A J u`, the parts with and without pi) are within the bits that are allowed for them, which for a
-    /// denominator near 2^31 are many.
+    /// Half turns about rational directions, in exact arithmetic. The denominators of the effects of
+    /// turns (`A J u`, the parts with and without pi) stay within the bits allowed for them, which are
+    /// many for a denominator near 2^31.
     #[test]
     fn bits_of_turns_hold_the_denominators() {
         for parameters in

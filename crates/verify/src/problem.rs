@@ -1,11 +1,11 @@
-//! A scheme, checked, and its rows in any ring.
+//! Checked problem of a scheme, and its rows in any ring.
 
 use crate::file::{Functional, Number, RawAxis, RawProblem, RowName};
 use crate::{Refused, need, refusal};
 
 /// Orders of rows: `F^4 = -(wN^2 + wU^2) F^2`, so 0 to 3 suffice.
 pub(crate) const ORDERS: usize = 4;
-/// A turn in 1e-9 degrees.
+/// Full turn in 1e-9 degrees.
 pub(crate) const TURN: i64 = 360_000_000_000;
 /// Drift terms of the gyros, by the axes whose components of g they multiply.
 const GRAVITY: [&str; 10] = ["F", "I", "O", "S", "II", "OO", "SS", "IO", "IS", "OS"];
@@ -17,18 +17,18 @@ const SENSORS: [char; 3] = ['X', 'Y', 'Z'];
 /// Local quantities: psi, eps, a in n.
 const LOCAL: usize = 9;
 
-/// All terms, in their order.
+/// Names of all terms, in their order.
 pub(crate) fn all_terms() -> impl Iterator<Item = &'static str> {
     GRAVITY.into_iter().chain(RATE).chain(FORCE)
 }
 
-/// A signed axis: its index, and true if it is negative.
+/// Signed axis: its index, and true if it is negative.
 pub(crate) type Axis = (usize, bool);
 
-/// A scheme, checked.
+/// Checked problem of a scheme.
 pub(crate) struct Problem {
     pub carry: String,
-    /// As text, and in 1e-9 degrees.
+    /// Latitude as text, then in 1e-9 degrees.
     pub latitude_deg: Option<String>,
     pub latitude: Option<i64>,
     pub pole: bool,
@@ -39,7 +39,7 @@ pub(crate) struct Problem {
     /// Number of psi unknowns.
     pub psi: usize,
     pub coefficients: Vec<Coefficient>,
-    /// Per position the turns to it, where torquer errors act on them; empty where they do not.
+    /// Turns to every position, if torquer errors act in them; empty otherwise.
     pub slews: Vec<Vec<Slew>>,
 }
 
@@ -58,28 +58,28 @@ pub(crate) enum Source {
     Force,
 }
 
-/// One turn.
+/// One turn of a slew.
 pub(crate) struct Slew {
-    pub about: About,
-    /// In 1e-9 degrees.
+    pub about: TurnAxis,
+    /// Angle in 1e-9 degrees.
     pub angle: i64,
 }
 
-/// The axis of a turn.
-pub(crate) enum About {
-    /// As the attitudes before and behind it say.
+/// Axis of a turn.
+pub(crate) enum TurnAxis {
+    /// Axis of the shortest turn between the attitudes before and after it.
     Shortest,
-    /// X_p, Y_p, Z_p.
+    /// Platform axis X_p, Y_p or Z_p.
     Platform(usize),
-    /// N, U, E.
+    /// Geographic axis N, U or E.
     Geographic(usize),
-    /// The middle gimbal at this gamma.
+    /// Axis of the middle gimbal at this gamma.
     Middle(i64),
-    /// A direction in n.
+    /// Direction in n.
     Direction([Number; 3]),
 }
 
-/// Numbers that rows can be written in.
+/// Ring of the entries of rows.
 pub(crate) trait Ring {
     type Element: Clone;
     fn zero(&self) -> Self::Element;
@@ -92,7 +92,7 @@ pub(crate) trait Ring {
     fn cos_sin(&self, angle: i64) -> (Self::Element, Self::Element);
     /// `wN` and `wU`.
     fn rates(&self) -> [Self::Element; 2];
-    /// Per position what slews leave in psi^n: three rows, one column per coefficient.
+    /// Effects of slews on psi^n per position: three rows, one column per coefficient.
     fn left(&self, problem: &Problem, attitudes: &[Matrix<Self::Element>]) -> Vec<Matrix<Self::Element>>;
 }
 
@@ -111,7 +111,7 @@ pub(crate) fn times<R: Ring>(ring: &R, a: &Matrix<R::Element>, b: &Matrix<R::Ele
     a.iter().map(|row| (0..b[0].len()).map(|j| entry(row, j)).collect()).collect()
 }
 
-/// `C = Mx(alpha) My(beta) Mz(gamma)`.
+/// Attitude `C = Mx(alpha) My(beta) Mz(gamma)`.
 fn attitude<R: Ring>(ring: &R, angles: &[i64; 3]) -> Matrix<R::Element> {
     let [(ca, sa), (cb, sb), (cg, sg)] = angles.map(|a| ring.cos_sin(a));
     let (o, i) = (|| ring.zero(), || ring.one());
@@ -121,7 +121,7 @@ fn attitude<R: Ring>(ring: &R, angles: &[i64; 3]) -> Matrix<R::Element> {
     times(ring, &times(ring, &x, &y), &z)
 }
 
-/// Refuses a word that is no carry.
+/// Refuses an unknown carry.
 pub(crate) fn known_carry(carry: &str) -> Result<(), Refused> {
     let known = ["platform", "inertial", "reset"].contains(&carry);
     need(known, "problem.carry", "platform, inertial or reset", carry)
@@ -181,20 +181,20 @@ impl Problem {
         })
     }
 
-    /// The column of an unknown.
+    /// Column of an unknown; `None` for an unknown name.
     pub(crate) fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
     }
 
-    /// Least number of positions that may determine `seen` coefficients, by counting rows; `None` where the
-    /// argument does not hold.
+    /// Smallest number of positions that may determine `seen` coefficients, by counting rows; `None` if
+    /// the argument does not hold.
     pub(crate) fn fewest_positions(&self, seen: usize) -> Option<usize> {
         if seen == 0 || self.pole {
             return None;
         }
         let (reset, inertial) = (self.carry == "reset", self.carry == "inertial");
         let rows = 5 + usize::from(self.force()) + usize::from(self.azimuth);
-        // without accelerometers and slews the rows that hold no drift are about psi alone
+        // without accelerometer errors and slews, the rows without drift are about psi alone
         let drift_alone = !(self.force() || inertial && self.is_torqued());
         let most = |k: usize| {
             let all = rows * k - if reset { 3 * k } else { 3 };
@@ -226,7 +226,7 @@ impl Problem {
         (1..=4).filter(|c| (*c != 2 || force) && (*c != 4 || self.azimuth)).collect()
     }
 
-    /// `S_i`: the local quantities of a position in terms of the unknowns.
+    /// Matrix `S_i`: local quantities of a position as functions of the unknowns.
     pub(crate) fn local<R: Ring>(
         &self,
         ring: &R,
@@ -259,7 +259,7 @@ impl Problem {
         s
     }
 
-    /// `C` of every position.
+    /// Attitude `C` of every position.
     pub(crate) fn attitudes<R: Ring>(&self, ring: &R) -> Vec<Matrix<R::Element>> {
         self.positions.iter().map(|a| attitude(ring, a)).collect()
     }
@@ -309,7 +309,7 @@ impl Problem {
     }
 }
 
-/// The axes of the gyros (I, O, S each) and of the accelerometers.
+/// Axes of the gyros (I, O, S each) and of the accelerometers.
 fn sensors(raw: &RawProblem) -> Result<([[Axis; 3]; 3], [Axis; 3]), Refused> {
     let mut gyros = [[(0, false); 3]; 3];
     for (i, (slot, gyro)) in gyros.iter_mut().zip(&raw.gyros).enumerate() {
@@ -333,7 +333,7 @@ fn sensors(raw: &RawProblem) -> Result<([[Axis; 3]; 3], [Axis; 3]), Refused> {
     Ok((gyros, inputs))
 }
 
-/// The coefficients of a term: names and how they enter.
+/// Coefficients of a term, with their names.
 fn of_term(term: &str, gyros: &[[Axis; 3]; 3], inputs: &[Axis; 3]) -> Vec<(String, Coefficient)> {
     let of = match term {
         _ if FORCE.contains(&term) => Source::Force,
@@ -367,7 +367,7 @@ fn of_term(term: &str, gyros: &[[Axis; 3]; 3], inputs: &[Axis; 3]) -> Vec<(Strin
     pairs.map(of_pair).collect()
 }
 
-/// The turns to every position.
+/// Turns to every position.
 fn slews(raw: &RawProblem, positions: &[[i64; 3]]) -> Result<Vec<Vec<Slew>>, Refused> {
     let Some(slews) = &raw.slews else { return Ok(Vec::new()) };
     let found = slews.len();
@@ -379,21 +379,21 @@ fn slews(raw: &RawProblem, positions: &[[i64; 3]]) -> Result<Vec<Vec<Slew>>, Ref
         need(turns.len() <= most, &place, &format!("at most {most} turns"), turns.len())?;
         let turn = |turn: &crate::file::RawTurn| {
             let about = match &turn.about {
-                None if turns.len() == 1 => About::Shortest,
+                None if turns.len() == 1 => TurnAxis::Shortest,
                 None => return Err(refusal(&place, "an axis where there are several turns", "null")),
                 Some(RawAxis::Direction(v)) => {
                     let plain = v.iter().all(|x| x.0.keys().all(|(_, a, b)| *a == 0 && *b == 0));
                     need(plain, &place, "numbers without rates", "a rate")?;
-                    About::Direction(v.clone())
+                    TurnAxis::Direction(v.clone())
                 }
                 Some(RawAxis::Named(name)) => match name.as_str() {
-                    "X_p" => About::Platform(0),
-                    "Y_p" => About::Platform(1),
-                    "Z_p" => About::Platform(2),
-                    "N" => About::Geographic(0),
-                    "U" => About::Geographic(1),
-                    "E" => About::Geographic(2),
-                    "middle" => About::Middle(positions[i - 1][2]),
+                    "X_p" => TurnAxis::Platform(0),
+                    "Y_p" => TurnAxis::Platform(1),
+                    "Z_p" => TurnAxis::Platform(2),
+                    "N" => TurnAxis::Geographic(0),
+                    "U" => TurnAxis::Geographic(1),
+                    "E" => TurnAxis::Geographic(2),
+                    "middle" => TurnAxis::Middle(positions[i - 1][2]),
                     _ => return Err(refusal(&place, "an axis of a turn", name)),
                 },
             };
@@ -413,7 +413,7 @@ fn axis(place: &str, text: &str) -> Result<Axis, Refused> {
     }
 }
 
-/// A decimal of degrees in 1e-9 degrees, in its only form.
+/// Decimal number of degrees in 1e-9 degrees; only its canonical form is accepted.
 pub(crate) fn nanodeg(place: &str, text: &str) -> Result<i64, Refused> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     let (whole, decimals) = digits.split_once('.').unwrap_or((digits, ""));
@@ -429,8 +429,8 @@ pub(crate) fn nanodeg(place: &str, text: &str) -> Result<i64, Refused> {
 }
 
 impl Functional {
-    /// Refuses what is no functional of the unknowns of a problem, or has an entry 0 or a power of a rate
-    /// that is 0.
+    /// Refuses a functional with names that are no unknowns of the problem, with an entry 0, or with a
+    /// power of a rate that is 0.
     pub(crate) fn check(&self, place: &str, problem: &Problem) -> Result<(), Refused> {
         need(!self.0.is_empty(), place, "at least one unknown", "none")?;
         for (name, number) in &self.0 {

@@ -1,4 +1,4 @@
-//! The problem that a scheme file states, as a certificate writes it.
+//! Problem of a scheme file, in the form of a certificate.
 
 use toml::Value;
 
@@ -6,7 +6,7 @@ use crate::file::{Number, RawAxis, RawGyro, RawProblem, RawTurn};
 use crate::problem::{TURN, all_terms, nanodeg};
 use crate::{Refused, refusal, same};
 
-/// Refuses unless the problem of a certificate is that of a scheme file.
+/// Refuses a certificate whose problem differs from that of a scheme file.
 pub(crate) fn compare(certificate: &RawProblem, scheme: &str) -> Result<(), Refused> {
     let found = read(scheme, certificate.slews.as_deref())?;
     let place = |key: &str| format!("problem.{key}, against the scheme file");
@@ -36,7 +36,7 @@ fn text<'a>(value: Option<&'a Value>, default: &'a str, what: &str) -> Result<&'
     }
 }
 
-/// The shortest decimal of a number.
+/// Shortest decimal of a number.
 fn decimal(value: &Value) -> Result<String, Refused> {
     match value {
         Value::Integer(i) => Ok(i.to_string()),
@@ -49,7 +49,7 @@ fn signed(axis: &str) -> String {
     if axis.starts_with(['+', '-']) { axis.into() } else { format!("+{axis}") }
 }
 
-/// Keys of a scheme file; those without a part in the problem are passed over.
+/// Keys of a scheme file; those that do not affect the problem are ignored.
 const KEYS: [&str; 16] = [
     "name",
     "description",
@@ -70,13 +70,13 @@ const KEYS: [&str; 16] = [
 ];
 const KEYS_OF_POSITION: [&str; 5] = ["name", "angles_deg", "attitude", "dwell_s", "slew"];
 
-/// Refuses keys that may have a part in the problem and are not known here.
+/// Refuses unknown keys, which may affect the problem.
 fn known_keys(table: &toml::Table, known: &[&str]) -> Result<(), Refused> {
     let other = table.keys().find(|key| !known.contains(&key.as_str()));
     other.map_or(Ok(()), |key| refused("keys of standing positions", key))
 }
 
-/// The terms, families written out.
+/// Names of the terms, with families expanded.
 fn terms(file: &toml::Table) -> Result<Vec<&'static str>, Refused> {
     let list: Vec<&str> = match file.get("terms") {
         None => vec!["F", "I", "O", "S"],
@@ -149,7 +149,7 @@ fn read(scheme: &str, claimed: Option<&[Vec<RawTurn>]>) -> Result<RawProblem, Re
     })
 }
 
-/// Three axes, in a table with these keys or in a list in their order.
+/// Three axes, from a table with these keys or a list in their order.
 fn axes(own: Option<&Value>, keys: [&str; 3], defaults: [&str; 3]) -> Result<[String; 3], Refused> {
     let found = match own {
         None => return Ok(defaults.map(signed)),
@@ -183,7 +183,7 @@ fn position(entry: &Value) -> Result<[String; 3], Refused> {
     }
 }
 
-/// The turns that a scheme file states; of a shortest turn those claimed, if they have its form.
+/// Turns that a scheme file states; for a shortest turn the claimed ones, if they have its form.
 fn slews(
     entries: &[Value],
     positions: &[[String; 3]],
@@ -222,14 +222,14 @@ fn slews(
     Ok(out)
 }
 
-/// The shortest decimal of an angle in 1e-9 degrees.
+/// Shortest decimal of an angle in 1e-9 degrees.
 fn in_degrees(nanodeg: i64) -> String {
     let (sign, m) = (if nanodeg < 0 { "-" } else { "" }, nanodeg.unsigned_abs());
     let text = format!("{sign}{}.{:09}", m / 1_000_000_000, m % 1_000_000_000);
     text.trim_end_matches('0').trim_end_matches('.').into()
 }
 
-/// The value of a number without rates.
+/// Value of a number without rates.
 fn value(x: &Number) -> f64 {
     let ratio = |q: &num_rational::BigRational| {
         let of = |n: &num_bigint::BigInt| n.to_string().parse::<f64>().unwrap_or(f64::NAN);
@@ -238,8 +238,8 @@ fn value(x: &Number) -> f64 {
     x.0.iter().map(|((r, _, _), q)| ratio(q) * f64::from(*r).sqrt()).sum()
 }
 
-/// One turn about a direction of a scheme file, by its angle (degrees) if one is stated: half a turn about
-/// it, or the turn below 180 degrees that the attitudes give.
+/// True for one turn about a direction of a scheme file, by its angle (degrees) if one is stated: half
+/// a turn about it, or the turn below 180 degrees between the attitudes.
 fn is_along(turns: &[RawTurn], direction: &[Value], angle: Option<&str>) -> bool {
     let [turn] = turns else { return false };
     let number = |x: &Value| x.as_float().or(x.as_integer().map(|i| i as f64));
@@ -257,8 +257,8 @@ fn is_along(turns: &[RawTurn], direction: &[Value], angle: Option<&str>) -> bool
     }
 }
 
-/// One turn below 180 degrees about the axis that the attitudes give, or a half turn about a direction whose
-/// first component not 0 is positive.
+/// True for one turn below 180 degrees about the axis between the attitudes, or a half turn about a
+/// direction whose first non-zero component is positive.
 fn is_shortest(turns: &[RawTurn]) -> bool {
     let [turn] = turns else { return false };
     let angle = nanodeg("", &turn.angle_deg).unwrap_or(0);
@@ -271,7 +271,7 @@ fn is_shortest(turns: &[RawTurn]) -> bool {
     }
 }
 
-/// The angles of an attitude by the directions of X_p, Y_p, Z_p: those with the fewest that are not 0.
+/// Angles of an attitude by the directions of X_p, Y_p, Z_p: those with the fewest non-zero angles.
 fn cardinal(letters: &str) -> Result<[String; 3], Refused> {
     let quarters = [(0, 1, 0), (90, 0, 1), (180, -1, 0), (-90, 0, -1)];
     let direction = |axis: [i32; 3]| match axis {
@@ -284,7 +284,7 @@ fn cardinal(letters: &str) -> Result<[String; 3], Refused> {
     };
     let all = (0..64).map(|i| [quarters[i / 16], quarters[i / 4 % 4], quarters[i % 4]]);
     let fits = |[(_, ca, sa), (_, cb, sb), (_, cg, sg)]: &[(i32, i32, i32); 3]| {
-        // the columns of Mx My Mz
+        // columns of Mx My Mz
         let x = [cb * cg, -ca * sg + sa * sb * cg, sa * sg + ca * sb * cg];
         let y = [cb * sg, ca * cg + sa * sb * sg, -sa * cg + ca * sb * sg];
         let z = [-sb, sa * cb, ca * cb];

@@ -1,6 +1,8 @@
-// What is asked after an edit: verdicts at once, solutions and sigmas when the hand rests, sweeps behind.
+// Questions after an edit: verdicts at once, solutions and sigmas after a pause, sweeps in the background.
 
-/** A message for everyone, also for those who do not see it; `kind` is `fine`, or `unseen` where the page shows it anyway. */
+/**
+ * Shows a message, also to screen readers. `kind`: `fine`, or `unseen` where the page shows the text anyway.
+ */
 function say(text, kind = '') {
   $('notice').className = kind;
   $('notice').textContent = text;
@@ -33,7 +35,7 @@ async function verdictsNow() {
     put($('summary'), 'not judged: what is below is of the scheme before');
     return wrong(found.problem);
   }
-  // an entry that was refused after this question stays refused
+  // a refusal that came after this question stays on the page
   if (Number($('notice').dataset.problem) <= before) { say(''); delete $('notice').dataset.problem; }
   verdicts.now = found;
   drawVerdicts();
@@ -51,16 +53,16 @@ function failed(problem) {
   return null;
 }
 
-/** Solutions and sigmas, once nothing changes for a moment. */
+/** Asks for solutions and sigmas after a pause without edits. */
 function askRest() {
   clearTimeout(resting);
-  // what was under way behind leaves the machine to the verdicts
+  // ends the sweep in the background, so that the verdicts have the machine
   round++;
   resting = setTimeout(async () => {
     if (!state.scheme.position?.length) return;
     const asked = JSON.stringify(state.scheme), named = [source(state.scheme)];
     const still = () => asked === JSON.stringify(state.scheme);
-    // what follows is told against the verdicts
+    // the sigmas below are shown beside the verdicts, which come first
     await answered;
     if (!still() || isStale()) return;
     const run = await behind.ask('call', ['simulate', { sources: named }], { lane: 'sigmas' }).catch(failed);
@@ -90,7 +92,7 @@ function askRest() {
   }, 160);
 }
 
-/** What a position is needed for: the unknowns that the others do not show, and those that they show later. */
+/** Unknowns that need a position: not observable without it (`lost`), or of a higher degree (`later`). */
 async function without(at) {
   const scheme = copy(state.scheme);
   scheme.position.splice(at, 1);
@@ -106,7 +108,7 @@ async function without(at) {
   return { lost, later };
 }
 
-/** The scheme without each position, the chosen one first. */
+/** Judges the scheme without each position, the selected one first. */
 async function dropOne() {
   const all = state.scheme.position ?? [], asked = JSON.stringify(state.scheme), at = state.selected;
   if (all.length < 2 || all.length > 60) { put($('drop-one'), ''); return drawNeeds(null); }
@@ -126,7 +128,7 @@ async function dropOne() {
   drawNeeds(needs);
 }
 
-// what each position was found to be needed for, of which scheme
+// need of each position, and the scheme that it is of
 const needed = { of: null, by: [] };
 
 function drawNeeds(needs) {
@@ -136,9 +138,9 @@ function drawNeeds(needs) {
   });
 }
 
-// what a slider's range was found to hold, by the scheme without that angle
+// degrees and sigmas along a slider, by the scheme without that angle
 const sweeps = new Map();
-// of more positions they would take too long
+// sweeps of schemes with more positions would take too long
 const MANY = 30;
 const strip = { axis: 0, of: null };
 const GRID = Array.from({ length: 73 }, (_, i) => i * 5 - 180);
@@ -152,7 +154,10 @@ function sweepKey(axis) {
   return JSON.stringify([state.selected, s]);
 }
 
-/** The angles that are tried along a slider: multiples of 5, then those of the other positions, their mirror images, and quarter turns from both. */
+/**
+ * Angles tried along a slider: multiples of 5, the other positions' angles, mirror images, quarter turns of
+ * both.
+ */
 function anglesToTry(axis) {
   const wrapped = (angle) => +(((angle + 540) % 360) - 180).toFixed(9);
   const others = state.scheme.position.filter((_, i) => i !== state.selected).map((p) => anglesOfPosition(p)?.[axis] ?? 0);
@@ -200,7 +205,7 @@ async function sweep(axis, mine) {
 }
 
 let round = 0;
-/** What is told of all angles of the sliders, the one in hand first. */
+/** Sweeps all angles of the sliders in the background, the slider in use first. */
 async function askBehind() {
   const mine = ++round;
   behind.forget('sweep');
@@ -223,7 +228,7 @@ function drawSweep(axis) {
 const signature = (degrees) => Object.values(degrees).map((d) => d ?? '-').join(' ');
 const ranked = (degrees) => Object.values(degrees).filter((d) => d !== null).length;
 
-/** Where the verdict is another than nearly everywhere. */
+/** Marks the angles whose verdict differs from the most frequent one. */
 function drawMarks(axis) {
   const key = chosen() && sweepKey(axis), found = key && sweeps.get(key);
   mark(AXES[axis], found?.grid ?? GRID, found?.degrees);
@@ -250,7 +255,7 @@ function mark(slider, grid, degrees) {
 
 const LATITUDES = GRID.filter((angle) => Math.abs(angle) <= 90);
 
-/** The latitudes at which the verdict is another. */
+/** Finds the latitudes whose verdict differs from the most frequent one. */
 async function sweepLatitudes(mine) {
   if (state.scheme.position.length > MANY) return;
   const keyNow = () => JSON.stringify({ ...state.scheme, latitude_deg: null }), key = keyNow();
@@ -266,7 +271,7 @@ async function sweepLatitudes(mine) {
   mark('latitude', LATITUDES, degrees);
 }
 
-/** The choice of the unknown whose sigma the strip shows. */
+/** Offers the unknowns whose sigma the strip can show. */
 function offerStrip(rows) {
   const box = $('strip-of'), names = rows.map((q) => q.name);
   if (box.dataset.of === names.join()) return;
@@ -276,7 +281,7 @@ function offerStrip(rows) {
   strip.of = box.value;
 }
 
-/** Degrees of all unknowns along the slider, a line of cells each, and the sigma of one of them. */
+/** Draws the degrees of all unknowns along the slider, a row of cells each, and the sigma of one unknown. */
 function drawStrip() {
   const canvas = $('strip');
   if (!canvas.clientWidth) return;

@@ -1,4 +1,4 @@
-// The best schemes of the cardinal attitudes, and the text of schemes and models.
+// Search for the best schemes of the cardinal attitudes; the text of schemes and models.
 
 async function search() {
   const k = Number($('design-k').value);
@@ -20,7 +20,7 @@ async function search() {
   const began = performance.now();
   let ended = 0;
   const going = (now) => {
-    // a stage that is done is followed by another
+    // the bar is indeterminate between two stages
     if (now.total && now.done < now.total) $('design-progress').value = now.done / now.total; else $('design-progress').removeAttribute('value');
     put($('design-said'), `${now.what}: ${now.done}${now.total ? ` of ${now.total}` : ''}${now.best ? `, best so far ${now.best.toPrecision(4)}` : ''}`);
   };
@@ -38,7 +38,7 @@ async function search() {
   $('design-stop').disabled = true;
 }
 
-// the conditions that what is found is of
+// conditions of the listed schemes
 let foundOf = null;
 const conditions = () => JSON.stringify({ ...state.scheme, position: 0, combinations: 0, name: 0, description: 0 });
 
@@ -59,7 +59,7 @@ function drawFound(design, took, wanted) {
     load.addEventListener('click', () => {
       edit((s) => {
         s.position = f.angles.map((a) => positionOf(a, s.gimbals));
-        // the direction of a half turn belongs to the scheme
+        // the direction of a half turn is part of the scheme
         f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
         state.selected = 0;
       });
@@ -71,14 +71,14 @@ function drawFound(design, took, wanted) {
   $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met'], rows));
 }
 
-/** A position from angles as the answer has them: by letters only where no gimbal limits ask for these angles. */
+/** Position from the angles of an answer: by letters, unless gimbal limits require these angles. */
 function positionOf(text, gimbals) {
   const angles = text.split(',').map(Number);
   const letters = !gimbals && angles.every(Number.isFinite) ? lettersOf(matrixOf(angles)) : null;
   return letters ? { attitude: letters } : { angles_deg: text.split(',').map((t) => (Number.isFinite(Number(t)) ? Number(t) : t.trim())) };
 }
 
-/** The line of a place with what is meant marked under it. */
+/** The line of a text with the place of a problem marked under it. */
 function placed(text, { line, start, end }) {
   const from = text.lastIndexOf('\n', start - 1) + 1, whole = text.slice(from).split('\n', 1)[0], cut = Math.max(0, start - from - 40);
   const shownLine = whole.slice(cut, cut + 72), marked = Math.max(1, Math.min(end, from + whole.length) - start);
@@ -86,7 +86,7 @@ function placed(text, { line, start, end }) {
   return `${head}${shownLine}\n${' '.repeat(head.length + start - from - cut)}${'^'.repeat(Math.min(marked, 72))}`;
 }
 
-/** What is written in the text, judged. */
+/** Judges the text in the editor. */
 async function judgeText() {
   const text = $('text').value;
   const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { lane: 'text' }).catch((p) => ({ problem: p }));
@@ -146,7 +146,7 @@ function setText(text, name) {
   judgeText();
 }
 
-/** The text as positions. */
+/** Takes the text over as positions. */
 async function take() {
   const name = writing.name;
   if (await openText($('text').value, name)) {

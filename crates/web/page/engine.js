@@ -1,11 +1,12 @@
-// Workers that run the engine. Of a worker one question is under way at a time; of a lane only the latest waits.
+// Workers that run the engine. A worker answers one question at a time. Only the latest question of a lane
+// waits.
 
 const DATA = JSON.parse(document.getElementById('data').textContent);
 const SOURCE = URL.createObjectURL(new Blob([DATA.worker], { type: 'text/javascript' }));
-// compiled once, by the first worker that is ready
+// engine compiled by the first worker that is ready, for all others
 let compiled = null;
 
-/** A worker that is started when it is first asked, and again after a crash or a stop. */
+/** A worker that starts at the first question, and again after a crash or a stop. */
 function makeEngine() {
   let worker = null, current = null, next = 0;
   const waiting = [];
@@ -42,7 +43,7 @@ function makeEngine() {
     worker = null;
     const left = current;
     current = null;
-    // what was to start the old worker must not start the new one
+    // drops the start message of the ended worker: the next worker gets its own
     const starts = waiting.findIndex((w) => w.kind === 'start');
     if (starts >= 0) waiting.splice(starts, 1);
     return left;
@@ -54,7 +55,7 @@ function makeEngine() {
   }
 
   return {
-    /** Asks; null where a later question of the same lane came first. */
+    /** Asks; resolves to null if a later question of the same lane replaces this one. */
     ask(kind, args, { lane, going } = {}) {
       return new Promise((resolve, reject) => {
         if (lane) {
@@ -66,13 +67,13 @@ function makeEngine() {
         step();
       });
     },
-    /** Forgets what waits in lanes that begin so. */
+    /** Drops waiting questions of lanes that begin with `lane`. */
     forget(lane) {
       for (let i = waiting.length - 1; i >= 0; i--) {
         if (waiting[i].lane?.startsWith(lane)) waiting.splice(i, 1)[0].resolve(null);
       }
     },
-    /** Ends what is under way. */
+    /** Ends the current question. */
     stop() {
       end()?.reject({ kind: 'interrupted', message: 'Stopped.' });
       step();
@@ -80,10 +81,10 @@ function makeEngine() {
   };
 }
 
-// what follows every input, and what may take its time
+// workers for questions after every input, for slow questions, and for searches
 const live = makeEngine(), behind = makeEngine(), searcher = makeEngine();
 
-/** A command as the command line knows it. */
+/** Answers a command of the command line; `request` holds its options and files. */
 async function call(command, request) {
   return live.ask('call', [command, request]);
 }

@@ -20,7 +20,7 @@ function anglesOf(c) {
 
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-/** The matrix of `NUE` and the like; null where the letters are no right-handed axes. */
+/** The matrix of three letters such as `NUE`; null if the letters are no right-handed axes. */
 function matrixOfLetters(letters) {
   const axes = [...letters.toUpperCase()].map((l) => LETTERS[l]);
   if (axes.length !== 3 || axes.some((a) => !a)) return null;
@@ -29,7 +29,7 @@ function matrixOfLetters(letters) {
   return [0, 1, 2].map((i) => axes.map((a) => a[i]));
 }
 
-/** `NUE` where the axes are along these directions. */
+/** Letters of the axes' directions, such as `NUE`; null if an axis is not along one of the six. */
 function lettersOf(c) {
   const name = (j) => Object.entries(LETTERS).find(([, v]) => v.every((x, i) => Math.abs(x - c[i][j]) < 1e-9))?.[0];
   const letters = [0, 1, 2].map(name);

@@ -1,4 +1,4 @@
-// Tabs, files, links, keys; and the start.
+// Tabs, files, links, keys; start of the page.
 
 const TABS = ['scheme', 'design', 'text'];
 
@@ -13,7 +13,7 @@ function show(tab) {
   if (tab === 'scheme') { canvasSoon(); drawVerdicts(); }
 }
 
-/** Gives a file to whoever asked for it. */
+/** Downloads a text as a file. */
 function download(text, name, type) {
   const url = URL.createObjectURL(new Blob([text], { type }));
   const a = element('a', { href: url, download: name });
@@ -27,10 +27,10 @@ async function openFile(file) {
   await openText(await file.text(), file.name);
 }
 
-// a scheme of a thousand positions has half as many
+// most characters of a link; a scheme of a thousand positions needs half as many
 const LONGEST_LINK = 400_000;
 
-/** Reads the scheme that an address holds. */
+/** Opens the scheme in the page's address. */
 async function openLink() {
   const held = new URLSearchParams(location.hash.slice(1)), part = held.get('scheme') ?? held.get('text');
   if (!part) return false;
@@ -126,6 +126,6 @@ async function begin() {
   document.documentElement.dataset.ready = 'yes';
 }
 
-// the commands, for whoever opens the console
+// commands for the browser's console
 window.obsdeg = { call, scheme: () => toToml(state.scheme), ask: live.ask };
 begin();

@@ -1,4 +1,4 @@
-// The list of positions, the sliders of the one that is chosen, and the conditions.
+// The list of positions, the sliders of the selected position, and the conditions.
 
 const $ = (id) => document.getElementById(id);
 const AXES = ['alpha', 'beta', 'gamma'];
@@ -9,7 +9,7 @@ function element(tag, properties = {}, ...children) {
   return e;
 }
 
-// to a billionth of a degree, as angles are kept
+// rounded to 1e-9 deg, the resolution of angles
 const shown = (x) => decimal(Math.round(x * 1e9) / 1e9).replace('-', '\u2212');
 const chosen = () => state.scheme.position?.[state.selected];
 
@@ -74,7 +74,7 @@ function row() {
   return element('li', {}, grip, name, element('small', { className: 'need' }), element('span', { className: 'moves' }, ...moves));
 }
 
-/** Carries a position to where the pointer lets it go. */
+/** Drags a position to the place in the list where the pointer is released. */
 function lift(e) {
   e.preventDefault();
   const grip = e.currentTarget, list = $('positions'), from = indexOf(grip);
@@ -103,9 +103,9 @@ function lift(e) {
   for (const [kind, f] of [['pointermove', over], ['pointerup', drop], ['pointercancel', drop]]) grip.addEventListener(kind, f);
 }
 
-/** Gives the chosen position other angles. */
+/** Sets one Euler angle of the selected position. */
 function setAngle(axis, value, as) {
-  // angles by name stay beside it
+  // the other two angles stay, also if they are names
   const { angles_deg: own } = chosen();
   const before = anglesOfPosition(chosen()) ?? (own?.length === 3 ? own : [0, 0, 0]);
   edit(() => {
@@ -161,7 +161,7 @@ function drawSelected() {
   canvasSoon();
 }
 
-/** A number in a field, or nothing where it is empty; NaN where it is no number. */
+/** Number in a field; undefined if the field is empty, NaN if it holds no number. */
 const numberIn = (e) => (e.value.trim() === '' ? undefined : finite(e.value));
 const finite = (text) => {
   const x = text?.trim() ? Number(text.trim().replace('\u2212', '-')) : NaN;
@@ -169,7 +169,7 @@ const finite = (text) => {
 };
 const refuse = (message) => wrong({ message });
 
-/** Puts a value into the scheme, or takes it out. */
+/** Sets a value of the scheme, or removes it. */
 function setKey(path, value, as) {
   edit((s) => {
     const keys = path.split('.'), last = keys.pop();

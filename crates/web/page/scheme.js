@@ -1,11 +1,11 @@
-// The scheme that is edited: an object laid out as a scheme file, with its history, as TOML and as a link.
+// The edited scheme: an object laid out as a scheme file, with its history, as TOML and as a link.
 
 const START = { carry: 'platform', position: [{ angles_deg: [0, 0, 0] }, { angles_deg: [180, 0, 0] }] };
 const copy = (x) => JSON.parse(JSON.stringify(x));
 
 const state = { scheme: copy(START), name: 'scheme.toml', selected: 0 };
 const past = [], future = [], listeners = [];
-// edits of one gesture, such as a slider that is dragged, are one step back
+// edits of one gesture, such as dragging a slider, are undone in one step
 let gesture = null;
 
 const isPlain = (x) => x !== null && typeof x === 'object' && !Array.isArray(x);
@@ -17,7 +17,7 @@ function tomlValue(v) {
   return typeof v === 'number' ? decimal(v) : String(v);
 }
 
-/** A number without an exponent where it is small: angles are decimals. */
+/** A small number without an exponent: angles are decimals. */
 function decimal(x) {
   const [digits, power] = String(x).split('e-');
   if (!power) return digits;
@@ -47,7 +47,7 @@ function toToml(scheme) {
   return `${out.join('\n').trim()}\n`;
 }
 
-/** Where an angle is a name, it has no number. */
+/** Euler angles of a position in deg; null if one of them is a name. */
 function anglesOfPosition(p) {
   if (typeof p.attitude === 'string') {
     const c = matrixOfLetters(p.attitude);
@@ -59,7 +59,7 @@ function anglesOfPosition(p) {
 
 const nameOfPosition = (p, i) => p.name ?? `p${i + 1}`;
 
-/** Changes the scheme; `as` is the gesture that the change is a part of. */
+/** Changes the scheme; `as` names the gesture that the change belongs to. */
 function edit(change, as = null) {
   if (!as || gesture !== as) {
     past.push(JSON.stringify([state.scheme, state.selected, state.name]));
@@ -90,7 +90,7 @@ function restore(from, to) {
 const undo = () => restore(past, future);
 const redo = () => restore(future, past);
 
-/** Takes another scheme in place of this one. */
+/** Replaces the scheme by another. */
 function replace(scheme, name = 'scheme.toml') {
   edit(() => {
     state.scheme = scheme;
@@ -100,7 +100,7 @@ function replace(scheme, name = 'scheme.toml') {
   });
 }
 
-/** A text as part of an address. */
+/** A text encoded for the page's address. */
 function packed(text) {
   const binary = Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b)).join('');
   return btoa(binary).replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '');

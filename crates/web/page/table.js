@@ -1,10 +1,10 @@
-// The table of verdicts, what changed in it, links between what cannot be told apart, sigmas against requirements.
+// The table of verdicts: changes, links between indistinguishable unknowns, sigmas against requirements.
 
 const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
-// the verdicts of the scheme as it is, those before the last gesture, its sigmas by name
+// verdicts of the current scheme and of the one before the last gesture; sigmas by name
 const verdicts = { now: null, before: null, sigmas: null, sigmasOf: null, solutions: null, solutionsOf: null };
 
-/** What is on the table is what changes are told against, from here on. */
+/** Makes the verdicts of the table those that later changes are compared with. */
 function emphasise() { verdicts.before = verdicts.now ?? verdicts.before; }
 
 const verdictOf = (q) => (q.degree === null || q.degree === undefined ? WORDS[q.status] ?? q.status : String(q.degree));
@@ -26,7 +26,7 @@ function putMath(e, math, text) {
   if (math) e.innerHTML = math; else e.replaceChildren(text.length > 60 ? element('code', { textContent: text }) : text);
 }
 
-/** A name as a formula, and as a text for those who hear it. */
+/** A name as a formula, and as a text for screen readers. */
 function putName(e, math, name) {
   if (e.dataset.of === (math || name)) return;
   putMath(e, math, name);
@@ -73,7 +73,7 @@ function drawVerdicts() {
     drawSolution(cell(tr, 5, 'solution'), q, name);
   });
   drawLinks(rows);
-  // of another scheme they are faint until those of this one are there
+  // sigmas of another scheme are faint until those of this scheme arrive
   const asked = JSON.stringify(state.scheme);
   table.classList.toggle('old-sigmas', verdicts.sigmasOf !== asked);
   if (verdicts.sigmasOf !== asked) drawOmitted(null);
@@ -89,14 +89,14 @@ function drawVerdicts() {
   offerStrip(rows);
 }
 
-/** Classes of the terms of a family in words: one for all, or how many of each. */
+/** Classes of the terms of a family in words: one class for all, or the number of terms in each. */
 function classes(f) {
   if (f.no_effect === null) return '\u2013';
   const counts = [[f.no_effect, 'no effect'], [f.silent, 'silent'], [f.terms - f.no_effect - f.silent, 'visible']].filter(([n]) => n);
   return counts.length === 1 ? counts[0][1] : counts.map(([n, word]) => `${n} ${word}`).join(', ');
 }
 
-/** The families of errors that the scheme does not estimate, with the change of the estimates per unit of each. */
+/** Draws the families of errors that are not estimated, and the change of the estimates per unit of each. */
 function drawOmitted(omitted) {
   $('not-estimated').hidden = !omitted;
   if (!omitted) return;
@@ -111,7 +111,7 @@ function drawOmitted(omitted) {
   $('omitted').replaceChildren(table);
 }
 
-/** The first lines of the answer: the answer, and what resolves what is not observable. */
+/** Shows the first lines of the answer, and remedies for unknowns that are not observable. */
 function drawSentences(e, sentences = []) {
   if (e.dataset.of === sentences.join('\n')) return;
   e.dataset.of = sentences.join('\n');
@@ -119,7 +119,7 @@ function drawSentences(e, sentences = []) {
 }
 
 const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };
-// a solution of more terms is folded
+// number of terms from which a solution is folded
 const SHORT = 8;
 
 /** A solution as a formula, folded where it has many terms. */
@@ -146,7 +146,7 @@ function drawSolution(td, q, name) {
   putMath(td, '', where ? `${why}; ${where}` : why);
 }
 
-/** Two digits, without an exponent where a number is large. */
+/** Two significant digits, without an exponent for large numbers. */
 const two = (x) => (x >= 100 && x < 1e7 ? String(Number(x.toPrecision(2))) : x.toPrecision(2));
 
 function drawSigma(td, name) {
@@ -155,7 +155,7 @@ function drawSigma(td, name) {
   if (td.dataset.of === key) return;
   td.dataset.of = key;
   if (!s) return td.replaceChildren();
-  // a requirement is held against what decides: with a bench the total
+  // the requirement is compared with the total where a bench is stated, else with sigma
   const sigma = s.predicted_sigma, decides = s.total ?? sigma;
   const total = s.total !== undefined && two(s.total) !== two(sigma) ? `, total ${two(s.total)}` : '';
   const said = sigma === null ? 'not determined' : `${two(sigma)}${total} ${s.unit}`;
@@ -176,7 +176,7 @@ function drawSigma(td, name) {
   td.replaceChildren(box, said);
 }
 
-/** Arcs beside the table between unknowns that cannot be told apart. */
+/** Draws arcs beside the table between indistinguishable unknowns. */
 function drawLinks(rows) {
   const svg = $('links'), body = $('verdicts').querySelector('tbody');
   const places = rows.map((_, i) => body.rows[i].offsetTop + body.rows[i].offsetHeight / 2);

@@ -1,4 +1,4 @@
-// Five steps that show what the page is for; each sets the scheme that it speaks of.
+// Five steps that show the use of the page; each sets its scheme.
 
 const SIX = [[10, 25, 40], [130, -50, 70], [-95, 33, -160], [60, 80, 15], [-20, -70, 110], [170, 15, -75]].map((angles_deg) => ({ angles_deg }));
 const TOUR = [
@@ -33,7 +33,7 @@ function drawTour() {
   $('tour-next').disabled = tourStep === TOUR.length - 1;
 }
 
-/** Has the table tell what differs from another step, or nothing. */
+/** Shows in the table the differences from another step; without a step, none. */
 async function compareWith(step) {
   const mine = tourStep;
   verdicts.before = null;

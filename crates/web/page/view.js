@@ -1,17 +1,17 @@
-// The platform in three dimensions, as the reports draw it: North to the right, Up upwards, East towards the reader.
+// The platform in three dimensions, as in reports: North to the right, Up upwards, East towards the reader.
 
 const look = { azimuth: 40 * RAD, elevation: 20 * RAD };
-// an attitude on the way, while a slew is shown
+// attitude during a shown slew
 let onTheWay = null;
 
-// the colours of the page, until the other scheme is preferred
+// colours of the page by name; cleared when the preferred colour scheme changes
 const palette = new Map();
 function color(name) {
   if (!palette.has(name)) palette.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
   return palette.get(name);
 }
 
-/** A canvas at the resolution of the screen; its context and its size. */
+/** Drawing context and size in pixels of a canvas at the resolution of the screen. */
 function sheet(canvas) {
   const scale = window.devicePixelRatio || 1, [w, h] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
@@ -25,7 +25,7 @@ function sheet(canvas) {
   return [c, w, h];
 }
 
-/** Right, down and towards the reader. */
+/** Components of a vector to the right, downwards and towards the reader. */
 function seen([n, u, e]) {
   const [sa, ca, sh, ch] = [Math.sin(look.azimuth), Math.cos(look.azimuth), Math.sin(look.elevation), Math.cos(look.elevation)];
   const near = n * sa + e * ca;
@@ -34,7 +34,7 @@ function seen([n, u, e]) {
 
 const GYROS = { X: { I: '+x', O: '-z', S: '+y' }, Y: { I: '+y', O: '-z', S: '-x' }, Z: { I: '+z', O: '+x', S: '+y' } };
 
-/** An axis of the platform in n. */
+/** Axis of the platform, such as `-x`, in n. */
 function axisOf(c, text) {
   const j = 'xyz'.indexOf(text[1]);
   return c.map((row) => (text[0] === '-' ? -1 : 1) * row[j]);
@@ -112,7 +112,7 @@ function drawView() {
   }
 }
 
-/** Shows how the platform turns from this position to the next, the shortest way. */
+/** Shows the shortest slew from this position to the next. */
 function showSlew() {
   const all = state.scheme.position, at = state.selected, next = (at + 1) % all.length;
   const [from, to] = [anglesOfPosition(all[at]), anglesOfPosition(all[next])];

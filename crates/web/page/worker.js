@@ -1,13 +1,13 @@
-// The engine in a thread of its own. Messages in: { id, kind, args }; out: { id, out }, { id, going } and { id, crash }.
+// The engine in a thread. Messages in: { id, kind, args }; out: { id, out }, { id, going } and { id, crash }.
 let asked = 0;
 
-// the engine tells how far it is
+// called by the engine with its progress
 function going(now) {
   postMessage({ id: asked, going: JSON.parse(now) });
   return true;
 }
 
-// four bytes of five digits to the base 85, both least significant first
+// four bytes from five digits to base 85, both least significant first
 function bytes(text) {
   const start = text.indexOf(' ') + 1, out = new Uint8Array(Number(text.slice(0, start)));
   for (let i = start, at = 0; i < text.length; i += 5, at += 4) {
@@ -31,7 +31,7 @@ const cut = (number) => (Number(number) < 1e-6 ? number : String(Number(Number(n
 const readable = (term) => ({ ...term, coefficient: term.coefficient.replace(/\d+\.\d{6,}/g, cut) });
 
 const KINDS = {
-  // the engine, packed; or what another worker compiled of it
+  // starts the engine: packed, or as a module that another worker compiled
   start({ unpack, engine, module }) {
     if (!module) {
       obsdeg_unpack.initSync({ module: bytes(unpack) });
@@ -42,7 +42,7 @@ const KINDS = {
   },
   call: (command, request) => JSON.parse(obsdeg_web.call(command, JSON.stringify(request))),
   toml: (text) => JSON.parse(obsdeg_web.toml_as_json(text)),
-  // an answer with its formulas, whose decimals are cut to what one reads
+  // an answer with its formulas, whose decimals are shortened
   verdicts(request) {
     const said = KINDS.call('analyze', request);
     if (said.problem) return said;

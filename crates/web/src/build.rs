@@ -1,4 +1,4 @@
-//! The engine compiled and packed, and the page around it.
+//! Build of the page: the compiled and packed engine, with the page around it.
 
 use std::fs;
 use std::io::Write;
@@ -16,7 +16,7 @@ use wasm_bindgen_cli_support::Bindgen;
 const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/page.css");
 const WORKER: &str = include_str!("../page/worker.js");
-/// The scripts of the page, one after the other.
+/// Scripts of the page, in the order in which they run.
 const SCRIPTS: [&str; 10] = [
     include_str!("../page/engine.js"),
     include_str!("../page/geometry.js"),
@@ -30,21 +30,22 @@ const SCRIPTS: [&str; 10] = [
     include_str!("../page/main.js"),
 ];
 
-/// Why there is no page.
+/// Error that ends the build of the page.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BuildError {
-    /// A file.
+    /// A file that cannot be read or written.
     #[error("{path}: {reason}")]
     File { path: String, reason: std::io::Error },
-    /// The compiler, which has said more.
+    /// The compiler failed; its own message says more.
     #[error(
-        "the engine was not compiled; expected the target wasm32-unknown-unknown (rustup target add wasm32-unknown-unknown)"
+        "the engine was not compiled; expected the target wasm32-unknown-unknown (rustup target add \
+         wasm32-unknown-unknown)"
     )]
     Compiler,
-    /// The glue between script and engine.
+    /// The script between page and engine could not be made.
     #[error("no glue: {0}")]
     Glue(String),
-    /// The page.
+    /// The template of the page could not be filled in.
     #[error("no page: {0}")]
     Page(#[from] minijinja::Error),
 }
@@ -55,7 +56,7 @@ struct Module {
     script: String,
 }
 
-/// Writes the page, and says what it wrote.
+/// Writes the page; returns its path and sizes in words.
 pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let compiled = compile(&root)?;
@@ -78,7 +79,7 @@ pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
         script => &script,
         script_digest => digest(&script),
         version => env!("CARGO_PKG_VERSION"),
-        // nothing in it ends the element that holds it
+        // without `<`, no text in the data ends the script element
         data => data.to_string().replace('<', "\\u003c"),
     })?;
     let path = asked.unwrap_or_else(|| root.join("target/workbench.html"));
@@ -88,7 +89,7 @@ pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
     Ok(format!("{}: {all:.2} MB; the engine {whole:.2} MB, packed {small:.2} MB", path.display()))
 }
 
-/// Compiles the engine and what unpacks it; the files that came of it.
+/// Compiles the engine and the unpacking module; returns the paths of the WebAssembly files.
 fn compile(root: &Path) -> Result<Vec<PathBuf>, BuildError> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let done = Command::new(cargo)
@@ -105,7 +106,7 @@ fn compile(root: &Path) -> Result<Vec<PathBuf>, BuildError> {
     Ok(paths.filter(|p| p.extension().is_some_and(|e| e == "wasm")).collect())
 }
 
-/// The one of these files with that name, and the script that calls it.
+/// The compiled module of that name, with the script that calls it.
 fn glued(compiled: &[PathBuf], name: &str) -> Result<Module, BuildError> {
     let file =
         compiled.iter().find(|p| p.file_stem().is_some_and(|s| s == name)).ok_or(BuildError::Compiler)?;
@@ -118,7 +119,7 @@ fn glued(compiled: &[PathBuf], name: &str) -> Result<Module, BuildError> {
     Ok(Module { wasm: output.wasm_mut().emit_wasm(), script: output.js().into() })
 }
 
-/// Packed as LZMA.
+/// Bytes packed with LZMA.
 fn packed(bytes: &[u8]) -> Result<Vec<u8>, BuildError> {
     let options =
         LzmaOptions { nice_len: 273, dict_size: 1 << 24, lc: 4, pb: 0, ..LzmaOptions::with_preset(9) };
@@ -130,9 +131,9 @@ fn packed(bytes: &[u8]) -> Result<Vec<u8>, BuildError> {
     write().map_err(|reason| BuildError::File { path: "packing".into(), reason })
 }
 
-/// Bytes as characters, five for four (base64 takes five and a third): four bytes are a number, least
-/// significant first, its digits to the base 85 likewise, from `(` on without the backslash. The length
-/// stands before them.
+/// Bytes as text, five characters for four bytes (base64: 5.33). Four bytes are a number, least significant
+/// byte first; its five digits to the base 85 follow, least significant first. Digits are the characters from
+/// `(` on, with `}` for the backslash and `~` for `<`. The number of bytes stands before them.
 fn as_text(bytes: &[u8]) -> String {
     let mut out = format!("{} ", bytes.len());
     for chunk in bytes.chunks(4) {
@@ -152,7 +153,7 @@ fn as_text(bytes: &[u8]) -> String {
     out
 }
 
-/// Schemes and models of the repository's examples, with what its list says of each.
+/// Schemes and models of the repository's examples, each with its description in the list of examples.
 fn examples(root: &Path) -> Result<Vec<Value>, BuildError> {
     let read = |path: &Path| {
         fs::read_to_string(path)
@@ -175,7 +176,7 @@ fn examples(root: &Path) -> Result<Vec<Value>, BuildError> {
     Ok(out)
 }
 
-/// What a content security policy calls a text by.
+/// Digest of a script or style, as a content security policy names it.
 fn digest(text: &str) -> String {
     STANDARD.encode(Sha256::digest(text))
 }

@@ -1,4 +1,4 @@
-//! What the page's worker calls: the commands, and what only a page needs of texts.
+//! Functions that the page's worker calls: the commands, and texts that only a page needs.
 #![cfg(target_arch = "wasm32")]
 
 use obsdeg_commands::{Host, Now, Problem};
@@ -7,44 +7,44 @@ use wasm_bindgen::prelude::wasm_bindgen;
 
 #[wasm_bindgen]
 extern "C" {
-    /// Of the worker: hears how far the work is, as JSON; false ends it.
+    /// Function of the worker that receives progress as JSON; it returns false to end the work.
     fn going(now: &str) -> bool;
 }
 
-/// A command by its name, with options and files as JSON. The answer is `{"text", "sentences", "passed"}`:
-/// the text is the command line's with `--format json`, the sentences are its first lines; or `{"problem":
-/// {"kind", "message", "place"}}`.
+/// Answers a command by its name, with options and files as JSON. The answer is
+/// `{"text", "sentences", "passed"}`: `text` is that of the command line with `--format json`, `sentences`
+/// are its first lines. A failure is `{"problem": {"kind", "message", "place"}}`.
 #[wasm_bindgen]
 pub fn call(command: &str, request: &str) -> String {
     let hears = |now: Now| going(&serde_json::to_string(&now).unwrap_or_default());
     let mut host = Host { worker: None, going: &hears };
     match obsdeg_commands::call_json(command, request, &mut host) {
         Ok(a) => json!({ "text": a.text, "sentences": a.sentences, "passed": a.passed }),
-        Err(problem) => json!({ "problem": said(&problem) }),
+        Err(problem) => json!({ "problem": problem_json(&problem) }),
     }
     .to_string()
 }
 
-/// A problem, with the line and the column of its place.
-fn said(problem: &Problem) -> Value {
+/// A problem as JSON, with line and column of its place.
+fn problem_json(problem: &Problem) -> Value {
     let place = problem.place.as_ref().map(|p| {
         let (line, column) = p.line_and_column();
         let count = |end: usize| p.text.get(..end).map_or(0, |t| t.encode_utf16().count());
         json!({ "name": p.name, "line": line, "column": column,
-            // in the units of a page's texts
+            // offsets in UTF-16 units, as in the page's texts
             "start": count(p.span.start), "end": count(p.span.end) })
     });
     json!({ "kind": problem.kind, "message": problem.message, "place": place })
 }
 
-/// TOML as JSON, or `{"problem": ...}` where it is none.
+/// TOML as JSON, or `{"problem": ...}` if the text is no TOML.
 #[wasm_bindgen]
 pub fn toml_as_json(text: &str) -> String {
     match toml::from_str::<Value>(text) {
         Ok(value) => json!({ "value": value }),
         Err(e) => {
             let problem = Problem::at(e.message(), "", text, e.span().unwrap_or(0..0));
-            json!({ "problem": said(&problem) })
+            json!({ "problem": problem_json(&problem) })
         }
     }
     .to_string()

@@ -1,6 +1,6 @@
 //! Builds the page: the engine as WebAssembly, packed, with scripts, style and examples in one file.
 //!
-//! `cargo run -p obsdeg-web [PAGE]`; without a name it is `target/workbench.html`.
+//! `cargo run -p obsdeg-web [PAGE]`; the default path is `target/workbench.html`.
 
 #[cfg(not(target_arch = "wasm32"))]
 mod build;

@@ -1,4 +1,5 @@
-//! Unpacks the engine of the page: browsers unpack deflate, which leaves it half as large again.
+//! Unpacks the engine of the page from LZMA: browsers can only unpack deflate, whose files are half as large
+//! again.
 #![cfg(target_arch = "wasm32")]
 
 use std::io::Read;
@@ -6,10 +7,10 @@ use std::io::Read;
 use lzma_rust2::LzmaReader;
 use wasm_bindgen::prelude::wasm_bindgen;
 
-/// What was packed as LZMA.
+/// Unpacks bytes that were packed with LZMA.
 ///
 /// # Errors
-/// What is wrong with it.
+/// Defect of the packed bytes, in words.
 #[wasm_bindgen]
 pub fn unpack(packed: &[u8]) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();

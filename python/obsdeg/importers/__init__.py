@@ -1,7 +1,8 @@
 """Models from elsewhere in obsdeg's own format.
 
-`load` reads SBML, PEtab problems, `@ODEmodel` texts of StructuralIdentifiability.jl, MATLAB scripts of STRIKE-GOLDD, systems written with SymPy, and obsdeg's own
-models and schemes. What has no counterpart is refused with an `ImportProblem`, which names construct and place.
+`load` reads SBML, PEtab problems, `@ODEmodel` texts of StructuralIdentifiability.jl, MATLAB scripts of
+STRIKE-GOLDD, systems written with SymPy, and obsdeg's own models and schemes. An unsupported construct raises
+an `ImportProblem`, which names construct and place.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ class Imported:
     Attributes:
         text: A model file (TOML, or obsdeg's JSON), or a scheme file.
         kind: ``"model"`` or ``"scheme"``.
-        source: What it was read from: ``"SBML"``, ``"PEtab"``, ``"SI.jl"``, ``"STRIKE-GOLDD"``, ``"SymPy"`` or ``"obsdeg"``.
-        notes: What the reader of an answer has to know of the import.
+        source: Format of the source: ``"SBML"``, ``"PEtab"``, ``"SI.jl"``, ``"STRIKE-GOLDD"``, ``"SymPy"`` or
+            ``"obsdeg"``.
+        notes: Remarks on the import for readers of an answer.
     """
 
     text: str
@@ -45,13 +47,13 @@ def load(path: str | Path, **options: Any) -> Imported:
     """Reads a file of any known kind.
 
     Arguments:
-        path: The file; what it is, is seen from what it says, and then from its ending.
-        options: Those of the reader: `sbml.load`, `petab.load`, `sijl.load`, `strike_goldd.load`.
+        path: The file. Its kind follows from its content, then from its extension.
+        options: Options of the reader: `sbml.load`, `petab.load`, `sijl.load`, `strike_goldd.load`.
 
     Raises:
-        ImportProblem: a construct without a counterpart, or a file of no known kind.
-        FileNotFoundError: there is none.
-        ImportError: the package that reads this kind is not installed; it is named.
+        ImportProblem: unsupported construct, or file of unknown kind.
+        FileNotFoundError: no such file.
+        ImportError: the package that reads this kind is not installed; the message names it.
     """
     path = Path(path)
     try:
@@ -92,7 +94,7 @@ def _text(path: Path) -> str:
 
 
 def _own(text: str, path: Path) -> None:
-    """Refuses what is no text of obsdeg's own; what it says is read when it is judged."""
+    """Refuses a text that is not in a format of obsdeg; its content is read when it is judged."""
     is_json = text.lstrip().startswith("{")
     try:
         found: Any = json.loads(text) if is_json else _toml.loads(text)
@@ -103,7 +105,7 @@ def _own(text: str, path: Path) -> None:
 
 
 def __getattr__(name: str) -> Any:
-    # SymPy is loaded when something is read
+    # SymPy is imported when something is read
     if name in ("System", "to_toml"):
         return getattr(importlib.import_module(".system", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -119,7 +121,7 @@ def _needed(module: str, source: str) -> Any:
 
 
 def _kind(text: str, path: Path) -> tuple[str, str]:
-    """What a file is, and the module that reads it; a model or scheme of obsdeg's own needs none."""
+    """Kind of a file and the module that reads it; None for a model or scheme of obsdeg's own."""
     ending = path.suffix.lower()
     head = text.lstrip()
     if head.startswith("<"):

@@ -1,4 +1,5 @@
-"""Exponentials of the time as states: `e = exp(c t)` is `e' = c e`, `e(0) = 1`, and the equations stay rational."""
+"""Exponentials of the time as states: `e = exp(c t)` is `e' = c e`, `e(0) = 1`, and the equations stay
+rational."""
 
 from __future__ import annotations
 
@@ -9,7 +10,8 @@ from .system import State, System
 
 
 def exponentials_as_states(system: System) -> None:
-    """Replaces `exp(c t + d)`, c and d of constants and parameters alone, where the time stands in rates, definitions or outputs."""
+    """Replaces `exp(c t + d)` in rates, definitions and outputs that depend on the time; c and d contain
+    constants and parameters only."""
     fixed = {*system.parameters, *system.constants}
     while more := {n for n, d in system.definitions.items() if n not in fixed and TIME not in d.free_symbols and names_in(d) <= fixed}:
         fixed |= more

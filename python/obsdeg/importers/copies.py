@@ -1,4 +1,4 @@
-"""Experiments written as one: every experiment has copies of the states, definitions and outputs."""
+"""Several experiments written as one: every experiment has copies of the states, definitions and outputs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .system import State, System
 def unrolled(system: System) -> System:
     """The same system with one experiment; `x` of the third is `x_at3`.
 
-    Outputs that are always zero, since nothing is measured there, are left out.
+    Outputs that are always zero, since nothing is measured there, are omitted.
 
     Raises:
         ImportProblem: experiments with segments or unknown inputs.

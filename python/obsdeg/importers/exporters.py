@@ -1,4 +1,5 @@
-"""Models of obsdeg as texts for others: `@ODEmodel` of StructuralIdentifiability.jl, and Python with SymPy."""
+"""Models of obsdeg as texts for others: `@ODEmodel` of StructuralIdentifiability.jl, and Python with SymPy.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +16,17 @@ from .formula import TIME, Expr, exact, expand, parse, put, text_of
 from .problem import ImportProblem
 from .system import State, System
 
-#: What the text for SymPy imports, and what it says.
+#: Names that the text for SymPy imports and uses.
 _IMPORTED = ("Abs", "Rational", "acos", "asin", "atan", "atan2", "cos", "exp", "log", "pi", "sign", "sin", "sqrt", "symbols", "tan", "tanh")
 _KEYS = ("name", "rates", "outputs", "starts", "parameters", "known_inputs", "unknown_inputs", "constants", "definitions")
 
 
 def read_model(model: str | Text) -> System:
-    """A system of an obsdeg model, TOML or JSON, without vectors.
+    """System of an obsdeg model, TOML or JSON, without vectors.
 
     Raises:
-        ImportProblem: vectors and matrices, segments, experiments with values of their own: what no export has room for.
+        ImportProblem: vectors and matrices, segments, or experiments with different values, which no export
+            supports.
     """
     text = model.text if isinstance(model, Text) else model
     if text.lstrip().startswith("{"):
@@ -98,16 +100,17 @@ def _json(text: str) -> System:
 
 
 def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
-    """The text of `@ODEmodel` for StructuralIdentifiability.jl.
+    """Text of `@ODEmodel` for StructuralIdentifiability.jl.
 
     Arguments:
-        model: A `Model`, the text of one (TOML or JSON), or a system.
-        name: The variable that it is assigned to.
+        model: A `Model`, its text (TOML or JSON), or a system.
+        name: Variable to which the model is assigned.
 
-    Known constants of any value become outputs of their own, since every constant is unknown there.
+    Known constants with a generic value become outputs, since every constant is unknown there.
 
     Raises:
-        ImportProblem: what the macro has no room for: functions, the time, given starts, unknown inputs, segments, constraints.
+        ImportProblem: functions, the time, given starts, unknown inputs, segments or constraints, which the
+            macro does not support.
     """
     system = model if isinstance(model, System) else read_model(model)
     _plain(system)
@@ -144,16 +147,17 @@ def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
             label += "_out"
         taken.add(label)
         lines.append(f"    {label}(t) = {text(y, f'the output {n}')}")
-    # functions of SI.jl take them as an argument
+    # functions of SI.jl take known starts as an argument
     tail = f"known_ic = [{', '.join(known)}]\n" if known else ""
     return f"using StructuralIdentifiability\n\n{name} = @ODEmodel(\n" + ",\n".join(lines) + "\n)\n" + tail
 
 
 def to_sympy(model: str | Text | System) -> str:
-    """Python text that says the system with SymPy: `rates`, `outputs` and all else by name; `sympy_system.load` reads it.
+    """Python text of the system for SymPy: `rates`, `outputs` and all else by name; `sympy_system.load` reads
+    it.
 
     Raises:
-        ImportProblem: segments, constraints, inputs that are bounded.
+        ImportProblem: segments, constraints, or bounded inputs.
     """
     system = model if isinstance(model, System) else read_model(model)
     _plain(system)
@@ -196,7 +200,7 @@ def to_sympy(model: str | Text | System) -> str:
 
 
 def _python_names(system: System) -> System:
-    """The system with names that Python takes: `lambda` becomes `lambda_`."""
+    """The system with names that Python accepts: `lambda` becomes `lambda_`."""
     taken = {*system.names(), *_IMPORTED, *_KEYS, "t"}
     new: dict[str, str] = {}
     for n in system.names():
@@ -227,7 +231,7 @@ def _number(value: Expr) -> str:
 
 
 def _plain(system: System) -> None:
-    """Refuses what neither text has room for."""
+    """Refuses constructs that neither text supports."""
     if system.experiments > 1 or system.segments > 1 or system.constraints:
         what = "constraints" if system.constraints else f"{system.experiments} experiments of {system.segments} segments"
         raise ImportProblem(what, "one run from a free start")

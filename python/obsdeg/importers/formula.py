@@ -15,13 +15,13 @@ import sympy  # type: ignore[import-untyped]
 from .limits import DEPTH, FORMULA, LITERAL, WRITTEN, bounded_exp, bounded_power, hold, measured
 from .problem import ImportProblem, OverLimit
 
-#: A SymPy expression (SymPy has no types of its own).
+#: SymPy expression (SymPy has no types of its own).
 Expr: TypeAlias = Any
 
-#: The time of a run, which is 0 at its start. No name of a file looks like it.
+#: Time of a run, 0 at its start. No name in a file has this form.
 TIME: Expr = sympy.Symbol("<time>")
 
-#: Functions of one argument that obsdeg knows, by their names there.
+#: Functions of one argument in obsdeg, by name.
 FUNCTIONS: dict[str, Callable[[Expr], Expr]] = {
     "sin": sympy.sin,
     "cos": sympy.cos,
@@ -36,7 +36,7 @@ FUNCTIONS: dict[str, Callable[[Expr], Expr]] = {
     "abs": sympy.Abs,
     "sign": sympy.sign,
 }
-#: Others that are written by those.
+#: Functions that are written by means of those.
 DERIVED: dict[str, Callable[..., Expr]] = {
     "ln": sympy.log,
     "log10": lambda x: sympy.log(x) / sympy.log(10),
@@ -59,16 +59,16 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
     r"|(?P<name>[^\W\d][\w!]*)|(?P<sign>\*\*|//|[-+*/^(),]))"
 )
-#: Factors above which a product is made at once.
+#: Number of factors above which a product is formed in one step.
 LONG = 64
 _SUM, _PRODUCT, _POWER, _ATOM = 1, 2, 3, 4
 
 
 def exact(number: float | str) -> Expr:
-    """The rational number that a decimal text says; of a float, that of its shortest text.
+    """Rational number of a decimal text; of a float, the number of its shortest text.
 
     Raises:
-        ImportProblem: it is infinite or no number.
+        ImportProblem: the number is infinite or invalid.
     """
     text = repr(float(number)) if isinstance(number, float) else str(number)
     exponent = re.search(r"[eE]([+-]?\d+)\s*$", text[-LITERAL:])
@@ -89,21 +89,21 @@ def exactly(expression: Expr) -> Expr:
 
 
 def symbol(name: str) -> Expr:
-    """The symbol of a name."""
+    """Symbol of a name."""
     return sympy.Symbol(name)
 
 
 def names_in(*expressions: Expr) -> set[str]:
-    """The names that stand in expressions; the time is none."""
+    """Names in expressions, without the time."""
     found: set[Expr] = set().union(*(sympy.sympify(e).free_symbols for e in expressions))
     return {s.name for s in found if s != TIME}
 
 
 def put(expression: Expr, values: Mapping[str, Expr]) -> Expr:
-    """Replaces names, all at once and once each.
+    """Replaces names, all at the same time and once each.
 
     Raises:
-        ImportProblem: a formula of too many operations would come of it.
+        ImportProblem: the result would have too many operations.
     """
     swaps = {s: values[s.name] for s in expression.free_symbols if s != TIME and s.name in values}
     if not swaps:
@@ -114,10 +114,10 @@ def put(expression: Expr, values: Mapping[str, Expr]) -> Expr:
 
 
 def expand(expression: Expr, values: Mapping[str, Expr], what: str) -> Expr:
-    """Replaces names by what they stand for until none is left.
+    """Replaces names by their definitions until none is left.
 
     Raises:
-        ImportProblem: names that stand for each other.
+        ImportProblem: circular definitions.
     """
     for _ in range(len(values) + 2):
         if not names_in(expression) & values.keys():
@@ -132,10 +132,10 @@ def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None) 
 
     Arguments:
         text: The formula.
-        calls: Functions beside the usual ones, by name.
+        calls: Additional functions by name.
 
     Raises:
-        ImportProblem: it is no such formula, or takes too much work; the construct is named.
+        ImportProblem: invalid formula, or too much work; the message names the construct.
     """
     if len(text) > FORMULA:
         raise OverLimit(f"a formula of {len(text)} characters", f"at most {FORMULA}")
@@ -143,7 +143,7 @@ def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None) 
 
 
 class _Reader:
-    """A formula from its tokens: numbers as expressions, all others as texts."""
+    """Formula from its tokens: numbers as expressions, all others as texts."""
 
     def __init__(self, text: str, known: Mapping[str, Callable[..., Expr]]) -> None:
         self.text, self.known = text, known
@@ -168,7 +168,7 @@ class _Reader:
             raise OverLimit(construct, f"at most {DEPTH}")
 
     def take(self, *signs: str) -> str | None:
-        """The next token if it is one of these."""
+        """Next token if it is one of the given ones."""
         found = self.tokens[self.at] if self.at < len(self.tokens) else None
         if not isinstance(found, str) or found not in signs:
             return None
@@ -190,7 +190,7 @@ class _Reader:
             while by := self.take("*", "/", "//"):
                 factor = self.factor(depth)
                 factors.append(factor if by == "*" else 1 / factor)
-            # SymPy multiplies a number into a sum of two factors alone; long products are made at once
+            # SymPy distributes a number over a sum of two factors only; long products are formed in one step
             product = sympy.Mul(*factors) if len(factors) > LONG else reduce(mul, factors)
             terms.append(-product if sign == "-" else product)
             sign = self.take("+", "-")
@@ -240,13 +240,14 @@ class _Reader:
 
 
 def shortened(text: str) -> str:
-    """A text that fits into a sentence."""
+    """Text shortened for use in a sentence."""
     text = " ".join(text.split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def number_text(value: Expr) -> str:
-    """A rational number: a decimal where it is one of at most 30 digits, else a fraction in brackets."""
+    """Text of a rational number: a decimal of at most 30 digits if possible, otherwise a fraction in
+    brackets."""
     p, q = int(value.p), int(value.q)
     sign, rest = "-" if p < 0 else "", q
     for prime in (2, 5):
@@ -269,11 +270,11 @@ def _whole(n: int) -> str:
 
 
 def text_of(expression: Expr, names: Mapping[str, str] | None = None, *, power: str = "^", time: str = "t") -> str:
-    """A formula as obsdeg reads it.
+    """Formula in the notation of obsdeg.
 
     Arguments:
-        expression: What is written.
-        names: New names, by the old ones.
+        expression: The formula.
+        names: New names by the old ones.
         power: The sign of powers.
         time: The name of the time.
 
@@ -302,7 +303,7 @@ def text_of(expression: Expr, names: Mapping[str, str] | None = None, *, power: 
         nonlocal written
         written += 1
         if written > WRITTEN:
-            # max and min have their arguments twice
+            # max and min contain their arguments twice
             construct = f"a formula of more than {WRITTEN} operations as obsdeg reads it"
             raise OverLimit(construct, f"at most {WRITTEN}")
         if e == TIME:

@@ -1,4 +1,4 @@
-"""Known numbers as known constants of any value: what holds for almost all of them."""
+"""Known numbers as known constants with generic values, for verdicts that hold for almost all values."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from .system import System, Table
 
 
 def loosened(system: System) -> System:
-    """The same system, whose known constants and starts are of any value where the number is not zero.
+    """The same system with generic values for its known constants and starts, unless the number is zero.
 
-    One number is one constant wherever a constant of this name has it. Numbers in formulas, switches (0 and 1 in tables) and exponents stay.
+    Equal numbers of one constant become one new constant. Numbers in formulas, switches (0 and 1 in tables)
+    and exponents do not change.
     """
     taken = set(system.names())
     powers: set[str] = set()

@@ -1,15 +1,15 @@
-"""What an importer takes on: counted before the work is done, so that careless input ends in a sentence.
+"""Limits of the importers: work is counted before it is done, so that excessive input ends with a message.
 
 | what | limit |
 | --- | --- |
 | characters of a text | `TEXT` |
 | characters of a formula or statement | `FORMULA` |
-| brackets, functions and powers in each other | `DEPTH` |
-| elements of XML in each other | `ELEMENTS` |
-| operations of a formula when what it names is put in | `OPERATIONS` |
-| operations of a formula when max and min are written by abs | `WRITTEN` |
-| digits of a number that powers make | `DIGITS` |
-| digits and exponent of a number as it is written | `LITERAL` |
+| nested brackets, functions and powers | `DEPTH` |
+| nested elements of XML | `ELEMENTS` |
+| operations of a formula with definitions inserted | `OPERATIONS` |
+| operations of a formula with max and min written by abs | `WRITTEN` |
+| digits of a number from powers | `DIGITS` |
+| digits and exponent of a written number | `LITERAL` |
 | entries of a vector | `ENTRIES` |
 | equations of an `@ODEmodel` | `EQUATIONS` |
 """
@@ -27,7 +27,7 @@ import sympy  # type: ignore[import-untyped]
 from .._files import TEXT, read_text
 from .problem import OverLimit
 
-#: Bytes of a file of a PEtab problem.
+#: Limit in bytes of a file of a PEtab problem.
 TABLE = 100_000_000
 FORMULA = 100_000
 DEPTH = 150
@@ -41,10 +41,10 @@ EQUATIONS = 4_000
 
 
 def text_of_file(path: str | Path, *, errors: str = "strict") -> str:
-    """The text of a file.
+    """Text of a file.
 
     Raises:
-        OverLimit: it is longer than `TEXT`.
+        OverLimit: the text is longer than `TEXT`.
     """
     try:
         return read_text(path, errors=errors)
@@ -55,20 +55,21 @@ def text_of_file(path: str | Path, *, errors: str = "strict") -> str:
 
 
 def bounded_power(base: Any, exponent: Any) -> Any:
-    """`base ** exponent`, unless that is a number of more than `DIGITS` digits.
+    """Power `base ** exponent`, if it is not a number of more than `DIGITS` digits.
 
     Raises:
-        OverLimit: it is.
+        OverLimit: the power is such a number.
     """
     _hold_power(base, exponent)
     return base**exponent
 
 
 def bounded_exp(argument: Any) -> Any:
-    """`exp(argument)`, which SymPy makes a power where logarithms of numbers are in it.
+    """Exponential `exp(argument)`, which SymPy turns into a power if the argument contains logarithms of
+    numbers.
 
     Raises:
-        OverLimit: that power is a number of more than `DIGITS` digits.
+        OverLimit: the power is a number of more than `DIGITS` digits.
     """
     for term in sympy.Add.make_args(argument):
         coefficient, rest = term.as_coeff_Mul()
@@ -87,7 +88,7 @@ def _hold_power(base: Any, exponent: Any) -> None:
 
 
 def _digits(base: Any) -> float:
-    """Digits of the numbers among the factors of an expression; 0 where they are 1 and -1 alone."""
+    """Digits of the numbers among the factors of an expression; 0 if all are 1 or -1."""
     if isinstance(base, sympy.Rational):
         largest = max(abs(int(base.p)), int(base.q))
         return 0.0 if largest <= 1 else largest.bit_length() * math.log10(2)
@@ -98,21 +99,22 @@ def _digits(base: Any) -> float:
     return 0.0
 
 
-#: Number of operations, and how deep they are in each other.
+#: Number of operations and their nesting depth.
 Size = tuple[int, int]
 
 
 def measured(expression: Any, sizes: Callable[[Any], Size | None] = lambda leaf: None) -> Size:
-    """Number of operations of an expression as it is written out, and how deep they are in each other.
+    """Number of operations of an expression when written out, and their nesting depth.
 
-    Common parts are counted wherever they stand, and visited once.
+    Common parts are counted at every occurrence, but visited once.
 
     Arguments:
-        expression: What is measured.
-        sizes: Those of what will stand for a symbol, or None where it stays.
+        expression: Expression to measure.
+        sizes: Sizes of the replacements of symbols; None for a symbol that stays.
 
     Raises:
-        OverLimit: a power in it is a number of more than `DIGITS` digits, which SymPy makes when it puts something in.
+        OverLimit: a power in it is a number of more than `DIGITS` digits, which SymPy would evaluate during a
+            replacement.
     """
     known: dict[Any, Size] = {}
     stack = [(sympy.sympify(expression, strict=True), False)]
@@ -134,10 +136,10 @@ def measured(expression: Any, sizes: Callable[[Any], Size | None] = lambda leaf:
 
 
 def hold(size: Size, what: str) -> None:
-    """Holds that operations and depth are within limits.
+    """Checks that operations and depth are within their limits.
 
     Raises:
-        OverLimit: they are not.
+        OverLimit: one of them is not.
     """
     operations, depth = size
     if operations > OPERATIONS:
@@ -147,12 +149,12 @@ def hold(size: Size, what: str) -> None:
 
 
 def entries(rows: str, columns: str) -> int:
-    """Entries of an array, from its numbers of rows and columns.
+    """Number of entries of an array, from its numbers of rows and columns.
 
     Raises:
         OverLimit: a vector of more than `ENTRIES` entries.
     """
-    # many digits are no number that Python makes of a text
+    # longer texts are not converted to a number
     number = ENTRIES + 1 if max(len(rows), len(columns)) > 9 else int(rows) * int(columns)
     if number > ENTRIES:
         raise OverLimit(f"an array of {rows[:20]} x {columns[:20]} entries", f"at most {ENTRIES}")
@@ -160,10 +162,10 @@ def entries(rows: str, columns: str) -> int:
 
 
 def hold_brackets(text: str, pairs: Iterable[str] = ("()", "[]", "{}")) -> None:
-    """Holds that brackets are not too deep in each other for the parser of Python, which may crash.
+    """Checks that brackets are not nested too deeply for the parser of Python, which may crash.
 
     Raises:
-        OverLimit: they are.
+        OverLimit: the brackets are nested too deeply.
     """
     steps = {p[0]: 1 for p in pairs} | {p[1]: -1 for p in pairs}
     depth = 0
@@ -174,10 +176,10 @@ def hold_brackets(text: str, pairs: Iterable[str] = ("()", "[]", "{}")) -> None:
 
 
 def hold_xml(path: str | Path) -> None:
-    """Holds that an XML file is neither too long nor too deep for libSBML, which would end the interpreter.
+    """Checks that an XML file is neither too long nor too deep for libSBML, which would end the interpreter.
 
     Raises:
-        OverLimit: it is, or defines entities, which may grow without bound.
+        OverLimit: the file is too long or too deep, or defines entities, which may grow without bound.
     """
     text = text_of_file(path, errors="replace")
     parser = expat.ParserCreate()
@@ -204,5 +206,5 @@ def hold_xml(path: str | Path) -> None:
     try:
         parser.Parse(text.encode(), True)
     except expat.ExpatError:
-        # what is no XML is said by libSBML
+        # libSBML reports files that are not XML
         return

@@ -1,8 +1,9 @@
-"""PEtab problems (version 1, by the `petab` library): conditions become experiments, observables outputs, estimated parameters unknowns.
+"""PEtab problems (version 1, by the `petab` library): conditions become experiments, observables outputs,
+estimated parameters unknowns.
 
-Measurements are taken to be continuous in time: an observable that is measured in a condition is seen there at all times. Scales of
-parameters and transformations of observables are one to one and change no verdict. Parameters of the noise alone are left out: the mean of a measurement does
-not depend on them.
+Measurements count as continuous in time: an observable measured in a condition is measured there at all
+times. Scales of parameters and transformations of observables are one to one and change no verdict.
+Parameters of the noise only are omitted: the mean of a measurement does not depend on them.
 """
 
 from __future__ import annotations
@@ -29,20 +30,20 @@ from .steady import SteadyState
 from .system import MAX_EXPERIMENTS, State, System, Table
 from .timeline import Timeline
 
-#: What an entity is given in a condition, by its name.
+#: Values that a condition gives to entities, by name.
 Overrides = dict[str, Expr]
 
 
 @dataclass
 class _Run:
-    """Conditions with the same equations and starts, and what is measured in them.
+    """Conditions with equal equations and starts, and their measurements.
 
     Attributes:
-        before: What it settles in first, if in anything.
-        during: What holds then.
-        rests: Whether nothing is changed behind the steady state: what is measured at the end of time.
-        measured: For every observable the lists of its parameters.
-        end: The time of the last measurement.
+        before: Values in the steady state before the run; None without one.
+        during: Values during the run.
+        rests: True if nothing changes after the steady state: measurements are those of infinite time.
+        measured: Lists of parameters of every observable.
+        end: Time of the last measurement.
     """
 
     before: Overrides | None
@@ -53,16 +54,18 @@ class _Run:
 
 
 def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", until_events: bool = False) -> System:
-    """A system of a PEtab problem (its YAML file).
+    """System of a PEtab problem (its YAML file).
 
     Arguments:
         path: The file.
-        numbers: `exact`: fixed numbers are what they are; `generic`: those that are not zero are known and of any value (`generic.loosened`).
-        starts: `given`: states start where the problem says; `unknown`: anywhere, of which the verdict "observable" is as good.
-        until_events: Judges runs up to events that depend on states, which is refused otherwise.
+        numbers: `exact`: fixed numbers keep their values; `generic`: non-zero numbers are known with generic
+            values (`generic.loosened`).
+        starts: `given`: starts of the problem; `unknown`: unknown starts, for which the verdict "observable"
+            implies it for given ones too.
+        until_events: Judges runs up to events that depend on states; otherwise such events are refused.
 
     Raises:
-        ImportProblem: a construct without a counterpart.
+        ImportProblem: unsupported construct.
     """
     file = str(path)
     if numbers not in ("exact", "generic") or starts not in ("given", "unknown"):
@@ -70,10 +73,10 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
     try:
         layout = _layout(file)
         for part in layout.get("problems", []):
-            part.pop("visualization_files", None)  # nothing of the mathematics
+            part.pop("visualization_files", None)  # not part of the mathematics
         _hold_files(layout, Path(file).parent)
         with warnings.catch_warnings():
-            # of the library's own dependencies
+            # warnings from dependencies of the library
             warnings.filterwarnings("ignore", module="petab")
             problem = v1.Problem.from_yaml(layout, base_path=str(Path(file).parent))
     except ImportProblem as found:
@@ -94,17 +97,17 @@ def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", unt
 
 
 def _layout(file: str) -> Any:
-    """What the YAML file says."""
+    """Content of the YAML file."""
     text = text_of_file(file)
     hold_brackets(text)
     if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
-        # what stands for others many times over grows without bound
+        # aliases that contain aliases grow without bound
         raise ImportProblem("an alias (`*name`)", "YAML without aliases")
     return yaml.safe_load(text)
 
 
 def _hold_files(layout: Any, folder: Path) -> None:
-    """Holds that the files of a problem are files, and not too long."""
+    """Checks that the files of a problem are files, and not too long."""
     stack = [layout]
     while stack:
         found = stack.pop()
@@ -124,7 +127,7 @@ def _hold_files(layout: Any, folder: Path) -> None:
 def _formula(text: Any) -> Expr:
     """A formula of PEtab."""
     try:
-        # by our own grammar, which counts before it works; PEtab has more
+        # our own grammar counts before it works; PEtab's grammar is larger
         parse(str(text))
     except OverLimit:
         raise
@@ -134,7 +137,7 @@ def _formula(text: Any) -> Expr:
 
 
 def _cell(value: Any) -> Expr | None:
-    """A number or the name of a parameter; None where there is nothing."""
+    """Number or parameter name in a cell; None for an empty cell."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return None
     try:
@@ -234,7 +237,7 @@ class _Problem:
         constants = [n for n in overridden if n not in k.rates]
         assigned = self.assigned = dict(k.assigned)
         for n in constants:
-            # a condition says otherwise
+            # unless a condition sets it
             k.assigned.pop(n, None)
         out.states = {n: State(rate) for n, rate in k.rates.items()}
         out.parameters = {n: "" for n in self.estimated}
@@ -281,7 +284,7 @@ class _Problem:
         given = {n: [r.during.get(n, k.starts.get(n)) for r in runs] for n in k.rates}
         begin = {n: steps.spread(values, f"{n}_start") for n, values in given.items()}
         table = {**begin, **steps.definitions}
-        # an initial assignment may name states: their starts
+        # an initial assignment may name states: their starts are meant
         for n in list(k.assigned):
             if n in steps.definitions:
                 steps.definitions[n] = steps.settled(k.at_start(steps.definitions[n], table, n), n)
@@ -303,7 +306,7 @@ class _Problem:
             out.states[n].start = steps.spread(values, f"{n}_start")
 
     def _steady(self, run: _Run, start: Any) -> dict[str, Expr]:
-        """The unknowns that stand for the steady state before a run."""
+        """Unknowns for the steady state before a run."""
         k, out = self.k, self.out
         assert run.before is not None
         assigned = {n: start(e, f"the initial assignment of {n}") for n, e in self.assigned.items()}

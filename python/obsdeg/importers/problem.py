@@ -1,17 +1,17 @@
-"""Why something cannot be imported."""
+"""Errors of imports."""
 
 from __future__ import annotations
 
 
 class ImportProblem(ValueError):
-    """A construct that has no counterpart in a model of obsdeg, and where it stands.
+    """Construct that a model of obsdeg does not support, and its place.
 
     Attributes:
-        file: The file, or what the text was called.
-        place: The line (``line 7``) or the element (``event_1``, ``the rule of k1``).
-        construct: What was found.
-        expected: What could stand there.
-        hint: What may be done about it; empty when nothing is known.
+        file: File, or name of the text.
+        place: Line (``line 7``) or the element (``event_1``, ``the rule of k1``).
+        construct: Construct that was found.
+        expected: Supported alternatives.
+        hint: Advice; empty if there is none.
     """
 
     def __init__(self, construct: str, expected: str, *, place: str = "", hint: str = "", file: str = "") -> None:
@@ -20,7 +20,7 @@ class ImportProblem(ValueError):
         super().__init__(construct)
 
     def located(self, *, file: str = "", place: str = "") -> ImportProblem:
-        """The same problem, with file and place filled in where they were not known."""
+        """The same problem with file and place filled in if they were unknown."""
         self.file, self.place = self.file or file, self.place or place
         return self
 
@@ -34,7 +34,7 @@ class ImportProblem(ValueError):
 
 
 class OverLimit(ImportProblem):
-    """A construct that would take too much work or memory."""
+    """Construct that would need too much work or memory."""
 
 
 def _again(construct: str, expected: str, place: str, hint: str, file: str) -> ImportProblem:
@@ -42,5 +42,5 @@ def _again(construct: str, expected: str, place: str, hint: str, file: str) -> I
 
 
 def visible(text: str) -> str:
-    """The text with an escape in place of every character that is not printed: a quoted file does not steer a terminal."""
+    """Text with escapes for unprintable characters, so that a quoted file cannot control a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -1,6 +1,7 @@
-"""Square roots in starts as unknowns of their own: `r^2 = g`, and the starts are rational.
+"""Square roots in starts as separate unknowns: `r^2 = g`, so that the starts are rational.
 
-A start that solves a quadratic equation, as a steady state often does, holds the root of one polynomial in many places.
+A start that solves a quadratic equation, as a steady state often does, contains the root of one polynomial in
+many places.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from .system import System
 
 
 def roots_as_unknowns(system: System) -> None:
-    """Replaces the roots in the starts, where they are of one polynomial in parameters and constants that all experiments share."""
+    """Replaces the roots in the starts if all are of one polynomial in parameters and constants that all
+    experiments share."""
     shared = {*system.parameters, *(n for n, v in system.constants.items() if not isinstance(v, tuple))}
     starts = {n: s.start for n, s in system.states.items() if s.start is not None and not isinstance(s.start, str)}
     roots = {p for e in starts.values() for p in e.atoms(sympy.Pow) if p.exp.is_Rational and p.exp.q == 2 and p.base.free_symbols}

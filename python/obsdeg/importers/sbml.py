@@ -1,6 +1,7 @@
 """SBML models (levels 2 and 3, by libSBML): reactions, rules, initial assignments, events.
 
-Of a species the concentration is the state, or its amount where the model says `hasOnlySubstanceUnits`: what its name means in formulas.
+The state of a species is its concentration, or its amount with `hasOnlySubstanceUnits`, as its name means in
+formulas.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .system import State, System
 
 @dataclass
 class Event:
-    """An event: `trigger` becomes true, and `assignments` happen at once."""
+    """Event: when `trigger` becomes true, `assignments` happen instantaneously."""
 
     name: str
     trigger: Expr
@@ -31,16 +32,17 @@ class Event:
 
 @dataclass
 class Kinetics:
-    """The equations of an SBML model, before anything is said of what is measured or known.
+    """Equations of an SBML model, before outputs and known constants are chosen.
 
     Attributes:
-        rates: The derivative of every state, in its unit per unit of time.
-        starts: Its value at time 0.
-        rules: What assignment rules define.
-        values: Numbers of all that is constant.
-        assigned: Constants and states whose start an initial assignment gives.
-        changes: For every species the amount that each reaction makes of it, and its volume (1 for amounts).
-        fluxes: The rate of every reaction, amount per unit of time.
+        rates: Derivative of every state, in its unit per unit of time.
+        starts: Value of every state at time 0.
+        rules: Definitions by assignment rules.
+        values: Values of all constants.
+        assigned: Constants and states with an initial assignment.
+        changes: Amount of every species that each reaction produces, and the volume of the species (1 for
+            amounts).
+        fluxes: Rate of every reaction, amount per unit of time.
         events: Events.
     """
 
@@ -56,16 +58,17 @@ class Kinetics:
     events: list[Event] = field(default_factory=list)
 
     def at_start(self, expression: Expr, values: Mapping[str, Expr], place: str) -> Expr:
-        """An expression at time 0 in terms of what has neither rule nor start; `values` come before those of the model."""
+        """Expression at time 0, without names that have a rule or a start; `values` take precedence over
+        those of the model."""
         table = {**self.rules, **self.starts, **self.assigned, **values}
         return expand(expression, table, place).xreplace({TIME: sympy.S.Zero})
 
 
 def read(path: str | Path) -> Kinetics:
-    """The equations of an SBML file.
+    """Equations of an SBML file.
 
     Raises:
-        ImportProblem: it is no SBML, or has a construct without a counterpart.
+        ImportProblem: not SBML, or an unsupported construct.
     """
     hold_xml(path)
     document = libsbml.readSBMLFromFile(str(path))
@@ -73,7 +76,7 @@ def read(path: str | Path) -> Kinetics:
 
 
 def kinetics(document: Any, file: str) -> Kinetics:
-    """The equations of a `libsbml.SBMLDocument`."""
+    """Equations of a `libsbml.SBMLDocument`."""
     for i in range(document.getNumErrors()):
         error = document.getError(i)
         if error.getSeverity() >= libsbml.LIBSBML_SEV_ERROR:
@@ -94,7 +97,7 @@ class _Reader:
         for i in range(document.getNumPlugins()):
             plugin = document.getPlugin(i)
             package = plugin.getPackageName()
-            # layout of level 2 stands in annotations
+            # level 2 stores layout in annotations
             if package in ("layout", "render", "groups", "l3v2extendedmath") or not document.getPackageRequired(package):
                 continue
             if package == "comp" and model.getPlugin("comp").getNumSubmodels() == 0:
@@ -129,7 +132,7 @@ class _Reader:
         for e in model.getListOfEvents():
             self._event(e)
         for name in [n for e in out.events for n in e.assignments if n not in out.rates]:
-            # a constant that events change is a state at rest
+            # a constant that events change becomes a state with rate zero
             start = out.values.pop(name, None) or out.assigned.pop(name, None)
             if start is None:
                 raise ImportProblem(f"an assignment to `{name}`", "one to a state or a constant", place=f"an event on {name}")
@@ -154,7 +157,7 @@ class _Reader:
         (self.rated if rule.isRate() else self.out.rules)[name] = self._formula(rule, place)
 
     def _quantity(self, name: str, value: Expr | None) -> None:
-        """Something that is constant unless a rule says otherwise."""
+        """Adds a quantity that is constant unless a rule changes it."""
         if name in self.rated:
             self.out.rates[name] = self.rated[name]
             if value is not None:
@@ -184,7 +187,7 @@ class _Reader:
             out.starts[name] = start
 
     def _reactions(self) -> dict[str, dict[str, Expr]]:
-        """Amounts of every species that reactions make per unit of their rate."""
+        """Amounts of every species that reactions produce per unit of their rates."""
         moved: dict[str, dict[str, Expr]] = {}
         for reaction in self.model.getListOfReactions():
             name = reaction.getId()
@@ -232,16 +235,17 @@ def load(
     unknown: Iterable[str] | None = None,
     starts: str = "given",
 ) -> System:
-    """A system of an SBML file.
+    """System of an SBML file.
 
     Arguments:
         path: The file.
-        outputs: What is measured: formulas by name, in names of the model. SBML has no place for it.
-        unknown: The constants that are not known; all parameters of the model when left out, local ones as `reaction_parameter`.
-        starts: `given`: states start where the file says; `unknown`: anywhere.
+        outputs: Measured quantities: formulas by name, in names of the model. SBML does not contain them.
+        unknown: Unknown constants; by default all parameters of the model, local ones as
+            `reaction_parameter`.
+        starts: `given`: starts of the file; `unknown`: unknown starts.
 
     Raises:
-        ImportProblem: a construct without a counterpart; no outputs.
+        ImportProblem: unsupported construct, or no outputs.
     """
     from .timeline import Timeline
 

@@ -17,14 +17,14 @@ from .problem import ImportProblem
 
 @dataclass(frozen=True)
 class Lambda:
-    """A function definition: its arguments and what it is worth."""
+    """Function definition: arguments and value."""
 
     arguments: tuple[str, ...]
     body: Expr
 
 
 def _log(*args: Expr) -> Expr:
-    # log(base, x); one argument alone is the decimal logarithm
+    # log(base, x); with one argument it is the decimal logarithm
     base, x = args if len(args) == 2 else (sympy.Integer(10), args[0])
     return sympy.log(x) / sympy.log(base)
 
@@ -91,24 +91,25 @@ _CONSTANTS: dict[int, Expr] = {
 }
 
 
-#: Elements in each other above which the depth of their expression is measured; it grows to this at most before.
+#: Nesting depth of elements above which the depth of the expression is measured; below, the expression cannot
+#: be deeper.
 MEASURED = DEPTH // 3
 
 
 def formula(node: Any, functions: Mapping[str, Lambda], place: str) -> Expr:
-    """The formula of a MathML tree.
+    """Formula of a MathML tree.
 
     Arguments:
-        node: A `libsbml.ASTNode`, or None where there is no formula.
+        node: A `libsbml.ASTNode`, or None if there is no formula.
         functions: The function definitions of the model.
-        place: What it is the formula of.
+        place: Place of the formula in the model.
 
     Raises:
-        ImportProblem: a construct that has no counterpart, or a formula that takes too much work.
+        ImportProblem: unsupported construct, or too much work.
     """
     if node is None:
         raise ImportProblem("no formula", "one", place=place)
-    # without recursion, which would end at a thousand elements in each other; SymPy makes less of sums of sums
+    # not recursive, since Python's limit is a thousand nested calls; SymPy flattens sums of sums
     stack: list[tuple[Any, bool]] = [(node, False)]
     values: list[tuple[Expr, int]] = []
     while stack:
@@ -133,7 +134,7 @@ def formula(node: Any, functions: Mapping[str, Lambda], place: str) -> Expr:
 
 
 def _applied(node: Any, parts: list[Expr], functions: Mapping[str, Lambda]) -> Expr:
-    """A node with the expressions of its children."""
+    """Expression of a node from those of its children."""
     kind = node.getType()
     if node.isNumber():
         if kind == L.AST_INTEGER:
@@ -166,7 +167,7 @@ def _applied(node: Any, parts: list[Expr], functions: Mapping[str, Lambda]) -> E
 
 
 def lambdas(model: Any) -> dict[str, Lambda]:
-    """The function definitions of a model; each may use those before it."""
+    """Function definitions of a model; each may use earlier ones."""
     out: dict[str, Lambda] = {}
     for definition in model.getListOfFunctionDefinitions():
         name = definition.getId()

@@ -1,6 +1,7 @@
 """Models of StructuralIdentifiability.jl: the text of its macro `@ODEmodel`.
 
-`x'(t) = ...` declares a state, `y(t) = ...` an output; what else is a function of the time is a known input, and every other name an unknown parameter.
+`x'(t) = ...` declares a state, `y(t) = ...` an output. Any other function of the time is a known input, and
+every other name an unknown parameter.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from .system import State, System
 _MACRO = re.compile(r"@ODEmodel\s*\(")
 _LEFT = re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$")
 _OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
-# 2x, 3(a + b): a number in front multiplies; in 1e5*x it is all of 1e5
+# 2x, 3(a + b): a number in front multiplies; in 1e5*x the number is 1e5
 _COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
 
 
 def load(path: str | Path, *, model: int = 1) -> System:
-    """The system of the n-th `@ODEmodel` of a file.
+    """System of the n-th `@ODEmodel` of a file.
 
     Raises:
-        ImportProblem: it is no such model.
+        ImportProblem: not such a model.
     """
     try:
         return read(text_of_file(path), model=model, name=Path(path).stem)
@@ -33,10 +34,10 @@ def load(path: str | Path, *, model: int = 1) -> System:
 
 
 def read(text: str, *, model: int = 1, name: str = "model") -> System:
-    """The system of the n-th `@ODEmodel` of a text.
+    """System of the n-th `@ODEmodel` of a text.
 
     Raises:
-        ImportProblem: it is no such model.
+        ImportProblem: not such a model.
     """
     text = re.sub(r"#=.*?=#", lambda m: "\n" * m.group().count("\n"), text, flags=re.DOTALL)
     text = re.sub(r"#[^\n]*", "", text)
@@ -92,7 +93,7 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
 
 
 def _equations(text: str, start: int) -> list[tuple[int, str]]:
-    """The equations between the brackets, with the lines at which they begin."""
+    """Equations between the brackets, with the numbers of their first lines."""
     depth, begin, out = 1, start, []
     for i in range(start, len(text)):
         depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(text[i], 0)

@@ -1,6 +1,7 @@
-"""The steady state before a run: unknowns that are tied to the parameters by constraints.
+"""Steady state before a run: unknowns that constraints tie to the parameters.
 
-At rest `N v(x, p) = 0`, N the stoichiometric matrix of the reactions that are not zero, and what no reaction changes is what it was at the
+At rest `N v(x, p) = 0`, with the stoichiometric matrix N of the non-zero reactions. Combinations that no
+reaction changes keep their value from the
 start: `w N = 0` gives `w (V x - V x_0) = 0`.
 """
 
@@ -16,10 +17,10 @@ from .sbml import Kinetics
 
 
 class SteadyState:
-    """A steady state of a model.
+    """Steady state of a model.
 
     Attributes:
-        start: For every state the symbol of its value, or the value where nothing moves it.
+        start: Symbol of the value of every state, or the value itself if nothing changes it.
         constraints: Expressions that are zero.
     """
 
@@ -27,10 +28,10 @@ class SteadyState:
         """Ties states to constants.
 
         Arguments:
-            k: The equations.
-            values: Constants while it settles: numbers or expressions of parameters.
-            begin: Where it starts from.
-            suffix: What is added to the names of states.
+            k: Equations of the model.
+            values: Constants while the model settles: numbers or expressions of parameters.
+            begin: Starts of the states before the model settles.
+            suffix: Suffix of the names of states.
         """
         table = {**k.rules, **k.assigned, **values}
         if k.events:
@@ -56,7 +57,8 @@ class SteadyState:
             if len(alone) == 1:
                 self.start[alone[0]] = begin[alone[0]]
         self.constraints: list[Expr] = []
-        # rows of N v = 0 such that each has, where that can be, a parameter to solve for that no other row holds
+        # rows of N v = 0 in which a parameter occurs that no other row contains, as far as possible, so that
+        # each row can be solved for it
         private = [r for r in moving if self._own(r, moving, fluxes, begin)]
         order = private + [r for r in moving if r not in private]
         reduced, pivots = matrix[:, [moving.index(r) for r in order]].rref() if moving else (matrix, ())
@@ -82,7 +84,7 @@ class SteadyState:
 
     @staticmethod
     def _own(reaction: str, moving: Sequence[str], fluxes: Mapping[str, Expr], begin: Mapping[str, Expr]) -> bool:
-        """Whether something that is no state stands in the rate of one reaction alone."""
+        """True if a name that is not a state occurs in the rate of this reaction only."""
         others = names_in(*(fluxes[r] for r in moving if r != reaction), *begin.values())
         return bool(names_in(fluxes[reaction]) - others - begin.keys())
 
@@ -95,9 +97,10 @@ class SteadyState:
 
 
 def _check(constraints: Sequence[Expr]) -> None:
-    """Whether the constraints can be solved one after the other, each for something that those before it left open.
+    """Checks that the constraints can be solved one after the other, each for a name that earlier ones left
+    open.
 
-    That is how points are found at which they hold: those with the fewest open names come first.
+    Points on the constraints are found in this way: constraints with the fewest open names come first.
     """
     left = [names_in(c) for c in constraints]
     while left:

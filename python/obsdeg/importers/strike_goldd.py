@@ -1,7 +1,8 @@
-"""Models of STRIKE-GOLDD: MATLAB scripts that give `x`, `p`, `h`, `f`, `u`, `w`, `ics` and `known_ics` and save them.
+"""Models of STRIKE-GOLDD: MATLAB scripts that give `x`, `p`, `h`, `f`, `u`, `w`, `ics` and `known_ics` and
+save them.
 
-The statements are read, nothing is run: `syms`, assignments of formulas and of vectors, `save`. Symbols that are in none of `x p u w` are known
-constants of any value; so are numbers what they are.
+The statements are parsed, not run: `syms`, assignments of formulas and of vectors, `save`. Symbols in none of
+`x p u w` are known constants with generic values; numbers keep their values.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from .limits import FORMULA, entries, hold_brackets, text_of_file
 from .problem import ImportProblem, OverLimit
 from .system import State, System
 
-#: A value: a formula, or the entries of a vector.
+#: Formula, or entries of a vector.
 Value = Expr | list[Expr]
 
 _IGNORED = re.compile(r"^(clear|clc|close|clearvars|format|disp|fprintf|warning|addpath|cd|hold|tic|toc)\b")
@@ -30,7 +31,7 @@ _TRANSPOSE = re.compile(r"(\.'|'|\.\s*')\s*$")
 
 
 def models(text: str) -> list[str]:
-    """The names under which a script saves models, in order."""
+    """Names under which a script saves models, in order."""
     return [name for name, _ in _saved(text)]
 
 
@@ -42,17 +43,20 @@ def load(
     unknown_inputs: str | int = "arbitrary",
     starts: str = "unknown",
 ) -> System:
-    """A system of a script.
+    """System of a script.
 
     Arguments:
         path: The file.
-        model: Which of the models that it saves: the name, or a number from 1 on.
-        known_inputs: What `u` does: anything (`generic`), or a polynomial in time of this degree (`nnzDerU` of the options).
-        unknown_inputs: What is known of `w`: nothing (`arbitrary`), or the degree of its polynomial in time (`nnzDerW` of the options).
-        starts: `unknown`, as the options of STRIKE-GOLDD have it by default; `given`: those that `known_ics` marks are those of `ics`.
+        model: Name or number (from 1) of one of the saved models.
+        known_inputs: Kind of `u`: `generic`, or the degree of its polynomial in time (`nnzDerU` of the
+            options).
+        unknown_inputs: Kind of `w`: `arbitrary`, or the degree of its polynomial in time (`nnzDerW` of the
+            options).
+        starts: `unknown`, the default of STRIKE-GOLDD; `given`: the starts marked by `known_ics` are those of
+            `ics`.
 
     Raises:
-        ImportProblem: a statement that is not read, or no model.
+        ImportProblem: unsupported statement, or no model.
     """
     try:
         text = text_of_file(path, errors="replace")
@@ -69,7 +73,7 @@ def read(
     unknown_inputs: str | int = "arbitrary",
     starts: str = "unknown",
 ) -> System:
-    """A system of a script's text; as `load`."""
+    """System of a script's text; otherwise as `load`."""
     saved = _saved(text)
     names = [name for name, _ in saved]
     if isinstance(model, str):
@@ -125,7 +129,7 @@ def read(
 
 
 def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
-    """What a script saves: names, and the variables as they are then."""
+    """Saves of a script: names, and the variables at that point."""
     values: dict[str, Value] = {}
     declared: set[str] = set()
     out: list[tuple[str, dict[str, Value]]] = []
@@ -144,7 +148,7 @@ def _saved(text: str) -> list[tuple[str, dict[str, Value]]]:
             elif found := _SAVE.match(statement):
                 name, *listed = re.findall(r"[\w.-]+", found.group(1)) or ["model"]
                 saved = {n: v for n, v in values.items() if n in listed or not listed}
-                # a symbol that is saved as it is: `syms u`
+                # a symbol saved without an assignment: `syms u`
                 own = {n: symbol(n) for n in listed if n in declared and n not in values}
                 out.append((name, {**saved, **own}))
             elif found := _PLACE.match(statement):
@@ -198,7 +202,7 @@ def _value(text: str, values: dict[str, Value]) -> Value:
     # v(2) is an entry
     vectors = {n: v for n, v in values.items() if isinstance(v, list)}
     calls = {n: (lambda index, v=v, n=n: _entry(v, index, n)) for n, v in vectors.items()}
-    # an array of one entry is that entry
+    # an array of one entry equals that entry
     single = {n: v[0] for n, v in vectors.items() if len(v) == 1}
     expression = put(parse(plain, calls=calls), single)
     vectors = {n: v for n, v in vectors.items() if n not in single}
@@ -223,7 +227,7 @@ def _closes(text: str) -> int:
 
 
 def _entries(text: str) -> list[str]:
-    """The entries of a vector: apart by `;`, `,`, ends of lines, and blanks that stand between two entries."""
+    """Entries of a vector, separated by `;`, `,`, line ends, and blanks between two entries."""
     out, depth, current = [], 0, ""
     for i, c in enumerate(text):
         depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(c, 0)
@@ -236,7 +240,7 @@ def _entries(text: str) -> list[str]:
 
 
 def _apart(before: str, after: str) -> bool:
-    """Whether a blank parts two entries: `a -b` does, `a - b` and `a* b` do not."""
+    """True if a blank separates two entries: `a -b` does, `a - b` and `a* b` do not."""
     left, right = before.rstrip(" \t"), after.lstrip(" \t")
     if not left or not right or left[-1] in "+-*/^;,\n([" or right[0] in "*/^;,\n)]":
         return False
@@ -246,7 +250,7 @@ def _apart(before: str, after: str) -> bool:
 
 
 def _statements(text: str) -> list[tuple[int, str]]:
-    """The statements of a script with their lines: comments gone, continued lines joined."""
+    """Statements of a script with their lines, without comments and with continued lines joined."""
     out: list[tuple[int, str]] = []
     current, begin, depth = "", 0, 0
 
@@ -283,7 +287,7 @@ def _statements(text: str) -> list[tuple[int, str]]:
 
 
 def _code(line: str) -> str:
-    """A line without its comment; `%` within quotes is none."""
+    """Line without its comment; `%` within quotes starts none."""
     quoted = False
     for i, c in enumerate(line):
         if c == "'" and (quoted or not re.search(r"[\w\])'.]$", line[:i])):

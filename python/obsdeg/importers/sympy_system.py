@@ -1,6 +1,7 @@
-"""Systems that were written with SymPy: from its objects, or from the text that `exporters.to_sympy` writes.
+"""Systems written with SymPy: from its objects, or from the text that `exporters.to_sympy` writes.
 
-The text gives `rates`, `outputs` and what else there is to say as dictionaries and lists of formulas; it is read, never run.
+The text defines `rates`, `outputs` and other keys as dictionaries and lists of formulas; it is parsed, never
+run.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from .limits import hold, hold_brackets, measured, text_of_file
 from .problem import ImportProblem
 from .system import State, System
 
-#: Functions beside those of formulas.
+#: Functions in addition to those of formulas.
 _CALLS = {"Rational": lambda p, q=sympy.S.One: p / q, "Abs": sympy.Abs}
-#: What a text may give.
+#: Keys of a text.
 KEYS = ("name", "rates", "outputs", "starts", "parameters", "known_inputs", "unknown_inputs", "constants", "definitions")
 
 
@@ -34,17 +35,17 @@ def system(
     unknown_inputs: Iterable[Any] = (),
     constants: Mapping[Any, Any] | None = None,
 ) -> System:
-    """A system of SymPy objects.
+    """System of SymPy objects.
 
     Arguments:
-        rates: The derivative of every state, by symbol or function `x(t)`, as an expression or the text of a
+        rates: Derivative of every state, by symbol or function `x(t)`, as an expression or the text of a
             formula; or equations `Eq(x(t).diff(t), ...)`.
-        outputs: What is measured, by name.
-        starts: Known values at the start, by state; `"known"` for one of any value.
-        parameters: The unknown constants; all other symbols when left out.
+        outputs: Measured quantities by name.
+        starts: Known values at the start by state; `"known"` for a generic value.
+        parameters: Unknown constants; by default all other symbols.
         known_inputs: Known functions of time.
         unknown_inputs: Unknown functions of time.
-        constants: Known constants: numbers, or None for any value.
+        constants: Known constants: numbers, or None for a generic value.
 
     Raises:
         ImportProblem: equations that are not solved for a derivative, names without a meaning.
@@ -56,7 +57,7 @@ def system(
 
     def plain(value: Any) -> Expr:
         expression = _expression(value)
-        # SymPy visits parts in common as often as they stand there
+        # SymPy visits common parts at every occurrence
         hold(measured(expression), "a formula")
         functions = {f: symbol(f.func.__name__) for f in expression.atoms(sympy.core.function.AppliedUndef)}
         if expression.has(sympy.Derivative):
@@ -91,10 +92,10 @@ def system(
 
 
 def _expression(value: Any) -> Expr:
-    """An expression of SymPy as it is, a text by the grammar of formulas: SymPy would run it as Python.
+    """Expression of SymPy unchanged; a text by the grammar of formulas, since SymPy would run it as Python.
 
     Raises:
-        ImportProblem: it is neither.
+        ImportProblem: the value is neither.
     """
     if isinstance(value, str):
         return parse(value, calls=_CALLS)
@@ -118,10 +119,10 @@ def _equation(equation: Any) -> tuple[Any, Any]:
 
 
 def load(path: str | Path) -> System:
-    """The system of a file that `exporters.to_sympy` wrote, or one like it.
+    """System of a file that `exporters.to_sympy` wrote, or of a similar file.
 
     Raises:
-        ImportProblem: it says something else.
+        ImportProblem: the file has other statements.
     """
     try:
         return read(text_of_file(path), name=Path(path).stem)
@@ -130,7 +131,7 @@ def load(path: str | Path) -> System:
 
 
 def read(text: str, *, name: str = "system") -> System:
-    """The system of a text; as `load`."""
+    """System of a text; otherwise as `load`."""
     hold_brackets(text)
     try:
         tree = ast.parse(text)
@@ -177,7 +178,7 @@ def read(text: str, *, name: str = "system") -> System:
 
 
 def _literal(node: ast.expr, text: str) -> Any:
-    """A dictionary or list of formulas, a text, None."""
+    """Dictionary or list of formulas, text, or None."""
     match node:
         case ast.Dict(keys=keys, values=values):
             return {_key(k, text): _literal(v, text) for k, v in zip(keys, values, strict=True)}

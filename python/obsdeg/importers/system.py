@@ -1,4 +1,4 @@
-"""A system as it is imported, and its text in obsdeg's model format."""
+"""Imported system, and its text in obsdeg's model format."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import sympy  # type: ignore[import-untyped]
 from .formula import FUNCTIONS, Expr, names_in, text_of
 from .problem import ImportProblem
 
-#: Most experiments of a model file.
+#: Largest number of experiments of a model file.
 MAX_EXPERIMENTS = 20
-#: Names that mean something in expressions.
+#: Names with a meaning in expressions.
 RESERVED = frozenset(
     [
         *FUNCTIONS,
@@ -39,11 +39,12 @@ RESERVED = frozenset(
 
 @dataclass
 class State:
-    """A state.
+    """State of a system.
 
     Attributes:
-        rate: Its derivative, per unit of the time of the file.
-        start: Its value at the start, in terms of parameters and constants; ``"known"`` for a known one of generic value; None for an unknown one.
+        rate: Derivative, per unit of the time of the file.
+        start: Value at the start, in terms of parameters and constants; ``"known"`` for a known one of
+            generic value; None for an unknown one.
     """
 
     rate: Expr
@@ -58,17 +59,18 @@ Table = tuple[tuple[Expr, ...], ...]
 
 @dataclass
 class System:
-    """States, constants and outputs with all that a model file may say.
+    """States, constants and outputs, with all further keys of a model file.
 
     Expressions name states, parameters, inputs, constants and definitions; `formula.TIME` is the time.
 
     Attributes:
-        constants: Known constants: None for a generic value, an expression of other constants, or a table ``[experiment][segment]`` of numbers.
+        constants: Known constants: None for a generic value, an expression of other constants, or a table
+            ``[experiment][segment]`` of numbers.
         known_inputs: ``"generic"``, ``"constant"`` or the degree of a polynomial in time.
         unknown_inputs: ``"arbitrary"`` or the degree of a polynomial in time.
-        carry: For every segment the states that jump at its beginning.
-        constraints: What is zero at the start.
-        notes: What the reader of an answer has to know of the import.
+        carry: States that jump at the beginning of each segment.
+        constraints: Expressions that are zero at the start.
+        notes: Remarks on the import for readers of an answer.
     """
 
     name: str
@@ -87,7 +89,7 @@ class System:
     notes: list[str] = field(default_factory=list)
 
     def names(self) -> list[str]:
-        """All names that expressions may hold, in the order of the file."""
+        """All names that expressions may contain, in the order of the file."""
         groups: Sequence[Mapping[str, object]] = (
             self.states,
             self.parameters,
@@ -99,7 +101,7 @@ class System:
         return [name for group in groups for name in group]
 
     def used(self) -> set[str]:
-        """The names that equations, outputs, starts, jumps and constraints need."""
+        """Names that equations, outputs, starts, jumps and constraints need."""
         needed: set[str] = set()
         open_ = names_in(
             *(s.rate for s in self.states.values()),
@@ -119,10 +121,10 @@ class System:
         return needed
 
     def check(self) -> None:
-        """Holds that every name means something.
+        """Checks that every name is defined exactly once.
 
         Raises:
-            ImportProblem: names given twice, or never.
+            ImportProblem: a name defined twice, or never.
         """
         listed = self.names()
         if twice := sorted({n for n in listed if listed.count(n) > 1}):
@@ -131,7 +133,7 @@ class System:
             raise ImportProblem(f"`{lost[0]}`, which has no value", "a value, or one of the unknowns")
 
     def drop_unused(self) -> None:
-        """Drops definitions and constants that nothing needs."""
+        """Removes definitions and constants that nothing needs."""
         needed = self.used()
         self.definitions = {n: e for n, e in self.definitions.items() if n in needed}
         self.constants = {n: e for n, e in self.constants.items() if n in needed}
@@ -142,7 +144,7 @@ def _quoted(text: str) -> str:
 
 
 def renamed(system: System) -> dict[str, str]:
-    """New names of what would mean something else in a model file: `sign` becomes `sign_`."""
+    """New names for names that have a meaning in a model file: `sign` becomes `sign_`."""
     taken = set(system.names())
     out: dict[str, str] = {}
     for name in system.names():
@@ -157,10 +159,10 @@ def renamed(system: System) -> dict[str, str]:
 
 
 def to_toml(system: System) -> str:
-    """The model file of a system.
+    """Model file of a system.
 
     Raises:
-        ImportProblem: too many experiments, names given twice or never, functions without a counterpart.
+        ImportProblem: too many experiments, names defined twice or never, or unsupported functions.
     """
     if system.experiments > MAX_EXPERIMENTS:
         raise ImportProblem(f"{system.experiments} experiments", f"at most {MAX_EXPERIMENTS}")
@@ -235,7 +237,8 @@ def to_toml(system: System) -> str:
 def _segments(
     tables: Mapping[str, Table], count: int, text: object, key: object
 ) -> tuple[list[list[str]], tuple[list[str], list[list[str]]]]:
-    """What constants are worth in later segments: directly where all experiments agree, else through a constant of its own."""
+    """Values of constants in later segments: direct if all experiments agree, otherwise through an additional
+    constant."""
     assert callable(text) and callable(key)
     steps: list[list[str]] = [[] for _ in range(count)]
     fresh: list[str] = []

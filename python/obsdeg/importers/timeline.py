@@ -1,7 +1,8 @@
-"""What switches at given times: piecewise functions and events become segments.
+"""Switches at given times: piecewise functions and events become segments.
 
-A condition must be decided by the time and by known numbers. Every experiment is cut where one of its conditions changes; a piecewise
-function becomes the sum of its branches, each times a constant that is 1 in the segments where it holds and else 0.
+The time and known numbers must decide every condition. Every experiment is divided where one of its
+conditions changes. A piecewise function becomes the sum of its branches, each times a constant that is 1 in
+the segments where the branch holds and 0 elsewhere.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from .problem import ImportProblem
 from .sbml import Event
 from .system import System, Table
 
-#: Why segments say less than a run of some length.
+#: Reason why segments determine less than a run of finite length.
 REACHED_AT_ONCE = (
     "segments are reached at once: what is observable stays so at almost all switching times; where starts are known, "
     "longer segments may tell more apart"
@@ -24,7 +25,7 @@ REACHED_AT_ONCE = (
 
 
 class Timeline:
-    """The segments of all experiments of a system, and the constants that follow them."""
+    """Segments of all experiments of a system, and the constants that change with them."""
 
     def __init__(
         self,
@@ -37,16 +38,17 @@ class Timeline:
         nominal: Mapping[str, Expr] | None = None,
         until_events: bool = False,
     ) -> None:
-        """Cuts the runs.
+        """Divides the runs into segments.
 
         Arguments:
-            system: The system; its rates are settled here, its outputs by `settled`.
-            definitions: Named expressions of the whole model, which become those of the system.
-            values: For every experiment the numbers of its constants.
-            ends: For every experiment the time of its last measurement; None: it never ends.
+            system: The system; its rates are replaced here, its outputs by `settled`.
+            definitions: Definitions of the whole model, which become those of the system.
+            values: Values of the constants in every experiment.
+            ends: Time of the last measurement of every experiment; None if it never ends.
             events: Events of the model.
-            nominal: Numbers for unknowns that say when something switches; only their order counts.
-            until_events: Leaves out events that depend on states: the verdict is about what comes before.
+            nominal: Values of unknowns that decide when something switches; only the order of the switches
+                counts.
+            until_events: Omits events that depend on states: the verdict covers the time before them.
         """
         self.system, self.values, self.events = system, values, list(events)
         self.nominal, self.switching = dict(nominal or {}), set[str]()
@@ -75,7 +77,7 @@ class Timeline:
             state.rate = self.settled(state.rate, f"the equation of {name}")
 
     def _decided(self, condition: Expr, experiment: int | Mapping[str, Expr], place: str) -> Expr:
-        """A condition in terms of the time alone."""
+        """Condition in terms of the time only."""
         numbers = self.values[experiment] if isinstance(experiment, int) else experiment
         found = expand(condition, {**self.definitions, **numbers}, place)
         self.switching |= names_in(found) & self.nominal.keys()
@@ -110,7 +112,7 @@ class Timeline:
         return (bounds[here] + bounds[here + 1]) / 2
 
     def _table(self, condition: Expr, place: str) -> Table:
-        """1 where a condition holds, by experiment and segment."""
+        """1 where a condition holds, otherwise 0, by experiment and segment."""
         rows = []
         for e in range(len(self.values)):
             found = self._decided(condition, e, place)
@@ -121,7 +123,7 @@ class Timeline:
         return tuple(rows)
 
     def switch(self, table: Table, name: str = "on") -> Expr:
-        """A constant with these values by experiment and segment; a number where they agree."""
+        """Constant with these values by experiment and segment; a number if they agree."""
         values = {v for row in table for v in row}
         if len(values) == 1:
             return values.pop()
@@ -135,7 +137,7 @@ class Timeline:
         return symbol(self.tables[table])
 
     def settled(self, expression: Expr, place: str) -> Expr:
-        """The expression without piecewise functions."""
+        """Expression without piecewise functions."""
         pieces = {p for p in expression.atoms(sympy.Piecewise)}
         swaps: dict[Expr, Expr] = {}
         for piece in pieces:
@@ -149,7 +151,8 @@ class Timeline:
         return expression.xreplace(outer | swaps) if swaps else expression
 
     def spread(self, values: Sequence[Expr], name: str) -> Expr:
-        """What has these values in the experiments: one for all, a constant of the experiment, or a sum with switches."""
+        """Expression with these values in the experiments: a common one, a constant of the experiment, or a
+        sum with switches."""
         if all(v == values[0] for v in values):
             return values[0]
         if all(v.is_Rational for v in values):
@@ -185,7 +188,7 @@ class Timeline:
                 for s in range(1, self.segments):
                     fires = [int(row[s] == 1 and row[s - 1] == 0) for row in table]
                     if any(fires):
-                        # constants are those behind the jump: no other experiment may see it
+                        # constants have their value after the jump, and no other experiment may use it
                         column = tuple(tuple(sympy.Integer(f) for _ in range(self.segments)) for f in fires)
                         on = self.switch(column, "fires")
                         old = system.carry[s].get(target, symbol(target))

@@ -1,10 +1,10 @@
 """Numbers of solutions of random small systems, by Groebner bases of SymPy: written to counts.json.
 
-A system has two states, one to three parameters and one or two outputs, polynomials with small coefficients. At a
-random point the derivatives of the outputs are numbers; that they are these numbers is a system of equations modulo
-a prime, whose lexicographic basis with an unknown last holds a polynomial of this unknown alone. Its distinct roots
-are the values that the unknown takes. Systems whose rank is not full, and those that take longer than a limit, are
-left out. `python oracle.py N` writes N systems.
+A system has two states, one to three parameters and one or two outputs, all polynomials with small
+coefficients. At a random point the derivatives of the outputs are numbers. Equating them to these numbers
+gives a system of equations modulo a prime. Its lexicographic basis with an unknown last contains a polynomial
+in this unknown alone. The distinct roots of this polynomial are the values of the unknown. Systems without
+full rank, and those that exceed a time limit, are omitted. `python oracle.py N` writes N systems.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def drawn(rng: random.Random) -> dict[str, list[str]]:
 
 
 def counted(system: dict[str, list[str]], rng: random.Random) -> dict[str, int] | None:
-    """The number of values of every unknown; None if the rank is not full."""
+    """Number of values of every unknown; None if the rank is not full."""
     unknowns = symbols(["x1", "x2", *system["parameters"]])
     read = {str(u): u for u in unknowns}
     rates = [sympy.sympify(r.replace("^", "**"), locals=read) for r in system["rates"]]
@@ -87,7 +87,7 @@ def rank(rows: list[list[int]]) -> int:
 
 
 class TooLong(Exception):
-    """The limit is over."""
+    """Raised when the time limit is exceeded."""
 
 
 def ended(*_: object) -> None:
@@ -107,7 +107,7 @@ def main() -> None:
             continue
         finally:
             signal.alarm(0)
-        # every third of those with one solution alone
+        # one in three of those with a single solution only
         if numbers and (max(numbers.values()) > 1 or rng.random() < 0.34):
             out.append({**system, "numbers": numbers})
             print(len(out), numbers, file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-//! Schemes at the edge of degeneracy: right verdicts do not disagree, wrong ones do.
+//! Cross-checks at the edge of degeneracy: correct verdicts cause no disagreement, wrong ones do.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Angle, Carry, Scheme};
@@ -9,8 +9,8 @@ use obsdeg_evidence::prediction::Prediction;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 use obsdeg_exact::SplitMix64;
 
-/// A scheme whose positions nearly coincide, are nearly opposite, or are nearly cardinal, or whose latitude
-/// is nearly that of a pole or of the equator.
+/// Scheme with positions that nearly coincide, are nearly opposite or nearly cardinal, or with a latitude
+/// near a pole or the equator.
 fn borderline(seed: u64) -> Scheme {
     const DEGREE: i64 = 1_000_000_000;
     let mut rng = SplitMix64::new(seed ^ 0x626f_7264_6572);
@@ -53,12 +53,12 @@ fn checked(seed: u64, scheme: &Scheme) -> CrossCheck {
     crosscheck(scheme, &Conditions::default(), &options(seed), &|_| true).expect("an answer")
 }
 
-/// What is not resolvable has a reason, check by check.
+/// Asserts that every check that is not resolvable states a reason.
 fn explained(c: &CrossCheck) {
     assert_eq!(c.unresolved.len(), c.counts.not_resolvable, "{:?}", c.unresolved);
 }
 
-/// Right verdicts on schemes at the edge: none disagrees, and most of the checks are resolved.
+/// Correct verdicts on schemes at the edge: no check disagrees, and most are resolved.
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
 fn right_verdicts(seeds: std::ops::Range<u64>) {
     let (mut agree, mut open, mut wrong) = (0, 0, Vec::new());
@@ -77,10 +77,10 @@ fn right_verdicts(seeds: std::ops::Range<u64>) {
     assert!(open * 10 <= agree, "{agree} agree, {open} not resolvable");
 }
 
-/// What is changed of a verdict, and the outcomes of the checks that must show it.
+/// Falsified prediction, outcomes of the checks that must detect it, and the index of the change.
 type Falsified = (Prediction, fn(&CrossCheck, usize) -> [Agreement; 2], usize);
 
-/// A degree that is off by one.
+/// Changes one degree by one.
 fn another_degree(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
     let of: Vec<usize> = (0..right.unknowns.len()).filter(|&i| right.unknowns[i].degree.is_some()).collect();
     let i = *of.get(rng.below(of.len().max(1) as u64) as usize)?;
@@ -90,7 +90,7 @@ fn another_degree(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified>
     Some((wrong, |c, i| [c.quantities[i].degree_slope.outcome; 2], i))
 }
 
-/// An unknown that is not observable, declared so.
+/// Declares an unobservable unknown observable.
 fn declared_observable(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
     let of: Vec<usize> = (0..right.unknowns.len()).filter(|&i| right.unknowns[i].degree.is_none()).collect();
     let i = *of.get(rng.below(of.len().max(1) as u64) as usize)?;
@@ -99,7 +99,7 @@ fn declared_observable(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsi
     Some((wrong, |c, i| [c.quantities[i].degree_slope.outcome, c.quantities[i].status_outcome], i))
 }
 
-/// An entry of a null vector, by derivatives or with dwells, off by a thousandth.
+/// Changes one entry of a null vector by a thousandth, in the null space of the derivatives or of the dwells.
 fn another_entry(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> {
     let mut wrong = right.clone();
     let dwells = rng.below(2) == 0;
@@ -111,8 +111,8 @@ fn another_entry(right: &Prediction, rng: &mut SplitMix64) -> Option<Falsified> 
     Some((wrong, |c, i| [c.spaces[i].outcome; 2], if dwells { 3 } else { 1 }))
 }
 
-/// Wrong verdicts on schemes at the edge, `count` of each kind: each is caught where its check is resolved,
-/// and most are.
+/// Falsifies verdicts on schemes at the edge, `count` of each kind. Every resolved check catches its change,
+/// and at least 95 % are resolved.
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
 fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
     let kinds = [another_degree, declared_observable, another_entry];
@@ -131,7 +131,7 @@ fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
             let c = c.expect("an answer");
             explained(&c);
             if c.passed || c.verdicts_agree {
-                // nothing that many digits decide is open
+                // an uncaught change is one whose check is not resolvable
                 let outcomes = of(&c, at);
                 assert!(outcomes.contains(&Agreement::NotResolvable), "{kind} {seed} {s:?} is not caught");
                 open += 1;
@@ -147,7 +147,7 @@ fn wrong_verdicts(count: usize, scheme: impl Fn(u64) -> Scheme) {
 #[test]
 fn schemes_at_the_edge_agree() {
     right_verdicts(0..16);
-    // the filter shows what many digits say of its own samples, at their times
+    // the filter in doubles shows the values that many digits give for its own sample times
     for seed in [218, 329] {
         let c = checked(seed, &borderline(seed));
         assert!(c.verdicts_agree, "{seed}: {:?}", c.disagreements);
@@ -162,7 +162,7 @@ fn schemes_at_the_edge_agree() {
             assert!(why.contains("the filter in doubles shows the same"), "{seed}: {why}");
         }
     }
-    // an ordinary readout of gimbals, and separations to both sides of the prior's width
+    // an ordinary gimbal readout, and separations on both sides of the prior's width
     for (angle, open) in [("180.001", 1), ("0.001", 6), ("179.99999", 5)] {
         let c = checked(1, &crate::schemes::scheme(&["0,0,0", &format!("{angle},0,0")], Carry::Platform));
         explained(&c);

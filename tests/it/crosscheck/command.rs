@@ -1,4 +1,4 @@
-//! The command: exit codes, bytes, words and figures.
+//! The command `crosscheck`: exit codes, bytes, words and figures.
 
 use super::P1P2;
 use crate::program::{obsdeg, run, stderr, stdout};
@@ -18,7 +18,7 @@ fn exit_codes_and_the_same_bytes() {
     assert_eq!(run(&["--drift-noise", "0.01"]).status.code(), Some(2));
 }
 
-/// The paper's case word by word; figures that are rounding are left out.
+/// Verbatim output of the paper's case, without numbers that are rounding errors.
 #[test]
 fn the_papers_case_word_by_word() {
     let output = run(&P1P2);
@@ -33,7 +33,7 @@ fn the_papers_case_word_by_word() {
     });
 }
 
-/// Figures of the evidence, and nothing else, are written.
+/// The folder contains the figures of the evidence and nothing else.
 #[test]
 fn the_folder_of_a_crosscheck() {
     let place = tempfile::tempdir().expect("a folder");
@@ -57,7 +57,7 @@ fn the_folder_of_a_crosscheck() {
     for text in ["slope -0.5", "slope -1.5", "slope -2.5", "dwell of a position [s]", "1 sigma [deg/h/g]"] {
         assert!(slopes.contains(text), "{text}");
     }
-    // no two curves alike, of one order or of several: colours and dashes; references are black and dotted
+    // curves differ in colour or dashes, also those of different orders; reference lines are black and dotted
     let value = |path: &str, key: &str| {
         let rest = path.split_once(&format!(" {key}=\""))?.1;
         rest.split_once('"').map(|(value, _)| value.to_string())

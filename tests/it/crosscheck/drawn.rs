@@ -1,12 +1,12 @@
-//! Schemes drawn at random.
+//! Cross-checks of random schemes.
 
 use obsdeg_core::model::{Angle, Carry, Path, Scheme, Term, Unknowns};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, FilterChange, crosscheck};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_exact::SplitMix64;
 
-/// A scheme drawn at random: carries, latitudes with poles and equator, terms, one to eight positions; `near`
-/// has two positions or a latitude that hardly differ from another.
+/// Random scheme: carry, latitude (poles and equator included), terms, one to eight positions. With `near`
+/// two positions or the latitude are nearly degenerate.
 pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     let mut rng = SplitMix64::new(seed);
     let mut pick = |n: usize| rng.below(n as u64) as usize;
@@ -24,7 +24,7 @@ pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     if near && pick(3) == 0 {
         latitude = ["89.9999", "89.99", "0.0001", "-0.01", "89.999999999", "-89.9999"][pick(6)];
     } else if near {
-        // 0.1 to 1e-9 degrees
+        // separations of 0.1 to 1e-9 degrees
         let mut place = places[pick(count)];
         place[pick(3)] += [100_000_000, 30_000_000, 10_000_000, 1_000_000, 1000, 1][pick(6)];
         places.push(place);
@@ -46,8 +46,8 @@ pub(super) fn drawn(seed: u64, near: bool) -> Scheme {
     scheme
 }
 
-/// The same positions and conditions with any of the terms of the whole platform, and a path where torquer
-/// errors act on it.
+/// The same positions and conditions with random terms of the whole platform, and a path so that torquer
+/// errors act.
 fn drawn_whole(seed: u64) -> Scheme {
     let mut rng = SplitMix64::new(seed ^ 0x7768_6f6c_6500);
     let mut scheme = drawn(seed, false);
@@ -62,7 +62,7 @@ fn drawn_whole(seed: u64) -> Scheme {
     scheme
 }
 
-/// Checks schemes drawn at random: no verdict disagrees, and at most one check in so many is not resolvable.
+/// Cross-checks random schemes: no verdict disagrees, and at most one check in `one_in` is not resolvable.
 #[expect(clippy::print_stdout, reason = "the figures of a long run")]
 fn sweep(seeds: std::ops::Range<u64>, one_in: usize, scheme: impl Fn(u64) -> Scheme) {
     let mut counts = [0; 3];
@@ -85,21 +85,22 @@ fn sweep(seeds: std::ops::Range<u64>, one_in: usize, scheme: impl Fn(u64) -> Sch
 #[test]
 fn schemes_drawn_at_random_agree() {
     sweep(0..10, 100, |seed| drawn(seed, false));
-    // a psi that is not excited, but for what cosines of right angles leave of its column
+    // a psi that is not excited: its column holds only the rounded cosines of right angles
     sweep(296..297, 100, |seed| drawn(seed, false));
-    // psi at the end, in which a psi that is not excited cancels but for rounding
+    // psi at the end, in which a psi that is not excited cancels up to rounding
     sweep(666..667, 100, |seed| drawn(seed, false));
     sweep(1000..1004, 10, |seed| drawn(seed, true));
-    // sines of right angles are rounded, times a psi that nobody sees
+    // rounded sines of right angles times an unobservable psi
     sweep(1060..1061, 10, |seed| drawn(seed, true));
 }
 
-/// Accelerometers, torquers and mounting: the same checks. What dwells add to combinations is not resolvable.
+/// Cross-checks of schemes with accelerometers, torquers and mounting. Contributions of dwells to
+/// combinations are not resolvable.
 #[test]
 fn whole_platforms_drawn_at_random_agree() {
     sweep(2000..2005, 20, drawn_whole);
-    // a torquer error that is in psi^n after a turn, and that nothing sees: rounding leaves nothing of it in
-    // psi at the end
+    // an unobservable torquer error that is part of psi^n after a turn: in psi at the end it is lost in
+    // rounding
     sweep(2162..2163, 20, drawn_whole);
 }
 
@@ -107,7 +108,7 @@ fn whole_platforms_drawn_at_random_agree() {
 #[test]
 #[ignore = "minutes"]
 fn many_schemes_drawn_at_random_agree() {
-    // SEEDS=667..800 for a part of them
+    // SEEDS=667..800 selects a range of seeds
     let part = std::env::var("SEEDS").ok();
     if let Some((first, end)) = part.as_deref().and_then(|s| s.split_once("..")) {
         let [first, end] = [first, end].map(|x| x.parse().expect("a seed"));

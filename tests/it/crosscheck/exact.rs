@@ -1,4 +1,4 @@
-//! Runs against exact truth.
+//! Monte Carlo runs against exact truth.
 
 use obsdeg_core::model::settings::{Assignment, FilterKind, Truth};
 use obsdeg_core::model::{Carry, Scheme};
@@ -9,7 +9,7 @@ use obsdeg_report::{Format, Layout};
 use super::check;
 use crate::schemes::{S6, paper, scheme};
 
-/// Which filter ran, ANEES of all unknowns and NIS; every run settles.
+/// Filter that ran, ANEES of all unknowns and NIS; asserts that every run converges.
 fn statistics(scheme: &Scheme, conditions: &Conditions, runs: usize) -> (FilterKind, Statistic, Statistic) {
     let conditions = Conditions { truth: Truth::Exact, ..conditions.clone() };
     let plan = Plan::new(scheme, &conditions).expect("a plan");
@@ -26,11 +26,11 @@ fn values(name: &str, value: f64) -> Vec<Assignment> {
     vec![Assignment { name: name.into(), value }]
 }
 
-/// ANEES and NIS of many runs against exact truth at the paper's drifts. The iterated filter is what it
-/// believes; one that goes through the run once is not, since it linearised the first steps before it knew
-/// the drifts, nor is the linear one. With p1 p2 the most probable run alone has an ANEES of 16.5 under
-/// inertial carry: what is left open bends by more than what is known. Six odd attitudes under platform carry
-/// need shorter runs to begin with.
+/// ANEES and NIS of many runs against exact truth at the paper's drifts. The iterated filter is consistent.
+/// The extended filter is not: it linearises the first steps before it knows the drifts. The linear filter is
+/// not either. With p1 p2 under inertial carry the most probable run alone has an ANEES of 16.5, since the
+/// curvature along undetermined directions exceeds that along known ones. Six odd attitudes under platform
+/// carry need shorter first runs.
 #[test]
 fn the_iterated_filter_is_what_it_believes() {
     iterated_is_what_it_believes(30, 12);
@@ -42,8 +42,8 @@ fn the_iterated_filter_is_what_it_believes_in_200_runs() {
     iterated_is_what_it_believes(200, 50);
 }
 
-/// `runs` of the iterated filter (half as many of six odd attitudes), `others` of the extended and of the
-/// linear one.
+/// Checks `runs` runs of the iterated filter (half as many for six odd attitudes), and `others` runs of the
+/// extended and of the linear filter.
 fn iterated_is_what_it_believes(runs: usize, others: usize) {
     const SIX: [&str; 6] = ["0,0,0", "180,0,0", "90,0,0", "-90,0,0", "0,0,90", "0,0,-90"];
     let carries = [Carry::Platform, Carry::Inertial];
@@ -61,8 +61,8 @@ fn iterated_is_what_it_believes(runs: usize, others: usize) {
     }
 }
 
-/// A platform without drifts is not run with others, though the prior allows for them: the filter is chosen
-/// by the truth that is run.
+/// A platform without drifts runs without drifts although the prior allows them, and the filter is chosen by
+/// that truth.
 #[test]
 fn the_truth_is_that_of_the_scheme() {
     let still =
@@ -71,8 +71,8 @@ fn the_truth_is_that_of_the_scheme() {
     assert!(filter == FilterKind::Linear && anees.pass && nis.pass, "{anees:?} {nis:?}");
 }
 
-/// The drift noise of a slew is that of as many steps as it would have, in the truth as in the filter,
-/// whatever the step.
+/// The drift noise during a slew equals that of the steps in its duration, in truth and filter, for any step
+/// size.
 #[test]
 fn slews_have_the_noise_that_the_filter_allows_for() {
     let conditions = Conditions {
@@ -96,7 +96,7 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     let c = check(&paper(Carry::Platform), &exact, FilterChange::default());
     let nis = c.monte_carlo.statistics.iter().find(|s| s.name == "NIS").expect("NIS");
     assert!(!c.passed && nis.measured > 100.0 && !c.validity.holds);
-    // what fails is the model of the runs, not a verdict
+    // the model of the runs fails, not a verdict
     assert!(c.verdicts_agree && c.quantities.iter().all(|q| !q.slope.fails() && !q.inflation.fails()));
     let title = |c: &CrossCheck| {
         let text = obsdeg_report::written(c, Format::Table, Layout::default()).expect("text");
@@ -104,7 +104,8 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     };
     assert_eq!(
         title(&c),
-        "Cross-check: filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter (platform carry)"
+        "Cross-check: filter and exact verdicts agree, but the Monte Carlo runs (d) do NOT fit the filter (platform \
+         carry)"
     );
     let wrong = FilterChange { carry: Some(Carry::Inertial), ..FilterChange::default() };
     let c = check(&paper(Carry::Platform), &Conditions::default(), wrong);
@@ -113,7 +114,7 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
         "{:?}",
         c.disagreements
     );
-    // of psi too: with 0.1 deg |psi|^2/2 is half the noise of one sample, which 200 samples begin to see
+    // psi small too: at 0.1 deg, |psi|^2/2 is half the noise of one sample, which shows after 200 samples
     let psi = values("psi", 0.02);
     let priors = [exact.priors.clone(), psi.clone()].concat();
     let small =
@@ -122,8 +123,8 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     assert!(c.passed && c.validity.holds, "{:?}", c.disagreements);
 }
 
-/// Drifts, torquers, accelerometers and mounting: the filter with full attitudes on exact truth, which
-/// integrates them all, is what it believes to be.
+/// Drifts, torquers, accelerometers and mounting: the filter with full attitudes is consistent with an exact
+/// truth that integrates them all.
 #[test]
 fn the_whole_platform_is_consistent() {
     whole_platform_is_consistent(12);

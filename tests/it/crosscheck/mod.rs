@@ -1,4 +1,4 @@
-//! The exact verdicts against the filter: what must agree, and what must not.
+//! Cross-check of the exact verdicts against the filter: required agreements and required disagreements.
 
 mod borderline;
 mod command;
@@ -31,7 +31,7 @@ fn right(scheme: &Scheme) -> CrossCheck {
     check(scheme, &Conditions::default(), FilterChange::default())
 }
 
-/// The measured slope of every unknown, as predicted by its accuracy order, which the test knows by itself.
+/// Measured slopes of the unknowns whose names begin with `which`, without combinations.
 fn slopes(c: &CrossCheck, which: &str) -> Vec<f64> {
     let of = |name: &str| name.starts_with(which) && !name.contains(' ');
     c.quantities.iter().filter(|q| of(&q.name)).filter_map(|q| q.slope.measured).collect()
@@ -87,7 +87,7 @@ fn the_papers_case_is_consistent() {
     assert_eq!((c.orders.measured, c.orders.of), (8, 8));
 }
 
-/// A filter with other unknowns is found out for that; what it does not have is not measured.
+/// A filter without one of the unknowns disagrees, and that unknown is not measured.
 #[test]
 fn a_filter_without_an_unknown() {
     let c = check(
@@ -104,9 +104,9 @@ fn a_filter_without_an_unknown() {
     assert!(c.orders.measured < c.orders.of && c.quantities.iter().any(|q| q.modelled));
 }
 
-/// One position: the best variance of psi_z, eps_x and eps_y, when what their solution needs is unknown and
-/// the rest of the drift is known, is 1, 12 and 720 times sigma^2 dt / T^(2k+1) (over wN^2 for eps_y, which
-/// enters psi_z'' by wN).
+/// One position: the smallest variances of psi_z, eps_x and eps_y are 1, 12 and 720 times sigma^2 dt /
+/// T^(2k+1), with all unknowns of their solution free and the rest of the drift known (over wN^2 for eps_y,
+/// which enters psi_z'' through wN).
 #[test]
 fn variance_constants_of_a_single_position() {
     let single = Scheme { unknowns: Unknowns::Drift, ..scheme(&["0,0,0"], Carry::Platform) };
@@ -151,7 +151,7 @@ fn wrong_filters_are_found_out() {
     ] {
         let c = check(&paper(Carry::Platform), &Conditions::default(), change.clone());
         assert!(!c.passed && !c.disagreements.is_empty(), "{change:?}");
-        // by the data too, not only by the model
+        // the data show it too, not only the model
         assert!(c.monte_carlo.statistics.iter().any(|s| s.name == "NIS" && !s.pass), "{change:?}");
     }
     let c = right(&paper(Carry::Platform));
@@ -161,7 +161,7 @@ fn wrong_filters_are_found_out() {
     );
 }
 
-/// A sign that is wrong in the model of the verdicts shows against the equations of direction cosines.
+/// A wrong sign in the model of the verdicts disagrees with the equations in direction cosines.
 #[test]
 fn the_model_is_held_against_equations_written_anew() {
     for carry in Carry::ALL {
@@ -171,7 +171,7 @@ fn the_model_is_held_against_equations_written_anew() {
     }
 }
 
-/// A prior of one position holds for the truth and for filters that have no such unknown.
+/// A prior of psi at one position applies to the truth, and to filters without that unknown.
 #[test]
 fn psi_of_one_position() {
     let prior = |name: &str| Assignment { name: name.into(), value: 0.2 };
@@ -183,8 +183,9 @@ fn psi_of_one_position() {
     assert!(!check(&paper(Carry::Reset), &conditions, other).passed);
 }
 
-/// At the pole, drift that nobody sees turns psi during the dwell: what derivatives see is lost at the start
-/// (slope) or at the end (inflation), and directions move psi as well. The filter agrees with all of it.
+/// At the pole, unobservable drift turns psi during the dwell. What the derivatives determine is lost at the
+/// start (slope) or at the end (inflation), and unobservable directions include psi. The filter agrees with
+/// all of this.
 #[test]
 fn at_the_pole_the_dwell_takes_away() {
     let at_the_pole =
@@ -199,15 +200,15 @@ fn at_the_pole_the_dwell_takes_away() {
     let of = |name: &str| c.quantities.iter().find(|q| q.name == name).expect("an unknown");
     let seen = |name: &str| (of(name).accuracy_order, of(name).inflation.predicted);
     assert_eq!(["psi_x", "psi_y", "psi_z"].map(seen), [(Some(0), 1.0), (None, 10.0), (Some(0), 10.0)]);
-    // derivatives see it, samples over dwells do not
+    // observable by derivatives, but not by samples over dwells
     assert_eq!(
         (of("psi_y").status_measured, of("psi_y").slope.measured),
         (Some(Status::Observable), Some(0.0))
     );
 }
 
-/// The control at another latitude is far from the scheme's: at 89.9999 degrees a filter at the pole is
-/// hardly wrong.
+/// The control uses a latitude far from that of the scheme: at 89.9999 degrees a filter for the pole would be
+/// almost correct.
 #[test]
 fn the_control_is_at_a_latitude_far_away() {
     for (latitude, control) in
@@ -225,8 +226,9 @@ fn the_control_is_at_a_latitude_far_away() {
     }
 }
 
-/// Of white innovations the probability is even: 500 times ten runs of 20 samples, whose longest lag has half
-/// as many products. The mean of 500 even numbers is 0.5 +- 0.013, and one in a hundred is below 0.01.
+/// With white innovations the probability is uniformly distributed: 500 times ten runs of 20 samples (half as
+/// many products at the longest lag). The mean of 500 uniform numbers is 0.5 +- 0.013, and one in a hundred
+/// lies below 0.01.
 #[test]
 fn whiteness_of_right_filters_is_even() {
     let conditions = Conditions { dwell_s: 100.0, ..Conditions::default() };
@@ -237,7 +239,7 @@ fn whiteness_of_right_filters_is_even() {
     let p: Vec<f64> = (0..500).map(|k| prepared.whiteness(&prepared.chunk(10 * k, 10 * k + 10))).collect();
     let (mean, small) = (p.iter().sum::<f64>() / 500.0, p.iter().filter(|p| **p < 0.01).count());
     assert!((mean - 0.5).abs() < 0.05 && (1..=12).contains(&small), "{mean} {small}");
-    // of one sample, and of two, there are no lags and one
+    // runs of one sample have no lag, runs of two samples have one
     let short = Conditions { dwell_s: 10.0, ..conditions };
     for attitudes in [&["0,0,0"][..], &["0,0,0", "180,0,0"]] {
         let plan = Plan::new(&scheme(attitudes, Carry::Inertial), &short).expect("a plan");
@@ -248,7 +250,7 @@ fn whiteness_of_right_filters_is_even() {
     }
 }
 
-/// Same seed, same bytes, whatever the number of threads; and the bar hears of every run.
+/// The same seed gives the same bytes on any number of threads, and the progress bar counts every run.
 #[test]
 fn threads_do_not_change_the_sums() {
     let conditions = Conditions::default();
@@ -274,8 +276,8 @@ fn threads_do_not_change_the_sums() {
 
 proptest! {
     #![proptest_config(Config { cases: 24, rng_seed: RngSeed::Fixed(1), ..Config::default() })]
-    /// Random schemes of whole degrees (the same ones each time: one in three hundred right filters leaves a
-    /// band of 99.9 %): model evidence a, b, c and the ranking agree with the exact verdicts.
+    /// Model evidence a, b, c and the ranking agree with the exact verdicts on random schemes with whole
+    /// degrees. The seeds are fixed, because one correct filter in three hundred leaves a band of 99.9 %.
     #[test]
     fn random_schemes_agree(
         angles in prop::collection::vec(prop::array::uniform3(-18i32..18), 1..6),
@@ -291,8 +293,8 @@ proptest! {
     }
 }
 
-/// Noise, step and dwell only scale what the samples say: slopes, inflation and null vectors are theirs, not
-/// those of a prior.
+/// Noise, step and dwell only scale the information of the samples: slopes, inflation and null vectors do not
+/// change, and do not come from a prior.
 #[test]
 fn evidence_does_not_depend_on_noise_and_steps() {
     let usual = right(&paper(Carry::Platform));
@@ -329,8 +331,8 @@ fn evidence_does_not_depend_on_noise_and_steps() {
     }
 }
 
-/// Valid schemes always get an answer. (One of the first has coefficients that never separate, at a latitude
-/// and dwells that used to end in a pivot of nothing.)
+/// Every valid scheme gets an answer. One of the first has inseparable coefficients at a latitude and dwells
+/// that once led to a pivot of zero.
 #[test]
 fn every_valid_scheme_is_answered() {
     let mut first = scheme(&["0,0,180", "180,180,0", "0,-90,180", "90,180,-90", "0,90,0"], Carry::Platform);
@@ -370,7 +372,7 @@ fn every_valid_scheme_is_answered() {
     });
 }
 
-/// A position cannot be dropped when there is no other.
+/// The only position of a scheme cannot be dropped.
 #[test]
 fn the_only_position_is_not_dropped() {
     let filter = FilterChange { dropped: Some(0), ..FilterChange::default() };
@@ -380,8 +382,8 @@ fn the_only_position_is_not_dropped() {
     assert!(refused.to_string().contains("only position"), "{refused}");
 }
 
-/// What doubles at dwells of a platform do not show, many digits at short dwells do: positions that hardly
-/// differ, and a latitude close to the pole.
+/// Positions that hardly differ and a latitude close to the pole are resolved with many digits at short
+/// dwells, where doubles at dwells of a platform show nothing.
 #[test]
 fn what_doubles_do_not_show_is_resolved() {
     let at = |latitude: &str, attitudes: &[&str], carry| Scheme {
@@ -406,8 +408,8 @@ fn what_doubles_do_not_show_is_resolved() {
     }
 }
 
-/// What is not resolvable is counted, and no disagreement: the filter's prior is none beside a direction that
-/// is seen through a turn of 1e-9 degrees.
+/// Checks that are not resolvable are counted and are no disagreement: here the filter's prior is too narrow
+/// for a direction that is observed only through a turn of 1e-9 degrees.
 #[test]
 fn what_is_not_resolvable_is_no_disagreement() {
     let s = scheme(&["40,-6,155", "-22,12,45", "140,136,109", "40,-6,155.000000001"], Carry::Platform);

@@ -1,4 +1,4 @@
-//! Verdicts that are wrong on purpose are caught.
+//! Deliberately wrong verdicts are caught by the cross-check.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Scheme};
@@ -8,26 +8,26 @@ use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use crate::schemes::{paper, scheme};
 
-/// The verdicts on a scheme, as numbers.
+/// Predicted verdicts of a scheme, as numbers.
 fn predicted(scheme: &Scheme) -> Prediction {
     let plan = Plan::new(scheme, &Conditions::default()).expect("a plan");
     Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], 1).expect("a prediction")
 }
 
-/// Holds a prediction against a scheme.
+/// Cross-checks a prediction against a scheme.
 fn held(prediction: &Prediction, scheme: &Scheme) -> CrossCheck {
     let options = CrossCheckOptions { runs: 2, seed: 1, filter: FilterChange::default() };
     crosscheck_against(prediction, scheme, &Conditions::default(), &options, &|_| true).expect("checked")
 }
 
-/// Every wrong word of a verdict is caught: one field after the other is changed, of the first unknown of
-/// every kind.
+/// Every field of a verdict is checked: one field after the other is changed, for the first unknown of every
+/// kind.
 #[test]
 fn wrong_verdicts_are_caught() {
     wrong_words_are_caught(&scheme(&["0,0,0", "90,0,0", "0,90,0"], Carry::Inertial), false);
 }
 
-/// The same of every unknown of p1 p2.
+/// Every field of the verdicts on all unknowns of p1 p2 is checked.
 #[test]
 #[ignore = "a minute: .ci/run release"]
 fn wrong_verdicts_on_every_unknown_are_caught() {
@@ -41,7 +41,7 @@ fn wrong_words_are_caught(s: &Scheme, on_every_unknown: bool) {
     assert!(c.passed && c.counts.not_resolvable == 0, "{:?}", c.disagreements);
     let mut wrong: Vec<(String, Change)> = Vec::new();
     let mut add = |what: String, change: Change| wrong.push((what, change));
-    // the first of every kind: the others are judged alike
+    // the first unknown of every kind; the others are judged alike
     let kind = |u: &PredictedUnknown| (u.status, u.degree, u.accuracy_order, u.order_at_end);
     let is_first = |i: usize| right.unknowns[..i].iter().all(|u| kind(u) != kind(&right.unknowns[i]));
     let chosen = (0..right.unknowns.len()).filter(|&i| on_every_unknown || is_first(i));
@@ -151,7 +151,7 @@ fn wrong_words_are_caught(s: &Scheme, on_every_unknown: bool) {
             Box::new(move |p| {
                 let again = list(p)[i].clone();
                 let (n, unknowns) = (list(p).len(), p.unknowns.len());
-                // of one vector, another that is seen
+                // a single vector is replaced by an observable direction
                 let other = vec![vec![(unknowns - 1, 1.0)]; n];
                 *list(p) = if n > 1 { vec![again; n] } else { other };
             }),
@@ -192,13 +192,13 @@ fn wrong_words_are_caught(s: &Scheme, on_every_unknown: bool) {
             continue;
         }
         let c = held(&prediction, s);
-        // what exit code 1 says
+        // the conditions of exit code 1
         assert!(!c.passed && !c.verdicts_agree && c.counts.disagree > 0, "{what} is not caught");
     }
 }
 
-/// The verdicts on another carry, another mounting (signs of S_i: two at a time, since axes stay
-/// right-handed), other angles and another latitude are caught.
+/// Verdicts on another carry, mounting, attitude or latitude are caught. Signs of S_i change two at a time,
+/// so that the axes stay right-handed.
 #[test]
 fn verdicts_on_something_else_are_caught() {
     let s = scheme(&["0,0,0", "90,0,0", "0,90,0"], Carry::Platform);
@@ -212,7 +212,7 @@ fn verdicts_on_something_else_are_caught() {
     let mut mountings = 0;
     for other in (0..9).map(|k| mounted(k / 3, k % 3)) {
         let (wrong, right) = (predicted(&other), predicted(&s));
-        // what is the same to every word is no wrong verdict
+        // mountings with the same verdicts are skipped
         if wrong != right {
             let c = held(&wrong, &s);
             assert!(!c.passed && !c.verdicts_agree, "{other:?}");

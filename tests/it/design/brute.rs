@@ -1,6 +1,6 @@
-//! Sigmas of the cardinal attitudes with slews between them, from the equations alone: nothing of the program
-//! is used. Attitudes are integer matrices, slews turn in n, the drift model is (22), (23), (27), (28) of the
-//! paper.
+//! Sigmas of the cardinal attitudes with slews between them, computed from the equations alone, without any
+//! code of the program. Attitudes are integer matrices, slews turn in n, the drift model is (22), (23), (27),
+//! (28) of the paper.
 
 type Matrix = [[f64; 3]; 3];
 
@@ -10,28 +10,28 @@ type Row = [f64; N];
 
 const EARTH: f64 = 7.292115e-5;
 const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
-/// Without it, what nothing determines would stop the elimination: rad, and rad/s.
+/// Sigmas of the prior, in rad and rad/s, which keep the elimination regular for undetermined unknowns.
 const PRIOR: [f64; 2] = [1e2, 1e2 * DPH * 3600.0];
 
-/// One way from an attitude to another.
+/// Slew path from one attitude to another.
 #[derive(Debug, Clone)]
-pub(crate) struct Way {
-    /// The axis in n.
+pub(crate) struct SlewPath {
+    /// Slew axis in n (unit vector).
     pub(crate) about: [f64; 3],
-    /// Its time, in s.
+    /// Duration of the slew, in s.
     pub(crate) seconds: f64,
-    /// psi^n behind it by psi^n before and the coefficients.
+    /// psi^n after the slew, as rows over psi^n before it and the coefficients.
     psi: [Row; 3],
 }
 
-/// The conditions.
+/// Model of a platform with given candidates and conditions.
 pub(crate) struct Brute {
     attitudes: Vec<Matrix>,
-    /// `ways[i][j]`: one, two for half a turn.
-    pub(crate) ways: Vec<Vec<Vec<Way>>>,
-    /// The root of the information of a dwell on (psi^n, eps^n) at its start.
+    /// `paths[i][j]`: slew paths from attitude i to j; two for a half turn, otherwise one.
+    pub(crate) paths: Vec<Vec<Vec<SlewPath>>>,
+    /// Square root of the information of a dwell on (psi^n, eps^n) at its start.
     root: [[f64; 6]; 6],
-    /// psi^n behind a dwell by (psi^n, eps^n) before.
+    /// psi^n after a dwell, as rows over (psi^n, eps^n) before it.
     after: [[f64; 6]; 3],
     w: Matrix,
 }
@@ -40,7 +40,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// The matrix of three letters: column j is where platform axis j points.
+/// Attitude matrix of three letters: column j is the direction of platform axis j.
 fn matrix(name: &str) -> Matrix {
     let mut c = [[0.0; 3]; 3];
     for (j, letter) in name.chars().enumerate() {
@@ -57,7 +57,7 @@ fn matrix(name: &str) -> Matrix {
     c
 }
 
-/// Rodrigues: the rotation about a unit vector.
+/// Rotation matrix about a unit vector (Rodrigues), angle in rad.
 fn turned(axis: &[f64; 3], angle: f64) -> Matrix {
     let [x, y, z] = *axis;
     let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
@@ -93,8 +93,8 @@ impl Brute {
         let (wn, wu) = (EARTH * latitude_deg.to_radians().cos(), EARTH * latitude_deg.to_radians().sin());
         let w = [[0.0, 0.0, -wu], [0.0, 0.0, wn], [wu, -wn, 0.0]];
         let attitudes: Vec<Matrix> = names.iter().map(|n| matrix(n)).collect();
-        let mut out = Self { attitudes, ways: Vec::new(), root: [[0.0; 6]; 6], after: [[0.0; 6]; 3], w };
-        // psi' = W psi + eps, eps' = 0: Taylor's series of a step is at its end after a few terms
+        let mut out = Self { attitudes, paths: Vec::new(), root: [[0.0; 6]; 6], after: [[0.0; 6]; 3], w };
+        // psi' = W psi + eps, eps' = 0: a few terms of the Taylor series suffice for one step
         let mut now: [[f64; 6]; 3] =
             std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
         for _ in 0..(dwell / step).round() as usize {
@@ -117,12 +117,12 @@ impl Brute {
             }
         }
         out.after = now;
-        let ways = |a: usize| (0..names.len()).map(|b| out.between(a, b, rate_deg_s)).collect();
-        out.ways = (0..names.len()).map(ways).collect();
+        let paths = |a: usize| (0..names.len()).map(|b| out.between(a, b, rate_deg_s)).collect();
+        out.paths = (0..names.len()).map(paths).collect();
         out
     }
 
-    fn between(&self, from: usize, to: usize, rate_deg_s: f64) -> Vec<Way> {
+    fn between(&self, from: usize, to: usize, rate_deg_s: f64) -> Vec<SlewPath> {
         let (from, to) = (&self.attitudes[from], &self.attitudes[to]);
         let back: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| from[j][i]));
         let r = product(to, &back);
@@ -130,7 +130,7 @@ impl Brute {
         let unit = |v: [f64; 3]| v.map(|x| x / v.iter().map(|x| x * x).sum::<f64>().sqrt());
         if trace == 3.0 {
             let psi = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
-            return vec![Way { about: [0.0; 3], seconds: 0.0, psi }];
+            return vec![SlewPath { about: [0.0; 3], seconds: 0.0, psi }];
         }
         let angle = ((trace - 1.0) / 2.0).acos();
         let axes = if trace == -1.0 {
@@ -144,7 +144,7 @@ impl Brute {
         };
         let seconds = angle.to_degrees() / rate_deg_s;
         axes.into_iter()
-            .map(|about| Way { about, seconds, psi: self.slew(from, &about, angle, seconds) })
+            .map(|about| SlewPath { about, seconds, psi: self.slew(from, &about, angle, seconds) })
             .collect()
     }
 
@@ -178,9 +178,9 @@ impl Brute {
         x
     }
 
-    /// The sigma of every coefficient in deg/h (per g): attitudes in order, `ways[i]` which way from i to i +
-    /// 1.
-    pub(crate) fn sigmas(&self, sequence: &[usize], ways: &[usize]) -> [f64; 12] {
+    /// Sigma of every coefficient in deg/h (per g). `sequence` lists attitudes, `paths[i]` selects the slew
+    /// path from position i to i + 1.
+    pub(crate) fn sigmas(&self, sequence: &[usize], paths: &[usize]) -> [f64; 12] {
         let mut root = [[0.0; N]; N];
         for (i, row) in root.iter_mut().enumerate() {
             row[i] = 1.0 / PRIOR[usize::from(i >= 3)];
@@ -188,11 +188,11 @@ impl Brute {
         let mut psi: [Row; 3] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
         for (place, &c) in sequence.iter().enumerate() {
             if place > 0 {
-                let way = &self.ways[sequence[place - 1]][c][ways[place - 1]];
+                let path = &self.paths[sequence[place - 1]][c][paths[place - 1]];
                 psi = std::array::from_fn(|i| {
                     std::array::from_fn(|j| {
-                        let own = if j < 3 { 0.0 } else { way.psi[i][j] };
-                        own + (0..3).map(|k| way.psi[i][k] * psi[k][j]).sum::<f64>()
+                        let own = if j < 3 { 0.0 } else { path.psi[i][j] };
+                        own + (0..3).map(|k| path.psi[i][k] * psi[k][j]).sum::<f64>()
                     })
                 });
             }

@@ -1,10 +1,11 @@
-//! The command: what an answer says, the file of the winner, an interrupt.
+//! The command `design`: conditions of an answer, file of the best scheme, interrupts.
 
 use std::process::{Command, Stdio};
 
 use crate::program::{json, obsdeg, refused, run, stderr, stdout};
 
-/// An answer says what its sigmas rest on, in words and in JSON, and how many schemes are as good.
+/// An answer states the conditions of its sigmas, in words and in JSON, and the number of equally good
+/// schemes.
 #[test]
 fn an_answer_says_what_it_rests_on() {
     let run = |more: &[&str]| {
@@ -25,7 +26,8 @@ fn an_answer_says_what_it_rests_on() {
         "half turns are tried in both directions",
         "NUE (-N) NDW (-N) NUE",
         "Best schemes (sigma: information of all samples, no prior, no random drift; psi at the end)",
-        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
+        "Proven best of these candidates by worst degree, then the criterion worst: NUE (-N) NDW (-N) NUE: worst \
+         sigma 0.008402 deg/h (D_FY); no requirement is stated, so none is judged.",
         "inertial carry: psi goes on in geographic axes from position to position",
         "under the other carries, platform (repositioning at once): not every coefficient is determined",
         "not stated, chosen by the program: latitude 28.2 deg\n",
@@ -36,8 +38,10 @@ fn an_answer_says_what_it_rests_on() {
     let json: serde_json::Value = serde_json::from_str(&run(&["--format", "json"])).expect("JSON");
     let search = &json["search"];
     let conditions = serde_json::json!({
-        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0, "accelerometer_noise_g": 2e-5,
-        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5, "drift_noise": null, "prior": null, "by_default": ["latitude_deg"]
+        "latitude_deg": 28.2, "latitude_by_default": true, "dwell_s": 500.0, "step_s": 20.0,
+        "accelerometer_noise_g": 2e-5,
+        "azimuth_noise_deg": null, "slew_rate_deg_s": 0.5, "drift_noise": null, "prior": null,
+        "by_default": ["latitude_deg"]
     });
     assert_eq!(search["conditions"], conditions);
     assert!(search["drift_noise"].is_null() && search["prior"].is_null());
@@ -45,7 +49,7 @@ fn an_answer_says_what_it_rests_on() {
     assert_eq!(json["found"][0]["requirements"]["stated"], 0);
     let missed = run(&["--requirement", "D=1e-9"]).replace("\n      ", " ");
     assert!(missed.contains("requirements are NOT met, 3 of 3 missed: D_FX, D_FY, D_FZ"), "{missed}");
-    // requirements decide only where there are some
+    // `--meet` and the criterion `margin` need a requirement
     refused(
         &["design", "--positions", "5", "--meet"],
         &["--meet needs a requirement", "--requirement NAME=SIGMA"],
@@ -60,13 +64,13 @@ fn an_answer_says_what_it_rests_on() {
     assert_eq!(json["found"][0]["half_turns"], turns);
 }
 
-/// Ctrl-C ends the program with the exit code of a shell when nothing was found.
+/// Ctrl-C before any result ends the program with exit code 130.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_program_ends_with_130() {
-    // minutes of work, whatever the machine
+    // a search of minutes on any machine
     let arguments = ["design", "--minimum", "--carry", "inertial", "--candidates", "grid:30", "--quiet"];
-    // a signal that comes before the program listens ends it without a code: then it is tried again
+    // a signal before the program handles it ends the program without a code: the test tries again later
     let code = [300, 1000, 3000].into_iter().find_map(|wait| {
         let program =
             obsdeg(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -80,7 +84,7 @@ fn an_interrupted_program_ends_with_130() {
     assert_eq!(code, Some(130));
 }
 
-/// The winner's file is a scheme that `analyze` accepts and that has the sigma promised; wrong arguments are
+/// The file of the best scheme is accepted by `analyze` and has the promised sigma. Wrong arguments are
 /// named.
 #[test]
 fn the_winner_is_a_scheme_file() {
@@ -117,8 +121,8 @@ fn the_winner_is_a_scheme_file() {
     let (promised, kept) = (promised.as_f64().expect("a number"), kept.as_f64().expect("a number"));
     assert!((promised / kept - 1.0).abs() < 1e-6, "{promised} {kept}");
     assert!(run(&["analyze", "--scheme", &winner, "--solutions", "off"]).status.success());
-    // half turns about an axis and about a diagonal, either way, are in the file: what the commands make of
-    // it is what was found
+    // the file has half turns about an axis and about a diagonal, in both directions, and the other commands
+    // confirm the result of the search
     let two = place.path().join("two.toml").display().to_string();
     for (attitudes, axes) in [
         (["NUE", "NDW"], ["about = \"N\", angle_deg = 180", "about = \"N\", angle_deg = -180"]),
@@ -155,7 +159,7 @@ fn the_winner_is_a_scheme_file() {
         {
             assert!((promised / kept - 1.0).abs() < within, "{promised} {kept}");
         }
-        // lists of slews say how they turn
+        // lists of slews state the slew axes
         let slews = [&compared["schemes"][0]["slews"], &simulated["timeline"]].map(|rows| {
             let of = |r: &serde_json::Value| r["turn"]["about"].as_array().cloned();
             rows.as_array().expect("rows").iter().filter_map(of).collect::<Vec<_>>()
@@ -222,15 +226,15 @@ fn the_winner_is_a_scheme_file() {
     }
 }
 
-/// The answer without the parts that it was put together from.
+/// The answer in JSON without the entry on its parts.
 fn without_parts(answer: &str) -> serde_json::Value {
     let mut answer: serde_json::Value = serde_json::from_str(answer).expect("JSON");
     answer["search"].as_object_mut().expect("a search").remove("parts");
     answer
 }
 
-/// Parts are files; together they give what the command gives, and what is wrong with one is said with its
-/// name.
+/// Parts of a search are files. Merged they give the answer of the whole search, and a message on a bad part
+/// names its file.
 #[test]
 fn parts_are_files() {
     let place = tempfile::tempdir().expect("a folder");
@@ -246,13 +250,13 @@ fn parts_are_files() {
         let said = stdout(&with(&["--part", &format!("{i}/2"), "-o", path]));
         assert!(said.starts_with(&format!("part {i} of 2: ")), "{said}");
         assert!(said.ends_with(" sequences; --format: where the parts are merged\n"), "{said}");
-        // done already
+        // a complete part is not searched again
         assert_eq!(stdout(&with(&["--part", &format!("{i}/2"), "-o", path])), said);
     }
     let whole = stdout(&with(&[]));
     let merged = stdout(&with(&["--merge", &two, &one]));
     assert_eq!(without_parts(&merged), without_parts(&whole));
-    // the parts know what they were asked, a file of candidates too
+    // parts contain their inputs, including a file of candidates
     assert_eq!(stdout(&run(&["design", "--merge", &one, &two, "--format", "json"])), merged);
     let said = stdout(&run(&["design", "--merge", &one, &two]));
     assert!(said.contains("proven if the parts were searched as they state"), "{said}");
@@ -297,7 +301,7 @@ fn parts_are_files() {
     }
 }
 
-/// Options that would do nothing are refused, with what they need.
+/// Options without effect are refused, and the message names the missing option.
 #[test]
 fn options_that_do_nothing_are_refused() {
     let minimum = "does nothing with --minimum";

@@ -1,5 +1,5 @@
-//! Noise of Z that is correlated, in the criterion: against least squares with the covariance of all samples,
-//! written from the equations, and against a filter that has the biases of the accelerometers as states.
+//! Correlated noise of Z in the criterion: against least squares with the covariance of all samples, written
+//! from the equations, and against a filter with the biases of the accelerometers as states.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, SMatrix};
 use obsdeg_core::model::settings::Assignment;
@@ -14,7 +14,7 @@ use obsdeg_exact::SplitMix64;
 use super::certificate::{DPH, EARTH, attitude, drift};
 use super::*;
 
-/// Sigma of the process over its coefficient B: 0.664/0.617.
+/// Sigma of the process divided by its bias-instability coefficient B: 0.664/0.617.
 const OF_B: f64 = 0.664_282_470 / 0.617_364_283;
 
 fn correlated(instability_ug: f64, correlation_s: f64) -> Conditions {
@@ -25,9 +25,9 @@ fn correlated(instability_ug: f64, correlation_s: f64) -> Conditions {
     }
 }
 
-/// Sigmas of psi at the end (deg, platform axes; under reset carry of every position) and the coefficients
-/// (deg/h) by generalised least squares: every sample is a row of (psi, D), and the noise of any two has the
-/// covariance of the biases of three accelerometers between them.
+/// Sigmas of psi at the end (deg, platform axes; under reset carry for every position) and of the
+/// coefficients (deg/h), by generalised least squares. Every sample is a row over (psi, D). The noise
+/// covariance of two samples is that of three accelerometer biases.
 fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64, c: &Conditions) -> Vec<f64> {
     let (north, up) = (EARTH * latitude.to_radians().cos(), EARTH * latitude.to_radians().sin());
     let mut f = SMatrix::<f64, 6, 6>::zeros();
@@ -51,8 +51,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     let mut before = Matrix3::identity();
     // psi^n as a functional of the unknowns
     let mut psi = Matrix3xX::<f64>::zeros(n);
-    // psi in platform axes at the end: of the scheme, in axes of the first position where it goes on in n; of
-    // every position under reset carry
+    // psi at the end in platform axes: under reset carry for every position, otherwise for the scheme; psi
+    // carried in n is expressed in the axes of the first position
     let mut ends: Vec<Matrix3xX<f64>> = Vec::new();
     for (i, d) in degrees.iter().enumerate() {
         let turn = attitude(*d);
@@ -106,8 +106,8 @@ fn least_squares(degrees: &[[f64; 3]], carry: Carry, terms: &str, latitude: f64,
     psi.chain(inverse.row_iter().skip(psis).map(|r| r.norm())).collect()
 }
 
-/// Sequences drawn at random, all carries, correlation times from one sample to a whole run and beyond,
-/// instability from nothing to a hundred times the white noise.
+/// Random sequences under all carries, with correlation times from one sample to longer than the run, and
+/// bias instability from zero to a hundred times the white noise.
 #[test]
 fn sigmas_are_those_of_least_squares_with_all_correlations() {
     let mut rng = SplitMix64::new(37);
@@ -162,8 +162,8 @@ fn sigmas_are_those_of_least_squares_with_all_correlations() {
     assert!(compared > 200 && differs > 5, "{compared} {differs}");
 }
 
-/// Errors of accelerometers among the unknowns, slews that take time, priors: against a filter with the
-/// biases as states.
+/// Unknown errors of accelerometers, slews that take time, and priors: against a filter with the biases as
+/// states.
 #[test]
 fn sigmas_are_those_of_a_filter_with_biases() {
     let candidates = Candidates::grid(45_000_000_000).expect("a grid");
@@ -213,8 +213,9 @@ fn sigmas_are_those_of_a_filter_with_biases() {
     }
 }
 
-/// What is designed is the best of all sequences by least squares, order counted under every carry; the
-/// winner's file has the noise, its run the sigma; bounds on sums of information are not said.
+/// The design is the best of all sequences by least squares, in every order under every carry. The file of
+/// the best scheme contains the noise, and its run has the promised sigma. No bound is stated, since bounds
+/// hold for sums of information.
 #[test]
 fn designs_count_correlated_noise() {
     let degrees = [[0.0, 0.0, 0.0], [90.0, 0.0, 90.0], [20.0, -40.0, 70.0], [110.0, 15.0, -35.0]];
@@ -258,7 +259,7 @@ fn designs_count_correlated_noise() {
         }
         assert!((equal.value / least - 1.0).abs() < 1e-5, "{carry}: {} {least}", equal.value);
         assert!(orders > least * (1.0 + 1e-5), "{carry}: {orders} {least}");
-        // the run of the winner, without a prior to speak of
+        // run of the best scheme with an almost uninformative prior
         for f in [equal, &found.found[0]] {
             let scheme = scheme_found(f, &like, &conditions).expect("a scheme");
             let wide =

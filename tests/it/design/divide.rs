@@ -1,5 +1,5 @@
-//! The total time divided among positions: by the information of all samples, computed from the scheme by the
-//! plan of a simulation.
+//! Division of the total time among positions, against the information of all samples that a simulation plan
+//! computes from the scheme.
 
 use obsdeg_core::model::{Carry, Dwell, Scheme};
 use obsdeg_design::design::{CriterionName, DesignOptions, design, scheme_found};
@@ -8,7 +8,7 @@ use obsdeg_evidence::simulation::Conditions;
 
 use super::{base, on, options};
 
-/// The criterion of a scheme whose dwells are multiples of ten seconds.
+/// Criterion of a scheme with dwells in multiples of ten seconds.
 fn value(scheme: &Scheme, tens: &[usize], conditions: &Conditions, criterion: CriterionName) -> f64 {
     let mut scheme = scheme.clone();
     for (p, tens) in scheme.positions.iter_mut().zip(tens) {
@@ -23,9 +23,10 @@ fn value(scheme: &Scheme, tens: &[usize], conditions: &Conditions, criterion: Cr
     }
 }
 
-/// Better than equal dwells in the same time, as good as it says, and no better by a step moved from any
-/// position to any other; where the criterion is smooth and no dwell is given up (under reset carry some are,
-/// for one long dwell is worth more than two), a step is worth the same everywhere.
+/// The divided time is better than equal dwells, has the stated criterion, and moving a step from one
+/// position to another does not improve it. Where the criterion is smooth and every dwell stays positive, the
+/// gain of one step is the same at all positions. Under reset carry some dwells vanish, since one long dwell
+/// is better than two short ones.
 #[test]
 fn time_is_divided_as_well_as_can_be() {
     let step = Conditions { dwell_s: 200.0, ..super::quiet() };
@@ -67,7 +68,7 @@ fn time_is_divided_as_well_as_can_be() {
             }
         }
         if carry == Carry::Platform {
-            // to a step: the second differences of a variance that goes with the cube of a dwell
+            // equal up to the second difference of one step (the variance falls with the cube of a dwell)
             let (least, most) =
                 (worth.iter().copied().fold(f64::MAX, f64::min), worth.iter().copied().fold(0.0, f64::max));
             assert!(least > 0.0 && most < least * 1.6, "{carry}: {worth:?} {tens:?}");

@@ -1,4 +1,4 @@
-//! Free attitudes: evaluated as they are printed, and never worse than the cardinal ones.
+//! Free attitudes: evaluated as printed, and never worse than the cardinal ones.
 
 use obsdeg_core::model::c_n_f64;
 use obsdeg_core::model::settings::Assignment;
@@ -13,27 +13,33 @@ use super::*;
 const CRITERIA: [CriterionName; 5] =
     [CriterionName::Worst, CriterionName::A, CriterionName::D, CriterionName::E, CriterionName::Margin];
 
-/// The angles as they are printed.
+/// Angles of a printed attitude, in degrees.
 fn degrees(text: &str) -> [f64; 3] {
     let angles: Vec<f64> = text.split(',').map(|a| a.parse().expect("degrees")).collect();
     angles.try_into().expect("three angles")
 }
 
-/// Designs with free and with cardinal attitudes of one task, and what tells its criterion from the
+/// Designs of one task with free and with cardinal attitudes, and the data for an evaluation from the
 /// equations.
-struct Both {
+struct DesignPair {
     terms: &'static str,
     criterion: Criterion,
     conditions: Conditions,
     latitude: f64,
     cardinal: Design,
     free: Design,
-    /// The weights over all attitudes, all of them, from the same candidates.
+    /// Optimal weights over all attitudes, found from the same candidates.
     every: Everywhere,
 }
 
-/// A task that is drawn, with `k` positions.
-fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng: &mut SplitMix64) -> Both {
+/// Random task with `k` positions.
+fn both(
+    criterion: CriterionName,
+    terms: &'static str,
+    k: usize,
+    step: i64,
+    rng: &mut SplitMix64,
+) -> DesignPair {
     let mut between =
         |low: f64, high: f64| low + (high - low) * (rng.below(1 << 30) as f64 / f64::from(1 << 30));
     let m = 3 * terms.len();
@@ -75,11 +81,11 @@ fn both(criterion: CriterionName, terms: &'static str, k: usize, step: i64, rng:
     let all: Vec<usize> = (0..m).collect();
     let evaluator = Evaluator::new(&base, &grid.attitudes, &all, &conditions).expect("an evaluator");
     let every = evaluator.everywhere(&without_psi(&criterion), k, &|| true).expect("a bound");
-    Both { terms, criterion, conditions, latitude, cardinal, free, every }
+    DesignPair { terms, criterion, conditions, latitude, cardinal, free, every }
 }
 
-impl Both {
-    /// The criterion of attitudes as they are printed, each so many times.
+impl DesignPair {
+    /// Criterion of printed attitudes with the given weights; `None` if it cannot be evaluated.
     fn value(&self, angles: &[String], times: &[f64]) -> Option<f64> {
         let c = &self.conditions;
         let oracle = Oracle::new(
@@ -92,12 +98,12 @@ impl Both {
         oracle.weighed(&scheme, &counting, &self.criterion)
     }
 
-    /// Whether what is printed could be told from the equations: of the best scheme, the finer one, and the
-    /// weights.
+    /// Checks the printed values by the equations. True for each that could be evaluated: best schemes,
+    /// scheme with finer angles, weights.
     fn check(&self, step: f64) -> [bool; 3] {
         let (first, cardinal) = (&self.free.found[0], &self.cardinal.found[0]);
         let task = format!("{} {:?} {first:?}", self.terms, self.criterion);
-        // better in the order of the search: a smaller degree first
+        // better in the order of the search, where a smaller degree comes first
         let key = |f: &Found| (f.worst_degree, f.value);
         assert!(key(first) <= (cardinal.worst_degree, cardinal.value * (1.0 + 1e-12)), "{task} {cardinal:?}");
         let reaches = |value: Option<f64>, told: f64, within: f64| {
@@ -124,9 +130,9 @@ impl Both {
             assert!(f.value < first.value, "{task}");
             reaches(self.value(&f.angles, &once(f.angles.len())), f.value, 1e-4)
         });
-        // weights are parts of their sum; psi of positions is left out of what they reach
-        let of_coefficients = Both { criterion: without_psi(&self.criterion), ..self.shallow() };
-        // ten are printed
+        // weights are relative to their sum, and psi of the positions does not count in their criterion
+        let of_coefficients = DesignPair { criterion: without_psi(&self.criterion), ..self.shallow() };
+        // the answer lists at most ten
         assert!(every.weights.len() == 10 || every.lighter == 0 && every.weights.len() < 10, "{task}");
         let all = &self.every.support;
         let angles: Vec<String> =
@@ -135,7 +141,8 @@ impl Both {
         let times: Vec<f64> =
             all.iter().map(|(_, weight)| weight / sum * first.angles.len() as f64).collect();
         let weights = reaches(of_coefficients.value(&angles, &times), self.every.attained, 1e-3);
-        // the search begins with the same attitudes in another order: both are between the bounds of both
+        // the search starts from the same attitudes in another order: both values lie between the bounds of
+        // both
         assert!(every.attained >= self.every.value && self.every.attained >= every.best_possible, "{task}");
         [found, finer, weights]
     }
@@ -171,7 +178,7 @@ fn free_attitudes_are_never_worse(tasks: impl Iterator<Item = (CriterionName, &'
     assert!(told[0] * 10 >= count * 8 && told[1] > 0 && told[2] * 10 >= count * 5, "{told:?} of {count}");
 }
 
-/// Ten random tasks, every criterion, angles in steps of 5 and of 7 degrees.
+/// Two random tasks: the first criterion, angles in steps of 5 and of 7 degrees.
 #[test]
 fn two_tasks_are_never_worse() {
     free_attitudes_are_never_worse(ten_tasks().take(2));
@@ -183,7 +190,8 @@ fn ten_tasks_are_never_worse() {
     free_attitudes_are_never_worse(ten_tasks());
 }
 
-/// Three to six positions: criterion, terms, number of positions, step in 1e-9 degrees.
+/// Criterion, terms, number of positions and angle step (1e-9 degrees) of ten tasks with three to six
+/// positions.
 fn ten_tasks() -> impl Iterator<Item = (CriterionName, &'static str, usize, i64)> {
     CRITERIA.into_iter().enumerate().flat_map(|(i, criterion)| {
         let terms = ["F", "FI", "FO", "IS", "FS"][i];
@@ -204,8 +212,8 @@ fn thirty_tasks_are_never_worse() {
     free_attitudes_are_never_worse(tasks);
 }
 
-/// Six positions of twelve coefficients, where those of the weights alone are worse than the cardinal
-/// attitudes by 41 %.
+/// Six free positions for twelve coefficients. Attitudes taken from the weights alone would be 41 % worse
+/// than the cardinal attitudes.
 #[test]
 fn six_free_positions_are_better_than_six_cardinal_ones() {
     let free = |step: i64| {
@@ -219,32 +227,32 @@ fn six_free_positions_are_better_than_six_cardinal_ones() {
     assert!(five < 0.95 * cardinal && hundredths < 0.95 * cardinal, "{five} {hundredths} {cardinal}");
 }
 
-/// What is called an image is one: a turn of the platform axes makes the one scheme of the other, by their
-/// matrices; what is not, is none.
+/// A scheme is called an image exactly if a turn of the platform axes maps its attitude matrices to those of
+/// the other.
 #[test]
 fn images_are_turns_of_the_axes() {
     let options = DesignOptions { keep: 40, ..options(Some(4)) };
     let mut images = 0;
     for carry in Carry::ALL {
-        // what every turn of the axes renames among themselves
+        // coefficients that every turn of the axes permutes among themselves
         let options = DesignOptions { required: vec!["D_F".into()], ..options.clone() };
         let found = designed(carry, &options).found;
-        // every attitude as whole numbers
-        type Whole = [[i64; 3]; 3];
-        let matrices = |f: &Found| -> Vec<Whole> {
+        // attitude as a matrix of whole numbers
+        type IntegerMatrix = [[i64; 3]; 3];
+        let matrices = |f: &Found| -> Vec<IntegerMatrix> {
             let of = |a: &String| c_n_f64(&obsdeg_core::model::parse_attitude(a).expect("angles"));
             f.angles.iter().map(|a| of(a).map(|row| row.map(|x| x.round() as i64))).collect()
         };
-        let arranged = |mut list: Vec<Whole>| {
+        let arranged = |mut list: Vec<IntegerMatrix>| {
             if carry == Carry::Reset {
                 list.sort_unstable();
             }
             list
         };
-        let product = |c: &Whole, p: &Whole| -> Whole {
+        let product = |c: &IntegerMatrix, p: &IntegerMatrix| -> IntegerMatrix {
             std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| c[i][k] * p[k][j]).sum()))
         };
-        let turns: Vec<Whole> = Candidates::cardinals()
+        let turns: Vec<IntegerMatrix> = Candidates::cardinals()
             .attitudes
             .iter()
             .map(|e| c_n_f64(e).map(|row| row.map(|x| x.round() as i64)))

@@ -1,5 +1,5 @@
-//! Gimbal limits: what a design prints, writes and draws lies within them, and a file's own angles beyond are
-//! pointed out.
+//! Gimbal limits: all angles that a design prints, writes and draws lie within them. Angles of a file beyond
+//! the limits are pointed out.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use obsdeg_report::{Format, Layout, written};
 
 use crate::program::{run, stderr, stdout};
 
-/// A design task of random limits, candidates and constraints.
+/// Random design task: gimbal limits, candidates and constraints.
 fn task(rng: &mut SplitMix64) -> (Vec<String>, Search) {
     let mut limits = Vec::new();
     for name in ["alpha", "beta", "gamma"] {
@@ -27,8 +27,10 @@ fn task(rng: &mut SplitMix64) -> (Vec<String>, Search) {
     let candidates = ["cardinal", "cardinal", "grid:90", "grid:45", "grid:45", "free"][kind as usize];
     let carry = if candidates == "free" { "reset" } else { ["inertial", "platform"][rng.below(2) as usize] };
     let mut asked = serde_json::json!({
-        "positions": if candidates == "grid:45" { 2 } else { 2 + rng.below(2) }, "candidates": candidates, "carry": carry, "latitude": "45", "gimbal": limits,
-        "observable": ["D_FX", "D_SX"], "restarts": 2, "keep": 3, "refine": candidates != "free" && rng.below(2) == 0, "step": 100.0,
+        "positions": if candidates == "grid:45" { 2 } else { 2 + rng.below(2) }, "candidates": candidates,
+        "carry": carry, "latitude": "45", "gimbal": limits,
+        "observable": ["D_FX", "D_SX"], "restarts": 2, "keep": 3,
+        "refine": candidates != "free" && rng.below(2) == 0, "step": 100.0,
     });
     if candidates == "free" {
         asked["round"] = ["5", "7", "12.5"][rng.below(3) as usize].into();
@@ -38,7 +40,7 @@ fn task(rng: &mut SplitMix64) -> (Vec<String>, Search) {
     (limits, serde_json::from_value(asked).expect("options"))
 }
 
-/// `45,-30.5,180` among other text.
+/// Attitudes such as `45,-30.5,180` found in a text.
 fn angles_in(text: &str) -> impl Iterator<Item = Euler> {
     let words = text.split(|c: char| c.is_whitespace() || "()\"[];:<>|".contains(c));
     words.filter_map(|word| {
@@ -47,8 +49,8 @@ fn angles_in(text: &str) -> impl Iterator<Item = Euler> {
     })
 }
 
-/// The sum of what the gimbals turn to the nearest of all angles of an attitude (not at beta = +-90) within
-/// limits, tried one by one, in degrees.
+/// Smallest sum of gimbal turns to any angles of the same attitude within the limits, in degrees, by trial
+/// (beta is not +-90).
 fn shortest(limits: &Gimbals, to: [f64; 3], from: [f64; 3]) -> f64 {
     let mut best = f64::INFINITY;
     for twin in [to, [to[0] + 180.0, 180.0 - to[1], to[2] + 180.0]] {
@@ -64,9 +66,9 @@ fn shortest(limits: &Gimbals, to: [f64; 3], from: [f64; 3]) -> f64 {
     best
 }
 
-/// Of random tasks: every angle in tables, JSON, Markdown, the winner's file and the picture of its positions
-/// is within its gimbal, the attitudes are those that the letters name, and between positions no gimbal way
-/// is shorter. Returns the number of schemes.
+/// Random tasks: every angle in tables, JSON, Markdown, the scheme file and the picture of the positions is
+/// within its gimbal limits. Attitudes match their letters, and no gimbal path between positions is shorter.
+/// Returns the number of schemes.
 fn within(tasks: usize, seed: u64) -> usize {
     let mut rng = SplitMix64::new(seed);
     let mut schemes = 0;
@@ -76,7 +78,7 @@ fn within(tasks: usize, seed: u64) -> usize {
         let mut gimbals = Gimbals::default();
         limits.iter().for_each(|l| gimbals.limit(l).expect("a limit"));
         let Ok(found) = obsdeg_commands::design(&search, &SearchFiles::default(), &Host::silent()) else {
-            // the gimbals may leave too few attitudes
+            // too few attitudes lie within the limits
             continue;
         };
         let Designed::Schemes(searched) = &found else { panic!("{what}") };
@@ -117,7 +119,7 @@ fn within(tasks: usize, seed: u64) -> usize {
         let names = [&design.candidates, &design.minimum.witness];
         let printed = [Format::Table, Format::Json, Format::Markdown]
             .map(|format| written(searched.as_ref(), format, Layout::default()).expect("written"));
-        // what is of all attitudes, or beyond by what it says
+        // attitudes of the bound over all attitudes, and attitudes reported as beyond the limits
         let beyond: Vec<&String> = design.beyond_gimbals.iter().collect();
         let every = design
             .search
@@ -161,15 +163,15 @@ fn no_angle_of_a_design_is_outside_its_gimbal() {
     assert!(within(10, 32) > 20);
 }
 
-/// 200 tasks: `cargo test --release --test it -- --ignored no_angle_of_200_designs`.
+/// The same on 200 tasks: `cargo test --release --test it -- --ignored no_angle_of_200_designs`.
 #[test]
 #[ignore = "a minute or two"]
 fn no_angle_of_200_designs_is_outside_its_gimbal() {
     assert!(within(200, 33) > 400);
 }
 
-/// Angles of a file beyond its limits are pointed out, with the twin, in the first lines of every answer, and
-/// stay as they are written.
+/// Angles of a file beyond its limits are pointed out in the first lines of every answer, with equivalent
+/// angles, and stay as written.
 #[test]
 fn angles_of_a_file_beyond_its_limits_are_pointed_out() {
     let place = tempfile::tempdir().expect("a folder");
@@ -181,7 +183,8 @@ fn angles_of_a_file_beyond_its_limits_are_pointed_out() {
         positions.concat()
     );
     std::fs::write(&file, &text).expect("written");
-    let said = "angles beyond the gimbal limits (alpha from -90 to 90 deg): p2 (135,20,0): the same attitude within them is -45,160,180";
+    let said = "angles beyond the gimbal limits (alpha from -90 to 90 deg): p2 (135,20,0): the same attitude within \
+                them is -45,160,180";
     for command in [
         &["analyze", &file, "--solutions", "off"][..],
         &["simulate", &file],

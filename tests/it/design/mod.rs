@@ -1,5 +1,5 @@
-//! Schemes found: the fewest positions, the best of five of the cardinal attitudes, and what the filter makes
-//! of it.
+//! Designed schemes: the fewest positions, the best five of the cardinal attitudes, and the filter's run of
+//! the result.
 
 mod brute;
 mod certificate;
@@ -28,7 +28,7 @@ fn base(carry: Carry) -> Scheme {
     Scheme { carry, latitude: "28.2".parse().ok(), ..Scheme::default() }
 }
 
-/// All twelve coefficients.
+/// Indices of all twelve coefficients.
 const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
 fn options(positions: Option<usize>) -> DesignOptions {
@@ -51,7 +51,7 @@ fn evaluator_of(carry: Carry, candidates: &Candidates) -> Evaluator {
     Evaluator::new(&base(carry), &candidates.attitudes, &ALL, &quiet()).expect("an evaluator")
 }
 
-/// The sequence of some names.
+/// Sequence of candidate indices of the given names.
 fn sequence_of(candidates: &Candidates, names: &[String]) -> Vec<usize> {
     let place = |n: &String| candidates.names.iter().position(|c| c == n).expect("a candidate");
     names.iter().map(place).collect()
@@ -71,12 +71,12 @@ fn quiet() -> Conditions {
     }
 }
 
-/// Its largest sigma of a drift.
+/// Largest sigma of a drift, in deg/h.
 fn worst(found: &Found) -> f64 {
     found.worst_sigma_dph.expect("a drift is required")
 }
 
-/// A scheme that was found, with its half turns as they were found.
+/// Scheme of a search result, with the half turns of the result.
 fn scheme_found(found: &Found, like: &Scheme) -> Scheme {
     let angles = found.angles.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("angles"));
     let mut positions = Scheme::of_angles(angles).positions;

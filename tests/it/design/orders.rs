@@ -1,5 +1,4 @@
-//! The order of the criteria, constraints, worst degree, criterion, against every sequence of small random
-//! tasks, one by one.
+//! Order of a search (constraints, worst degree, criterion), against every sequence of small random tasks.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme, c_n_f64, cardinal, parse_attitude};
@@ -14,7 +13,7 @@ use rayon::prelude::*;
 
 use super::{on, options, scheme_found};
 
-/// One of some things.
+/// Random element of a list.
 fn pick<T: Clone>(rng: &mut SplitMix64, list: &[T]) -> T {
     list[rng.below(list.len() as u64) as usize].clone()
 }
@@ -23,7 +22,7 @@ fn between(rng: &mut SplitMix64, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.below(1 << 30) as f64 / f64::from(1 << 30)
 }
 
-/// Cardinal attitudes have half turns and images of each other, others have neither.
+/// Random candidates: cardinal attitudes, with half turns and symmetric images, or others, with neither.
 fn candidates(rng: &mut SplitMix64) -> Candidates {
     let cardinals = Candidates::cardinals();
     let cardinal = rng.below(3) > 0;
@@ -46,8 +45,8 @@ struct Task {
 const NAMES: [&str; 12] =
     ["D_FX", "D_FY", "D_FZ", "D_IX", "D_IY", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SX", "D_SY", "D_SZ"];
 
-/// Four to six candidates, two to four positions, any carry, coefficients that some of them determine
-/// (mostly), and any constraints.
+/// Random task: four to six candidates, two to four positions, any carry, required coefficients that are
+/// mostly observable, and any constraints.
 fn task(seed: u64) -> Task {
     let mut rng = SplitMix64::new(seed ^ 0x0bd3_7a5c);
     let rng = &mut rng;
@@ -60,7 +59,7 @@ fn task(seed: u64) -> Task {
     let (candidates, required) = (0..50)
         .map(|_| {
             let candidates = candidates(rng);
-            // the gimbals may leave none
+            // no attitude may lie within the gimbal limits
             let attitudes = candidates.clone().within(&base.gimbals).0.attitudes;
             if attitudes.is_empty() {
                 return (candidates, Vec::new());
@@ -107,7 +106,7 @@ fn task(seed: u64) -> Task {
         degree_caps,
         meet,
         total_s: some(rng).then(|| k as f64 * 1000.0 + (between(rng, 0.0, k as f64) * slews).round()),
-        // quarter turns take exactly so long: what is as long as the limit is within it
+        // duration of a quarter turn: a slew as long as the limit is allowed
         slew_s: (turning && some(rng)).then(|| pick(rng, &[slews, slews / 2.0, slews / 1.7])),
         criterion,
         keep: 4,
@@ -117,45 +116,46 @@ fn task(seed: u64) -> Task {
     Task { base, conditions, options }
 }
 
-/// Some coefficients are asked for: requirements on psi do not count.
+/// Limits of the coefficients, without requirements on psi.
 fn limits_of(coefficients: &[f64]) -> Limits {
     Limits { coefficients: coefficients.to_vec(), psi: [f64::INFINITY; 3] }
 }
 
-/// A sequence that keeps every constraint: worst degree and criterion.
-struct Kept {
+/// Sequence that meets every constraint.
+struct SequenceScore {
     degree: usize,
     value: f64,
     seconds: f64,
     names: Vec<String>,
 }
 
-/// What a task comes to when its sequences are taken one by one.
-struct Judged {
+/// Task with all its sequences evaluated.
+struct EvaluatedTask {
     candidates: Candidates,
     rows: Rows,
     evaluator: Evaluator,
     criterion: Criterion,
     constraints: Constraints,
     floor: usize,
-    kept: Vec<Kept>,
-    /// Some candidates together leave a required coefficient unobservable.
+    kept: Vec<SequenceScore>,
+    /// True if all candidates together leave a required coefficient unobservable.
     never: bool,
 }
 
-fn judged(t: &Task) -> Judged {
+fn judged(t: &Task) -> EvaluatedTask {
     let (mut out, caps, limits) = prepared(t);
     out.kept = out.all(t, &caps, &limits);
     out
 }
 
-/// The same before any sequence is looked at; caps on the degrees and limits of what is required.
-fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
+/// The task before any sequence is evaluated, with the caps on degrees and the limits of required
+/// coefficients.
+fn prepared(t: &Task) -> (EvaluatedTask, Vec<usize>, Vec<f64>) {
     let (reached, _) = t.options.candidates.clone().within(&t.base.gimbals);
     let mut candidates = Candidates::default();
     for (name, attitude) in reached.names.iter().zip(&reached.attitudes) {
-        // Euler angles that are not alike may be the same attitude: only cardinals are repeated here, and
-        // they have names
+        // different Euler angles may give the same attitude: only cardinal attitudes repeat here, and their
+        // names tell
         if !candidates.names.contains(name) {
             candidates.add(attitude.clone());
         }
@@ -202,13 +202,14 @@ fn prepared(t: &Task) -> (Judged, Vec<usize>, Vec<f64>) {
     let best = rows.degrees(&every);
     let never = best.iter().any(Option::is_none);
     let floor = best.into_iter().flatten().max().unwrap_or(0);
-    let out = Judged { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
+    let out =
+        EvaluatedTask { candidates, rows, evaluator, criterion, constraints, floor, kept: Vec::new(), never };
     (out, caps, limits)
 }
 
-impl Judged {
-    /// All sequences, built up stop by stop, without any of the shortcuts of a search.
-    fn all(&self, t: &Task, caps: &[usize], limits: &[f64]) -> Vec<Kept> {
+impl EvaluatedTask {
+    /// Evaluates all sequences, built position by position without any shortcut of a search.
+    fn all(&self, t: &Task, caps: &[usize], limits: &[f64]) -> Vec<SequenceScore> {
         let k = t.options.positions.expect("a number");
         let mut sequences: Vec<Vec<Stop>> = vec![Vec::new()];
         for _ in 0..k {
@@ -225,7 +226,7 @@ impl Judged {
         sequences.iter().filter_map(|s| self.one(t, s, caps, limits)).collect()
     }
 
-    fn one(&self, t: &Task, s: &[Stop], caps: &[usize], limits: &[f64]) -> Option<Kept> {
+    fn one(&self, t: &Task, s: &[Stop], caps: &[usize], limits: &[f64]) -> Option<SequenceScore> {
         let mut set: Vec<usize> = s.iter().map(|s| s.candidate).collect();
         let names = set.iter().map(|&c| self.candidates.names[c].clone()).collect();
         let slews: Vec<f64> = set.windows(2).map(|w| self.evaluator.slew_s(w[0], w[1])).collect();
@@ -241,12 +242,14 @@ impl Judged {
             && (!t.options.meet || self.evaluator.of_sequence(s, &margin) <= 1.0)
             && value.is_finite();
         let degree = degrees.into_iter().max()?;
-        kept.then_some(Kept { degree, value, seconds, names })
+        kept.then_some(SequenceScore { degree, value, seconds, names })
     }
 
-    /// The best of all: its worst degree and criterion.
+    /// Worst degree and criterion of the best sequence.
     fn best(&self) -> Option<(usize, f64)> {
-        let order = |a: &&Kept, b: &&Kept| a.degree.cmp(&b.degree).then(a.value.total_cmp(&b.value));
+        let order = |a: &&SequenceScore, b: &&SequenceScore| {
+            a.degree.cmp(&b.degree).then(a.value.total_cmp(&b.value))
+        };
         self.kept.iter().min_by(order).map(|k| (k.degree, k.value))
     }
 }
@@ -255,9 +258,9 @@ fn close(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < 1e-8
 }
 
-impl Judged {
-    /// The candidates that positions are: gimbal limits may ask for other angles of the same attitude, which
-    /// name it then.
+impl EvaluatedTask {
+    /// Candidate names of the positions. Gimbal limits may lead to other angles, and names, for the same
+    /// attitude.
     fn named(&self, positions: &[String]) -> Vec<String> {
         let matrix = |e: &Euler| c_n_f64(e).map(|row| row.map(|x| (x * 1e9).round() as i64));
         let name = |position: &String| {
@@ -269,8 +272,9 @@ impl Judged {
     }
 }
 
-/// What exhaustion found is the best of all, in its order; it says nothing that is not so.
-fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, DesignError>) {
+/// Checks that the result of exhaustion is the best of all sequences in the search order, and that its
+/// statements hold.
+fn hold_exhaustion(seed: u64, t: &Task, all: &EvaluatedTask, found: &Result<Design, DesignError>) {
     let Some((degree, value)) = all.best() else {
         let error = found.as_ref().expect_err("nothing is within the constraints").to_string();
         let expected = if all.never { "unobservable" } else { "every sequence was examined" };
@@ -287,19 +291,20 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
         plain[0]
     );
     let ties = search.ties.expect("all were searched");
-    let near = |k: &&Kept| k.degree == degree && k.value <= value * (1.0 + ties.within);
+    let near = |k: &&SequenceScore| k.degree == degree && k.value <= value * (1.0 + ties.within);
     assert_eq!(ties.sequences, all.kept.iter().filter(near).count() as u64, "{seed}");
     for f in &plain {
         let names = all.named(&f.positions);
-        let is = |k: &&Kept| {
+        let is = |k: &&SequenceScore| {
             k.names == names
                 && k.degree == f.worst_degree
                 && close(k.value, f.value)
                 && close(k.seconds, f.total_s)
         };
-        // the positions of a set are in the order of the search
-        let same =
-            |k: &&Kept| t.base.carry == Carry::Reset && k.degree == f.worst_degree && close(k.value, f.value);
+        // under reset carry the positions are a set, listed in the order of the search
+        let same = |k: &&SequenceScore| {
+            t.base.carry == Carry::Reset && k.degree == f.worst_degree && close(k.value, f.value)
+        };
         assert!(all.kept.iter().any(|k| is(&k) || same(&k)), "{seed}: {f:?}");
     }
     if found.symmetry == 1 {
@@ -311,10 +316,10 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
             assert!(f.worst_degree == degree && close(f.value, value), "{seed}: {degree} {value} {f:?}");
         }
     }
-    // no sequence of the same dwell is before the front
+    // no sequence with the same dwell is better than the front
     for f in found.front.iter().filter(|f| f.worst_degree <= degree && f.positions.len() == search.positions)
     {
-        let beats = |k: &Kept| {
+        let beats = |k: &SequenceScore| {
             f.dwell_s == t.conditions.dwell_s
                 && k.degree == degree
                 && k.seconds <= f.total_s + 1e-6
@@ -327,11 +332,12 @@ fn hold_exhaustion(seed: u64, t: &Task, all: &Judged, found: &Result<Design, Des
     }
 }
 
-/// Refined angles keep every constraint and are better in the same order, as a comparison of schemes sees it.
+/// Checks that refined angles meet every constraint and are better in the same order, by a comparison of
+/// schemes.
 fn hold_refinement(
     seed: u64,
     t: &Task,
-    all: &Judged,
+    all: &EvaluatedTask,
     f: &obsdeg_design::design::Found,
     (degree, value): (usize, f64),
 ) {
@@ -357,13 +363,13 @@ fn hold_refinement(
     }
 }
 
-/// Both searches order alike, and as a search through every sequence does; what they say is so.
+/// Both searches order schemes as a loop through every sequence does, and their statements hold.
 #[test]
 fn both_searches_order_as_brute_force() {
     searches_order_as_brute_force(12);
 }
 
-/// Both searches against brute force, 200 tasks.
+/// Both searches against all sequences, 200 tasks.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn both_searches_order_as_brute_force_at_length() {
@@ -378,8 +384,7 @@ fn searches_order_as_brute_force(tasks: usize) {
             let all = judged(&t);
             let found = design(&t.base, &t.conditions, &t.options, &on);
             hold_exhaustion(seed, &t, &all, &found);
-            // exchange is not sure to find the best, but what it finds is what it seems, and never better
-            // than the best
+            // exchange may miss the best sequence, but its values are correct and never better than the best
             let search = Search {
                 rows: &all.rows,
                 walks: false,
@@ -418,14 +423,13 @@ fn searches_order_as_brute_force(tasks: usize) {
     );
 }
 
-/// Branch and bound keeps what exhaustion keeps: schemes, front and ties, whatever is asked for; and it does
-/// leave sequences out.
+/// Branch and bound returns the schemes, front and ties of exhaustion for every task, and excludes sequences.
 #[test]
 fn what_a_bound_leaves_out_is_not_missed() {
     bounds_miss_nothing(24);
 }
 
-/// Bounds against exhaustion, 400 tasks.
+/// Branch and bound against exhaustion, 400 tasks.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn what_a_bound_leaves_out_is_not_missed_at_length() {
@@ -437,7 +441,7 @@ fn bounds_miss_nothing(tasks: u64) {
         .into_par_iter()
         .map(|seed| {
             let mut t = task(seed);
-            // a prior is in every prefix
+            // the prior counts in every prefix of a sequence
             let known =
                 [("D", 0.3), ("psi", 1e-3), ("psi_z", 1e-4)].map(|(name, value)| (name.to_string(), value));
             let stated = known.into_iter().map(|(name, value)| Assignment { name, value });
@@ -472,8 +476,8 @@ fn bounds_miss_nothing(tasks: u64) {
     assert!(found as u64 * 8 > tasks * 3 && excluded * 2 > tasks * 25, "{found} {excluded}");
 }
 
-/// Six candidates of which five positions do, within turns of a quarter: with six, repeating one costs no
-/// turn.
+/// Five of six candidates suffice, with slews of at most a quarter turn: six positions stay possible, since
+/// repeating a position needs no slew.
 #[test]
 fn a_position_more_is_never_impossible_when_repeating_costs_nothing() {
     let mut candidates = Candidates::default();

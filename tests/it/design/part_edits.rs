@@ -1,5 +1,5 @@
-//! Parts of a search that were edited at random: each is refused, or merges to the bytes of the whole. Some
-//! edits leave the digest as it was; others compute it again, and then every block is searched again.
+//! Randomly edited parts of a search: each is refused, or merges to the bytes of the whole search. Some edits
+//! keep the old digest. Others compute it again, and then every block is searched again.
 
 use obsdeg_commands::{Designed, Host, Search, SearchFiles, Source, design as command};
 use obsdeg_design::design::Part;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::*;
 
-/// Edits of everyday runs; `.ci/run release` makes a thousand.
+/// Number of edits in everyday runs; `.ci/run release` makes a thousand.
 const DAILY: u64 = 60;
 const RELEASE: u64 = 1000;
 
@@ -16,7 +16,7 @@ fn below(random: &mut SplitMix64, n: usize) -> usize {
     random.below(n.max(1) as u64) as usize
 }
 
-/// One byte of a text, or a stretch of it, replaced, left out or doubled.
+/// Replaces, removes or doubles one byte or a stretch of a text.
 fn edit_text(text: &str, random: &mut SplitMix64) -> String {
     let mut bytes = text.as_bytes().to_vec();
     let place = below(random, bytes.len());
@@ -34,7 +34,7 @@ fn edit_text(text: &str, random: &mut SplitMix64) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// All paths to values below one, itself too.
+/// Collects the JSON paths of a value and of all values below it.
 fn paths(value: &Value, path: &str, out: &mut Vec<String>) {
     out.push(path.into());
     match value {
@@ -49,7 +49,7 @@ fn paths(value: &Value, path: &str, out: &mut Vec<String>) {
     }
 }
 
-/// One value of a JSON text changed.
+/// Changes one value of a JSON text.
 fn edit_value(text: &str, random: &mut SplitMix64) -> String {
     let mut all: Value = serde_json::from_str(text).expect("JSON");
     let mut places = Vec::new();
@@ -107,7 +107,7 @@ fn edit_value(text: &str, random: &mut SplitMix64) -> String {
     all.to_string()
 }
 
-/// What the command makes of parts.
+/// Merges parts as the command does.
 fn merged(parts: &[String], check: Option<u64>) -> Result<String, String> {
     let source = |(i, text): (usize, &String)| Source {
         name: format!("part-{}.json", i + 1),
@@ -123,7 +123,7 @@ fn merged(parts: &[String], check: Option<u64>) -> Result<String, String> {
     }
 }
 
-/// The parts of a search, as the command writes them.
+/// Parts of a search, as the command writes them.
 fn parts_of(asked: &Search, of: usize) -> Vec<String> {
     let part = |number: usize| {
         let asked = Search { part: Some([number, of]), ..asked.clone() };
@@ -160,7 +160,7 @@ fn every_edit_is_refused_or_changes_nothing(edits: u64) {
             _ => edit_value(&before, &mut random),
         };
         let again = seed % 4 >= 2;
-        // with its digest computed again, where the edit is a part at all
+        // with a new digest, if the edited text still parses as a part
         let resealed = serde_json::from_str::<Part>(&text).ok().filter(|_| again).map(Part::sealed);
         parts[edited] = resealed.map_or(text, |part| serde_json::to_string(&part).expect("JSON"));
         let (found, expected) = match again {
@@ -174,7 +174,7 @@ fn every_edit_is_refused_or_changes_nothing(edits: u64) {
     }
     eprintln!("{edits} edits: refused {refused:?} (digest as it was, computed again)");
     let half = edits as usize / 2;
-    // an edit of a list may leave it as it is
+    // an edit of a list may leave the list unchanged
     assert!(refused[0] > half * 2 / 3 && refused[1] > half / 2, "{refused:?}");
 }
 

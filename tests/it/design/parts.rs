@@ -1,5 +1,5 @@
-//! Exhaustive searches in parts: put together they are the whole, byte for byte; what does not belong is
-//! refused by name.
+//! Exhaustive searches in parts: the merged answer equals that of the whole search, byte for byte. A foreign
+//! or changed part is refused with its name.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -18,7 +18,7 @@ fn read(part: &Part) -> Part {
     serde_json::from_str(&json(part)).expect("a part")
 }
 
-/// The answer as that of a search as a whole, and its parts.
+/// Splits a merged answer into the answer of the whole search and the report on the parts.
 fn without_parts(merged: &Design) -> (Design, PartsReport) {
     let mut rest = merged.clone();
     let parts = rest.search.as_mut().and_then(|s| s.parts.take()).expect("parts");
@@ -26,7 +26,7 @@ fn without_parts(merged: &Design) -> (Design, PartsReport) {
     (rest, parts)
 }
 
-/// Searches whose answers have fronts, ties and several worst degrees.
+/// Search tasks whose answers have fronts, ties and several worst degrees.
 fn tasks() -> Vec<(Scheme, Conditions, DesignOptions)> {
     let all = Candidates::cardinals();
     let some = |names: &[&str]| {
@@ -62,7 +62,7 @@ fn parts_together_are_the_whole() {
     parts_are_the_whole(&[3]);
 }
 
-/// Parts against the whole, with more parts than some tasks have starts.
+/// Parts against the whole search, with more parts than some tasks have starts.
 #[test]
 #[ignore = "full length, for `.ci/run release`"]
 fn parts_together_are_the_whole_at_length() {
@@ -115,7 +115,7 @@ fn parts_are_the_whole(numbers: &[usize]) {
     }
 }
 
-/// Stopped anywhere and gone on with, a part is what it would have been.
+/// A part that is interrupted anywhere and resumed equals the uninterrupted part.
 #[test]
 fn an_interrupted_part_goes_on() {
     let (base, conditions, options) = &tasks()[0];
@@ -138,7 +138,7 @@ fn an_interrupted_part_goes_on() {
         }
     }
     assert!(interruptions > 5, "{interruptions}");
-    // it is not taken for the whole part meanwhile
+    // an unfinished part is refused
     let unfinished = Part { complete: false, ..whole }.sealed();
     let error = design_merged(base, conditions, options, &[("a.json".into(), unfinished)], 0, &on);
     assert!(error.expect_err("unfinished").to_string().starts_with("a.json: part 2 of 3 was interrupted"));
@@ -161,7 +161,7 @@ fn what_does_not_belong_is_refused_by_name() {
     let other = part(1, 2);
     let message = refused(&[("a", &one), ("b", &other), ("c", &three)]);
     assert_eq!(message, "b: it is part 1 of 2; expected a part of 3");
-    // of other inputs: what differs is named
+    // parts of a search with other inputs: the message names the difference
     let others = [
         (
             base.clone(),
@@ -193,7 +193,7 @@ fn what_does_not_belong_is_refused_by_name() {
         let message = refused(&[("a", &one), ("b", &foreign), ("c", &three)]);
         assert_eq!(message, format!("b: it is a part of another search: {why}"));
     }
-    // changed by hand, and with a digest that was computed again
+    // edited parts, with the old digest and with a new one
     let tampered = Part { digest: two.digest.replace(|c: char| c.is_ascii_digit(), "0"), ..two.clone() };
     let message = refused(&[("a", &one), ("b", &tampered), ("c", &three)]);
     assert!(message.starts_with("b: it was changed after it was written"), "{message}");
@@ -220,7 +220,7 @@ fn what_does_not_belong_is_refused_by_name() {
     assert_eq!(going_on, DesignError::Part { name: "the part to go on with".into(), why });
 }
 
-/// Parts have about as much to do as each other, also where most sequences begin with the first starts.
+/// Parts have similar amounts of work, even where most sequences begin with the first starts.
 #[test]
 fn parts_share_the_work() {
     let all = DesignOptions { criterion: CriterionName::D, keep: 1, ..options(Some(6)) };
@@ -238,8 +238,8 @@ fn parts_share_the_work() {
     }
 }
 
-/// Parts whose contents were changed and whose digest was computed again: what they list is evaluated again,
-/// what they count must add up, and a block that is searched again gives what it gives.
+/// Changed parts with a new digest are refused: listed schemes are evaluated again, counts must add up, and a
+/// repeated search of a block must give the same result.
 #[test]
 fn what_no_search_writes_is_refused() {
     let (base, conditions, options) = &tasks()[0];
@@ -257,7 +257,7 @@ fn what_no_search_writes_is_refused() {
     assert_eq!(without_parts(&repeated).0, without_parts(&whole).0);
     type Change = fn(&mut Part);
     let changes: [(Change, &str); 16] = [
-        // as it was in a report: two positions of the first changed, a criterion that none has
+        // the edit of a report: two positions of the first scheme swapped, and a criterion that no scheme has
         (
             |p| {
                 p.levels[0].best.found[0].sequence.swap(1, 2);
@@ -301,7 +301,7 @@ fn what_no_search_writes_is_refused() {
         let message = merged(&changed.sealed(), 0).expect_err(expected).to_string();
         assert!(message.starts_with("b: ") && message.contains(expected), "{message}; {expected}");
     }
-    // what no check but a search finds: sequences that were never searched
+    // sequences that were never searched: only a repeated search finds this
     let mut forged = two.clone();
     let best = &mut forged.levels[0].best;
     let left_out = best.examined / 2;

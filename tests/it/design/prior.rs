@@ -1,5 +1,5 @@
-//! What is known beforehand counts in the criterion: against the information of all samples and that prior,
-//! by the plan of a simulation, and the filter's own run.
+//! Priors count in the criterion: against the information of all samples with that prior, by a simulation
+//! plan, and against the filter's own run.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
@@ -12,7 +12,7 @@ use obsdeg_exact::SplitMix64;
 
 use super::*;
 
-/// Adds priors that are stated, later ones over earlier ones.
+/// Adds stated priors; later ones replace earlier ones.
 fn with_priors(conditions: &Conditions, stated: &[(&str, f64)]) -> Conditions {
     let mut out = conditions.clone();
     out.priors.extend(stated.iter().map(|(name, value)| Assignment { name: (*name).into(), value: *value }));
@@ -27,7 +27,7 @@ fn odd() -> Candidates {
     out
 }
 
-/// The scheme of a sequence.
+/// Scheme of a sequence of candidates.
 fn scheme(like: &Scheme, candidates: &Candidates, sequence: &[usize], slew: Option<f64>) -> Scheme {
     let attitudes = sequence.iter().map(|&c| candidates.attitudes[c].clone());
     let mut out = Scheme { positions: Scheme::of_angles(attitudes).positions, ..like.clone() };
@@ -35,8 +35,8 @@ fn scheme(like: &Scheme, candidates: &Candidates, sequence: &[usize], slew: Opti
     out
 }
 
-/// Sigmas of all unknowns at the end as they are shown: by all samples and the prior of the run, its every
-/// prior stated.
+/// Sigmas of all unknowns at the end, in the units of the answer, by all samples and the stated prior of the
+/// run.
 fn by_samples(scheme: &Scheme, conditions: &Conditions) -> Vec<(String, f64)> {
     let plan = Plan::new(scheme, conditions).expect("a plan");
     let prior = RunStart::new(&plan, conditions).expect("a start").sigma;
@@ -53,8 +53,8 @@ fn by_samples(scheme: &Scheme, conditions: &Conditions) -> Vec<(String, f64)> {
     plan.platform.names().iter().cloned().zip(sigmas.iter().zip(units).map(|(s, u)| s / u)).collect()
 }
 
-/// Sigmas of sequences drawn at random, of coefficients and psi, priors of any width and uneven among axes,
-/// factors on those of drifts.
+/// Sigmas of coefficients and psi of random sequences, with priors of any width that differ between axes, and
+/// with scaled drift priors.
 #[test]
 fn sigmas_are_those_of_all_samples_and_the_prior() {
     let candidates = odd();
@@ -110,7 +110,7 @@ fn sigmas_are_those_of_all_samples_and_the_prior() {
                 );
                 compared += 1;
             }
-            // it tells something
+            // the prior lowers some sigma by at least 10 %
             told +=
                 usize::from(without.is_empty() || without.iter().zip(&found).any(|(a, b)| b < &(a * 0.9)));
         }
@@ -118,8 +118,8 @@ fn sigmas_are_those_of_all_samples_and_the_prior() {
     assert!(compared > 300 && told == 24, "{compared} {told}");
 }
 
-/// What a design promises is what the filter of a run believes at its end, and what it finds is the best of
-/// all sequences by the samples; the front, refinement and dwells know of the prior too.
+/// The sigma that a design promises is that of the filter at the end of a run. Its result is the best of all
+/// sequences by the samples. Front, refinement and dwells include the prior too.
 #[test]
 fn designs_count_the_prior() {
     let candidates = odd();
@@ -146,7 +146,7 @@ fn designs_count_the_prior() {
         let drifts = run.quantities.iter().filter(|q| q.name.starts_with("D_"));
         let largest = drifts.map(|q| q.sigma).fold(0.0, f64::max);
         assert!((largest / first.value - 1.0).abs() < 1e-4, "{carry}: {largest} {first:?}");
-        // no observable sequence of the smallest worst degree is better
+        // no observable sequence with the smallest worst degree is better
         let largest = |sequence: &[usize]| {
             let there = scheme(&like, &candidates, sequence, slew);
             let drifts =
@@ -163,7 +163,7 @@ fn designs_count_the_prior() {
             set.dedup();
             let degrees: Option<Vec<usize>> = rows.degrees(&set).into_iter().collect();
             if degrees.is_some_and(|d| d.into_iter().max() == Some(first.worst_degree)) {
-                // either way of half turns may be the better one
+                // either direction of a half turn may be the better one
                 least = least.min(largest(&sequence));
             }
         }
@@ -192,8 +192,8 @@ fn designs_count_the_prior() {
     }
 }
 
-/// Over all attitudes: no set of attitudes drawn at random is below the bound, and priors of psi that differ
-/// by axis have none.
+/// The bound over all attitudes holds for random sets of attitudes. Priors of psi that differ by axis have no
+/// such bound.
 #[test]
 fn all_attitudes_have_a_bound_with_a_prior() {
     let like = Scheme { unknowns: "F,I".parse().expect("terms"), ..base(Carry::Reset) };
@@ -234,7 +234,7 @@ fn all_attitudes_have_a_bound_with_a_prior() {
     assert!(matches!(&error, DesignError::OnePosition { what: "prior", .. }), "{error}");
 }
 
-/// A turn of the platform axes is a symmetry only where what is known beforehand turns with it.
+/// A turn of the platform axes is a symmetry only if it maps the prior to itself.
 #[test]
 fn symmetry_is_that_of_the_prior() {
     let order = |stated: &[(&str, f64)]| {

@@ -1,4 +1,4 @@
-//! The search: the fewest positions, the best of them, proofs, symmetry, constraints, interruption.
+//! The search: fewest positions, best sequences, proofs, symmetry, constraints, interruption.
 
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::settings::Assignment;
@@ -11,7 +11,7 @@ use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::simulation::{Conditions, Plan, batch};
 use obsdeg_exact::SplitMix64;
 
-use super::brute::{Brute, Way};
+use super::brute::{Brute, SlewPath};
 use super::*;
 
 #[test]
@@ -20,10 +20,11 @@ fn fewest_positions_with_a_witness() {
         let found = designed(carry, &options(None));
         let minimum = found.minimum;
         assert_eq!((minimum.positions, minimum.witness.len()), (Some(fewest), fewest), "{carry}");
-        // what has fewer was excluded by counting or one by one
+        // smaller sets were excluded by counting or one by one
         let excluded = minimum.none_of.iter().map(|[size, _]| *size as usize);
         assert_eq!(excluded.collect::<Vec<_>>(), (minimum.counting_bound..fewest).collect::<Vec<_>>());
-        // two rows of each of order 0 and 1 and one of order 2; three of them are of a psi of its own
+        // rows per position: two of order 0, two of order 1, one of order 2; under reset carry psi of the
+        // position uses up three
         assert_eq!(minimum.rows_per_position, if carry == Carry::Reset { 2 } else { 5 });
         let no_solutions = AnalysisOptions { solutions: false, ..AnalysisOptions::default() };
         let a = analyze(&scheme_of(&minimum.witness, carry), no_solutions, None).expect("analysed");
@@ -32,7 +33,7 @@ fn fewest_positions_with_a_witness() {
     }
 }
 
-/// The sets that the search calls observable are those that the analysis calls observable.
+/// The search and the analysis agree on the observable sets.
 #[test]
 fn sets_are_judged_as_schemes_are() {
     let candidates = Candidates::cardinals();
@@ -63,8 +64,9 @@ fn sets_are_judged_as_schemes_are() {
     }
 }
 
-/// Reference: over random full-rank five-sets the worst sigma runs from 0.039 over a median of 0.068 to 0.10
-/// deg/h; the optimum is proven by exhaustion over all orders; twelve positions in the same time reach 0.018.
+/// Reference: over random sets of five positions with full rank, the worst sigma ranges from 0.039 to 0.10
+/// deg/h with a median of 0.068. Exhaustion over all orders proves the optimum. Twelve positions in the same
+/// time reach 0.018.
 #[test]
 fn the_best_of_five_and_of_twelve() {
     let candidates = Candidates::cardinals();
@@ -86,7 +88,7 @@ fn the_best_of_five_and_of_twelve() {
         (0.036..0.042).contains(&low) && (0.060..0.076).contains(&median) && (0.09..0.12).contains(&high),
         "{low} {median} {high}"
     );
-    // what every sequence of five of the 24 comes to, up to turns of the platform axes
+    // the best sequence of five of the 24, up to turns of the platform axes
     let five = designed(Carry::Inertial, &options(Some(5)));
     let optimum = worst(&five.found[0]);
     assert!(five.search.is_some_and(|s| s.proven) && five.symmetry == 24);
@@ -97,8 +99,8 @@ fn the_best_of_five_and_of_twelve() {
     assert!(twelve.search.is_some_and(|s| !s.proven) && worst(&twelve.found[0]) <= 0.018);
 }
 
-/// Exhaustion over some of the candidates, against every sequence evaluated by itself, repeated positions
-/// included; with and without a symmetry.
+/// Exhaustion over a few candidates, against a separate evaluation of every sequence (repeated positions
+/// included), with and without a symmetry.
 #[test]
 fn exhaustion_finds_the_best() {
     let all = Candidates::cardinals();
@@ -106,7 +108,7 @@ fn exhaustion_finds_the_best() {
         names: list.iter().map(|&i| all.names[i].clone()).collect(),
         attitudes: list.iter().map(|&i| all.attitudes[i].clone()).collect(),
     };
-    // eight without much symmetry, and the eight that turns about Z_p make of two
+    // eight candidates with little symmetry, and eight that turns about Z_p generate from two
     let turned = ["NUE", "UNW", "USE", "DNE", "UEN", "EUS", "SDE", "DSW"].map(String::from);
     for (carry, candidates, k) in [
         (Carry::Platform, some(&[0, 1, 2, 4, 7, 10, 16, 23]), 5),
@@ -145,8 +147,8 @@ fn exhaustion_finds_the_best() {
     }
 }
 
-/// Turning the platform axes renames coefficients: every image of a sequence has the same criterion, when all
-/// coefficients count alike; a requirement of one of them breaks that.
+/// Turns of the platform axes rename coefficients. Every image of a sequence has the same criterion if all
+/// coefficients count alike. A requirement on one coefficient breaks the symmetry.
 #[test]
 fn turned_schemes_are_equally_good() {
     let candidates = Candidates::cardinals();
@@ -154,11 +156,11 @@ fn turned_schemes_are_equally_good() {
         let rows = rows_of(carry, &candidates);
         let all = rows.symmetry(&|_, _| true);
         assert_eq!((all.order, all.representatives()), (24, vec![0]));
-        // D_FX alone: turns about X_p, and half turns that turn it round
+        // D_FX alone: turns about X_p, and half turns that reverse it
         let one = rows.symmetry(&|i, j| (i == 0) == (j == 0));
         assert_eq!(one.order, 8);
     }
-    // every sequence has an image that begins with NUE: the best of all is the best of these
+    // every sequence has an image that begins with NUE, so the best of these is the best of all
     let rows = rows_of(Carry::Inertial, &candidates);
     let evaluator = evaluator_of(Carry::Inertial, &candidates);
     let of = |symmetry: &Symmetry| {
@@ -182,7 +184,7 @@ fn turned_schemes_are_equally_good() {
     assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
 
-/// One seed, one answer, on any number of threads; an interrupted search gives the best so far.
+/// One seed gives one answer on any number of threads. An interrupted search returns the best scheme so far.
 #[test]
 fn threads_and_interruption() {
     let few = DesignOptions { restarts: 32, ..options(Some(8)) };
@@ -191,18 +193,18 @@ fn threads_and_interruption() {
         pool.install(|| designed(Carry::Inertial, &few))
     };
     assert_eq!(threads(1), threads(3));
-    // until a sequence has been looked at
+    // interrupted after the first sequence
     let stopped = design(&base(Carry::Inertial), &quiet(), &few, &|now| now.examined == 0).expect("designed");
     let search = stopped.search.expect("a search");
     assert!(search.interrupted && !search.proven && search.ties.is_none() && !stopped.found.is_empty());
-    // heard within one restart of many evaluations
+    // interrupted within one restart of many evaluations
     assert!(search.examined < 4 * 256, "{}", search.examined);
     let impossible = design(&base(Carry::Inertial), &quiet(), &options(Some(3)), &on);
     assert!(impossible.expect_err("none").to_string().contains("3 of these candidates"));
 }
 
-/// What takes minutes hears at once that it is to stop: the search for the fewest positions, ways between
-/// many candidates, exchange by a slow criterion, exhaustion.
+/// Long searches stop soon after an interrupt: the search for the fewest positions, slew paths between many
+/// candidates, exchange by a slow criterion, exhaustion.
 #[test]
 fn long_searches_hear_of_an_interruption() {
     let grid = |deg: i64| Candidates::grid(deg * 1_000_000_000).expect("a grid");
@@ -217,7 +219,7 @@ fn long_searches_hear_of_an_interruption() {
             quiet(),
         ),
     ] {
-        // the first questions come from the search for the fewest, the others from what comes behind it
+        // the first calls come from the search for the fewest positions, later ones from the steps after it
         for patience in [0, 20, 200] {
             let asked = std::sync::atomic::AtomicU64::new(0);
             let going = |_: Progress| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < patience;
@@ -230,7 +232,8 @@ fn long_searches_hear_of_an_interruption() {
     }
 }
 
-/// The bound on errors counts every set: angles of nine decimals leave few primes, so more of them are taken.
+/// The error bound counts every set. Angles of nine decimals leave few primes, so the search uses more of
+/// them.
 #[test]
 fn nothing_is_proven_by_chance() {
     let mut rng = SplitMix64::new(19);
@@ -241,9 +244,9 @@ fn nothing_is_proven_by_chance() {
     let found = designed(Carry::Inertial, &DesignOptions { candidates, ..options(None) });
     assert_eq!((found.minimum.positions, found.minimum.proven), (Some(5), true));
     assert!(found.error_bound < 1e-12 && found.primes > 2, "{found:?}");
-    // each set is excluded by a rank of at most 15 rows modulo a prime that is 1 modulo 360e9; there are
-    // about 2^60 over phi(360e9) ln 2^61 = 9.6e10 * 42.3 of 61 bits, and a minor of 15 rows of 16 bits is
-    // divisible by at most 15 * 16 / 60
+    // a rank of at most 15 rows excludes each set, modulo a prime that is 1 modulo 360e9; there are about
+    // 2^60 over phi(360e9) ln 2^61 = 9.6e10 * 42.3 such primes of 61 bits, and at most 15 * 16 / 60 of them
+    // divide a minor of 15 rows of 16 bits
     let one = 15.0 * 16.0 / 60.0 / (2f64.powi(60) / (9.6e10 * 42.28));
     let sets = 2024.0 + 10626.0;
     assert!(
@@ -251,14 +254,14 @@ fn nothing_is_proven_by_chance() {
         "{:e} {one:e}",
         found.error_bound
     );
-    // one prime would not do, and the bound of the cardinal attitudes is counted in the same way
+    // one prime would not suffice; the bound of the cardinal attitudes is counted in the same way
     assert!(sets * one > 1e-2);
     let cardinal = designed(Carry::Inertial, &options(Some(5)));
     assert!(cardinal.primes == 2 && cardinal.error_bound < 1e-12 && cardinal.error_bound > 0.0);
     assert!(cardinal.search.is_some_and(|s| s.proven));
 }
 
-/// What must be kept is kept, and what is found is as good as a search through all sequences says.
+/// Results meet the constraints and are as good as the best of all sequences.
 #[test]
 fn constraints_are_kept() {
     let slews = Conditions { slew_rate_deg_s: Some(1.0), ..quiet() };
@@ -266,13 +269,12 @@ fn constraints_are_kept() {
     let tight = DesignOptions { total_s: Some(5380.0), slew_s: Some(100.0), ..options(Some(5)) };
     let kept = design(&base(Carry::Inertial), &slews, &tight, &on).expect("designed");
     assert!(kept.found.iter().all(|f| f.total_s <= 5380.0) && kept.found[0].value >= free.found[0].value);
-    // times by hand: quarter turns take 90 s, and the front goes down as time goes up
+    // by hand: quarter turns take 90 s; on the front the criterion falls as the time grows
     assert_eq!(kept.found[0].total_s, 5360.0);
     assert!(free.front.is_sorted_by(|a, b| a.total_s < b.total_s && a.value > b.value));
-    // every dwell is there: what slews alone determine does not push out what the exact verdict knows
+    // the front has dwells of every length: information from slews alone does not displace observable schemes
     assert!(free.front.iter().any(|f| f.total_s < 1400.0) && free.front.iter().any(|f| f.total_s > 20_000.0));
-    // without the D_I everything may have degree 1 (six positions), and is found before what has a smaller
-    // sigma
+    // without the D_I all degrees can be 1 (six positions); these come before schemes with a smaller sigma
     let some = ["D_F", "D_O", "D_S"].map(String::from).to_vec();
     let six = DesignOptions { required: some.clone(), ..options(Some(6)) };
     let mut few = Candidates::default();
@@ -285,7 +287,7 @@ fn constraints_are_kept() {
         DesignOptions { candidates: few, degree_caps: vec![(Some("D_I".into()), 1)], ..options(Some(5)) };
     let error = design(&base(Carry::Platform), &quiet(), &capped, &on).expect_err("the lemma forbids it");
     assert!(matches!(error, DesignError::Impossible { .. }), "{error}");
-    // requirements: met by what is found, and the margin says so
+    // the result meets the requirements, and its margin says so
     let strict = |sigma: f64| {
         let required = Assignment { name: "D".into(), value: sigma };
         let conditions = Conditions { requirements: vec![required], ..quiet() };
@@ -296,7 +298,7 @@ fn constraints_are_kept() {
     assert!(strict(0.0393).is_err());
 }
 
-/// Gimbal limits leave candidates out, refinement stays within them and is never worse.
+/// Gimbal limits exclude candidates. Refinement stays within the limits and is never worse.
 #[test]
 fn grids_gimbals_and_refinement() {
     let mut limited = base(Carry::Inertial);
@@ -318,8 +320,8 @@ fn grids_gimbals_and_refinement() {
     assert!((worst_sigma / worst(refined) - 1.0).abs() < 1e-5, "{worst_sigma} {refined:?}");
 }
 
-/// All 24^k sequences, with both directions of half turns, by an evaluation of their own: none is better than
-/// what the search calls proven, and as many as it says are as good.
+/// All 24^k sequences with both directions of half turns, by a separate evaluation: none is better than the
+/// proven optimum, and the number of ties is as stated.
 #[test]
 fn no_sequence_with_slews_is_better_than_the_proven() {
     let candidates = Candidates::cardinals();
@@ -330,7 +332,7 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
         let names: Vec<String> = coefficients[required.clone()].iter().map(ToString::to_string).collect();
         let wanted: Vec<usize> = required.clone().collect();
         let rows = Rows::new(&base(Carry::Inertial), &candidates.attitudes, &wanted, 7).expect("rows");
-        // worst degree and worst sigma of every sequence
+        // worst degree and worst sigma (deg/h) of every sequence
         let mut all: Vec<(usize, f64)> = Vec::new();
         let mut sequence = vec![0; k];
         'sequences: loop {
@@ -339,17 +341,17 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
             set.dedup();
             let degrees: Option<Vec<usize>> = rows.degrees(&set).into_iter().collect();
             if let Some(degree) = degrees.and_then(|d| d.into_iter().max()) {
-                let two: Vec<usize> = sequence.windows(2).map(|w| brute.ways[w[0]][w[1]].len()).collect();
-                let mut ways = vec![0; k - 1];
-                'ways: loop {
-                    let sigmas = brute.sigmas(&sequence, &ways);
+                let two: Vec<usize> = sequence.windows(2).map(|w| brute.paths[w[0]][w[1]].len()).collect();
+                let mut paths = vec![0; k - 1];
+                'paths: loop {
+                    let sigmas = brute.sigmas(&sequence, &paths);
                     all.push((degree, wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max)));
-                    for (way, two) in ways.iter_mut().zip(&two) {
-                        *way += 1;
-                        if *way < *two {
-                            continue 'ways;
+                    for (path, two) in paths.iter_mut().zip(&two) {
+                        *path += 1;
+                        if *path < *two {
+                            continue 'paths;
                         }
-                        *way = 0;
+                        *path = 0;
                     }
                     break;
                 }
@@ -363,7 +365,7 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
             }
             break;
         }
-        // what slews bring in beside the attitudes may leave a coefficient undetermined
+        // unknowns that enter through slews may leave a coefficient undetermined
         all.retain(|(_, sigma)| *sigma < 1e3);
         let found = design(
             &base(Carry::Inertial),
@@ -383,18 +385,19 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
         for f in &found.found {
             let sequence = sequence_of(&candidates, &f.positions);
             let leg = |i: usize| {
-                let all = &brute.ways[sequence[i]][sequence[i + 1]];
+                let all = &brute.paths[sequence[i]][sequence[i + 1]];
                 let about = f.half_turns.iter().find(|t| t.to == i + 2).map(|t| t.about);
-                let same =
-                    |w: &Way| about.is_none_or(|a| w.about.iter().zip(a).all(|(x, y)| (x - y).abs() < 1e-9));
+                let same = |w: &SlewPath| {
+                    about.is_none_or(|a| w.about.iter().zip(a).all(|(x, y)| (x - y).abs() < 1e-9))
+                };
                 assert_eq!(all.len(), 1 + usize::from(about.is_some()), "{f:?}");
                 all.iter().position(same).expect("a way")
             };
-            let ways: Vec<usize> = (0..k - 1).map(leg).collect();
-            let sigmas = brute.sigmas(&sequence, &ways);
+            let paths: Vec<usize> = (0..k - 1).map(leg).collect();
+            let sigmas = brute.sigmas(&sequence, &paths);
             let largest = wanted.iter().map(|&d| sigmas[d]).fold(0.0, f64::max);
             assert!((largest / worst(f) - 1.0).abs() < 1e-7, "{largest} {f:?}");
-            let slews = (0..k - 1).map(|i| brute.ways[sequence[i]][sequence[i + 1]][ways[i]].seconds);
+            let slews = (0..k - 1).map(|i| brute.paths[sequence[i]][sequence[i + 1]][paths[i]].seconds);
             assert!((slews.sum::<f64>() + k as f64 * 1000.0 - f.total_s).abs() < 1e-6, "{f:?}");
         }
         let ties = found.search.and_then(|s| s.ties.filter(|_| s.proven)).expect("proven");

@@ -1,4 +1,4 @@
-//! Sigmas that are promised, against the filter, the covariance and comparisons; requirements on them.
+//! Promised sigmas, against the filter, the covariance and comparisons; requirements on sigmas.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, SlewAxis, SlewTo};
@@ -11,7 +11,7 @@ use obsdeg_evidence::simulation::{Conditions, Plan, batch, simulate};
 
 use super::*;
 
-/// What is predicted is what the filter says: a prior that says nothing, no drift noise.
+/// The predicted sigma is that of the filter with an uninformative prior and no drift noise.
 #[test]
 fn the_predicted_sigma_is_that_of_the_filter() {
     for carry in Carry::ALL {
@@ -29,7 +29,7 @@ fn the_predicted_sigma_is_that_of_the_filter() {
         let drifts = run.quantities.iter().filter(|q| q.name.starts_with("D_"));
         let largest = drifts.map(|q| q.sigma).fold(0.0, f64::max);
         assert!((largest / worst(best) - 1.0).abs() < 1e-4, "{carry}: {largest} {best:?}");
-        // and so are the errors of 30 runs, within what their number allows (99.9 %)
+        // the errors of 30 runs agree too, within the 99.9 % limits for their number
         let square = |seed: u64| -> f64 {
             let (run, _) = simulate(&scheme, &conditions, seed).expect("simulated");
             let q = run.quantities.iter().find(|q| Some(&q.name) == best.worst.as_ref()).expect("the worst");
@@ -41,7 +41,7 @@ fn the_predicted_sigma_is_that_of_the_filter() {
     }
 }
 
-/// Every criterion against the covariance of the batch of all samples.
+/// Every criterion against the covariance from the information of all samples.
 #[test]
 fn criteria_are_those_of_the_covariance() {
     let candidates = Candidates::cardinals();
@@ -84,8 +84,8 @@ fn criteria_are_those_of_the_covariance() {
     }
 }
 
-/// psi has a requirement like everything else: the sigma that a search holds against it is that of a
-/// comparison, and what is found is the best of all sequences, judged one by one by comparisons.
+/// psi has requirements like the coefficients. The search uses the sigma of psi that a comparison states, and
+/// its result is the best of all sequences by separate comparisons.
 #[test]
 fn requirements_on_psi_count() {
     let mut candidates = Candidates::default();
@@ -112,7 +112,7 @@ fn requirements_on_psi_count() {
                     .positions,
                 ..like.clone()
             };
-            // the way that a search takes first
+            // direction of half turns that a search tries first
             for (i, turn) in evaluator.half_turns(&sequence.iter().map(|&c| c.into()).collect::<Vec<_>>()) {
                 let (axis, angle) = (Some(SlewAxis::Direction(turn.about)), "180".parse().ok());
                 scheme.positions[i].slew = Some(SlewTo { axis, angle, rate_deg_s: None });
@@ -130,7 +130,7 @@ fn requirements_on_psi_count() {
             }
             seen.push(of);
         }
-        // the largest sigma over requirement of every sequence; infinite where something is not determined
+        // largest ratio of sigma to requirement of every sequence; infinite if an unknown is not determined
         let worst = |asked: &dyn Fn(&str) -> f64| -> Vec<f64> {
             let over =
                 |(name, sigma): &(String, Option<f64>)| sigma.map_or(f64::INFINITY, |s| s / asked(name));
@@ -166,7 +166,8 @@ fn requirements_on_psi_count() {
             }
             let found = found.expect("designed");
             let first = &found.found[0];
-            // the smallest worst degree comes first; here all that determine everything have the same
+            // the smallest worst degree comes first; all sequences that determine everything have the same
+            // one here
             assert!((first.value * factor / best - 1.0).abs() < 1e-5, "{carry}: {} {best}", first.value);
             let margin = first.requirements.worst.as_ref().expect("a margin");
             assert!((margin.margin * first.value - 1.0).abs() < 1e-6, "{margin:?}");
@@ -174,7 +175,7 @@ fn requirements_on_psi_count() {
             let count = 3 + 3 * if carry == Carry::Reset { k } else { 1 };
             assert_eq!(first.requirements.stated, count);
         }
-        // asked for some coefficients, psi is not
+        // with selected coefficients psi does not count
         let some = DesignOptions {
             candidates: candidates.clone(),
             meet: true,
@@ -191,7 +192,7 @@ fn requirements_on_psi_count() {
     assert!(error.to_string().contains("`psi_x@1`"), "{error}");
 }
 
-/// True if psi is what misses most in some sequence that is determined.
+/// True if some fully determined sequence has its smallest margin at psi.
 fn psi_decides(seen: &[Vec<(String, Option<f64>)>], worst: &[f64], asked: &dyn Fn(&str) -> f64) -> bool {
     seen.iter().zip(worst).any(|(of, worst)| {
         let psi = of.iter().filter(|(name, _)| name.starts_with("psi"));
@@ -199,12 +200,12 @@ fn psi_decides(seen: &[Vec<(String, Option<f64>)>], worst: &[f64], asked: &dyn F
     })
 }
 
-/// Coefficients that do not count are estimated all the same: their sigma may be infinite, the others' are
-/// those of the batch.
+/// Coefficients that are not required are estimated too. Their sigma may be infinite; the other sigmas are
+/// those of all samples.
 #[test]
 fn what_is_not_required_may_be_lost() {
     let candidates = Candidates::cardinals();
-    // two positions: no D_I, no D_FZ alone (platform carry), but D_FX and D_SX
+    // two positions under platform carry: no D_I and no separate D_FZ, but D_FX and D_SX
     let required = [0, 9];
     let evaluator = Evaluator::new(&base(Carry::Platform), &candidates.attitudes, &required, &quiet());
     let sequence = sequence_of(&candidates, &["NUE".into(), "NDW".into()]);
@@ -223,7 +224,7 @@ fn what_is_not_required_may_be_lost() {
     assert_eq!(sigmas.len(), 2);
 }
 
-/// Every scheme that is listed has the sigma and the time that a comparison of schemes gives it.
+/// Every listed scheme has the sigma and the time that a comparison of schemes states.
 #[test]
 fn listed_schemes_are_what_a_comparison_says() {
     let slews = Conditions { slew_rate_deg_s: Some(0.5), ..quiet() };

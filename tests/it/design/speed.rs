@@ -1,5 +1,5 @@
-//! Searches that take long: all cores give one answer, what is not searched is certified, and weights are
-//! told so that they can be read.
+//! Long searches: one answer on any number of cores, certificates in place of a complete search, and readable
+//! weights.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -17,7 +17,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(work)
 }
 
-/// Twelve attitudes at random, in whole steps of five degrees.
+/// Twelve random attitudes in whole steps of five degrees.
 fn twelve() -> Candidates {
     let mut rng = SplitMix64::new(4);
     let mut angle = || Angle::from_degrees(5 * rng.below(72) as i32 - 180);
@@ -26,8 +26,7 @@ fn twelve() -> Candidates {
     out
 }
 
-/// Branch and bound on one, two, three and seven threads: schemes, front, ties and all that is counted are
-/// the same.
+/// Branch and bound on one, two, three and seven threads gives the same schemes, front, ties and counts.
 #[test]
 fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
     for carry in [Carry::Inertial, Carry::Platform] {
@@ -54,8 +53,8 @@ fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
     }
 }
 
-/// Two cores take at most 0.6 of the time of one for the best six of 24 under inertial carry; the answers are
-/// equal.
+/// Two cores need at most 0.6 of the time of one core for the best six of 24 under inertial carry, with equal
+/// answers.
 #[test]
 #[ignore = "half a minute on two idle cores: in the release part of the gate"]
 fn two_cores_take_at_most_three_fifths_of_the_time() {
@@ -67,7 +66,7 @@ fn two_cores_take_at_most_three_fifths_of_the_time() {
         let found = on_threads(threads, || designed(Carry::Inertial, &options(Some(6))));
         (began.elapsed(), serde_json::to_string(&found).expect("JSON"))
     };
-    // whatever else runs beside it makes a run longer, never shorter
+    // other load makes a run longer, never shorter
     let mut least = [Duration::MAX; 2];
     for _ in 0..3 {
         let found = [1, 2].map(of);
@@ -77,8 +76,8 @@ fn two_cores_take_at_most_three_fifths_of_the_time() {
     assert!(least[1] < least[0].mul_f64(0.6), "{least:?}");
 }
 
-/// Seventeen positions of twelve candidates: without being asked, the scheme of an exchange with what it is
-/// above a bound at most; when asked for less than that, all are searched.
+/// Seventeen positions of twelve candidates. By default the answer is the scheme of an exchange with its
+/// largest distance to a bound. With a smaller `--within` all sequences are searched.
 #[test]
 fn what_would_be_searched_for_minutes_is_certified() {
     let certified = DesignOptions {
@@ -93,18 +92,18 @@ fn what_would_be_searched_for_minutes_is_certified() {
     let certificate = search.certificate.expect("a certificate");
     assert!(!search.proven && search.ties.is_none() && search.examined < 100_000, "{}", search.examined);
     assert!(certificate.within_percent < 5.0, "{certificate:?}");
-    // multisets of 17 of 12: 28 over 11
+    // multisets of 17 of 12: binomial coefficient of 28 over 11
     assert_eq!((search.sequences, found.symmetry), (Some(21_474_180), 1));
-    // the same scheme is enough for whoever asks for no less; whoever asks for all gets all, where they are
-    // few
+    // the same scheme suffices for a `--within` that it meets; `--within 0` searches all sequences if they
+    // are few
     let within = Some(certificate.within_percent / 100.0 * 1.01);
     let enough = designed(Carry::Reset, &DesignOptions { within, ..certified.clone() });
     assert_eq!(enough.found, found.found);
-    // those with a sigma: six different ones of twelve
+    // sets with a sigma: six different ones of twelve
     let few = DesignOptions { positions: Some(6), within: Some(0.0), ..certified };
     let all = designed(Carry::Reset, &few).search.expect("a search");
     assert!(all.proven && all.sequences.is_none() && all.examined == 924, "{all:?}");
-    // what is asked for and not reached is searched, until it is stopped
+    // a `--within` that the exchange does not reach starts a complete search, here interrupted
     let stopped = design(
         &base(Carry::Reset),
         &quiet(),
@@ -114,8 +113,8 @@ fn what_would_be_searched_for_minutes_is_certified() {
     assert!(stopped.expect("the best so far").search.is_some_and(|s| s.interrupted));
 }
 
-/// Weights over all attitudes: every attitude once, with angles that an operator reads, and they reach what
-/// is said, by the equations.
+/// Weights over all attitudes list every attitude once, with angles in the usual ranges, and attain the
+/// stated criterion by the equations.
 #[test]
 fn weights_over_all_attitudes_are_told_once() {
     let candidates = twelve();
@@ -142,7 +141,7 @@ fn weights_over_all_attitudes_are_told_once() {
         every.support.iter().enumerate().map(|(i, (_, w))| (i, 17.0 * w / sum)).collect();
     let reached = oracle.weighed(&weighed, &(0..12).collect::<Vec<_>>(), &Criterion::D).expect("a criterion");
     assert!((reached / every.attained - 1.0).abs() < 1e-4, "{reached} {}", every.attained);
-    // an answer lists the heaviest, and counts the others
+    // an answer lists the heaviest weights and counts the others
     let some = DesignOptions {
         candidates,
         criterion: CriterionName::D,

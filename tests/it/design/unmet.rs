@@ -1,9 +1,9 @@
-//! `--meet` where no scheme meets every requirement: what is told would do does, by other searches and by
-//! other commands.
+//! `--meet` where no scheme meets every requirement: the suggested changes do meet them, by other searches
+//! and other commands.
 
 use crate::program::{json, run, stderr};
 
-/// Five positions, which no dwell of 600 s makes good enough.
+/// Options of a search for five positions that no dwell of 600 s makes good enough.
 const ASKED: [&str; 10] = [
     "design",
     "--carry",
@@ -21,15 +21,15 @@ fn asked<'o>(more: &[&'o str]) -> Vec<&'o str> {
     [&ASKED[..], more].concat()
 }
 
-/// What stands between two texts of a message.
+/// Text of a message between two of its phrases.
 fn between<'t>(text: &'t str, before: &str, behind: &str) -> &'t str {
     let at = text.find(before).unwrap_or_else(|| panic!("{before}: {text}")) + before.len();
     let end = text[at..].find(behind).unwrap_or_else(|| panic!("{behind}: {text}"));
     &text[at..at + end]
 }
 
-/// Every remedy is searched for again with the options that are told: a scheme is found, and a comparison
-/// says that every requirement is met.
+/// Every suggestion is tried with the printed options: the search finds a scheme, and a comparison confirms
+/// that it meets every requirement.
 #[test]
 fn what_would_do_does() {
     let output = run(&asked(&["--positions", "5"]));
@@ -39,7 +39,8 @@ fn what_would_do_does() {
     let nearest = between(&message, "nearest scheme found: ", ",");
     let (dwell, positions) =
         (between(&message, "with --dwell ", " "), between(&message, "with --positions ", " "));
-    // the nearest is as near as the best margin by exhaustion says, and its unknown is the one that limits it
+    // the nearest scheme has the best margin by exhaustion (rounded), and the message names its limiting
+    // unknown
     let without: Vec<&str> = asked(&["--positions", "5", "--criterion", "margin", "--format", "json"]);
     let without: Vec<&str> = without.into_iter().filter(|o| *o != "--meet").collect();
     let best = json(&without);
@@ -51,7 +52,7 @@ fn what_would_do_does() {
     assert!(margin <= least + 1e-4 && margin > 0.8 * least && margin < 1.0, "{told} {worst}");
     assert!(name.starts_with("(D_") || name.starts_with("(psi"), "{told}");
     assert_eq!(nearest.split(' ').count(), 5);
-    // a shorter dwell by two percent is not enough for this scheme; this one is
+    // the suggested dwell suffices for this scheme; one shorter by two percent does not
     let met = |arguments: &[&str]| {
         let found = json(&[arguments, &["--format", "json", "--restarts", "24"]].concat());
         let r = &found["found"][0]["requirements"];
@@ -87,11 +88,11 @@ fn what_would_do_does() {
     if message.contains("with --candidates grid:45 this scheme meets all") {
         met(&asked(&["--positions", "5", "--candidates", "grid:45"]));
     }
-    // the same command, the same bytes
+    // the same command gives the same bytes
     assert_eq!(stderr(&run(&asked(&["--positions", "5"]))), message);
 }
 
-/// A scheme file gives a search its conditions: the same as by options, with as many positions as it has.
+/// A scheme file sets the conditions of a search as options do, and its number of positions.
 #[test]
 fn conditions_are_those_of_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -100,7 +101,8 @@ fn conditions_are_those_of_a_file() {
     std::fs::write(
         &file,
         format!(
-            "carry = \"inertial\"\nlatitude_deg = 45\nterms = \"F,S\"\n[simulation]\ndwell_s = 700\n[requirements]\nD = 0.5\npsi = 5\n[gimbals]\nbeta_deg = [-60, 60]\n{positions}"
+            "carry = \"inertial\"\nlatitude_deg = 45\nterms = \"F,S\"\n[simulation]\ndwell_s = 700\n[requirements]\n\
+             D = 0.5\npsi = 5\n[gimbals]\nbeta_deg = [-60, 60]\n{positions}"
         ),
     )
     .expect("written");
@@ -130,7 +132,7 @@ fn conditions_are_those_of_a_file() {
         "json",
     ]);
     assert_eq!(by_file, by_options);
-    // another number, other candidates
+    // options override the number of positions and the candidates
     let other = ["--positions", "3", "--candidates", "grid:45", "--observable", "D_F", "--format", "json"];
     let other = json(&[&["design", &file][..], &other].concat());
     assert_eq!((&other["search"]["positions"], &other["carry"]), (&3.into(), &"inertial".into()));

@@ -1,4 +1,4 @@
-//! Searches with errors of the accelerometers and the torquers.
+//! Searches with unknown errors of the accelerometers and the torquers.
 
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 use obsdeg_design::design::{
@@ -15,7 +15,7 @@ fn whole(terms: &str, carry: Carry) -> Scheme {
     Scheme { unknowns: terms.parse().expect("terms"), ..base(carry) }
 }
 
-/// Sigmas of sequences drawn at random are those of comparisons, each in the unit of its coefficient.
+/// Sigmas of random sequences are those of comparisons, each in the unit of its coefficient.
 #[test]
 fn sigmas_are_those_of_comparisons() {
     let mut odd = Candidates::cardinals();
@@ -54,11 +54,11 @@ fn sigmas_are_those_of_comparisons() {
             let expected = predicted(&scheme, &conditions, 1).expect("predicted");
             let expected: Option<Vec<f64>> =
                 names.iter().map(|name| expected.iter().find(|s| s.0 == *name)?.1).collect();
-            // what is not determined has no sigma
+            // an undetermined unknown has no sigma
             let Some(expected) = expected else { continue };
             let found = evaluator.sigmas(&sequence);
             assert_eq!(found.len(), names.len(), "{terms} {carry}");
-            // what is as good as open has no digits left in the normal equations
+            // an almost undetermined unknown loses all digits in the normal equations
             if expected.iter().any(|s| *s > 1e5) {
                 continue;
             }
@@ -71,7 +71,7 @@ fn sigmas_are_those_of_comparisons() {
     }
 }
 
-/// No sigma is the largest of several units; what is not required is estimated with the rest.
+/// Sigmas in different units are not compared. Coefficients that are not required are estimated too.
 #[test]
 fn units_are_not_compared() {
     let like = whole("F,O,K0,K1", Carry::Reset);
@@ -101,7 +101,7 @@ fn units_are_not_compared() {
     assert_eq!(unit(CriterionName::A, &["K0"]).as_deref(), Some("ug"));
 }
 
-/// The best of all sequences under reset carry, by comparisons of every one of them.
+/// The best of all sequences under platform carry, by a separate evaluation of each.
 #[test]
 fn the_best_is_the_best_of_all() {
     let mut candidates = Candidates::default();
@@ -127,7 +127,7 @@ fn the_best_is_the_best_of_all() {
         let units = [1f64.to_radians() / 3600.0, 1e-6, 1e-6];
         let block =
             nalgebra::DMatrix::from_fn(9, 9, |i, j| covariance[(3 + i, 3 + j)] / units[i / 3] / units[j / 3]);
-        // what is open has the prior's sigma
+        // an undetermined coefficient keeps the sigma of the prior
         if block.diagonal().iter().all(|v| *v < 1e12) {
             least = least.min(block.determinant().powf(1.0 / 18.0));
         }
@@ -136,8 +136,8 @@ fn the_best_is_the_best_of_all() {
     assert!((best / least - 1.0).abs() < 1e-5, "{best} {least}");
 }
 
-/// Walks, on which torquer errors act: what is found is observable, and has the sigmas that a comparison
-/// gives it, half turns and all.
+/// Slew sequences on which torquer errors act: results are observable and have the sigmas that a comparison
+/// states, half turns included.
 #[test]
 fn walks_by_sigma() {
     let like = whole("F,GS,GM,K0,K1,M3", Carry::Inertial);
@@ -170,15 +170,15 @@ fn walks_by_sigma() {
     assert!(refused(&conditions, odd).contains("found candidate 20,-40,70"));
 }
 
-/// What turns of the platform axes make of each other is as good: the best of all sequences is that of those
-/// that are searched, and as many are as good.
+/// Images under turns of the platform axes are equally good: the best of the searched representatives is the
+/// best of all sequences, with as many ties.
 #[test]
 fn turned_schemes_are_equally_good() {
     let candidates = Candidates::cardinals();
     let mut orders = Vec::new();
     for terms in ["F,K0", "F,K1", "F,M3", "F,M6", "F,K0,K2", "F,GM3", "F,GS"] {
         for carry in [Carry::Platform, Carry::Reset] {
-            // three torqued rates of which the earth's is all: rounding decides what ties
+            // only the earth rate torques the platform, with three values: rounding decides the ties
             if (terms, carry) == ("F,GM3", Carry::Reset) {
                 continue;
             }
@@ -212,6 +212,6 @@ fn turned_schemes_are_equally_good() {
             assert_eq!(some.ties.total(symmetry.order), all.ties.total(1), "{terms} {carry}");
         }
     }
-    // a triangle of misalignments is none when it is turned; bias and scale factor are
+    // turns do not preserve a triangle of misalignments, but they preserve bias and scale factor
     assert!(orders.contains(&24) && orders.iter().any(|o| *o < 24), "{orders:?}");
 }

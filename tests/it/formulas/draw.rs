@@ -1,4 +1,4 @@
-//! Schemes that are drawn.
+//! Random schemes for the tests of formulas.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use proptest::test_runner::{Config, RngAlgorithm, RngSeed, TestRunner};
 
 use super::platform::{Carry, Case, Position, Turn};
 
-/// How the angles of a scheme are drawn.
+/// Kinds of angles in a random scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(not(feature = "symbolica"), allow(dead_code, reason = "generic angles need the engine"))]
 pub(super) enum Angles {
@@ -17,27 +17,27 @@ pub(super) enum Angles {
     Cardinal,
     /// Multiples of 15 degrees.
     Roots,
-    /// Few constant angles besides, whose sines and cosines are symbols.
+    /// A few constant angles besides, with symbols for their sines and cosines.
     Constants,
-    /// A name, with signs and offsets.
+    /// One angle name, with signs and offsets.
     Names,
-    /// Two names.
+    /// Two angle names.
     TwoNames,
-    /// Decimals, all different.
+    /// Decimal angles, all different.
     Decimals,
 }
 
-/// What is drawn.
+/// A random scheme.
 #[derive(Debug, Clone)]
-pub(super) struct Draw {
+pub(super) struct RandomScheme {
     pub(super) angles: Vec<[String; 3]>,
-    /// About what and by how many degrees each position turns.
+    /// Axis and angle (deg) by which each position turns.
     pub(super) turns: Vec<Option<(&'static str, i32)>>,
     pub(super) carry: Carry,
     pub(super) latitude: Option<&'static str>,
     pub(super) azimuth: bool,
     pub(super) terms: &'static str,
-    /// Combinations asked for.
+    /// Requested combinations.
     pub(super) asked: &'static [&'static str],
     pub(super) values: Vec<f64>,
 }
@@ -54,7 +54,7 @@ fn angle(kind: Angles) -> BoxedStrategy<String> {
     }
 }
 
-fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Value = Draw> {
+fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Value = RandomScheme> {
     let about = prop::sample::select(vec!["X_p", "Y_p", "Z_p", "N", "U", "E"]);
     let turn = move || match turning {
         [] => Just(None).boxed(),
@@ -70,15 +70,15 @@ fn draws(kind: Angles, most: usize, turning: &'static [i32]) -> impl Strategy<Va
     )
         .prop_map(move |(positions, carry, latitude, azimuth, terms, values)| {
             let (angles, turns): (Vec<_>, Vec<_>) = positions.into_iter().unzip();
-            // the drift alone is that of one position at rest
+            // the terms `drift` belong to one position at rest
             let single = angles.len() == 1 && turns[0].is_none();
             let terms = if single && values[0] < 0.5 { "drift" } else { terms };
-            Draw { angles, turns, carry, latitude, azimuth, terms, asked: &[], values }
+            RandomScheme { angles, turns, carry, latitude, azimuth, terms, asked: &[], values }
         })
 }
 
-impl Draw {
-    /// Names that need quotation marks, and names that do not.
+impl RandomScheme {
+    /// Name of a position; some names need quotation marks.
     fn name(&self, i: usize) -> String {
         if self.turns.iter().any(Option::is_some) && i > 0 {
             format!("leg {i}-b")
@@ -109,7 +109,7 @@ impl Draw {
         }
     }
 
-    /// Values for all that is unknown, of both signs, none near zero.
+    /// The scheme with values of both signs, none near zero, for all unknowns.
     pub(super) fn case(&self) -> Case {
         self.case_at(&HashMap::from([
             ("alpha".into(), 0.4 + self.values[62]),
@@ -117,7 +117,7 @@ impl Draw {
         ]))
     }
 
-    /// The same with these values for generic angles, in rad.
+    /// The scheme with values for its unknowns and these values (rad) for generic angles.
     pub(super) fn case_at(&self, names: &HashMap<String, f64>) -> Case {
         let mut values =
             self.values.iter().enumerate().map(|(i, x)| if i % 3 == 0 { -x } else { *x }).cycle();
@@ -154,7 +154,7 @@ impl Draw {
             None => [next().abs(), next()],
             Some(l) => {
                 let l: f64 = l.parse::<f64>().expect("degrees").to_radians();
-                // a rate that is zero is zero
+                // a rate of rounding errors is set to zero
                 let zero = |x: f64| if x.abs() < 1e-15 { 0.0 } else { x };
                 [zero(l.cos()), zero(l.sin())]
             }
@@ -171,13 +171,13 @@ impl Draw {
     }
 }
 
-/// A scheme of the given attitudes.
-pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> Draw {
+/// Scheme of the given attitudes and requested combinations.
+pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> RandomScheme {
     let of = |a: &&str| -> [String; 3] {
         let parts: Vec<String> = a.split(',').map(String::from).collect();
         parts.try_into().expect("three angles")
     };
-    Draw {
+    RandomScheme {
         angles: angles.iter().map(of).collect(),
         turns: vec![None; angles.len()],
         carry: Carry::Platform,
@@ -189,8 +189,8 @@ pub(super) fn fixed(angles: &[&str], asked: &'static [&'static str]) -> Draw {
     }
 }
 
-/// Draws `n` cases, the same ones every time.
-pub(super) fn cases(kind: Angles, most: usize, n: usize, turning: &'static [i32]) -> Vec<Draw> {
+/// The same `n` random schemes in every run.
+pub(super) fn cases(kind: Angles, most: usize, n: usize, turning: &'static [i32]) -> Vec<RandomScheme> {
     let config =
         Config { rng_seed: RngSeed::Fixed(12), rng_algorithm: RngAlgorithm::ChaCha, ..Config::default() };
     let mut runner = TestRunner::new(config);

@@ -1,6 +1,6 @@
-//! Every printed formula is read back, from text, JSON and LaTeX, and evaluated on derivatives of Z that are
-//! simulated from the equations alone. Nothing here but the printing under test comes from the engine:
-//! readers, motion and values are the test's own.
+//! Every printed formula is read back from text, JSON and LaTeX, and evaluated on derivatives of Z that are
+//! simulated from the equations alone. Only the tested output comes from the engine: readers, motion and
+//! values are the test's own.
 
 mod draw;
 mod platform;
@@ -18,22 +18,22 @@ use obsdeg_report::{Format, Layout};
 use obsdeg_symbolic::Worker;
 use serde_json::Value as Json;
 
-use self::draw::{Angles, Draw, cases, fixed};
+use self::draw::{Angles, RandomScheme, cases, fixed};
 use self::platform::Case;
 use self::text::READINGS;
 use self::value::Value;
 
-/// Exact coefficients, relative to the sum of the magnitudes that are added up.
+/// Relative tolerance of exact coefficients, relative to the sum of the magnitudes of all terms.
 const EXACT: f64 = 1e-9;
-/// Coefficients that are printed with six digits and decimals: 5e-6 each, and those of a combination on the
-/// left as well.
+/// Relative tolerance of coefficients printed as decimals with six digits: 5e-6 for each, and 5e-6 for the
+/// combination on the left.
 const SIX_DIGITS: f64 = 1.1e-5;
-/// Whatever cancels: absolute, for unknowns of about one.
+/// Absolute tolerance of terms that cancel, for unknowns of about one.
 const SIX_PLACES: f64 = 1e-4;
 
-/// How many of each kind were checked.
+/// Number of formulas of each kind that were checked.
 #[derive(Debug, Default)]
-struct Seen {
+struct CheckCounts {
     exact: usize,
     symbolic: usize,
     decimal: usize,
@@ -43,7 +43,7 @@ struct Seen {
     formulas: usize,
 }
 
-/// One check of a scheme, with all that a failure needs.
+/// Values for a check of one formula, and the text of a failure.
 struct Check<'a> {
     case: &'a Case,
     about: String,
@@ -71,7 +71,7 @@ impl Check<'_> {
     }
 
     fn equal(&self, what: &str, found: Value, expected: Value, tolerance: f64) {
-        // values are near one: what should vanish does so up to rounding
+        // values are near one: an expected zero is zero up to rounding
         let size = Value { size: found.size.max(expected.size).max(1e-3), ..found };
         assert!(
             size.is(expected.value, tolerance),
@@ -81,7 +81,7 @@ impl Check<'_> {
     }
 }
 
-/// The rows of the tables in a LaTeX document whose first cell is a formula.
+/// Rows of the tables in a LaTeX document whose first cell is a formula.
 fn latex_rows(document: &str) -> Vec<Vec<String>> {
     let rows = document.lines().filter(|l| l.starts_with('$') && l.ends_with("\\\\"));
     rows.map(|l| {
@@ -91,7 +91,7 @@ fn latex_rows(document: &str) -> Vec<Vec<String>> {
     .collect()
 }
 
-/// The formulas under a heading of a LaTeX document.
+/// Formulas under a heading of a LaTeX document.
 fn items<'a>(document: &'a str, heading: &str) -> Vec<&'a str> {
     let under = document.lines().skip_while(|l| !l.starts_with(&format!("\\paragraph{{{heading}"))).skip(1);
     let lines = under.take_while(|l| !l.starts_with("\\end")).filter_map(|l| l.strip_prefix("\\item $"));
@@ -102,7 +102,7 @@ fn list_of(json: &Json, key: &str) -> Vec<Json> {
     json[key].as_array().cloned().unwrap_or_default()
 }
 
-/// The stations, as the readers name them: `p1`, `leg 1-b[45]`.
+/// Station names as the readers write them: `p1`, `leg 1-b[45]`.
 fn stations(json: &Json) -> Vec<String> {
     let name = |s: &Json| {
         let position = s["position"].as_str().expect("a name");
@@ -111,8 +111,8 @@ fn stations(json: &Json) -> Vec<String> {
     list_of(json, "stations").iter().map(name).collect()
 }
 
-/// Everything that is printed about one scheme.
-fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen) {
+/// Checks all formulas of one scheme.
+fn check(draw: &RandomScheme, frame: Frame, worker: Option<&mut Worker>, seen: &mut CheckCounts) {
     let (scheme, case) = (draw.scheme(), draw.case());
     let options =
         AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame, omitted: false };
@@ -138,7 +138,8 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
         let single = i < quantities.len();
         let left = q[if single { "name" } else { "expression" }].as_str().expect("a text");
         let c = Check { case: &case, about: format!("{left} of {draw:?} in {frame:?}: {q:#}") };
-        // for spreadsheets a text that begins with a minus and names what only quotes can has an apostrophe
+        // in spreadsheets, a text that begins with a minus and contains a quoted name starts with an
+        // apostrophe
         let field = |key: &str| {
             row[key].strip_prefix('\'').filter(|f| f.contains('"')).unwrap_or(&row[key]).to_string()
         };
@@ -149,7 +150,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
             assert_eq!(tex::name(&latex[0]).as_deref(), Ok(left));
         }
         let Some(solution) = q["solution"].as_object() else {
-            // one that nobody could read is left out, and that is said
+            // an unreadably long solution is omitted, and a note says so
             let notes = json["notes"].to_string();
             let long =
                 notes.contains(&format!("no solution printed for {left}: its longest coefficient has"));
@@ -184,7 +185,7 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
             )))
         });
         c.equal("terms", sum, expected, EXACT);
-        // what is taken while the platform turns says so
+        // an answer states that it uses derivatives during a rotation
         let turning = |t: &Json| {
             let station = list_of(&json, "stations")
                 .into_iter()
@@ -202,8 +203,8 @@ fn check(draw: &Draw, frame: Frame, worker: Option<&mut Worker>, seen: &mut Seen
     }
 }
 
-/// The directions that Z is said not to see move no derivative of it.
-fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+/// Directions that are printed as unobservable change no derivative of Z.
+fn null_vectors(json: &Json, latex: &str, draw: &RandomScheme, case: &Case, seen: &mut CheckCounts) {
     let lines = items(latex, "Directions that derivatives of Z do not see");
     let vectors = json["null_space"].as_array().expect("a list");
     assert_eq!(lines.len(), vectors.len());
@@ -235,8 +236,8 @@ fn null_vectors(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut S
     }
 }
 
-/// The formulas of Z, and of psi and eps at each position.
-fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &mut Seen) {
+/// Checks the formulas of Z, and of psi and eps at each position.
+fn position_formulas(json: &Json, latex: &str, draw: &RandomScheme, case: &Case, seen: &mut CheckCounts) {
     let formulas = json["formulas"].as_array().expect("formulas");
     let lines = items(latex, "Z in n, and psi, eps in n at each position");
     assert_eq!(lines.len(), formulas.len());
@@ -250,7 +251,7 @@ fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &
         let stations = stations(json);
         let stations = own.map_or(stations.clone(), |i| vec![stations[i].clone()]);
         for station in stations {
-            // at a position, its own psi^n and eps^n
+            // formulas of one position mean its own psi^n and eps^n
             let at = |name: &str| {
                 let local = name.ends_with("^n") || name.ends_with("^n'");
                 case.value(&if local { format!("{name}@{station}") } else { name.into() })
@@ -277,8 +278,7 @@ fn position_formulas(json: &Json, latex: &str, draw: &Draw, case: &Case, seen: &
     }
 }
 
-/// Combinations that are asked for may have roots, decimals, sines and cosines in them, with and without the
-/// engine.
+/// Requested combinations may contain roots, decimals, sines and cosines, with and without the engine.
 fn asked(mut worker: Option<&mut Worker>) {
     for (angles, asked) in [
         (
@@ -299,7 +299,7 @@ fn asked(mut worker: Option<&mut Worker>) {
         ),
     ] {
         let draw = fixed(angles, asked);
-        let mut seen = Seen::default();
+        let mut seen = CheckCounts::default();
         for frame in [Frame::N, Frame::Platform] {
             let generic = angles[0].contains("alpha");
             if generic && worker.is_none() {
@@ -314,7 +314,7 @@ fn asked(mut worker: Option<&mut Worker>) {
     }
 }
 
-/// What a coefficient cannot be is refused with what it can be.
+/// Coefficients that are not allowed are refused, and the message lists the allowed ones.
 #[test]
 fn coefficients_that_are_not_known_are_refused() {
     for (text, expected) in [
@@ -334,7 +334,7 @@ fn coefficients_that_are_not_known_are_refused() {
     }
 }
 
-/// Every reported combination can be read: whatever the angles, none of its coefficients is a decimal.
+/// Every reported combination is readable: no coefficient is a decimal, at any angles.
 #[test]
 fn combinations_can_be_read() {
     for kind in [Angles::Decimals, Angles::Constants, Angles::Roots] {
@@ -352,12 +352,12 @@ fn combinations_can_be_read() {
                     c.expression
                 );
             }
-            // the unknowns in n of a single position have no names of their own in the model
+            // the unknowns in n of a single position have no names in the model
             if draw.terms == "drift" {
                 continue;
             }
-            // with the unknowns up to each degree, and those before, they span what is observable, and none
-            // is too many
+            // combinations and unknowns up to each degree span the observable functionals, and no combination
+            // is redundant
             let case = draw.case();
             let functional = |text: &str| -> Vec<f64> {
                 let part = |q: &Quantity| {
@@ -386,7 +386,7 @@ fn combinations_can_be_read() {
     }
 }
 
-/// The rank of the derivatives of Z up to an order as functionals of the unknowns.
+/// Rank of the derivatives of Z up to an order, as functionals of the unknowns.
 #[cfg(feature = "symbolica")]
 fn numeric_rank(case: &Case, order: usize) -> usize {
     let silent = case.silent();
@@ -401,7 +401,7 @@ fn numeric_rank(case: &Case, order: usize) -> usize {
     rank(unknowns.iter().map(column).collect())
 }
 
-/// The rank of a matrix, by elimination with full pivoting.
+/// Rank of a matrix, by elimination with full pivoting.
 fn rank(mut columns: Vec<Vec<f64>>) -> usize {
     let mut rank = 0;
     loop {
@@ -422,7 +422,7 @@ fn rank(mut columns: Vec<Vec<f64>>) -> usize {
     }
 }
 
-/// Degenerate angles: at each of the points that are given ranks are what is said, and not beside it.
+/// Degenerate angles: the rank profile is as printed at each given point, and different beside it.
 #[cfg(feature = "symbolica")]
 fn degenerate_angles(worker: &mut Worker) {
     let mut several = 0;
@@ -473,13 +473,13 @@ fn degenerate_angles(worker: &mut Worker) {
     assert!(several > 2);
 }
 
-/// Combinations that are asked for, without the engine.
+/// Requested combinations without the engine.
 #[test]
 fn combinations_asked_for() {
     asked(None);
 }
 
-/// Without the engine: numbers recovered from the fields, and decimals.
+/// Formulas without the engine: numbers recovered from the fields, and decimals.
 #[test]
 fn formulas_without_the_engine_give_the_truth() {
     without_the_engine(1);
@@ -493,7 +493,7 @@ fn formulas_without_the_engine_give_the_truth_at_length() {
 }
 
 fn without_the_engine(times: usize) {
-    let mut seen = Seen::default();
+    let mut seen = CheckCounts::default();
     for (kind, most, n, turning) in [
         (Angles::Cardinal, 5, 10 * times, &[] as &[i32]),
         (Angles::Roots, 4, 10 * times, &[]),
@@ -519,7 +519,8 @@ fn without_the_engine(times: usize) {
     );
 }
 
-/// With it: sines and cosines of names and of constant angles, and the formulas of each position.
+/// Formulas with the engine: sines and cosines of names and of constant angles, and the formulas of each
+/// position.
 #[cfg(feature = "symbolica")]
 #[test]
 fn formulas_of_the_engine_give_the_truth() {
@@ -530,7 +531,7 @@ fn formulas_of_the_engine_give_the_truth() {
         wait: std::time::Duration::from_secs(600),
         waiting: obsdeg_symbolic::Waiting::silent(),
     });
-    let mut seen = Seen::default();
+    let mut seen = CheckCounts::default();
     for (kind, most, n, turning) in [
         (Angles::Cardinal, 3, 4, &[] as &[i32]),
         (Angles::Roots, 3, 4, &[]),
@@ -543,7 +544,7 @@ fn formulas_of_the_engine_give_the_truth() {
             check(draw, [Frame::N, Frame::Platform][i % 2], Some(&mut worker), &mut seen);
         }
     }
-    let turning = Draw { turns: vec![Some(("X_p", 360))], ..fixed(&["alpha,0,0"], &[]) };
+    let turning = RandomScheme { turns: vec![Some(("X_p", 360))], ..fixed(&["alpha,0,0"], &[]) };
     for frame in [Frame::N, Frame::Platform] {
         check(&turning, frame, Some(&mut worker), &mut seen);
     }

@@ -1,32 +1,32 @@
-//! The platform simulated from the equations alone, in floating point and in platform axes: (1)-(6) of the
-//! paper, the passive Euler matrices, the carries, and Taylor coefficients of everything at one moment by
-//! their own recursion.
+//! Simulation of the platform from the equations alone, in floating point and in platform axes: (1)-(6) of
+//! the paper, the passive Euler matrices, the carries, and Taylor coefficients at one moment by a separate
+//! recursion.
 
 use std::collections::HashMap;
 
 pub(crate) type Vector = [f64; 3];
 pub(crate) type Matrix = [[f64; 3]; 3];
 
-/// Taylor coefficients that are kept: derivatives up to the second.
+/// Number of Taylor coefficients: derivatives up to the second.
 const ORDERS: usize = 3;
 
-/// A turn at a constant rate.
+/// Rotation at a constant rate.
 #[derive(Debug, Clone)]
 pub(crate) struct Turn {
-    /// 0, 1, 2.
+    /// Index of the rotation axis: 0, 1 or 2.
     pub(crate) axis: usize,
-    /// About N, U, E instead of X_p, Y_p, Z_p.
+    /// True for the axes N, U, E instead of X_p, Y_p, Z_p.
     pub(crate) geographic: bool,
-    /// The whole angle in degrees, right-handed.
+    /// Total angle in degrees, right-handed.
     pub(crate) angle_deg: f64,
-    /// The rate in rad per unit of time, of the sign of the angle.
+    /// Rate in rad per unit of time, with the sign of the angle.
     pub(crate) rate: f64,
 }
 
 #[derive(Debug, Clone)]
 pub(crate) struct Position {
     pub(crate) name: String,
-    /// alpha, beta, gamma in rad.
+    /// Euler angles alpha, beta, gamma in rad.
     pub(crate) angles: Vector,
     pub(crate) turn: Option<Turn>,
 }
@@ -38,18 +38,18 @@ pub(crate) enum Carry {
     Reset,
 }
 
-/// A scheme with values for everything that is unknown or generic.
+/// Scheme with values for all unknowns and generic angles.
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
     pub(crate) positions: Vec<Position>,
     pub(crate) carry: Carry,
-    /// (wN, wU).
+    /// Earth-rate components (wN, wU).
     pub(crate) rates: [f64; 2],
-    /// psi in platform axes where the scheme starts; under reset carry where each position starts.
+    /// psi in platform axes at the start of the scheme; under reset carry at the start of each position.
     pub(crate) psi: Vec<Vector>,
-    /// `D_FX` and the like.
+    /// Values of the coefficients by name, such as `D_FX`.
     pub(crate) drift: HashMap<String, f64>,
-    /// Generic angles in rad.
+    /// Values of generic angles by name, in rad.
     pub(crate) names: HashMap<String, f64>,
 }
 
@@ -65,7 +65,7 @@ fn apply(a: &Matrix, x: &Vector) -> Vector {
     std::array::from_fn(|i| (0..3).map(|k| a[i][k] * x[k]).sum())
 }
 
-/// `[x cross]`.
+/// Cross-product matrix `[x cross]`.
 fn cross_matrix([x, y, z]: Vector) -> Matrix {
     [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
 }
@@ -74,7 +74,7 @@ fn unit(axis: usize) -> Vector {
     std::array::from_fn(|i| f64::from(u8::from(i == axis)))
 }
 
-/// `C_c^n = Mx My Mz`, passive.
+/// Attitude matrix `C_c^n = Mx My Mz`, passive.
 pub(crate) fn euler([a, b, g]: Vector) -> Matrix {
     let ((sa, ca), (sb, cb), (sg, cg)) = (a.sin_cos(), b.sin_cos(), g.sin_cos());
     let mx = [[1.0, 0.0, 0.0], [0.0, ca, sa], [0.0, -sa, ca]];
@@ -83,7 +83,7 @@ pub(crate) fn euler([a, b, g]: Vector) -> Matrix {
     product(&product(&mx, &my), &mz)
 }
 
-/// `exp([a x] t)` by Rodrigues' formula.
+/// Rotation matrix `exp([a x] t)` by Rodrigues' formula, with the unit vector of axis a.
 fn rotation(axis: usize, t: f64) -> Matrix {
     let k = cross_matrix(unit(axis));
     let kk = product(&k, &k);
@@ -95,14 +95,14 @@ fn rotation(axis: usize, t: f64) -> Matrix {
 /// Taylor coefficients of a vector or matrix.
 type Series<T> = [T; ORDERS];
 
-/// What an observer at a station sees and what is there.
+/// Unknowns and derivatives of Z at a station.
 #[derive(Debug, Clone)]
 pub(crate) struct Station {
-    /// `psi^n`, `eps^n`, and the derivative of `eps^n` by time.
+    /// `psi^n`, `eps^n`, and the time derivative of `eps^n`.
     pub(crate) psi_n: Vector,
     pub(crate) eps_n: Vector,
     pub(crate) eps_rate_n: Vector,
-    /// Derivatives of Z in platform axes and in n, and of `psi_y^n`.
+    /// Derivatives of Z in platform axes and in n, and derivatives of `psi_y^n`.
     pub(crate) z_c: [Vector; ORDERS],
     pub(crate) z_n: [Vector; ORDERS],
     pub(crate) azimuth: [f64; ORDERS],
@@ -119,7 +119,7 @@ impl Case {
         }
     }
 
-    /// `psi^n` at a position: it goes on through rotations, and no time passes.
+    /// `psi^n` at a position: carried through rotations, with no time between positions.
     fn psi_n(&self, index: usize) -> Vector {
         let start = |i: usize| self.attitude(i, 0.0);
         match self.carry {
@@ -141,7 +141,7 @@ impl Case {
         self.drift.get(name).copied().unwrap_or(0.0)
     }
 
-    /// The drift in platform axes for gravity there, both as series.
+    /// Drift in platform axes as a series, for the gravity series `g` in platform axes.
     fn drift(&self, g: &Series<Vector>) -> Series<Vector> {
         // I, O, S of the gyros X, Y, Z as (sign, component of g)
         const GYROS: [[(f64, usize); 3]; 3] = [
@@ -178,17 +178,17 @@ impl Case {
         out
     }
 
-    /// Everything at a station: a position, or a position whose rotation has come `turned_deg` far.
+    /// Values at a station: a position, or a rotating position after a turn of `turned_deg` degrees.
     pub(crate) fn station(&self, index: usize, turned_deg: f64) -> Station {
         let c0 = self.attitude(index, turned_deg.to_radians());
         let turn = self.positions[index].turn.as_ref();
-        // the rate of the platform against n, in platform axes at this moment
+        // rate of the platform relative to n, in platform axes at this moment
         let spin: Vector = match turn {
             None => [0.0; 3],
             Some(t) if t.geographic => apply(&transposed(&c0), &unit(t.axis)).map(|x| x * t.rate),
             Some(t) => unit(t.axis).map(|x| x * t.rate),
         };
-        // C' = C [spin x], and spin is constant in platform axes whichever axis it is about
+        // C' = C [spin x]; spin is constant in platform axes for every rotation axis
         let k = cross_matrix(spin);
         let mut c: Series<Matrix> = [c0; ORDERS];
         for order in 1..ORDERS {
@@ -240,7 +240,7 @@ impl Case {
         }
     }
 
-    /// The same with all unknowns zero.
+    /// The same case with all unknowns zero.
     pub(crate) fn silent(&self) -> Self {
         let mut silent = self.clone();
         silent.psi.fill([0.0; 3]);
@@ -248,7 +248,7 @@ impl Case {
         silent
     }
 
-    /// The same with an unknown changed; false for one that there is not.
+    /// Adds `by` to an unknown; false if the name is no unknown.
     pub(crate) fn change(&mut self, name: &str, by: f64) -> bool {
         if let Some(d) = self.drift.get_mut(name) {
             *d += by;
@@ -260,18 +260,18 @@ impl Case {
         slot.map(|(psi, axis)| psi[axis] += by).is_some()
     }
 
-    /// The index of a position, and how far it has turned, from `p1` or `p1[45]`.
+    /// Index of a position and the angle it has turned (deg), from `p1` or `p1[45]`.
     pub(crate) fn find(&self, station: &str) -> Option<(usize, f64)> {
         let (name, turned) = match station.split_once('[') {
             Some((name, rest)) => (name, rest.strip_suffix(']')?.parse().ok()?),
             None => (station, 0.0),
         };
         let index = self.positions.iter().position(|p| p.name == name)?;
-        // what turns is named with its angle, what stands is not
+        // only a rotating position is named with an angle
         (self.positions[index].turn.is_some() == station.contains('[')).then_some((index, turned))
     }
 
-    /// The value of a name of the formulas: `Z3''@p1`, `w@p1`, `wN`, `psi_x@2`, `D_FX`, `eps_x^n@p1`.
+    /// Value of a name in the formulas: `Z3''@p1`, `w@p1`, `wN`, `psi_x@2`, `D_FX`, `eps_x^n@p1`.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         let axis = |c: char| ['x', 'y', 'z'].iter().position(|a| *a == c);
         if let Some((base, station)) = name.split_once('@') {
@@ -321,7 +321,7 @@ impl Case {
                 let component = axis(name.chars().nth(4)?)?;
                 match (&name[..4], name.get(5..)?) {
                     ("psi_", "") if self.carry != Carry::Reset => Some(self.psi[0][component]),
-                    // the unknowns of a single position
+                    // unknowns in n of a single position
                     ("psi_", "^n") => Some(self.station(0, 0.0).psi_n[component]),
                     ("eps_", "^n") => Some(self.station(0, 0.0).eps_n[component]),
                     _ => None,
@@ -331,7 +331,7 @@ impl Case {
     }
 }
 
-/// What the simulation rests on: the derivatives against differences of an integration in small steps.
+/// The simulated derivatives agree with differences of an integration in small steps.
 #[test]
 fn derivatives_are_those_of_the_integrated_motion() {
     let case = Case {

@@ -1,27 +1,27 @@
-//! A reader of formulas in LaTeX, written from the notation alone: names come out as in text.
+//! Reader of formulas in LaTeX, written from the notation alone. Names are returned as in text.
 
 use super::value::{Names, Value};
 
-struct Reader<'a> {
+struct LatexReader<'a> {
     rest: &'a str,
     names: &'a Names<'a>,
 }
 
-/// The value of a formula.
+/// Value of a formula.
 pub(crate) fn evaluate(latex: &str, names: &Names<'_>) -> Result<Value, String> {
-    let mut reader = Reader { rest: latex, names };
+    let mut reader = LatexReader { rest: latex, names };
     let value = reader.sum().map_err(|e| format!("{e} before `{}` in `{latex}`", reader.rest))?;
     if reader.rest.is_empty() { Ok(value) } else { Err(format!("left over `{}` in `{latex}`", reader.rest)) }
 }
 
-/// The name that `latex` is, as in text.
+/// Text name of a name in LaTeX.
 pub(crate) fn name(latex: &str) -> Result<String, String> {
-    let mut reader = Reader { rest: latex, names: &|_| None };
+    let mut reader = LatexReader { rest: latex, names: &|_| None };
     let name = reader.name()?;
     if reader.rest.is_empty() { Ok(name) } else { Err(format!("left over `{}`", reader.rest)) }
 }
 
-impl Reader<'_> {
+impl LatexReader<'_> {
     fn take(&mut self, token: &str) -> bool {
         let found = self.rest.strip_prefix(token);
         if let Some(rest) = found {
@@ -51,7 +51,7 @@ impl Reader<'_> {
         while self.take("\\,") || self.take("\\cdot ") {
             product = product.times(self.power()?);
         }
-        // no quotient but a fraction
+        // quotients are written as fractions
         if self.rest.starts_with('/') { Err("a slash".into()) } else { Ok(product) }
     }
 
@@ -123,7 +123,7 @@ impl Reader<'_> {
         Ok(inner)
     }
 
-    /// `(\text{p1})`, `(\text{about X}, -45^{\circ})`.
+    /// Reads a station such as `(\text{p1})` or `(\text{about X}, -45^{\circ})`.
     fn station(&mut self) -> Result<String, String> {
         if !self.take("(\\text") {
             return Err("no station".into());

@@ -1,37 +1,38 @@
-//! A reader of formulas as text, written from the notation alone.
+//! Reader of formulas as text, written from the notation alone.
 //!
-//! `+ - * / ^`, brackets of both kinds, a blank that multiplies, `sin cos sqrt`, `20 deg`, and names such as
-//! `psi_x@1`, `eps_y^n`, `Z3''@p1`, `Z1'@"about X"[45 deg]`. A sign stands only before a term.
+//! It reads `+ - * / ^`, round and square brackets, a blank for a product, `sin cos sqrt`, `20 deg`, and
+//! names such as `psi_x@1`, `eps_y^n`, `Z3''@p1`, `Z1'@"about X"[45 deg]`. A sign is allowed only before a
+//! term.
 
 use super::value::{Names, Value};
 
-/// How strongly a blank multiplies; a formula must mean the same in every reading.
+/// Precedence of a blank as product; a formula must have the same value with each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Blank {
-    /// Less than `*` and `/`.
+    /// Lower precedence than `*` and `/`.
     Weak,
-    /// As `*`.
+    /// Precedence of `*`.
     Plain,
-    /// More than `*` and `/`: `a/b c` would be `a/(b c)`.
+    /// Higher precedence than `*` and `/`: `a/b c` is `a/(b c)`.
     Strong,
 }
 
 pub(crate) const READINGS: [Blank; 3] = [Blank::Weak, Blank::Plain, Blank::Strong];
 
-struct Reader<'a> {
+struct TextReader<'a> {
     rest: &'a str,
     blank: Blank,
     names: &'a Names<'a>,
 }
 
-/// The value of a formula.
+/// Value of a formula.
 pub(crate) fn evaluate(text: &str, blank: Blank, names: &Names<'_>) -> Result<Value, String> {
-    let mut reader = Reader { rest: text, blank, names };
+    let mut reader = TextReader { rest: text, blank, names };
     let value = reader.sum().map_err(|e| format!("{e} before `{}` in `{text}`", reader.rest))?;
     if reader.rest.is_empty() { Ok(value) } else { Err(format!("left over `{}` in `{text}`", reader.rest)) }
 }
 
-impl Reader<'_> {
+impl TextReader<'_> {
     fn take(&mut self, token: &str) -> bool {
         let found = self.rest.strip_prefix(token);
         if let Some(rest) = found {
@@ -56,7 +57,7 @@ impl Reader<'_> {
         }
     }
 
-    /// True if a blank follows that multiplies, and takes it.
+    /// True if a blank that multiplies follows; consumes it.
     fn multiplies(&mut self) -> bool {
         let next = self.rest.strip_prefix(' ').and_then(|r| r.chars().next());
         let found = next.is_some_and(|c| c.is_alphanumeric() || c == '(' || c == '[');
@@ -124,7 +125,7 @@ impl Reader<'_> {
         }
         if self.rest.starts_with(|c: char| c.is_ascii_digit()) {
             let number = self.number()?;
-            // `1/2` is one number to every reader
+            // every reader takes `1/2` as one number
             let rest = self.rest;
             if self.blank == Blank::Strong && self.take("/") {
                 match self.number() {
@@ -162,7 +163,8 @@ impl Reader<'_> {
         (self.names)(&name).map(Value::of).ok_or_else(|| format!("`{name}` is not known"))
     }
 
-    /// `p1`, `"about X"`, with `[45 deg]` behind it: `p1`, `about X`, `p1[45]`.
+    /// Reads a station such as `p1` or `"about X"`, with or without `[45 deg]`; returns `p1`, `about X`,
+    /// `p1[45]`.
     fn station(&mut self) -> Result<String, String> {
         let mut name = if self.take("\"") {
             let name = self.word(|c| c != '"');
@@ -203,7 +205,7 @@ fn the_notation() {
             assert!(evaluate(text, blank, &names).expect("read").is(expected, 1e-15), "{text} {blank:?}");
         }
     }
-    // what means one thing to one reader and another to the next, and what means nothing
+    // texts with several readings, and texts with none
     let at = |text, blank| evaluate(text, blank, &names).expect("read").value;
     assert_ne!(at("1/a a", Blank::Plain), at("1/a a", Blank::Strong));
     for wrong in ["1/a -psi_x@1", "2 3 -", "a b", "", "Z3@p1+180 deg", "(a"] {

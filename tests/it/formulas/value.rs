@@ -1,6 +1,6 @@
-//! A number with the sum of the magnitudes that went into it, by which rounding is judged.
+//! Number with the sum of the magnitudes of its terms, for bounds on rounding.
 
-/// A value and its size: the same with every term taken positive.
+/// Value of an expression, and its size: the value with every term taken positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Value {
     pub(crate) value: f64,
@@ -24,7 +24,7 @@ impl Value {
         Self { value: self.value * other.value, size: self.size * other.size }
     }
 
-    /// What cancels in the denominator counts.
+    /// Quotient; its size includes the cancellation in the denominator.
     pub(crate) fn over(self, other: Self) -> Self {
         let d = other.value.abs();
         Self { value: self.value / other.value, size: self.size / d * (other.size / d) }
@@ -35,11 +35,11 @@ impl Value {
         (0..exponent.abs()).fold(Self::of(1.0), |product, _| product.times(base))
     }
 
-    /// True if it is `expected` up to `tolerance` times what went into it.
+    /// True if the value equals `expected` within `tolerance` times its size.
     pub(crate) fn is(self, expected: f64, tolerance: f64) -> bool {
         (self.value - expected).abs() <= tolerance * self.size.max(expected.abs())
     }
 }
 
-/// Where names get their values.
+/// Values by name; `None` for an unknown name.
 pub(crate) type Names<'a> = dyn Fn(&str) -> Option<f64> + 'a;

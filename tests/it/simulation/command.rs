@@ -1,11 +1,11 @@
-//! The command: its words, its formats, its folder, what it refuses.
+//! The command `simulate`: words, formats, folder, refusals.
 
 use sha2::{Digest, Sha256};
 
 use super::*;
 
-/// What is known from the prior only says on whose: of the paper's case D_FZ - wN psi_y is seen, neither of
-/// them alone.
+/// An unknown that rests on priors names them: in the paper's case D_FZ - wN psi_y is observable, neither of
+/// the two alone.
 #[test]
 fn what_rests_on_a_prior_says_on_whose() {
     let s = simulated(Carry::Platform, &Conditions::default());
@@ -13,7 +13,7 @@ fn what_rests_on_a_prior_says_on_whose() {
         (of(&s, "D_FZ").prior_of.as_slice(), of(&s, "psi_y").prior_of.as_slice()),
         (&["psi_y".to_string()][..], &["D_FZ".to_string()][..])
     );
-    // its sigma is that of psi_y's prior times wN, not its own prior
+    // sigma follows from the prior of psi_y times wN, not from its own prior
     let w_n = W_N_DPH * 28.2f64.to_radians().cos();
     assert!((of(&s, "D_FZ").sigma / (w_n * 0.1f64.to_radians()) - 1.0).abs() < 0.05, "{:?}", of(&s, "D_FZ"));
     for q in &s.quantities {
@@ -27,7 +27,7 @@ fn what_rests_on_a_prior_says_on_whose() {
     assert!(text.contains(line), "{text}");
 }
 
-/// A worst margin says whose it is where some that are missed have none.
+/// The smallest margin is attributed to "the others" if some missed unknowns have no margin.
 #[test]
 fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
     let attitudes = ["10,25,40", "130,-50,70", "-95,33,-160", "60,80,15", "-20,-70,110"];
@@ -38,8 +38,7 @@ fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
         arguments.extend(more);
         stdout(&run(&arguments)).replace("\n      ", " ")
     };
-    // the prior of psi_x and psi_y is all that they have in the run: no margin there, though they miss by
-    // more
+    // psi_x and psi_y rest on their prior and have no margin, although they miss by more
     let text = of(&["--requirement", "psi=0.01", "--prior", "psi=0.02"]);
     let said = "(resting on the prior); smallest margin of the others 0.0";
     assert!(text.contains("In this run requirements are NOT met, ") && text.contains(said), "{text}");
@@ -51,13 +50,15 @@ fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {
 fn the_papers_run_word_by_word() {
     let output = run(&P1P2);
     assert!(output.status.success() && output.stderr.is_empty());
-    insta::with_settings!({ omit_expression => true, prepend_module_to_snapshot => false, snapshot_path => "../snapshots" }, {
+    insta::with_settings!({
+        omit_expression => true, prepend_module_to_snapshot => false, snapshot_path => "../snapshots"
+    }, {
         insta::assert_snapshot!("simulate_p1p2_table", stdout(&output));
     });
 }
 
-/// The folder: a figure per unknown as SVG and PNG, all of them in one, CSV and Parquet with the same
-/// numbers, the same bytes each time, and nothing overwritten unless asked.
+/// The folder: a figure per unknown as SVG and PNG, one figure with all of them, CSV and Parquet with the
+/// same numbers, the same bytes each time, and nothing overwritten without --force.
 #[test]
 fn the_folder_of_a_run() {
     let place = tempfile::tempdir().expect("a folder");
@@ -83,7 +84,7 @@ fn the_folder_of_a_run() {
     let written = files(&one);
     assert_eq!(written, files(&two));
     let file = |name: &str| &written.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("{name}")).1;
-    // the paper's figures 2-10, the rest of the unknowns, and the grids; the errors of each
+    // the paper's figures 2-10, the other unknowns, the grids, and the errors of each
     let papers = ["psi_x", "psi_y", "psi_z", "D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
     let names = papers.iter().chain(&["D_OX", "D_FZ-wNpsi_y", "all", "figures-2-to-10"]);
     for name in names.flat_map(|name| [name.to_string(), format!("{name}.error")]) {
@@ -106,8 +107,8 @@ fn the_folder_of_a_run() {
             .collect();
         assert!(places[0].is_some() && places.is_sorted(), "in the paper's order: {places:?}");
     }
-    // the paper's offset of D_FZ: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023 deg/h, which the estimate
-    // leaves out
+    // the paper's offset of D_FZ, which the estimate omits: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023
+    // deg/h
     let offset = -15.041_067 * 28.2f64.to_radians().cos() * 0.1f64.to_radians();
     let label = format!("wN*(error of psi_y at t = 0) = {offset:.5} deg/h");
     let errors: Vec<&str> = (written.iter())
@@ -128,7 +129,7 @@ fn the_folder_of_a_run() {
 
     let parquet = bytes::Bytes::from(file("series.parquet").clone());
     let reader = SerializedFileReader::new(parquet).expect("Parquet");
-    // what it belongs to
+    // metadata of the run
     let metadata = reader.metadata().file_metadata().key_value_metadata().expect("metadata");
     let of = |key: &str| {
         let found = metadata.iter().find(|m| m.key == format!("obsdeg.{key}"));
@@ -165,7 +166,7 @@ fn the_folder_of_a_run() {
     assert_eq!(std::fs::read_dir(place.path()).expect("the place").count(), 2, "nothing is left behind");
 }
 
-/// Where another filter runs, its errors and those of the linear one over each other; the axis shows both.
+/// With another filter than the linear one, the figures overlay the errors of both, and the axis covers both.
 #[test]
 fn errors_of_two_filters() {
     let conditions = Conditions { truth: Truth::Exact, ..Conditions::default() };
@@ -187,7 +188,7 @@ fn errors_of_two_filters() {
     }
     assert!(svg("D_OX.error.svg").contains("not determined at small angles"));
     assert!(!svg("D_FX.error.svg").contains("not determined"));
-    // the linear filter is off by 10 deg/h where the other's +-3 sigma is 2.3
+    // the linear filter is off by 10 deg/h, where +-3 sigma of the other filter is 2.3
     assert!(svg("D_FY.error.svg").contains(">-10<"));
 }
 
@@ -220,7 +221,7 @@ fn wrong_arguments_name_the_place() {
     }
 }
 
-/// Every format says the verdict; JSON is as the schema says.
+/// Every format states the verdict; the JSON follows its schema.
 #[test]
 fn formats() {
     for format in ["markdown", "latex", "csv", "json"] {

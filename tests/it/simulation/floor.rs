@@ -1,4 +1,4 @@
-//! The noise floor against closed forms, generalised least squares, and what the commands say of it.
+//! The noise floor against closed forms and generalised least squares, and the output of the commands.
 
 use nalgebra::Cholesky;
 use obsdeg_core::model::PerGyro;
@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 use super::*;
 use crate::schemes::S6;
 
-/// X_p to the North at the equator: `psi_x' = D_FX + b + w` and nothing else.
+/// Scheme with X_p to the North at the equator: `psi_x' = D_FX + b + w` and no other term.
 fn alone() -> Scheme {
     Scheme {
         latitude: "0".parse().ok(),
@@ -18,14 +18,14 @@ fn alone() -> Scheme {
     }
 }
 
-/// Angle random walk in deg/sqrt(h) and rate random walk in deg/h/sqrt(h).
+/// Conditions with angle random walk in deg/sqrt(h) and rate random walk in deg/h/sqrt(h).
 fn with(angle: f64, rate: f64, accelerometer_noise_g: f64) -> Conditions {
     let gyro_noise = GyroNoise {
         angle_random_walk_deg_sqrt_h: PerGyro::all(angle),
         rate_random_walk_dph_sqrt_h: PerGyro::all(rate),
         ..GyroNoise::default()
     };
-    // short steps: the closed forms see Z all the time
+    // short steps, since the closed forms observe Z continuously
     Conditions {
         gyro_noise,
         accelerometer_noise_g,
@@ -41,15 +41,15 @@ fn of_d_fx(scheme: &Scheme, conditions: &Conditions) -> CoefficientFloor {
     found.coefficients.into_iter().find(|c| c.name == "D_FX").expect("D_FX")
 }
 
-/// Sigma of D_FX after `dwell` s in deg/h.
+/// Sigma of D_FX after `dwell` s, in deg/h.
 fn sigma(conditions: &Conditions, dwell: f64) -> f64 {
     let factor = dwell / conditions.dwell_s;
     let found = sigmas_without_prior(&alone(), conditions, factor).expect("sigmas");
     found[3].to_degrees() * 3600.0
 }
 
-/// Exact observations: sigma^2 = K N coth(K T/N), whose floor is within 5 % at 1.530 N/K. In deg and h: N =
-/// 0.006, K = 0.06 give sqrt(K N) = 0.01897 deg/h and 0.1530 h.
+/// Exact observations: sigma^2 = K N coth(K T/N), within 5 % of its floor from 1.530 N/K on. In deg and h: N
+/// = 0.006, K = 0.06 give sqrt(K N) = 0.01897 deg/h and 0.1530 h.
 #[test]
 fn angle_and_rate_random_walk() {
     let (n, k) = (0.006f64, 0.06f64);
@@ -83,7 +83,7 @@ fn rate_random_walk_and_white_observations() {
         let (found, expected) = (sigma(&conditions, t), closed(t));
         assert!((found / expected - 1.0).abs() < 0.02, "{t} s: {found} instead of {expected}");
     }
-    // where the closed form is within 5 % of its floor
+    // shortest dwell at which the closed form is within 5 % of its floor
     let (mut low, mut high) = (10.0, 1e5);
     while high - low > 1.0 {
         let middle = (low + high) / 2.0;
@@ -95,8 +95,7 @@ fn rate_random_walk_and_white_observations() {
     assert!((dwell / low - 1.0).abs() < 0.05, "{dwell} {low}");
 }
 
-/// No rate random walk: sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau))) with tau = sqrt(R)/N falls on, and there is
-/// no floor.
+/// No rate random walk: sigma^2 = N^2/(T - 2 tau tanh(T/(2 tau))) with tau = sqrt(R)/N falls without a floor.
 #[test]
 fn angle_random_walk_alone_has_no_floor() {
     let conditions = with(0.001, 0.0, 1e-5);
@@ -110,7 +109,7 @@ fn angle_random_walk_alone_has_no_floor() {
     let found = of_d_fx(&alone(), &conditions);
     assert!(found.least_sigma < found.sigma && found.dwell_s.is_none(), "{found:?}");
     assert_eq!(found.reached, Some(Reached::StillFalls));
-    // a bias that forgets averages out too
+    // a bias with a short correlation time averages out too
     let forgets = GyroNoise {
         bias_instability_dph: PerGyro::all(0.01),
         correlation_time_s: 10.0,
@@ -118,14 +117,14 @@ fn angle_random_walk_alone_has_no_floor() {
     };
     let forgetful = Conditions { gyro_noise: forgets, ..conditions };
     assert_eq!(of_d_fx(&alone(), &forgetful).reached, Some(Reached::StillFalls));
-    // where all dwells are long, none is named
+    // no dwell is named if all dwells are long enough
     let long = of_d_fx(&alone(), &Conditions { dwell_s: 1e6, ..with(0.006, 0.06, 1e-5) });
     assert_eq!((long.reached, long.dwell_s), (Some(Reached::AtTheShortest), None));
 }
 
-/// Two positions turned about the North at the equator, psi carried inertially:
-/// `psi_x' = D_FX -+ D_SX + b + w`. Sigmas of D_FX and D_SX by generalised least squares with the covariance
-/// of all samples written out: N^2 min(s, t), K^2 s^2 (3t - s)/6 for s <= t, and the noise of Z.
+/// Two positions turned about the North at the equator, psi carried inertially: `psi_x' = D_FX -+ D_SX + b +
+/// w`. Reference: sigmas of D_FX and D_SX by generalised least squares with the covariance of all samples:
+/// N^2 min(s, t), K^2 s^2 (3t - s)/6 for s <= t, and the noise of Z.
 #[test]
 fn two_positions_against_generalised_least_squares() {
     let scheme = Scheme {
@@ -144,7 +143,7 @@ fn two_positions_against_generalised_least_squares() {
             let white = if i == j { 1e-10 } else { 0.0 };
             n * n * s + k * k * s * s * (3.0 * t - s) / 6.0 + white
         });
-        // psi, D_FX, D_SX, which changes sign
+        // columns: psi, D_FX, D_SX (which changes sign)
         let design = DMatrix::from_fn(count, 3, |i, c| {
             let t = time(i);
             [1.0, t, if t <= dwell { -t } else { t - 2.0 * dwell }][c]
@@ -165,9 +164,8 @@ fn two_positions_against_generalised_least_squares() {
     }
 }
 
-/// Without random drift worth the name these sigmas are those of the information of all samples: no prior
-/// shows through, however unlike the unknowns, and samples that are taken together say what they say alone
-/// within 0.5 %.
+/// With negligible random drift the sigmas are those of the information of all samples. No prior affects
+/// them, whatever the scales of the unknowns. Samples taken together give the same sigmas within 0.5 %.
 #[test]
 fn without_drift_it_is_the_information() {
     for (attitudes, carry) in [
@@ -202,8 +200,8 @@ fn without_drift_it_is_the_information() {
     }
 }
 
-/// Both commands show it, in every format, where the gyros have noise, and only there; what samples do not
-/// determine has none.
+/// Both commands show the floor in every format, exactly if the gyros have noise. An undetermined unknown has
+/// no floor.
 #[test]
 fn simulate_and_compare_show_the_floor() {
     let place = tempfile::tempdir().expect("a folder");
@@ -245,8 +243,8 @@ fn simulate_and_compare_show_the_floor() {
     for quiet in [json(&P1P2), json(&["compare", &file])["schemes"][0].clone()] {
         assert!(quiet.get("noise_floor").is_none() && quiet["conditions"].get("gyro_noise").is_none());
     }
-    // predicted sigmas count the noise of the gyros that is stated; at the scheme's dwells they are those of
-    // the floor
+    // predicted sigmas include the stated noise of the gyros; at the scheme's dwells they equal those of the
+    // floor
     let quiet = json(&["compare", &file]);
     let sigma = |answer: &serde_json::Value, name: &str| {
         let all = answer["schemes"][0]["quantities"].as_array().expect("a list");

@@ -1,5 +1,4 @@
-//! Random drift of the gyros as states: the discretisation, Monte Carlo consistency, what a file and options
-//! say.
+//! Random drift of the gyros as states: discretisation, Monte Carlo consistency, files and options.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use obsdeg_core::model::settings::{FilterKind, Settings, Truth};
@@ -9,7 +8,7 @@ use obsdeg_evidence::simulation::GyroNoise;
 
 use super::*;
 
-/// Large against the noise of Z, unlike from gyro to gyro.
+/// Gyro noise that is large against the noise of Z, and different for each gyro.
 fn datasheet() -> GyroNoise {
     GyroNoise {
         angle_random_walk_deg_sqrt_h: PerGyro([0.002, 0.001, 0.004]),
@@ -23,7 +22,7 @@ fn noisy(gyro_noise: GyroNoise) -> Conditions {
     Conditions { gyro_noise, ..Conditions::default().without_drift_noise() }
 }
 
-/// Passive elementary turns, as the paper has them.
+/// Attitude matrix from passive elementary rotations, as in the paper.
 fn c_c_n([alpha, beta, gamma]: [f64; 3]) -> Matrix3<f64> {
     let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(|a| a.to_radians().sin_cos());
     Matrix3::new(1.0, 0.0, 0.0, 0.0, ca, sa, 0.0, -sa, ca)
@@ -31,16 +30,16 @@ fn c_c_n([alpha, beta, gamma]: [f64; 3]) -> Matrix3<f64> {
         * Matrix3::new(cg, sg, 0.0, -sg, cg, 0.0, 0.0, 0.0, 1.0)
 }
 
-/// Phi and Q of psi and the five biases of [`datasheet`] in a step at a position and of a turning one,
-/// against a Runge-Kutta integration of `Phi' = F Phi`, `Q' = F Q + Q F^T + N` with F and N written here: psi
-/// in n, then the biases X: K, B; Y: K; Z: B.
+/// Phi and Q of psi and the biases of [`datasheet`] over a step, at a position and during a rotation.
+/// Reference: Runge-Kutta integration of `Phi' = F Phi`, `Q' = F Q + Q F^T + N` with F and N written here:
+/// psi in n, then the biases X: K, B; Y: K; Z: B.
 #[test]
 fn steps_of_the_biases_against_integration() {
     type States = SMatrix<f64, 7, 7>;
     let (attitude, latitude) = ([10.0, 25.0, 40.0], 28.2f64.to_radians());
     let (w_n, w_u) = (7.292115e-5 * latitude.cos(), 7.292115e-5 * latitude.sin());
     let dph = 1f64.to_radians() / 3600.0;
-    // [gyro, density, decay]; sigma of B is 0.664/0.6174 of it
+    // [gyro, density, decay]; sigma of B is 0.664/0.6174 of its coefficient
     let markov = |b: f64| 2.0 * (b * dph * 0.664_282_470 / 0.617_364_283).powi(2) / 300.0;
     let walk = |k: f64| (k * dph / 60.0).powi(2);
     let biases = [
@@ -59,7 +58,7 @@ fn steps_of_the_biases_against_integration() {
         let plan = Plan::new(&scheme, &conditions).expect("a plan");
         assert_eq!((plan.unknowns(), plan.states()), (15, 19));
         let slope = |t: f64, phi: &States, q: &States| {
-            // turning about Z_p by `turn` over the step: n to platform by Rz(-angle) C_n^c
+            // rotation about Z_p by `turn` over the step: n to platform by Rz(-angle) C_n^c
             let angle = turn * t / dt;
             let c = c_c_n(attitude) * c_c_n([0.0, 0.0, -angle]);
             let (mut f, mut n) = (States::zeros(), States::zeros());
@@ -132,9 +131,9 @@ fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme) -> Vec<S
     prepared.statistics(&prepared.run(200, &|_| true))
 }
 
-/// With the states in filter and truth ANEES and NIS lie in their bands of 99.9 %; with the noise in the
-/// truth only both are far above. Linear truth, exact truth (drifts small enough for the linear filter),
-/// slews and a turning segment.
+/// With the noise states in filter and truth, ANEES and NIS lie in their 99.9 % bands; with the noise in the
+/// truth only, both are far above. Cases: linear truth, exact truth (drifts small enough for the linear
+/// filter), slews and a rotating segment.
 #[test]
 fn monte_carlo_with_the_states_in_filter_and_truth() {
     let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
@@ -165,7 +164,7 @@ fn monte_carlo_with_the_states_in_filter_and_truth() {
     }
 }
 
-/// The same with biases of the accelerometers, large against their white noise.
+/// Monte Carlo runs with biases of the accelerometers that are large against their white noise.
 #[test]
 fn monte_carlo_with_biases_of_the_accelerometers() {
     let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
@@ -199,8 +198,7 @@ fn monte_carlo_with_biases_of_the_accelerometers() {
         let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
         assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
     }
-    // a filter with full attitudes has the same sigmas where psi and drifts are small, and its innovations
-    // are what it believes
+    // a filter with full attitudes has the same sigmas for small psi and drifts, and consistent innovations
     let small = Conditions {
         values: [exact.values.clone(), vec![Assignment { name: "psi".into(), value: 1e-4 }]].concat(),
         ..slews(&exact)
@@ -222,7 +220,7 @@ fn monte_carlo_with_biases_of_the_accelerometers() {
     assert!(refused.starts_with("accelerometer_bias_instability_ug is"), "{refused}");
 }
 
-/// A gyro at a time: the noise of one is no noise about the other axes, whatever its mounting.
+/// Noise of a single gyro acts about its input axis only, whatever its mounting.
 #[test]
 fn noise_of_one_gyro_is_about_its_input_axis() {
     let mut mounted = scheme(&["0,0,0"], Carry::Platform);
@@ -241,14 +239,14 @@ fn noise_of_one_gyro_is_about_its_input_axis() {
         (by_bias[1] + 10.0).abs() < 1e-5 && by_bias[0].abs() < 1e-2 && by_bias[2].abs() < 1e-2,
         "{by_bias:?}"
     );
-    // as D_FX does
+    // like D_FX
     for i in 0..3 {
         assert!((phi[(i, 3)] - by_bias[i]).abs() < 1e-12, "{i}");
     }
 }
 
-/// An angle random walk replaces the random drift unless both are given in one place; what is not given
-/// stays.
+/// An angle random walk replaces the random drift unless both are given in the same place; settings that are
+/// not given do not change.
 #[test]
 fn conditions_by_file_and_options() {
     let walk = Settings { angle_random_walk_deg_sqrt_h: Some(PerGyro::all(0.002)), ..Settings::default() };
@@ -271,7 +269,7 @@ fn conditions_by_file_and_options() {
     }
 }
 
-/// The white drift of a datasheet is the random drift of the same density.
+/// The white drift of a datasheet equals the random drift of the same density.
 #[test]
 fn angle_random_walk_is_white_drift() {
     let walk = noisy(GyroNoise { angle_random_walk_deg_sqrt_h: PerGyro::all(0.002), ..GyroNoise::default() });

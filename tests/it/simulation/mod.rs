@@ -53,8 +53,8 @@ fn the_papers_run() {
     assert!(s.consistency.consistent);
 }
 
-/// What the samples do not determine is never reached, nor converging, however small its prior makes sigma:
-/// in the answer, in every format and in the figures.
+/// An undetermined unknown is never called reached or converging, even if a narrow prior makes its sigma
+/// small: in the answer, in every format and in the figures.
 #[test]
 fn what_is_not_observable_is_known_from_the_prior_only() {
     // a prior that meets every requirement by itself
@@ -64,7 +64,7 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
         values: vec![tight("D", 0.005)],
         ..Conditions::default()
     };
-    // stated as an option would, beside priors that nobody states
+    // requirements stated as by an option, with and without stated priors
     let required =
         |c: Conditions| Conditions { requirements: vec![tight("D", 0.1), tight("psi", 0.01)], ..c };
     for conditions in [required(Conditions::default()), required(known)] {
@@ -81,14 +81,13 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
             for q in s.quantities.iter().filter(|q| q.degree.is_some()) {
                 assert_ne!(q.outcome, Outcome::PriorOnly, "{carry}: {q:?}");
             }
-            // in the run they miss their requirements, whatever sigma is
+            // the run misses their requirements, whatever sigma is
             let unseen = s.quantities.iter().filter(|q| q.degree.is_none()).count();
             let run = &s.run.requirements;
             assert_eq!(
                 (run.stated, run.met),
                 (15 + 3 * usize::from(carry == Carry::Reset), {
-                    // a prior that is stated bounds what samples do not determine, in the run as in the
-                    // prediction
+                    // a stated prior bounds undetermined unknowns, in the run as in the prediction
                     let by_prior = |q: &Estimate| {
                         q.outcome == Outcome::PriorOnly
                             && q.predicted_sigma.is_some()
@@ -100,7 +99,7 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
             let bounded =
                 s.quantities.iter().filter(|q| q.degree.is_none() && q.predicted_sigma.is_some()).count();
             assert!(run.missed.len() + bounded >= unseen && unseen > 0);
-            // by prediction too, unless priors that are stated bound them: then that is said
+            // missed by prediction too, unless stated priors bound them, which the answer says
             for q in s.quantities.iter().filter(|q| q.degree.is_none()) {
                 let missed = s.requirements.missed.iter().any(|m| m.name == q.name);
                 let on_prior = s.requirements.on_prior.contains(&q.name);
@@ -108,7 +107,7 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
             }
         }
     }
-    // the paper's D_FZ, whose sigma is below what is required only because psi's prior is
+    // sigma of the paper's D_FZ meets its requirement only because of the prior of psi
     let d_fz = of(&simulated(Carry::Platform, &required(Conditions::default())), "D_FZ").clone();
     assert!(d_fz.required_sigma.is_some_and(|r| d_fz.sigma < r) && d_fz.outcome == Outcome::PriorOnly);
     let output = run(&[&P1P2[..], &["--requirement", "D=0.1", "--format", "json"]].concat());
@@ -127,8 +126,8 @@ fn what_is_not_observable_is_known_from_the_prior_only() {
     assert_eq!(["D_FZ", "psi_y", "D_OX", "D_FX", "psi_x"].map(title), [true, true, true, false, false]);
 }
 
-/// At the pole, drift about the vertical that nobody sees turns psi: psi_z is seen at the start and lost at
-/// the end, psi_y of the start is never known although a derivative of order 0 shows it.
+/// At the pole, unobservable drift about the vertical turns psi: psi_z is observable at the start and lost at
+/// the end. psi_y at the start is never determined although a derivative of order 0 shows it.
 #[test]
 fn psi_at_the_end_is_what_a_run_shows() {
     let pole =
@@ -148,7 +147,7 @@ fn psi_at_the_end_is_what_a_run_shows() {
     );
 }
 
-/// A truth that no single error gives away, each within three sigma of the prior: together they do.
+/// A truth with six errors of three prior sigmas: each is plausible alone, together they are not.
 #[test]
 fn consistency_takes_all_errors_together() {
     let unseen = ["D_IX", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SY"];
@@ -164,7 +163,7 @@ fn consistency_takes_all_errors_together() {
     let text = stdout(&output).replace("\n      ", " ");
     assert!(text.contains("the filter is NOT consistent with this truth: NEES"), "{text}");
     assert!(text.contains("Do not use the filter's sigmas"), "{text}");
-    // exact truth at the paper's drifts: by every measure
+    // exact truth at the paper's drifts: every test fails
     let linear = Some(FilterKind::Linear);
     let exact = Conditions { truth: Truth::Exact, filter: linear, ..Conditions::default() };
     let exact = simulated(Carry::Platform, &exact);
@@ -173,8 +172,8 @@ fn consistency_takes_all_errors_together() {
     }
 }
 
-/// A bias held for one step is another noise with other steps: the density says so, and whoever changes the
-/// step alone is warned.
+/// A bias held for one step has another density with other steps: the answer states the density, and warns if
+/// only the step was changed.
 #[test]
 fn random_drift_has_a_density() {
     let of = |settings: &[Settings]| {
@@ -185,7 +184,7 @@ fn random_drift_has_a_density() {
     let step = |step_s: f64| Settings { step_s: Some(step_s), ..Settings::default() };
     let noise = |text: &str| Settings { drift_noise: text.parse().ok(), ..Settings::default() };
     let near = |found: [f64; 2], expected: f64| found.iter().all(|x| (x / expected - 1.0).abs() < 1e-9);
-    // an angle of 0.01 deg/h times 10 s, 360 of them an hour: 0.01/360 sqrt(360) deg
+    // an angle of 0.01 deg/h times 10 s, 360 of them per hour: 0.01/360 sqrt(360) deg
     let default = of(&[]);
     assert!(
         near(default.drift_noise_density_deg_sqrt_h, 0.01 / 360f64.sqrt()) && !default.drift_noise_differs
@@ -193,15 +192,15 @@ fn random_drift_has_a_density() {
     let finer = of(&[step(1.0)]);
     assert!(near(finer.drift_noise_density_deg_sqrt_h, 0.01 / 3600f64.sqrt()) && finer.drift_noise_differs);
     assert_eq!(finer.drift_noise_step_s, Some(10.0));
-    // given with its step, or after it, it is meant so; a later step is another
+    // stated with its step, or after it: no warning; a later change of the step: a warning
     let both = Settings { drift_noise: "0.01 deg/h".parse().ok(), ..step(1.0) };
     assert!(!of(std::slice::from_ref(&both)).drift_noise_differs);
     assert!(!of(&[step(1.0), noise("0.01 deg/h")]).drift_noise_differs);
     assert!(of(&[both, step(2.0)]).drift_noise_differs);
-    // equal steps of a dwell that is no multiple
+    // a dwell that is no multiple of the step is divided into equal steps
     let uneven = Settings { dwell_s: Some(25.0), ..Settings::default() };
     assert!(of(&[uneven]).drift_noise_differs);
-    // a density is one
+    // stated as a density
     let walk = of(&[noise("5.27e-4 deg/sqrt(h)"), step(1.0)]);
     assert!(near(walk.drift_noise_density_deg_sqrt_h, 5.27e-4) && !walk.drift_noise_differs);
     assert_eq!(walk.drift_noise_step_s, None);
@@ -237,7 +236,7 @@ fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
     let small = Conditions { drift_scale: 1e-3, ..exact.clone() };
     let s = simulated(Carry::Inertial, &small);
     assert!(s.consistency.consistent && s.validity.holds, "{:?} {:?}", s.consistency, s.validity);
-    // left to itself the program takes the filter that follows, and shows the linear one beside it
+    // by default the program chooses a filter that follows the truth, and shows the linear one beside it
     let FilterReport { kind, reason, .. } =
         simulated(Carry::Inertial, &Conditions { filter: None, ..small }).filter;
     assert_eq!((kind, reason), (FilterKind::Linear, FilterReason::Valid));
@@ -253,7 +252,7 @@ fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
         assert!(s.consistency.consistent && passes > 1, "{carry}: {:?}", s.consistency);
         let d_fy = of(&s, "D_FY");
         assert!(d_fy.error_over_sigma.abs() < 3.0 && (0.5..1.0).contains(&d_fy.sigma), "{carry}: {d_fy:?}");
-        // the linear filter believes what is not so
+        // the linear filter has a small sigma and a large error
         let linear = d_fy.linear.expect("beside it");
         let alone = simulated(carry, &exact);
         assert_eq!((linear.error, linear.sigma), (of(&alone, "D_FY").error, of(&alone, "D_FY").sigma));
@@ -267,7 +266,7 @@ fn exact_truth_breaks_the_linear_filter_and_it_is_said_why() {
     assert!(of(&s, "D_FX").sigma > 10.0 * of(&s, "D_FX").linear.expect("beside it").sigma);
 }
 
-/// As drifts shrink the three filters become one.
+/// For small drifts the three filters agree.
 #[test]
 fn for_small_drifts_all_filters_agree() {
     for carry in Carry::ALL {
@@ -293,8 +292,8 @@ fn for_small_drifts_all_filters_agree() {
     }
 }
 
-/// Without noise and for tiny angles, exact and linear truth are the same, position by position and through
-/// slews, under every carry: two independent derivations of (2), (6) and of the carries.
+/// Without noise and for tiny angles, exact and linear truth agree, position by position and through slews,
+/// under every carry: two independent derivations of (2), (6) and of the carries.
 #[test]
 fn exact_truth_is_the_linear_one_for_small_angles() {
     let attitudes = ["10,25,40", "130,-50,70", "-95,33,-160"];
@@ -302,7 +301,7 @@ fn exact_truth_is_the_linear_one_for_small_angles() {
         [(Carry::Platform, None), (Carry::Inertial, None), (Carry::Reset, None), (Carry::Inertial, Some(2.0))]
     {
         let mut scheme = scheme(&attitudes, carry);
-        // the middle one turns
+        // the middle position rotates
         scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
         let conditions = |truth| Conditions {
             truth,
@@ -375,8 +374,8 @@ fn runge_kutta_and_the_exponential_agree() {
     }
 }
 
-/// The noise of a drift held over a step is that of `(integral of exp(W t)) eps`, however long the step: here
-/// the integral is taken by Simpson's rule on the closed form of a rotation.
+/// The noise of a drift held over a step is that of `(integral of exp(W t)) eps`, for any step length.
+/// Reference: Simpson's rule on the closed form of a rotation.
 #[test]
 fn held_drift_noise_of_any_step() {
     for dt in [1.0, 10.0, 3000.0, 50_000.0] {
@@ -434,8 +433,7 @@ fn held_drift_noise_of_any_step() {
     }
 }
 
-/// Exact truths take as many integration steps as their drifts need, and those that need too many are
-/// refused.
+/// An exact truth uses as many integration steps as its drifts need; too many steps are refused.
 #[test]
 fn large_drifts_of_an_exact_truth() {
     let large = |d: f64| Conditions {
@@ -447,7 +445,7 @@ fn large_drifts_of_an_exact_truth() {
         dwell_s: 1000.0,
         ..Conditions::default()
     };
-    // D_FX turns the platform about X_p, N: after t seconds Z3 = -sin of the angle, whatever the step
+    // D_FX turns the platform about X_p, N: after t seconds Z3 = -sin of the angle, for any step
     let (_, record) = simulate(&scheme(&["0,0,0"], Carry::Platform), &large(20_000.0), 1).expect("a run");
     let psi = record.traces.series[0].truth.last().copied().expect("an end");
     let drift = 20_000f64.to_radians() / 3600.0 * 1000.0;
@@ -458,7 +456,7 @@ fn large_drifts_of_an_exact_truth() {
     assert!(matches!(refused, SimulationError::TooManySteps { .. }), "{refused}");
 }
 
-/// Every count is tested in floating point, before anything is made of it.
+/// Every number of steps is checked in floating point before its first use.
 #[test]
 fn counts_of_steps_that_cannot_be() {
     let refused = |scheme: &Scheme, step_s: f64| {
@@ -467,7 +465,7 @@ fn counts_of_steps_that_cannot_be() {
     };
     let mut turning = scheme(&["0,0,0"], Carry::Platform);
     turning.positions[0].rotation = Some(Rotation::new("X_p", "360").expect("a rotation"));
-    // 2^64 steps, and beyond: no count wraps
+    // 2^64 steps and more: no number wraps around
     for step_s in [1e-6, 1.0842021724855044e-16, 1e-300, 0.0] {
         assert!(refused(&paper(Carry::Platform), step_s).contains("expected at most 1000000"));
         assert!(refused(&turning, step_s).contains("expected at most"));
@@ -500,9 +498,9 @@ fn what_cannot_be_simulated_is_refused_by_name() {
 
 const P1P2: [&str; 5] = ["simulate", "--angles", "0,0,0", "--angles", "180,0,0"];
 
-/// With slews of finite duration the exact verdict, of repositioning at once, does not say what samples
-/// determine: psi moves by drifts of its own meanwhile. The sigmas are from an independent computation
-/// without priors (information with the slews integrated).
+/// With slews of finite duration the exact verdict, which assumes instantaneous repositioning, does not
+/// decide what samples determine, because psi changes during the slews. The sigmas are from an independent
+/// computation without priors (information with integrated slews).
 #[test]
 fn with_slews_the_samples_decide() {
     let outcome = |arguments: &[&str]| {
@@ -515,7 +513,8 @@ fn with_slews_the_samples_decide() {
         json["quantities"].as_array().expect("a list").iter().map(of).collect::<BTreeMap<_, _>>()
     };
     let two = ["--angles", "NUE", "--angles", "NDW", "--latitude", "28.2"];
-    // at once D_FZ is observable; with slews only its prior bounds it: tenfold priors, tenfold sigma
+    // with instantaneous slews D_FZ is observable; with slower ones only its prior bounds it: tenfold priors
+    // give a tenfold sigma
     let at_once = outcome(&two);
     assert_eq!((at_once["D_FZ"].0, at_once["D_FZ"].1.as_str()), (Some(1), "determined"));
     for prior in ["D=10", "D=1000"] {

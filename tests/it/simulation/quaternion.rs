@@ -1,5 +1,5 @@
-//! The extended filter against one that is written here from the equations of the method alone: attitude as a
-//! quaternion, the drift of every gyro spelt out, Jacobians by differences, the covariance as a full matrix.
+//! The extended filter against a filter written here from the equations of the method: attitude as a
+//! quaternion, explicit drift of every gyro, Jacobians by differences, covariance as a full matrix.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use obsdeg_core::model::Carry;
@@ -12,7 +12,8 @@ use crate::schemes::{paper, scheme};
 const G: Vector3<f64> = Vector3::new(0.0, -1.0, 0.0);
 const LATITUDE: f64 = 28.2;
 
-/// True platform axes to n, and the twelve coefficients (D_F, D_I, D_O, D_S; X, Y, Z each).
+/// State: attitude quaternion from true platform axes to n, and the twelve coefficients (D_F, D_I, D_O, D_S;
+/// X, Y, Z each).
 #[derive(Clone)]
 struct State {
     q: UnitQuaternion<f64>,
@@ -24,7 +25,7 @@ fn earth() -> Vector3<f64> {
     Vector3::new(l.cos(), l.sin(), 0.0) * 7.292115e-5
 }
 
-/// `C_c^n` of (19): passive rotations.
+/// Attitude matrix `C_c^n` of (19): passive rotations.
 fn computed(alpha: f64, beta: f64, gamma: f64) -> Matrix3<f64> {
     let ((sa, ca), (sb, cb), (sg, cg)) = (alpha.sin_cos(), beta.sin_cos(), gamma.sin_cos());
     Matrix3::new(1.0, 0.0, 0.0, 0.0, ca, sa, 0.0, -sa, ca)
@@ -32,7 +33,7 @@ fn computed(alpha: f64, beta: f64, gamma: f64) -> Matrix3<f64> {
         * Matrix3::new(cg, sg, 0.0, -sg, cg, 0.0, 0.0, 0.0, 1.0)
 }
 
-/// (3) with the gyro axes of the paper.
+/// Drift by (3) with the gyro axes of the paper.
 fn drift(d: &[f64], g: &Vector3<f64>) -> Vector3<f64> {
     let ([f, i, o, s], [x, y, z]) = ([&d[..3], &d[3..6], &d[6..9], &d[9..12]], [g.x, g.y, g.z]);
     Vector3::new(
@@ -42,8 +43,8 @@ fn drift(d: &[f64], g: &Vector3<f64>) -> Vector3<f64> {
     )
 }
 
-/// One step at a position whose computed attitude is `c`: the platform turns at the commanded rate and its
-/// drift.
+/// State after one step at a position with the computed attitude `c`: the platform turns at the commanded
+/// rate and its drift.
 fn step(c: &Matrix3<f64>, dt: f64, x: &State) -> State {
     let command = c.transpose() * earth();
     let slope = |q: &nalgebra::Quaternion<f64>| {
@@ -63,7 +64,7 @@ fn step(c: &Matrix3<f64>, dt: f64, x: &State) -> State {
     State { q: UnitQuaternion::new_normalize(q), d: x.d.clone() }
 }
 
-/// (6) without small angles: `Z^n = C_c^n (f^p + g^c)`, `f^p = -g^p`; its components 1 and 3.
+/// Output by (6) without small angles: `Z^n = C_c^n (f^p + g^c)`, `f^p = -g^p`; components 1 and 3.
 fn output(c: &Matrix3<f64>, x: &State) -> [f64; 2] {
     let z = c * (c.transpose() * G - x.q.inverse() * G);
     [z.x, z.z]
@@ -143,8 +144,8 @@ fn an_independent_filter_has_the_same_estimates() {
         let mut k = 0;
         for (i, c_now) in c.iter().enumerate() {
             if i > 0 {
-                // instantaneous: the platform turns by what is commanded, in its own axes (inertial), or
-                // C_c^p goes on
+                // instantaneous slew: the platform turns by the command in its own axes (inertial carry), or
+                // keeps C_c^p
                 let turn = match carry {
                     Carry::Inertial => Matrix3::identity(),
                     _ => c_now * c[i - 1].transpose(),
@@ -172,7 +173,7 @@ fn an_independent_filter_has_the_same_estimates() {
                 let left = DMatrix::identity(15, 15) - &gain * &h;
                 p = &left * p * left.transpose() + &gain * gain.transpose() * 1e-10;
                 let new = moved(&x, &delta);
-                // what a reset does to the error, by differences
+                // effect of a reset on the error, by differences
                 let reset = by_differences(|e| apart(&moved(&x, &(&delta + e)), &new));
                 p = &reset * p * reset.transpose();
                 p = (&p + p.transpose()) / 2.0;

@@ -1,5 +1,5 @@
-//! A second path: rows in floating point, written from the equations in n, slews integrated step by step. It
-//! takes nothing of the engine but the list of terms.
+//! Second path: rows in floating point, written from the equations in n, with slews integrated step by step.
+//! Only the list of terms comes from the engine.
 
 use std::ops::{Add, Mul};
 
@@ -8,7 +8,7 @@ use obsdeg_ekf::decomposition::singular_values;
 
 pub(super) type M = [[f64; 3]; 3];
 
-/// A value and its first two Taylor coefficients in time.
+/// Value and its first two Taylor coefficients in time.
 #[derive(Clone, Copy)]
 struct Jet([f64; 3]);
 
@@ -30,7 +30,7 @@ fn constant(x: f64) -> Jet {
     Jet([x, 0.0, 0.0])
 }
 
-/// A sensor that measures along x, y or z: mountings of the paper, and accelerometers along the axes.
+/// Axes of the gyros X, Y and Z in c, mounted as in the paper.
 const GYROS: [[[f64; 3]; 3]; 3] = [
     // input, output, spin
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
@@ -42,8 +42,8 @@ fn dot(a: &[Jet; 3], b: &[f64; 3]) -> Jet {
     (0..3).map(|i| a[i] * constant(b[i])).fold(constant(0.0), Add::add)
 }
 
-/// `(axis, value)` in c of one unit of every coefficient of a term, for gravity g, torqued rate w and
-/// specific force f in c: drift first, error of the accelerometers second.
+/// Effects of one unit of every coefficient of a term, as `(axis, value)` in c, for gravity g, torqued rate w
+/// and specific force f in c: drift first, accelerometer error second.
 fn unit_effects(term: &str, g: &[Jet; 3], w: &[Jet; 3], f: &[Jet; 3]) -> Vec<(usize, Jet, Jet)> {
     let zero = constant(0.0);
     let mut out = Vec::new();
@@ -79,8 +79,8 @@ fn unit_effects(term: &str, g: &[Jet; 3], w: &[Jet; 3], f: &[Jet; 3]) -> Vec<(us
     out
 }
 
-/// `(eps^n, a^n)` per unit of every coefficient at the attitude `c` (rows in n), torqued with the rate `w` in
-/// c.
+/// Effects `(eps^n, a^n)` per unit of every coefficient at the attitude `c` (rows in n), torqued with the
+/// rate `w` in c.
 fn columns(terms: &[&str], c: &[[Jet; 3]; 3], w: &[Jet; 3]) -> [Vec<[Jet; 3]>; 2] {
     let in_c = |v: [f64; 3]| -> [Jet; 3] { std::array::from_fn(|j| dot(&[c[0][j], c[1][j], c[2][j]], &v)) };
     let (g, f) = (in_c([0.0, -1.0, 0.0]), in_c([0.0, 1.0, 0.0]));
@@ -92,7 +92,7 @@ fn columns(terms: &[&str], c: &[[Jet; 3]; 3], w: &[Jet; 3]) -> [Vec<[Jet; 3]>; 2
     ]
 }
 
-/// `C exp([u x] rate t)`.
+/// Attitude `C exp([u x] rate t)` as Taylor coefficients in t.
 fn turning(c: &M, u: &[f64; 3], rate: f64) -> [[Jet; 3]; 3] {
     let slope = |m: &M| -> M {
         std::array::from_fn(|i| {
@@ -106,7 +106,7 @@ fn turning(c: &M, u: &[f64; 3], rate: f64) -> [[Jet; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| Jet([c[i][j], first[i][j], second[i][j] / 2.0])))
 }
 
-/// `exp([u x] t) = cos t + sin t [u x] + (1 - cos t) u u^T` (Rodrigues).
+/// Rotation matrix `exp([u x] t) = cos t + sin t [u x] + (1 - cos t) u u^T` (Rodrigues).
 pub(super) fn turn(u: &[f64; 3], t: f64) -> M {
     let (sin, cos) = t.sin_cos();
     let cross: M = [[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]];
@@ -126,20 +126,20 @@ fn back(m: &M) -> M {
     std::array::from_fn(|i| std::array::from_fn(|j| m[j][i]))
 }
 
-/// A turn: axis in c, angle in rad.
+/// Rotation: axis in c, angle in rad.
 pub(super) type Turn = ([f64; 3], f64);
 
-/// A position.
+/// Position with the turns before and during it.
 pub(super) struct Leg {
     pub(super) attitude: M,
-    /// The turn that leads there, where torquer errors act.
+    /// Slew to the position, during which torquer errors act.
     pub(super) slew: Option<Turn>,
-    /// Its own turn while Z is observed.
+    /// Rotation of the position while Z is observed.
     pub(super) rotation: Option<Turn>,
 }
 
-/// What the torquers leave in psi^n in a turn: psi^n' = C(t) E(u) k by Gauss's rule of five points in parts
-/// of a tenth of a radian (error below 1e-16).
+/// Effect of the torquer errors on psi^n in a turn: psi^n' = C(t) E(u) k by Gauss's rule of five points in
+/// parts of a tenth of a radian (error below 1e-16).
 fn left_by(terms: &[&str], from: &M, (u, angle): Turn) -> Vec<[f64; 3]> {
     let outer = 5.0 + 2.0 * (10.0f64 / 7.0).sqrt();
     let inner = 5.0 - 2.0 * (10.0f64 / 7.0).sqrt();
@@ -169,13 +169,13 @@ fn left_by(terms: &[&str], from: &M, (u, angle): Turn) -> Vec<[f64; 3]> {
     sum
 }
 
-/// Attitudes of an arc that are looked at: more than its rows have sines, cosines and constants.
+/// Number of attitudes per arc, above the number of sines, cosines and constants in its rows.
 const ARC: usize = 23;
-/// Rates of the earth, and of turning: any will do.
+/// Rates wN, wU and the rate of rotation, dimensionless; any values will do.
 const RATES: [f64; 3] = [0.63, 0.41, 0.77];
 
-/// psi^n in the unknowns (3 x n) where a leg begins: `psi` is what it was at the end of the leg before, whose
-/// attitude is `end`.
+/// psi^n at the start of a position, as rows over the unknowns (3 x n). `psi` and `end` are psi^n and
+/// attitude at the end of the position before.
 fn begins(
     terms: &[&str],
     carry: Carry,
@@ -206,8 +206,8 @@ fn left_behind(psi: &[Vec<f64>; 3], left: &[[f64; 3]], first: usize) -> [Vec<f64
     })
 }
 
-/// The rank of all that is seen, and of each unknown whether it is determined: where a leg turns, Z is
-/// sampled along the turn and psi is integrated (Runge and Kutta, fourth order).
+/// Rank of all samples, and true for each determined unknown. In a rotation Z is sampled along the arc and
+/// psi is integrated (Runge and Kutta, fourth order).
 pub(super) fn sampled(terms: &[&str], legs: &[Leg], carry: Carry) -> (usize, Vec<bool>) {
     const SAMPLES: usize = 48;
     const STEPS: usize = 40;
@@ -290,9 +290,9 @@ pub(super) fn sampled(terms: &[&str], legs: &[Leg], carry: Carry) -> (usize, Vec
     (all, determined)
 }
 
-/// Ranks of V_0, V_1, V_2, and of each unknown the smallest order whose span holds it. Where a position
-/// turns, the derivatives of Z in time are taken as the attitude, gravity and the torqued rate (that of the
-/// turn added) change, at many attitudes of the arc.
+/// Ranks of V_0, V_1, V_2, and the smallest order whose span contains each unknown. In a rotation the time
+/// derivatives of Z include the changes of attitude, gravity and torqued rate (that of the rotation added),
+/// at many attitudes of the arc.
 pub(super) fn judge(terms: &[&str], legs: &[Leg], carry: Carry) -> (Vec<usize>, Vec<Option<usize>>) {
     let [w_n, w_u, rate] = RATES;
     let one = turning(&legs[0].attitude, &[0.0; 3], 0.0);
@@ -302,7 +302,7 @@ pub(super) fn judge(terms: &[&str], legs: &[Leg], carry: Carry) -> (Vec<usize>, 
     // psi' = psi x w
     let w: M = [[0.0, 0.0, -w_u], [0.0, 0.0, w_n], [w_u, -w_n, 0.0]];
     let mut rows: Vec<Vec<Vec<f64>>> = vec![Vec::new(); 3];
-    // psi^n in the unknowns
+    // psi^n as rows over the unknowns
     let mut psi: [Vec<f64>; 3] = Default::default();
     let mut end: Option<M> = None;
     for (i, leg) in legs.iter().enumerate() {

@@ -15,7 +15,7 @@ use crate::Going;
 use crate::record::{Record, RecordError, STANDARD_GRAVITY};
 use static_record::{Channel, StaticRecord};
 
-/// Clusters are no longer than this part of the samples: beyond, a few differences say next to nothing.
+/// Divisor of the number of samples for the longest cluster: longer clusters leave too few differences.
 const LONGEST: usize = 8;
 /// Fewest samples of a column: clusters of 1, 2, 4, 8 and 16 samples.
 pub(crate) const FEWEST: usize = 128;
@@ -25,22 +25,23 @@ const UNEXPLAINED: f64 = 1e-3;
 /// Reason why no noise was found in a static record.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoiseError {
-    /// The record.
+    /// Error of the record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A column that is asked for and not there.
+    /// A requested column does not exist.
     #[error("{record}: no column `{name}` with a unit of a rate or a force; expected one of {expected}")]
     Column {
         /// Name of the record.
         record: String,
-        /// Name that was asked for.
+        /// Name that was requested.
         name: String,
-        /// Columns with such units.
+        /// Columns with units of sensors.
         expected: String,
     },
     /// No column of a sensor.
     #[error(
-        "{record}: no column of a sensor; expected columns with a unit, of a gyro (deg/h, deg/s, rad/s) or an accelerometer (g, mg, ug, m/s^2), found {found}"
+        "{record}: no column of a sensor; expected columns with a unit, of a gyro (deg/h, deg/s, rad/s) or \
+         an accelerometer (g, mg, ug, m/s^2), found {found}"
     )]
     Sensors {
         /// Name of the record.
@@ -48,26 +49,27 @@ pub enum NoiseError {
         /// Columns of the record.
         found: String,
     },
-    /// Too many numbers.
+    /// The record has too many numbers.
     #[error(
-        "{record}: more than {most} numbers in columns of sensors; expected fewer columns (--column) or a shorter record"
+        "{record}: more than {most} numbers in columns of sensors; expected fewer columns (--column) or a \
+         shorter record"
     )]
     Long {
         /// Name of the record.
         record: String,
-        /// Most numbers.
+        /// Largest number allowed.
         most: usize,
     },
-    /// Too few samples in a row.
+    /// Too few samples without a gap.
     #[error(
         "{record}, column `{column}`: {found} samples without a gap between them at most; expected {FEWEST} or more"
     )]
     Short {
         /// Name of the record.
         record: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// Samples of the longest stretch.
+        /// Number of samples of the longest stretch.
         found: usize,
     },
     /// Samples that do not vary.
@@ -75,30 +77,30 @@ pub enum NoiseError {
     Constant {
         /// Name of the record.
         record: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// Their value.
+        /// Value of all samples.
         value: f64,
     },
-    /// Numbers that are none.
+    /// The fit fails on numbers that are not finite.
     #[error("{record}, column `{column}`: {source}")]
     Fit {
         /// Name of the record.
         record: String,
-        /// The column.
+        /// Name of the column.
         column: String,
         /// Error of the fit.
         source: EkfError,
     },
-    /// Interrupted.
+    /// The caller stopped the work.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Columns, confidence and gravity with which a static record is read.
+/// Columns, confidence and gravity for reading a static record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseOptions {
-    /// Names of the columns that are used; empty for all with a unit of a sensor.
+    /// Names of the columns to use; empty for all with a unit of a sensor.
     pub columns: Vec<String>,
     /// Probability that a confidence band holds a deviation.
     pub confidence: f64,
@@ -195,7 +197,7 @@ fn column(read: &StaticRecord, channel: &Channel, options: &NoiseOptions) -> Res
 }
 
 impl SensorKind {
-    /// Unit of its deviations.
+    /// Unit of the Allan deviations of a sensor.
     fn unit(self) -> &'static str {
         match self {
             Self::Gyro => "deg/h",
@@ -204,7 +206,7 @@ impl SensorKind {
     }
 }
 
-/// The coefficients of a fit in the units of datasheets; samples are `dt` s apart.
+/// Coefficients of a fit in the units of datasheets; samples are `dt` s apart.
 fn coefficients(found: &NoiseFit, sensor: SensorKind, dt: f64) -> Vec<NoiseCoefficient> {
     // a rate in deg/h (ug) times the root of a second; N = sigma sqrt(dt), K = step/sqrt(dt)
     let units: [(NoiseKind, &str, &str, f64); 3] = match sensor {

@@ -1,11 +1,11 @@
-//! Noise coefficients as the keys of a `[simulation]` table, and what they mean per sample and per step.
+//! Noise coefficients as keys of a `[simulation]` table, and their values per sample and per step.
 
 use obsdeg_ekf::noise::MARKOV_PEAK_AT;
 
 use super::answer::{ColumnNoise, NoiseCoefficient, NoiseKind, NoiseSetting, SensorKind};
 use crate::record::STANDARD_GRAVITY;
 
-/// The coefficient of a kind.
+/// Coefficient of a kind of noise.
 fn coefficient(column: &ColumnNoise, noise: NoiseKind) -> Option<&NoiseCoefficient> {
     column.coefficients.iter().find(|c| c.noise == noise)
 }
@@ -15,8 +15,8 @@ fn sensors(columns: &[ColumnNoise], kind: SensorKind) -> Vec<&ColumnNoise> {
     columns.iter().filter(|c| c.sensor == kind).collect()
 }
 
-/// Values of a coefficient: of three sensors each (0 where it is not resolved), else the largest; `None`
-/// where none is resolved.
+/// Values of a coefficient: of all three sensors if `three` (0 where it is not resolved), otherwise the
+/// largest; `None` where none is resolved.
 fn values(of: &[&ColumnNoise], noise: NoiseKind, three: bool) -> Option<Vec<f64>> {
     let each: Vec<Option<f64>> = of.iter().map(|c| coefficient(c, noise)?.value).collect();
     let largest = each.iter().copied().flatten().reduce(f64::max)?;
@@ -27,8 +27,8 @@ fn values(of: &[&ColumnNoise], noise: NoiseKind, three: bool) -> Option<Vec<f64>
     })
 }
 
-/// Correlation time (s) of the Gauss-Markov process that stands for flicker noise: its largest Allan
-/// deviation is where the fitted deviation is least.
+/// Correlation time (s) of the Gauss-Markov process that models flicker noise: its largest Allan deviation is
+/// where the fitted deviation is least.
 fn correlation_s(of: &[&ColumnNoise]) -> Option<f64> {
     let resolved = |c: &&&ColumnNoise| coefficient(c, NoiseKind::BiasInstability).is_some_and(|c| c.resolved);
     let least =
@@ -38,13 +38,13 @@ fn correlation_s(of: &[&ColumnNoise]) -> Option<f64> {
     (!all.is_empty()).then(|| mean.exp() / MARKOV_PEAK_AT)
 }
 
-/// White noise of a sample (g) of an accelerometer of this velocity random walk (m/s/sqrt(h)), for samples
+/// White noise of a sample (g) of an accelerometer with this velocity random walk (m/s/sqrt(h)), for samples
 /// `dt` s apart.
 fn per_sample(walk: f64, dt: f64) -> f64 {
     walk / 60.0 / STANDARD_GRAVITY / dt.sqrt()
 }
 
-/// The keys for the noise that is resolved; rows are `dt` s apart.
+/// Keys for the resolved noise; rows are `dt` s apart.
 pub(super) fn of(columns: &[ColumnNoise], dt: f64) -> Vec<NoiseSetting> {
     let (gyros, accelerometers) =
         (sensors(columns, SensorKind::Gyro), sensors(columns, SensorKind::Accelerometer));
@@ -63,14 +63,14 @@ pub(super) fn of(columns: &[ColumnNoise], dt: f64) -> Vec<NoiseSetting> {
     out
 }
 
-/// Four significant digits: a fit says no more.
+/// Number in four significant digits, the accuracy of a fit.
 fn rounded(x: f64) -> String {
     let text = format!("{x:.3e}");
     text.parse::<f64>()
         .map_or(text, |x| if (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") })
 }
 
-/// The settings as a table in TOML.
+/// Settings as a table in TOML.
 pub(super) fn table(settings: &[NoiseSetting]) -> String {
     let value = |s: &NoiseSetting| match &s.values[..] {
         [x] if s.key.contains("_random_walk") || s.key == "bias_instability_dph" => {
@@ -84,7 +84,7 @@ pub(super) fn table(settings: &[NoiseSetting]) -> String {
     if lines.is_empty() { String::new() } else { format!("[simulation]\n{}\n", lines.join("\n")) }
 }
 
-/// Notes on the settings of other commands that the coefficients stand for.
+/// Notes on settings of other commands with the same meaning.
 pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     let (gyros, accelerometers) =
         (sensors(columns, SensorKind::Gyro), sensors(columns, SensorKind::Accelerometer));
@@ -93,14 +93,17 @@ pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     if let Some(n) = largest(&gyros, NoiseKind::RandomWalk) {
         let step: f64 = 10.0;
         out.push(format!(
-            "An angle random walk of {} deg/sqrt(h) is `drift_noise = \"{0} deg/sqrt(h)\"`, or as a bias held for a step of S s 60 N/sqrt(S): \"{} deg/h\" for step_s = {step}. State drift_noise or angle_random_walk_deg_sqrt_h, not both.",
+            "An angle random walk of {} deg/sqrt(h) is `drift_noise = \"{0} deg/sqrt(h)\"`, or as a bias \
+             held for a step of S s 60 N/sqrt(S): \"{} deg/h\" for step_s = {step}. State drift_noise or \
+             angle_random_walk_deg_sqrt_h, not both.",
             rounded(n),
             rounded(60.0 * n / step.sqrt()),
         ));
     }
     if let Some(n) = largest(&accelerometers, NoiseKind::RandomWalk) {
         out.push(format!(
-            "accelerometer_noise_g is the white noise of one sample, N/sqrt(interval): {} g for rows {} s apart; for means over S s it is {} g/sqrt(S).",
+            "accelerometer_noise_g is the white noise of one sample, N/sqrt(interval): {} g for rows {} s \
+             apart; for means over S s it is {} g/sqrt(S).",
             rounded(per_sample(n, dt)),
             rounded(dt),
             rounded(per_sample(n, 1.0)),
@@ -112,7 +115,8 @@ pub(super) fn notes(columns: &[ColumnNoise], dt: f64) -> Vec<String> {
     for (of, kind) in [(&gyros, "gyros"), (&accelerometers, "accelerometers")] {
         if correlation_s(of).is_some() {
             out.push(format!(
-                "The bias instability of {kind} stands for a Gauss-Markov process; its correlation time puts the largest Allan deviation of the process where the fitted deviation is least."
+                "The bias instability of {kind} stands for a Gauss-Markov process; its correlation time puts \
+                 the largest Allan deviation of the process where the fitted deviation is least."
             ));
         }
     }

@@ -1,4 +1,4 @@
-//! A static record: time, and columns of gyros and accelerometers, in stretches of evenly spaced samples.
+//! Static record: time, and columns of gyros and accelerometers, in stretches of evenly spaced samples.
 
 use super::answer::SensorKind;
 use super::{NoiseError, NoiseOptions};
@@ -6,7 +6,7 @@ use crate::Going;
 use crate::platform::TIMES;
 use crate::record::{MOST, Record, Wanted};
 
-/// Units of rates, and what one of each is in deg/h.
+/// Units of rates, with their values in deg/h.
 const RATES: [(&str, f64); 5] = [
     ("deg/h", 1.0),
     ("deg/s", 3600.0),
@@ -14,14 +14,14 @@ const RATES: [(&str, f64); 5] = [
     ("rad/s", 3600.0 * 180.0 / std::f64::consts::PI),
     ("mrad/s", 3.6 * 180.0 / std::f64::consts::PI),
 ];
-/// Units of specific force, and what one of each is in ug; `None`: by gravity.
+/// Units of specific force, with their values in ug; `None`: by gravity.
 const FORCES: [(&str, Option<f64>); 4] =
     [("ug", Some(1.0)), ("mg", Some(1e3)), ("g", Some(1e6)), ("m/s^2", None)];
-/// Most numbers that are held.
+/// Most numbers that are kept in memory.
 const MOST_NUMBERS: usize = 50_000_000;
-/// An interval is a usual one within this part of it.
+/// Largest relative difference of a usual interval from the median.
 const USUAL: f64 = 0.5;
-/// A cell is far off beyond this many standard deviations of its distance from the mean of its neighbours.
+/// Distance of a bad cell from the mean of its neighbours, in standard deviations of this distance.
 const FAR: f64 = 8.0;
 /// Number of rows from one report of progress to the next.
 const OFTEN: usize = 10_000;
@@ -29,7 +29,7 @@ const OFTEN: usize = 10_000;
 /// Index, kind and scale of a column of a sensor, with its title.
 type Column<'a> = (&'a (usize, SensorKind, f64), String);
 
-/// A column of a sensor.
+/// Column of a sensor.
 pub(super) struct Channel {
     pub text: String,
     pub sensor: SensorKind,
@@ -41,7 +41,7 @@ pub(super) struct Channel {
     pub left_out: Vec<u64>,
 }
 
-/// A record in stretches.
+/// Static record in stretches.
 pub(super) struct StaticRecord {
     pub name: String,
     pub samples: usize,
@@ -60,7 +60,7 @@ fn sensor(unit: &str, gravity: f64) -> Option<(SensorKind, f64)> {
     rate.or(force.map(|(_, s)| (SensorKind::Accelerometer, s.unwrap_or(1e6 / gravity))))
 }
 
-/// The columns of sensors: index, kind, scale.
+/// Columns of sensors: index, kind, scale.
 fn sensors(record: &Record, options: &NoiseOptions) -> Result<Vec<(usize, SensorKind, f64)>, NoiseError> {
     let of = |(i, c): (usize, &crate::record::Column)| {
         let (kind, scale) = sensor(c.unit.as_deref()?, options.gravity_m_s2)?;
@@ -90,7 +90,7 @@ fn sensors(record: &Record, options: &NoiseOptions) -> Result<Vec<(usize, Sensor
 }
 
 impl StaticRecord {
-    /// Reads a record.
+    /// Reads a static record.
     pub(super) fn read(
         record: Record,
         options: &NoiseOptions,
@@ -151,7 +151,7 @@ impl StaticRecord {
     }
 }
 
-/// The median interval between times.
+/// Median interval between times, in s.
 fn usual(times: &[f64]) -> f64 {
     let mut all: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
     median(&mut all).unwrap_or(1.0)
@@ -162,8 +162,8 @@ fn median(all: &mut [f64]) -> Option<f64> {
     (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Values in stretches that begin anew at the rows `begins` and behind cells that are empty or far from both
-/// neighbours; with the lines of the latter.
+/// Values in stretches, and the lines of bad cells. A stretch begins at the rows `begins`, and behind cells
+/// that are empty or far from both neighbours.
 fn stretches(mut values: Vec<f64>, begins: &[usize], lines: &[u64]) -> (Vec<Vec<f64>>, Vec<u64>) {
     let off = |w: &[f64]| w[1] - (w[0] + w[2]) / 2.0;
     let mut sizes: Vec<f64> = values.windows(3).map(off).filter(|x| x.is_finite()).map(f64::abs).collect();

@@ -1,22 +1,22 @@
-//! Whether the clock of a record is right, by when positions begin and end beside the scheme.
+//! Clock of a record, checked by the times at which positions begin and end, compared with the scheme.
 
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
-/// So many intervals between samples a run must be longer or shorter to be told from how samples fall.
+/// Smallest difference of durations that is significant, in intervals between samples.
 const TOLD: f64 = 4.0;
 
-/// A straight line of times of a record over those of the scheme.
+/// Straight line of the times of a record over those of the scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Line {
-    /// What the record has at 0, in s.
+    /// Time of the record at time 0 of the scheme, in s.
     pub at_zero: f64,
-    /// How much faster its clock runs, as a part.
+    /// Excess rate of the record's clock, as a fraction.
     pub fast: f64,
-    /// The points are within this of it, in s.
+    /// Largest distance of a point from the line, in s.
     pub within: f64,
 }
 
-/// The line through points (scheme, record) in s, by least squares; none through fewer than three.
+/// Least-squares line through points (scheme, record) in s; `None` for fewer than three points.
 pub(crate) fn line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
@@ -31,12 +31,12 @@ pub(crate) fn line(points: &[(f64, f64)]) -> Option<Line> {
     Some(Line { at_zero, fast: slope - 1.0, within: points.iter().map(off).fold(0.0, f64::max) })
 }
 
-/// A clock in words.
+/// Description of a clock in words.
 pub(crate) fn words(fast: f64) -> String {
     format!("a clock that is {:.2} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
 }
 
-/// When every position of the scheme begins and ends, in s.
+/// Begin and end of every position of the scheme, in s.
 pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = Vec::new();
     for s in plan.segments.iter().filter(|s| !matches!(s.kind, SegmentKind::Slew(_))) {
@@ -49,9 +49,9 @@ pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
     out
 }
 
-/// How much faster the clock of a record runs than that of the scheme, as a part, where its positions begin
-/// and end, at `stays`, as they would by such a clock and not by a right one; `between` two samples there are
-/// so many s. Positions that begin late or end early all alike are no matter.
+/// Excess rate of a record's clock by its positions `stays` (begin and end), as a fraction; `between` is the
+/// time between two samples, in s. `None` unless such a clock explains the positions and a right one does
+/// not. A common delay of begins or ends has no effect.
 pub(crate) fn by_durations(stays: &[(f64, f64)], between: f64, plan: &Plan) -> Option<f64> {
     let bounds = bounds(plan);
     let each = bounds.iter().zip(stays);

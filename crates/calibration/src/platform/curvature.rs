@@ -1,18 +1,18 @@
-//! Curvature of an estimate: the test of the linear model of its covariance, and mean and covariance without
-//! it.
+//! Curvature of an estimate: a test of the linear model of its covariance, and mean and covariance without
+//! that model.
 //!
-//! Unknowns that a prior alone determines may be far from their estimates, and bend into the others: drifts
-//! times angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
-//! longest axes a of the posterior. Below one the covariance of the linear model holds. Above, mean and
-//! covariance are those of many estimates, each from data and priors with errors drawn anew (randomise, then
-//! optimise; Bardsley, Solonen, Haario, Laine 2014, doi:10.1137/140964023).
+//! Unknowns that only a prior determines may be far from their estimates, and affect the others nonlinearly:
+//! drifts times angles enter at second order. The criterion is `kappa = max |r(x +- a) - r(x) +- J a|` in
+//! sigma over the longest axes a of the posterior. Below one the covariance of the linear model holds. Above,
+//! mean and covariance are those of many estimates, each from data and priors with newly drawn errors
+//! (randomise, then optimise; Bardsley, Solonen, Haario, Laine 2014, doi:10.1137/140964023).
 //!
-//! Beyond `MOST`, where another minimum is nearly as low, or where repeated estimates do not settle, no
+//! Beyond `MOST`, where another minimum is nearly as low, or where repeated estimates do not converge, no
 //! covariance describes the errors, and all estimates are left open. Nothing is wrong with such a record:
-//! with the priors it says too little at these drifts. That some estimates could stand was tried, by the
-//! shift that the difference from the linear model makes to each and by how repeated estimates scatter: of 20
-//! records of p1 p2 at three times the paper's drifts one had 14 estimates that moved by no quarter of a
-//! sigma and were off by 160 together.
+//! with the priors it is not informative enough at these drifts. Attempts to keep some of the estimates
+//! failed. They used the change of each estimate from the linear model, and the scatter of repeated
+//! estimates. In a test with 20 records of p1 p2 at three times the paper's drifts, one record had 14
+//! estimates that moved by less than a quarter of a sigma. Together they were off by 160.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::Manifold;
@@ -22,32 +22,32 @@ use super::CalibrationError;
 use super::estimate::{Draw, Estimate, Problem};
 use crate::least_squares::{Information, Linearised};
 
-/// Longest axes of the posterior that are tried.
+/// Number of the longest axes of the posterior that are tried.
 const AXES: usize = 8;
-/// An axis can bend a run where the square of what it turns the platform by is more than this part of what
-/// all measurements could tell from nothing.
+/// Threshold of an axis in sigmas of all measurements: the square of the angle by which the axis turns the
+/// platform must exceed it to count.
 const SEEN: f64 = 0.1;
-/// Curvature from which on estimates are repeated.
+/// Smallest curvature, in sigma, at which estimates are repeated.
 pub(super) const BENT: f64 = 1.0;
-/// Curvature beyond which records and priors leave the estimates open.
+/// Largest curvature, in sigma, at which records and priors determine the estimates.
 const MOST: f64 = 20.0;
-/// One in so many repeated estimates may fail to settle.
+/// Reciprocal of the fraction of repeated estimates that may fail to converge.
 const FAILED: usize = 10;
-/// Fewest repeated estimates, and how many for each unknown.
+/// Fewest repeated estimates, and their number per unknown.
 const REFITS: (usize, usize) = (80, 4);
-/// Most products of bins, squared unknowns and repeated estimates.
+/// Largest product of bins, squared unknowns and repeated estimates.
 const WORK: f64 = 2e9;
 
-/// Curvature of an estimate, with mean and covariance where it counts.
+/// Curvature of an estimate, with mean and covariance of repeated estimates where it matters.
 #[derive(Debug, Clone)]
 pub(crate) struct Bent {
     /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is
     /// nearly as low.
     pub kappa: f64,
-    /// Repeated estimates, and how many of them did not settle.
+    /// Number of repeated estimates; `failed` of them did not converge.
     pub refits: usize,
     pub failed: usize,
-    /// Their mean about the estimate, and a root (n x any) of their covariance.
+    /// Mean of the repeated estimates about the estimate, and a root (n x any) of their covariance.
     pub found: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
@@ -59,10 +59,10 @@ impl Bent {
 }
 
 impl Problem<'_> {
-    /// The bend of an estimate.
+    /// Curvature of an estimate.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn bent(&self, estimate: &Estimate, seed: u64) -> Result<Bent, CalibrationError> {
         let kappa = if estimate.rivals > 0 { f64::INFINITY } else { self.kappa(estimate)? };
         let mut out = Bent { kappa, refits: 0, failed: 0, found: None };
@@ -105,15 +105,15 @@ impl Problem<'_> {
             return Ok(out);
         }
         let mean = all.iter().fold(DVector::zeros(n), |s, x| s + x) / m as f64;
-        // the inverse of a covariance from so few is too large by this part (Hartlap, Simon, Schneider 2007,
-        // doi:10.1051/0004-6361:20066170)
+        // the inverse of a covariance from so few samples is too large by this factor (Hartlap, Simon,
+        // Schneider 2007, doi:10.1051/0004-6361:20066170)
         let scale = 1.0 / ((m - n - 2) as f64).sqrt();
         let root = DMatrix::from_fn(n, m, |i, j| (all[j][i] - mean[i]) * scale);
         out.found = Some((mean, root));
         Ok(out)
     }
 
-    /// Local coordinates of the starts `to`, seen from the starts `from`.
+    /// Local coordinates of the starts `to`, relative to the starts `from`.
     pub(super) fn between(&self, from: &[PlatformState], to: &[PlatformState]) -> DVector<f64> {
         let mut out = DVector::zeros(self.unknowns.n);
         for ((from, to), index) in from.iter().zip(to).zip(&self.unknowns.index) {
@@ -122,8 +122,8 @@ impl Problem<'_> {
         out
     }
 
-    /// Errors as the estimate has them: of every measurement, with the random drift until then, and of the
-    /// priors.
+    /// Errors with the distribution of the estimate: of every measurement, with the random drift until then,
+    /// and of the priors.
     fn drawn(&self, estimate: &Estimate, noise: &mut Noise) -> Draw {
         let of_run = |run: &Linearised, noise: &mut Noise| {
             let (mut d, mut scratch) = (vec![0.0; run.states()], Vec::new());
@@ -148,7 +148,7 @@ impl Problem<'_> {
         Draw { noise: all, held, known }
     }
 
-    /// The longest axes of the posterior that can bend a run, one standard deviation long.
+    /// Longest axes of the posterior that can cause curvature, one standard deviation long.
     pub(super) fn axes(&self, estimate: &Estimate) -> Vec<DVector<f64>> {
         let (n, prior) = (self.unknowns.n, &self.unknowns.prior);
         let root = &estimate.solution.inverse_root;
@@ -166,7 +166,7 @@ impl Problem<'_> {
         all.filter(|a| self.turn(&estimate.at, a).powi(2) > least).collect()
     }
 
-    /// The largest curvature along these axes, both ways.
+    /// Largest curvature along these axes, in both directions.
     pub(super) fn kappa(&self, estimate: &Estimate) -> Result<f64, CalibrationError> {
         let mut kappa: f64 = 0.0;
         for axis in self.axes(estimate) {
@@ -177,7 +177,7 @@ impl Problem<'_> {
         Ok(kappa)
     }
 
-    /// The length in sigma of what a start moved by `a` leaves of the measurements beside the linear model.
+    /// Length in sigma of the residuals beyond the linear model, for a start moved by `a`.
     fn bend(&self, estimate: &Estimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
         let x = self.moved(&estimate.at.x, a);
         let mut sum = 0.0;

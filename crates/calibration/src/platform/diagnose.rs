@@ -1,5 +1,5 @@
-//! Whether an estimate can be believed: what is left of every measurement, by position, component and time;
-//! the filter as a second path; what single positions and the prior are worth.
+//! Diagnosis of an estimate: residuals of every measurement, by position, component and time; the filter as a
+//! second path; contributions of single positions and of the prior.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
@@ -28,45 +28,45 @@ use crate::answer::{
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
 
-/// How many times wider than the prior that of the filter is.
+/// Factor by which the prior of the filter is wider than that of the scheme.
 const WIDE: f64 = 100.0;
-/// A pull ten times as weak leaves the sigma of what is determined.
+/// Largest ratio of sigmas, for a pull ten times as weak, of a determined unknown.
 const DETERMINED: f64 = 1.05;
-/// Without a position sigma of what it alone determines grows by this at least.
+/// Smallest ratio of sigmas, without and with a position, of an unknown that this position alone determines.
 const LOST: f64 = 1e3;
 
-/// A measurement with what is left of it.
+/// Measurement with its residual.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Left {
+pub(crate) struct MeasurementResidual {
     pub run: usize,
     pub key: Key,
     /// Measurement minus estimate.
     pub residual: f64,
-    /// Its variance as it was given.
+    /// Variance of the measurement as given.
     pub r: f64,
-    /// The part of that which the estimate leaves free: `r D`.
+    /// Variance of the residual: `r D`.
     pub free: f64,
-    /// What all others leave of it, normalised.
+    /// Difference from the prediction by all other measurements, normalised.
     pub normalised: f64,
 }
 
-impl Left {
-    /// Its square in units of sigma.
+impl MeasurementResidual {
+    /// Square of the residual in units of sigma.
     fn square(&self) -> f64 {
         self.residual * self.residual / self.r
     }
 }
 
-/// What is left of all measurements, and the second path.
+/// Residuals of all measurements, and the second path.
 pub(crate) struct Diagnosed {
-    pub all: Vec<Left>,
+    pub all: Vec<MeasurementResidual>,
     pub second: SecondPath,
-    /// Of every run alone: the sum of squares that it leaves, by least squares with the wide prior.
+    /// Residual sums of squares by run, each run alone, by least squares with the wide prior.
     alone: Vec<f64>,
 }
 
 impl Diagnosed {
-    /// Of an estimate.
+    /// Diagnosis of an estimate.
     ///
     /// # Errors
     /// [`EkfError`].
@@ -83,7 +83,7 @@ impl Diagnosed {
         for (r, (run, keys)) in estimate.at.runs.iter().enumerate() {
             let index = &problem.unknowns.index[r];
             let own = &problem.runs[r].plan;
-            // random biases have a prior that is theirs
+            // random biases have priors of their own
             let wide = |(s, &i): (usize, &usize)| {
                 problem.unknowns.prior[i] * if s < own.unknowns() { WIDE } else { 1.0 }
             };
@@ -108,7 +108,7 @@ impl Diagnosed {
             let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
             let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
             for ((left, r_of), key) in smoothed.left_out.iter().zip(variances).zip(keys) {
-                out.all.push(Left {
+                out.all.push(MeasurementResidual {
                     run: r,
                     key: *key,
                     residual: r_of * left.u,
@@ -138,7 +138,7 @@ impl Diagnosed {
         Ok(out)
     }
 
-    /// Per channel: what its sigma is to be multiplied by.
+    /// Factors on the sigmas, by channel.
     pub(crate) fn channel_factors(&self, channels: usize) -> Vec<f64> {
         let of = |c| {
             let (chi, free) = self.sums(|l| l.key.channel == c);
@@ -147,13 +147,13 @@ impl Diagnosed {
         (0..channels).map(of).collect()
     }
 
-    /// Sum of squares and degrees of freedom of some measurements.
-    fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
+    /// Sum of squares and degrees of freedom of the measurements that `of` selects.
+    fn sums(&self, of: impl Fn(&MeasurementResidual) -> bool) -> (f64, f64) {
         let some = self.all.iter().filter(|l| of(l));
         some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
     }
 
-    /// Measurements further off than `gate`, in units of what is usual here where that is more than one.
+    /// Measurements farther off than `gate`, in units of the usual size of residuals if that exceeds one.
     pub(crate) fn beyond(&self, gate: f64) -> Vec<(usize, Key)> {
         let mut sizes: Vec<f64> = self.all.iter().map(|l| l.normalised.abs()).collect();
         if sizes.is_empty() {
@@ -166,7 +166,7 @@ impl Diagnosed {
     }
 }
 
-/// Everything that an answer is made of.
+/// Data of an answer.
 pub(crate) struct Parts<'a> {
     pub scheme: &'a Scheme,
     pub conditions: &'a Conditions,
@@ -175,13 +175,13 @@ pub(crate) struct Parts<'a> {
     pub prediction: &'a Prediction,
     pub problem: &'a Problem<'a>,
     pub estimate: &'a Estimate,
-    /// Its last step as the linear model has it: the covariance of the estimate may be that of repeated ones.
+    /// Last step by the linear model: the covariance of the estimate may be that of repeated estimates.
     pub linear: &'a Solution,
     pub bent: &'a Bent,
     pub found: &'a Diagnosed,
-    /// By run: the moment at which the scheme begins, where it was estimated.
+    /// Beginning of the scheme by run; `None` where it was not estimated.
     pub offsets: &'a [Option<Offset>],
-    /// Change of the measurements of each run with its beginning, where labels leave that open.
+    /// Change of the measurements with the beginning, by run; `None` unless labels leave the beginning open.
     pub later: &'a [Option<Later>],
     pub too_many: Option<usize>,
     pub known: Vec<String>,
@@ -189,22 +189,21 @@ pub(crate) struct Parts<'a> {
     pub interrupted: bool,
 }
 
-/// A functional that is reported.
+/// Functional of the unknowns that is reported.
 struct Asked {
     name: String,
     unit: &'static str,
     status: Status,
     degree: Option<usize>,
-    /// True if scheme and records determine it.
+    /// True if scheme and records determine the functional.
     determined: bool,
-    /// True if they do so only with a prior that is stated.
+    /// True if they determine it only with a stated prior.
     from_prior: bool,
-    /// True if no covariance describes its error: what they leave open bends the run.
+    /// True if no covariance describes its error, because undetermined unknowns cause too much curvature.
     left_open: bool,
-    /// On the unknowns, in SI.
+    /// Terms on the unknowns, in SI units.
     terms: Vec<(usize, f64)>,
-    /// The same in local coordinates at the estimate, and where the platform is at the attitudes of the
-    /// scheme.
+    /// Terms in local coordinates at the estimate; `planned` has those at the attitudes of the scheme.
     local: Vec<(usize, f64)>,
     planned: Vec<(usize, f64)>,
 }
@@ -217,7 +216,7 @@ impl Asked {
 }
 
 impl Parts<'_> {
-    /// The functionals: unknowns, then combinations, those with psi once per record.
+    /// Reported functionals: unknowns, then combinations; those with psi once per record.
     fn asked(&self, weaker: &Solution, at_rest: &[PlatformState]) -> (Vec<Asked>, Vec<Asked>) {
         let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
         let psi = self.planned.unknowns() - self.planned.platform.coefficients();
@@ -255,7 +254,7 @@ impl Parts<'_> {
             .iter()
             .enumerate()
             .flat_map(|(c, u)| make(&names[c], (u.status, u.degree, u.determined), &[(c, 1.0)]));
-        // what is made of determined unknowns alone says nothing new
+        // a combination of determined unknowns alone adds nothing
         let open = |c: &&PredictedCombination| {
             c.requested || c.terms.iter().any(|&(i, _)| !self.prediction.unknowns[i].determined)
         };
@@ -266,12 +265,12 @@ impl Parts<'_> {
         (unknowns.collect(), combinations.collect())
     }
 
-    /// True if priors are stated, or a calibration before is given.
+    /// True if priors are stated, or a prior calibration is given.
     fn has_prior(&self) -> bool {
         !self.problem.unknowns.stated.is_empty() || self.problem.known.is_some()
     }
 
-    /// The estimate with the prior of the scheme on everything.
+    /// Estimate with the prior of the scheme on everything.
     fn with_prior(&self) -> Result<Solution, EkfError> {
         self.problem.step_with_prior(&self.estimate.at)
     }
@@ -335,7 +334,7 @@ impl Parts<'_> {
             let scale = si_per_shown(a.unit);
             a.local.iter().fold(zero, |sum, &(i, k)| sum + solution.inverse_root.row(i) * (k / scale))
         };
-        // none that follows from the others
+        // no functional that follows from the others
         let single = |a: &Asked| a.terms.len() == 1;
         let follows = |a: &Asked| {
             a.terms.iter().all(|(i, _)| determined.iter().any(|d| single(d) && d.terms[0].0 == *i))
@@ -401,14 +400,14 @@ impl Parts<'_> {
         Ok(out)
     }
 
-    /// Largest sigma allowed of a coefficient, in its unit; `None` where none is stated. Psi is not judged.
+    /// Largest sigma allowed of a coefficient, in its unit; `None` where none is stated, and for psi.
     fn required(&self, name: &str) -> Option<f64> {
         let of = |a: &&Assignment| concerns(&a.name, name) && !name.starts_with("psi");
         self.conditions.requirements.iter().rfind(of).map(|a| a.value)
     }
 
-    /// Outcome of the requirements on coefficients, with what a bench adds to each and how far a suspected
-    /// error moves it; `None` where none is stated.
+    /// Outcome of the requirements on coefficients, with the contributions of a bench and of a suspected
+    /// error; `None` where no requirement is stated.
     fn requirements(&self, quantities: &[Estimated], outside: &Outside) -> Option<Requirements> {
         let claims = quantities.iter().map(|e| Claim {
             name: &e.name,
@@ -423,11 +422,12 @@ impl Parts<'_> {
         Some(out).filter(|r| r.stated > 0)
     }
 
-    /// Chi-square of everything: degrees of freedom are measurements minus what they determine.
+    /// Chi-square of the fit: degrees of freedom are measurements minus the combinations that they determine.
     fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
         let (_, free) = self.found.sums(|_| true);
         let left: f64 = self.estimate.at.cost - (&self.linear.root * &self.linear.x).norm_squared();
-        // what several records share counts once: every run alone leaves more free than all together
+        // unknowns common to several records count once: single runs leave more degrees of freedom than all
+        // together
         let alone = self.problem.runs.len() - 1;
         let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
         let shared = unknowns.iter().chain(combinations).filter(coefficients).count();
@@ -443,7 +443,7 @@ impl Parts<'_> {
         }
     }
 
-    /// The first unknown that all runs share.
+    /// Index of the first unknown common to all runs.
     fn shared(&self) -> usize {
         self.problem.unknowns.n - self.planned.platform.coefficients()
     }
@@ -475,7 +475,7 @@ impl Parts<'_> {
         Ok(out)
     }
 
-    /// What the estimate is without a position of a run.
+    /// Change of the estimates without a position of a run, and the unknowns that are then lost.
     fn without(
         &self,
         r: usize,
@@ -552,7 +552,7 @@ impl Parts<'_> {
         self.problem.runs.iter().enumerate().map(of).collect()
     }
 
-    /// What joining the records adds to what each leaves alone.
+    /// Increase of chi-square by joining the records, over the sum of their own.
     fn repeatability(&self, fit: &Fit) -> Option<Repeatability> {
         let runs = self.problem.runs.len();
         let (_, free) = self.found.sums(|_| true);
@@ -604,8 +604,8 @@ impl Parts<'_> {
         out
     }
 
-    /// How far a measurement that was left out is from the estimate: from its neighbours of the same position
-    /// and channel that count.
+    /// Distance of a measurement that was left out from the mean of its nearest neighbours of the same
+    /// position and channel that count.
     fn off(&self, run: &super::run::Run, key: &Key, value: f64) -> f64 {
         let near = run.measured().filter(|(k, ..)| {
             k.position == key.position && k.channel == key.channel && run.counts[k.bin][k.channel]
@@ -619,7 +619,7 @@ impl Parts<'_> {
         }
     }
 
-    /// Keys of the conditions that nobody states.
+    /// Keys of the conditions that are not stated.
     fn chosen(&self) -> Vec<String> {
         let stated = self.conditions.states();
         let all = [
@@ -676,7 +676,7 @@ impl Parts<'_> {
     }
 }
 
-/// Both ends of a band.
+/// Maps both ends of a band.
 pub(super) trait MapBoth {
     fn map_both(self, f: impl Fn(f64) -> f64) -> Self;
 }
@@ -687,14 +687,15 @@ impl MapBoth for (f64, f64) {
     }
 }
 
-/// Uncertainty of an estimate: its larger sigma, what the bench adds, and how far a suspected error moves it.
+/// Uncertainty of an estimate: its larger sigma, the contribution of the bench, and the change by a suspected
+/// error.
 fn total(e: &Estimated, outside: &Outside) -> Option<f64> {
     let named = |of: &[(String, f64)]| of.iter().find(|(name, _)| *name == e.name).map_or(0.0, |(_, x)| *x);
     let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)))?;
     Some(own.hypot(named(&outside.bench)).hypot(named(&outside.suspected)))
 }
 
-/// The smallest size of each open family at which a total reaches its requirement, beside the bench.
+/// Smallest size of each open family at which a total reaches its requirement, beside the bench.
 fn limits(quantities: &[Estimated], outside: &Outside) -> Vec<FamilyLimit> {
     let of = |family: &FamilyChange| {
         let used = family.changes.iter().filter(|(_, change)| *change != 0.0).filter_map(|(name, change)| {

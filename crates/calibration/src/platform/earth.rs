@@ -1,9 +1,9 @@
-//! Whether the clock of a record is right, by the rates of the earth and of turns.
+//! Clock of a record, checked by the rates of the earth and of turns.
 //!
-//! A clock that runs fast by a part `e` makes every rate of a record smaller by that part. Rates of drift are
-//! unknown, so of them nothing shows; the rate of the earth is known, and shows where psi is large enough for
-//! `w x psi` to matter, or where torquers are unknown that are driven with it; those of turns show by the
-//! drift meanwhile.
+//! A clock that is fast by a fraction `e` makes every rate of a record smaller by that fraction. Rates of
+//! drift are unknown, so they show nothing of it. The rate of the earth is known. It shows where psi is large
+//! enough for `w x psi` to matter, or where unknown torquer errors act with it. Rates of turns show by the
+//! drift during a turn.
 
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
@@ -16,28 +16,28 @@ use super::run::Run;
 use crate::answer::ClockByEarth;
 use crate::least_squares::Information;
 
-/// By this part the rates are moved to see what that does.
+/// Relative change of the rates for the finite differences.
 const MOVED: f64 = 0.005;
-/// With a larger sigma the clock may be off by all that it goes (three sigma), which the parabola at rates so
-/// near does not reach.
+/// Largest sigma of the result: above, three sigma exceed the clock rate that the parabola of nearby rates
+/// can represent.
 const LARGEST: f64 = 1.0 / 3.0;
-/// Fall of the sum of squares (3.3 sigma squared), and the least part that a clock is off, from which on the
-/// parabola is held against an estimate by that clock.
+/// Fall of the sum of squares (3.3 sigma squared), and smallest clock error (`FAR`, a fraction), from which
+/// the parabola is checked by an estimate with that clock.
 const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
 
 impl Parts<'_> {
-    /// The part by which the clock of run `r` is fast, by the rates of the earth and of turns that fit its
-    /// measurements best when all unknowns follow: of the sum of squares at three rates, the lowest point of
-    /// a parabola; `None` where they are nearly the same.
+    /// Fraction by which the clock of run `r` is fast, by the best fit of the rates of the earth and of turns
+    /// with all unknowns free. The result is the minimum of a parabola through the sums of squares at three
+    /// rates; `None` where they are nearly equal.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn clock(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
         let own = &self.problem.runs[r];
         let mut reading = own.reading.clone();
         if matches!(reading.by, By::Timeline | By::Both) {
-            // as by labels, so that turns may take less time
+            // as with labels, so that turns may take less time
             let ends = bounds(self.planned).into_iter().map(|(_, end)| end);
             reading.by = By::Label;
             reading.stays.iter_mut().zip(ends).for_each(|(stay, end)| stay.1 = end);
@@ -49,7 +49,7 @@ impl Parts<'_> {
             let information = Information::of(&along)?;
             Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
         };
-        // turns that take longer may not fit between two samples: of faster ones alone
+        // slower turns may not fit between two samples: use faster ones only
         let [same, fast, faster] = [left(0.0)?, left(MOVED)?, left(2.0 * MOVED)?];
         let curvature = same - 2.0 * fast + faster;
         let sigma = MOVED * (2.0 / curvature).sqrt();
@@ -67,8 +67,7 @@ impl Parts<'_> {
         Ok(Some(found))
     }
 
-    /// A run and its conditions where the earth and the platform turn `1 + by` times as fast as in the
-    /// scheme.
+    /// Run and conditions in which the earth and the platform turn `1 + by` times as fast as in the scheme.
     fn at_rate(&self, own: &Run, reading: &Reading, by: f64) -> Result<(Conditions, Run), CalibrationError> {
         let rate = |rate: &mut Option<f64>| rate.iter_mut().for_each(|rate| *rate *= 1.0 + by);
         let (mut scheme, mut conditions) = (self.scheme.clone(), self.problem.conditions.clone());
@@ -82,9 +81,9 @@ impl Parts<'_> {
         Ok((conditions, run))
     }
 
-    /// True if the estimate settles with run `r` by the clock that was found, and its sum of squares is below
-    /// `most`. A parabola at rates so near says nothing of a clock that is far off where the unknowns bend. A
-    /// clock by which turns do not fit between two samples cannot be tried, and is taken as it was found.
+    /// True if the estimate with the found clock of run `r` converges to a sum of squares below `most`. The
+    /// parabola of nearby rates does not hold for a clock that is far off where the model is nonlinear. A
+    /// clock with which turns do not fit between two samples cannot be tried, and is accepted.
     fn fits_at(&self, r: usize, reading: &Reading, found: &ClockByEarth, most: f64) -> bool {
         let own = self.problem;
         let Ok((conditions, run)) = self.at_rate(&own.runs[r], reading, -found.fast) else { return true };

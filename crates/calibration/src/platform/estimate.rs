@@ -1,10 +1,10 @@
-//! The estimate: Gauss and Newton on the starts of all runs and the constants they share.
+//! Estimate: Gauss-Newton on the starts of all runs and the constants that they share.
 //!
-//! Two modes. *Data alone*: no prior on what the records determine; what no record can tell (the null space
-//! of the exact verdict) stays within a stated box about its first estimate, one standard deviation wide, and
-//! nothing of it is reported. *Priors as stated*: the unknowns that a file or an option states priors of have
-//! exactly these, and the estimate is the most probable one. A weak pull on all else is towards where the
-//! iteration is, and so leaves no trace in where it ends.
+//! There are two modes. *Data alone*: no prior on unknowns that the records determine. The undetermined
+//! directions (null space of the exact verdict) stay within a stated box about their first estimates, one
+//! standard deviation wide, and are not reported. *Priors as stated*: exactly the unknowns with a prior in a
+//! file or an option have that prior, and the estimate is the most probable one. A weak pull on all other
+//! unknowns is towards the current iterate, so it does not affect the result.
 
 use std::cell::Cell;
 
@@ -20,46 +20,45 @@ use crate::least_squares::{Information, Linearised, Rows, Solution};
 
 /// Most linearisations.
 const PASSES: usize = 40;
-/// The iteration has settled when it moves by less than this, in standard deviations of any combination as
-/// the fit has them.
+/// Convergence limit: largest step, in standard deviations of any combination by the fit.
 const SETTLED: f64 = 1e-4;
-/// It has settled, too, where no step leads further down and the last is less than this.
+/// Largest last step of an iteration that counts as converged when no step lowers the sum of squares.
 const NEARLY: f64 = 0.02;
-/// Most that a step turns an attitude by, in rad: beyond, the linear model is wrong in kind.
+/// Largest turn of an attitude by a step, in rad: beyond it the linear model fails.
 pub(super) const TURN: f64 = 0.4;
-/// Halvings of a step that leads away.
+/// Most halvings of a step that increases the sum of squares.
 const HALVINGS: usize = 12;
-/// Eigenvalues below this part of the largest are none: a direction that no prior has a part in.
+/// Relative eigenvalue, by the largest, below which a direction is free of all priors.
 const RANK: f64 = 1e-18;
-/// A functional has a part in a direction from this part of both on.
+/// Relative size from which a functional has a component in a direction.
 const OPEN: f64 = 1e-9;
-/// Width of the box of what nothing determines, in prior standard deviations.
+/// Width of the box of undetermined directions, in prior standard deviations.
 pub(crate) const BOX: f64 = 1.0;
-/// The same where it is taken as known.
+/// Width of the box where the directions count as known.
 pub(crate) const TIGHT: f64 = 1e-5;
-/// How much wider than the prior everything is pulled to where the iteration is.
+/// Factor by which the pull towards the current iterate is weaker than the prior.
 pub(crate) const WEAK: f64 = 1e7;
 
-/// Largest angle (rad) by which a correction turns an attitude; the first `3 attitudes` components are turns.
+/// Largest turn (rad) of an attitude by a correction; its first `3 attitudes` components are turns.
 pub(super) fn largest_turn(correction: &[f64], attitudes: usize) -> f64 {
     let turns = correction[..3 * attitudes].chunks_exact(3);
     turns.map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max)
 }
 
-/// The unknowns of all runs: those of each run that are its own (psi, biases), and the coefficients.
+/// Unknowns of all runs: each run's own (psi, biases), and the common coefficients.
 #[derive(Debug, Clone)]
 pub(crate) struct Unknowns {
-    /// Of every run, the unknown that each of its states is.
+    /// Index of the unknown for every state, by run.
     pub index: Vec<Vec<usize>>,
-    /// The number of unknowns.
+    /// Number of unknowns.
     pub n: usize,
-    /// Prior standard deviations (SI), of which multiples are taken.
+    /// Prior standard deviations (SI), of which multiples are used.
     pub prior: Vec<f64>,
     /// First estimates (SI).
     pub first: Vec<f64>,
-    /// Directions that neither records nor priors determine, a column each: they stay within the box.
+    /// Directions that neither records nor priors determine, one per column: they stay within the box.
     pub loose: DMatrix<f64>,
-    /// Unknowns with a prior that is stated.
+    /// Unknowns with a stated prior.
     pub stated: Vec<usize>,
     /// True if the scheme alone leaves directions undetermined, whatever priors are stated.
     pub undetermined: bool,
@@ -68,9 +67,9 @@ pub(crate) struct Unknowns {
 }
 
 impl Unknowns {
-    /// Unknowns of runs of one platform, with `psi` states of their own before `coefficients` common ones,
-    /// and `biases` of their own behind; `prior` and `first` are of one run, `null` its directions that
-    /// nothing determines, `stated` says of which states a prior is stated.
+    /// Unknowns of runs of one platform. Each run has its own `psi` states, then come the `coefficients`
+    /// common to all, then the run's own `biases`. `prior` and `first` are those of one run, `null` its
+    /// undetermined directions, and `stated` is true for states with a stated prior.
     pub(crate) fn new(
         runs: usize,
         [psi, coefficients, biases]: [usize; 3],
@@ -94,7 +93,7 @@ impl Unknowns {
                 (all[i], start[i]) = (prior[s], first[s]);
             }
         }
-        // directions of psi alone are each run's own; others move the psi of all
+        // directions of psi alone belong to one run; others change the psi of all runs
         let mut columns: Vec<DVector<f64>> = Vec::new();
         for direction in null {
             let common = direction.iter().any(|(s, _)| *s >= psi);
@@ -116,8 +115,8 @@ impl Unknowns {
         Self { index, n, prior: all, first: start, loose, biases, stated, undetermined: !null.is_empty() }
     }
 
-    /// Leaves out of the box what rows of a prior on the unknowns (any x n) determine: of the directions
-    /// those combinations that no row has a part in.
+    /// Removes from the box the combinations of its directions that prior rows on the unknowns (any x n)
+    /// determine.
     pub(crate) fn determined_by(&mut self, prior: &DMatrix<f64>) {
         let size =
             |c: usize| (0..self.n).map(|i| (self.loose[(i, c)] / self.prior[i]).powi(2)).sum::<f64>().sqrt();
@@ -144,7 +143,7 @@ impl Unknowns {
         rows
     }
 
-    /// True if a functional has a part in directions that the box alone bounds.
+    /// True if a functional has a component in directions that only the box bounds.
     pub(crate) fn is_open(&self, terms: &[(usize, f64)]) -> bool {
         (0..self.loose.ncols()).any(|c| {
             let of = |&(i, k): &(usize, f64)| (k * self.loose[(i, c)], (k * self.prior[i]).abs());
@@ -154,15 +153,15 @@ impl Unknowns {
         })
     }
 
-    /// Rows that hold the loose directions within `width` times the prior, the least information that does
-    /// with the prior as its measure, biases, and the stated priors.
+    /// Rows that constrain the loose directions within `width` times the prior, with the least information
+    /// that does so, and rows of the biases and the stated priors.
     fn holding(&self, width: f64) -> DMatrix<f64> {
         let weighted =
             DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / self.prior[i]);
         let q = if weighted.ncols() == 0 { weighted } else { weighted.qr().q() };
         let m = q.ncols();
         let mut rows = DMatrix::from_fn(m, self.n, |j, i| q[(i, j)] / (width * self.prior[i]));
-        // random biases have a prior that is theirs
+        // random biases have priors of their own
         rows = rows.resize_vertically(m + self.biases.len(), 0.0);
         self.biases.iter().enumerate().for_each(|(k, &i)| rows[(m + k, i)] = 1.0 / self.prior[i]);
         let stated = self.stated_rows();
@@ -172,7 +171,7 @@ impl Unknowns {
         rows
     }
 
-    /// Local coordinates of all unknowns at the first estimates, seen from `at`.
+    /// Local coordinates of all unknowns at the first estimates, relative to `at`.
     fn to_first(&self, at: &[PlatformState]) -> DVector<f64> {
         let mut out = DVector::zeros(self.n);
         for (x, index) in at.iter().zip(&self.index) {
@@ -185,53 +184,54 @@ impl Unknowns {
     }
 }
 
-/// Runs and what is assumed of them.
+/// Runs with the assumptions of the fit.
 pub(crate) struct Problem<'a> {
     pub conditions: &'a Conditions,
     pub runs: &'a [Run],
     pub unknowns: &'a Unknowns,
-    /// Of a sample, by channel.
+    /// Standard deviations of a sample, by channel.
     pub sigmas: Vec<f64>,
-    /// What was known before of some combinations: rows and values in SI, with unit errors.
+    /// Prior information on some combinations: rows and values in SI units, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
-    /// Errors that are added to measurements and priors, for one of many estimates from data as they might
-    /// have been.
+    /// Errors that are added to measurements and priors, for one of the repeated estimates; `None`: no
+    /// errors.
     pub draw: Option<Draw>,
-    /// Hears of every linearisation; where it says no, the iteration ends.
+    /// Progress callback, called for every linearisation; the iteration ends when it returns false.
     pub going: &'a dyn Fn(Going<'_>) -> bool,
-    /// How many there were.
+    /// Number of linearisations.
     pub passes: Cell<usize>,
-    /// Whether it said no.
+    /// True if the callback returned false.
     pub stopped: Cell<bool>,
 }
 
-/// Errors of data as they might have been, in units of the data.
+/// Drawn errors of the data, in units of the data.
 #[derive(Debug, Clone)]
 pub(crate) struct Draw {
-    /// By run, of every measurement, in the order of rows.
+    /// Errors of every measurement, by run, in the order of the rows.
     pub noise: Vec<Vec<f64>>,
-    /// Errors of the rows that hold unknowns, and of those known before (unit variance).
+    /// Errors of the rows that constrain unknowns; `known` has those of the prior information (unit
+    /// variance).
     pub held: DVector<f64>,
     pub known: DVector<f64>,
 }
 
-/// Every run linearised at the estimate.
+/// All runs, linearised at the estimate.
 pub(crate) struct At {
     pub x: Vec<PlatformState>,
     pub runs: Vec<(Linearised, Vec<Key>)>,
     pub information: Vec<Information>,
-    /// What the estimate leaves, with what is held and known.
+    /// Sum of squares of all residuals, with those of constraining rows and prior information.
     pub cost: f64,
 }
 
-/// Where the iteration ended.
+/// End of the iteration.
 pub(crate) struct Estimate {
     pub at: At,
-    /// The last step (nearly zero) with its covariance.
+    /// Last step (nearly zero) with its covariance.
     pub solution: Solution,
     pub passes: usize,
     pub converged: bool,
-    /// Other minima that are nearly as low.
+    /// Number of other minima that are nearly as low.
     pub rivals: usize,
 }
 
@@ -241,7 +241,7 @@ impl Problem<'_> {
         self.at_parts(x, |_| &[])
     }
 
-    /// The same along trajectories in parts, by run (see [`Run::along_parts`]).
+    /// Linearises all runs along trajectories in parts, by run (see [`Run::along_parts`]).
     pub(super) fn at_parts<'n>(
         &self,
         x: Vec<PlatformState>,
@@ -269,7 +269,7 @@ impl Problem<'_> {
         Ok(At { x, runs, information, cost })
     }
 
-    /// Every run where all unknowns are zero: the platform at the attitudes of the scheme.
+    /// States of all runs with all unknowns zero: the platform at the attitudes of the scheme.
     pub(crate) fn at_rest(&self) -> Vec<PlatformState> {
         let of = |(run, index): (&Run, &Vec<usize>)| {
             PlatformState::of_unknowns(&vec![0.0; index.len()], run.plan.constants())
@@ -277,7 +277,7 @@ impl Problem<'_> {
         self.runs.iter().zip(&self.unknowns.index).map(of).collect()
     }
 
-    /// The unknowns at `x`.
+    /// Values of the unknowns at `x`.
     pub(crate) fn values(&self, x: &[PlatformState]) -> DVector<f64> {
         let mut out = DVector::zeros(self.unknowns.n);
         for (x, index) in x.iter().zip(&self.unknowns.index) {
@@ -286,7 +286,7 @@ impl Problem<'_> {
         out
     }
 
-    /// Residuals at `x` of the rows that hold unknowns about their first estimates.
+    /// Residuals at `x` of the rows that constrain unknowns about their first estimates.
     fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
         let left = rows * self.unknowns.to_first(x);
         match &self.draw {
@@ -295,7 +295,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Residuals at `x` of the rows of what was known before.
+    /// Residuals at `x` of the rows of the prior information.
     fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
         let Some((_, values)) = &self.known else { return DVector::zeros(0) };
         let left = values - rows * self.values(x);
@@ -305,22 +305,22 @@ impl Problem<'_> {
         }
     }
 
-    /// Rows of what is held and of what was known before.
+    /// Numbers of constraining rows, and of rows of the prior information.
     pub(super) fn beside_data(&self) -> (usize, usize) {
         (self.unknowns.holding(BOX).nrows(), self.known.as_ref().map_or(0, |(_, v)| v.len()))
     }
 
-    /// The next step from `at`: everything pulled there `weak` times as weakly as the prior would.
+    /// Next step from `at`, with a pull to it `weak` times as weak as the prior.
     pub(crate) fn step(&self, at: &At, weak: f64) -> Result<Solution, EkfError> {
         self.step_with(at, weak, None)
     }
 
-    /// The same with what nothing determines held within `width` times its prior.
+    /// Next step from `at`, with the undetermined directions constrained within `width` times their prior.
     pub(crate) fn step_held(&self, at: &At, width: f64) -> Result<Solution, EkfError> {
         self.pulled(self.said(at, None, width), WEAK)
     }
 
-    /// The same with another information of one run.
+    /// Next step from `at`, with another information of one run.
     pub(crate) fn step_with(
         &self,
         at: &At,
@@ -337,7 +337,7 @@ impl Problem<'_> {
         rows.solve()
     }
 
-    /// The step from `at` with the prior of everything about the first estimates.
+    /// Step from `at` with the prior on everything about the first estimates.
     pub(crate) fn step_with_prior(&self, at: &At) -> Result<Solution, EkfError> {
         let mut rows = self.said(at, None, BOX);
         let weights = DVector::from_iterator(self.unknowns.n, self.unknowns.prior.iter().map(|s| 1.0 / s));
@@ -346,7 +346,7 @@ impl Problem<'_> {
         rows.solve()
     }
 
-    /// What the records say, and what is held or known.
+    /// Rows of the records, of the constrained directions and of the prior information.
     fn said(&self, at: &At, instead: Option<(usize, &Information)>, width: f64) -> Rows {
         let n = self.unknowns.n;
         let mut rows = Rows::new(n);
@@ -366,13 +366,13 @@ impl Problem<'_> {
         rows
     }
 
-    /// A standard deviation as the fit has it.
+    /// Factor on standard deviations by the fit: root of chi-square per measurement, at least one.
     fn scale(&self, at: &At) -> f64 {
         let rows: usize = at.runs.iter().map(|(run, _)| run.residuals.len()).sum();
         (at.cost / rows.max(1) as f64).max(1.0).sqrt()
     }
 
-    /// Moves `x` by `step` of all unknowns.
+    /// Moves `x` by a step of all unknowns.
     pub(super) fn moved(&self, x: &[PlatformState], step: &DVector<f64>) -> Vec<PlatformState> {
         let mut out = x.to_vec();
         for (x, index) in out.iter_mut().zip(&self.unknowns.index) {
@@ -409,7 +409,7 @@ impl Problem<'_> {
             for _ in 0..=HALVINGS {
                 passes += 1;
                 let next = self.at(self.moved(&at.x, &step)).ok();
-                // by rounding, a sum of squares may grow at the end
+                // rounding may increase the sum of squares at the end
                 found = next.filter(|n| n.cost <= at.cost * (1.0 + 1e-9) + 1e-6);
                 if found.is_some() {
                     break;
@@ -420,13 +420,13 @@ impl Problem<'_> {
             at = next;
             solution = self.step(&at, WEAK)?;
         }
-        // where nothing leads further down, what is left of a step is what the model bends within it
+        // where no step lowers the sum of squares, the rest of the step is curvature within it
         let size = (&solution.root * &solution.x).norm();
         converged |= size <= NEARLY * self.scale(&at);
         Ok(Estimate { at, solution, passes, converged, rivals: 0 })
     }
 
-    /// The number of measurements.
+    /// Number of measurements.
     pub(crate) fn rows(&self, e: &Estimate) -> f64 {
         e.at.runs.iter().map(|(run, _)| run.residuals.len()).sum::<usize>() as f64
     }

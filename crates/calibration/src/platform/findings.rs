@@ -1,4 +1,4 @@
-//! What speaks against a model and its sigmas, the gravest first.
+//! Findings against a model and its sigmas, the most serious first.
 
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
@@ -9,13 +9,13 @@ use super::length::wrong;
 use super::run::Run;
 use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
 
-/// The paths agree to this, in sigma.
+/// Largest difference of the two paths, in sigma, that counts as agreement.
 const AGREE: f64 = 1e-6;
-/// A position that fits this many times worse than the others in the middle is named by itself.
+/// Ratio to the median of the positions from which a position with a worse fit is named.
 const APART: f64 = 2.0;
 
 impl Parts<'_> {
-    /// What speaks against all of it.
+    /// Findings against a calibration.
     pub(super) fn findings(&self, c: &Calibration) -> Vec<Finding> {
         let mut out = Vec::new();
         if self.interrupted {
@@ -66,7 +66,7 @@ impl Parts<'_> {
         out
     }
 
-    /// What is wrong with the length of the specific force of a run.
+    /// Finding on the length of the specific force of a run.
     fn force(&self, run: &Run) -> Option<Finding> {
         let reading = &run.reading;
         let wrong = wrong(&reading.lengths)?;
@@ -84,7 +84,7 @@ impl Parts<'_> {
         })
     }
 
-    /// Positions, or noise, or components.
+    /// Findings on the fit: single positions, or the noise, or single components.
     fn fits(&self, c: &Calibration) -> Vec<Finding> {
         let limits = |dof: f64, tests: usize| {
             let strict = 1.0 - (1.0 - STRICT) / tests.max(1) as f64;
@@ -132,7 +132,7 @@ impl Parts<'_> {
         out
     }
 
-    /// Chi-square of what was known before against the estimate, where it is beyond its band.
+    /// Chi-square of the prior information against the estimate; `None` within its band.
     fn known_misfit(&self) -> Option<f64> {
         let (rows, values) = self.problem.known.as_ref()?;
         let dof = values.len() as f64;
@@ -142,7 +142,7 @@ impl Parts<'_> {
     }
 }
 
-/// Values that cells of a column hold again and again.
+/// Findings on repeated values of cells in a column.
 fn cells(run: &Run) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for (cell, own) in &run.reading.cells {
@@ -177,9 +177,9 @@ fn cells(run: &Run) -> Vec<Finding> {
     out
 }
 
-/// What is wrong with the clock of a record: the rate of the earth says so where it is beyond chance, sigmas
-/// as the fit has them. Where it says that the clock is right, positions were held longer or shorter than in
-/// the scheme, which is no matter.
+/// Finding on the clock of a record: significant by the rate of the earth, with sigmas as the fit has them.
+/// If the rate of the earth shows a right clock, positions were only held longer or shorter than in the
+/// scheme, and there is no finding.
 fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
     let most = chi_square_quantile(1.0, 1.0 - (1.0 - STRICT) / c.records.len() as f64).sqrt();
     let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());

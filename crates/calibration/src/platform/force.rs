@@ -1,6 +1,5 @@
-//! What the specific force says of a record before anything is estimated: whether its numbers are of the
-//! units in the header, whether it points at every position where the scheme has it, and where a position
-//! begins and ends.
+//! Checks of a record by its specific force, before anything is estimated: the units of its numbers, its
+//! direction at every position, and the times at which positions begin and end.
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::apply;
@@ -10,84 +9,85 @@ use super::clock;
 use super::length::Length;
 use super::mistaken::Mistaken;
 
-/// The specific force of a position is no further than this from the vertical or, where psi goes on in n,
-/// from where the position before left it, in deg.
+/// Largest angle of the specific force of a position, in deg, from the vertical or, if psi continues in n,
+/// from its direction at the end of the position before.
 const TILT_DEG: f64 = 20.0;
-/// Largest tilt where psi does not go on in n and the vertical moves by more: so many times its
-/// moves from half to half of all positions until then (twice that is the move of a whole position; azimuth,
-/// too, may become tilt), whichever position is nearer.
+/// Largest tilt if psi does not continue in n and the vertical moves by more than `TILT_DEG`: a multiple of
+/// the summed moves of the vertical from half to half of the positions so far. Twice that sum is the move
+/// over whole positions; azimuth may become tilt too. The limit holds even if another position is nearer.
 const REACH: f64 = 4.0;
-/// From one position to the next drift moves the vertical by less than this, in deg, beside so many times
-/// what it moves it from half to half of the positions about the slew.
+/// Largest move of the vertical by drift from one position to the next: this angle, in deg, plus `MOVES`
+/// times the moves from half to half of the two positions.
 const JUMP_DEG: f64 = 3.0;
 const MOVES: f64 = 2.0;
-/// Another position fits better where it is nearer by this factor.
+/// Ratio of angles from which another position fits better.
 const NEARER: f64 = 3.0;
-/// The force is within this of one g where its units are right.
+/// Largest deviation of the force from 1 g, in g, with right units.
 const UNIT: f64 = 0.1;
-/// With the right unit it is within this.
+/// Largest deviation of the force from 1 g, in g, after a change of units.
 const CLOSE: f64 = 0.05;
-/// Further off one g, as a part, is no scale error.
+/// Largest relative deviation from 1 g that a scale error explains.
 const GROSS: f64 = 0.2;
 /// Most samples of a piece.
 const MOST: usize = 50;
-/// So many samples at the beginning of a position are pieces of their own, as are the last ones.
+/// Number of samples at either end of a position that are pieces of their own.
 const ALONE: usize = 8;
 /// Fewest pieces of a position in which a turn is sought.
 const FEWEST: usize = 20;
-/// From a piece to the next a platform that is held moves by no more than this, in deg, so much more in deg/s
-/// (a hundred deg/h), and so many times what noise makes of it.
+/// Largest move of the force of a platform at rest between two pieces: this angle in deg, plus a rate in
+/// deg/s (a hundred deg/h), plus a multiple of the noise.
 const HELD_DEG: f64 = 0.3;
 const DRIFTS_DEG_S: f64 = 0.03;
 const NOISE: f64 = 8.0;
-/// So many samples that are far from one g are looked at one by one.
+/// Number of samples far from 1 g that are examined one by one.
 const SUSPECTS: usize = 64;
-/// A sample is within this of those beside it, in g, or within this of the attitude of the scheme where there
-/// are none.
+/// Largest distance of a sample from its neighbours, in g; `ALONG` is that from the attitude of the scheme
+/// where there are no neighbours.
 const BESIDE: f64 = 0.03;
 const ALONG: f64 = 0.35;
-/// Of normal errors: sigma over the median of their sizes, and sigma of a median over that of a mean.
+/// Factors for normal errors: sigma over the median of their sizes, and sigma of a median over that of a
+/// mean.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 const SIGMA_OF_MEDIAN: f64 = 1.2533;
 
-/// The force of some samples in a row, in platform axes: the median of each component.
+/// Force of some consecutive samples, in platform axes: the median of each component.
 #[derive(Debug, Clone)]
 struct Piece {
     /// First and last line of the record.
     lines: (u64, u64),
-    /// The time of its first sample, in s.
+    /// Time of its first sample, in s.
     t: f64,
     samples: usize,
-    /// In g.
+    /// Median force in platform axes, in g.
     force: [f64; 3],
-    /// The median of its lengths, in g.
+    /// Median of the lengths of the force, in g.
     length: f64,
 }
 
-/// The forces of a record, by position.
+/// Forces of a record, by position.
 #[derive(Debug, Clone)]
 pub(crate) struct Forces {
-    /// Longest piece, in s.
+    /// Longest duration of a piece, in s.
     longest: f64,
     now: Vec<(u64, f64, [f64; 3])>,
-    /// The position of these, and how many of its samples there were.
+    /// Index of the position of the samples in `now`, and the number `seen` of its samples.
     position: usize,
     seen: usize,
     pieces: Vec<Vec<Piece>>,
-    /// By position: the variances of the lengths as they are known, their sum and number.
+    /// Known variances of the lengths, by position: their sum and number.
     variances: Vec<(f64, usize)>,
-    /// The first samples that are far from one g: position, line, force.
+    /// First samples far from 1 g: position, line, force.
     suspects: Vec<(usize, u64, [f64; 3])>,
 }
 
-/// A column of the force: as it is written, and what one of its numbers was taken for, in g.
+/// Column of the force: its text, and the assumed value of one of its numbers, in g.
 #[derive(Debug, Clone)]
 pub(crate) struct ForceColumn {
     pub text: String,
     pub scale: f64,
 }
 
-/// The median of some numbers; zero of none.
+/// Median of some numbers; zero for none.
 fn median(of: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = of.collect();
     if all.is_empty() {
@@ -101,25 +101,25 @@ fn length(f: &[f64; 3]) -> f64 {
     f.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The angle between two directions, in deg.
+/// Angle between two directions, in deg.
 fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
     (dot / (length(a) * length(b))).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-/// How far a force in platform axes is from the vertical where `C_c^n` is `c`, in deg.
+/// Angle of a force in platform axes from the vertical at the attitude `c`, in deg.
 fn tilt(c: &Matrix3<f64>, force: &[f64; 3]) -> f64 {
     angle(&apply(c, force), &[0.0, 1.0, 0.0])
 }
 
 impl Forces {
-    /// Of a record of so many positions, in pieces of at most `longest` s.
+    /// Forces of a record of `positions` positions, in pieces of at most `longest` s.
     pub(crate) fn new(positions: usize, longest: f64) -> Self {
         let (pieces, variances) = (vec![Vec::new(); positions], vec![(0.0, 0); positions]);
         Self { longest, now: Vec::new(), position: 0, seen: 0, pieces, variances, suspects: Vec::new() }
     }
 
-    /// Takes a sample of a position; the length of its force has the standard deviation `sigma`.
+    /// Adds a sample of a position; the length of its force has the standard deviation `sigma`.
     pub(crate) fn push(&mut self, position: usize, line: u64, t: f64, force: [f64; 3], sigma: f64) {
         if position != self.position {
             self.end();
@@ -143,7 +143,7 @@ impl Forces {
         }
     }
 
-    /// The position, or the record, is over.
+    /// Ends a position, or the record.
     pub(crate) fn end(&mut self) {
         for sample in std::mem::take(&mut self.now) {
             self.piece(&[sample]);
@@ -162,13 +162,13 @@ impl Forces {
         });
     }
 
-    /// Leaves out the piece of a position that is of these lines.
+    /// Removes the piece of a position with these lines.
     pub(crate) fn leave_out(&mut self, position: usize, lines: (u64, u64)) {
         self.pieces[position].retain(|piece| piece.lines != lines);
     }
 
-    /// By position: how long the force is, whatever single samples are. Its standard deviation is that of a
-    /// median, by what is known of the samples and by how its pieces scatter, whichever is greater.
+    /// Robust lengths of the force, by position. Their standard deviation is that of a median, from the known
+    /// variances of the samples or from the scatter of the pieces, whichever is larger.
     pub(crate) fn lengths(&self) -> Vec<Option<Length>> {
         let mut out = vec![None; self.pieces.len()];
         for (p, _, force) in self.usual() {
@@ -182,7 +182,7 @@ impl Forces {
         out
     }
 
-    /// Of every position that has samples: its first line and its force.
+    /// Index, first line and median force of every position with samples.
     fn usual(&self) -> impl Iterator<Item = (usize, u64, [f64; 3])> + '_ {
         let of = |(p, pieces): (usize, &Vec<Piece>)| {
             let line = pieces.first()?.lines.0;
@@ -191,15 +191,15 @@ impl Forces {
         self.pieces.iter().enumerate().filter_map(of)
     }
 
-    /// The position whose force is furthest from one g, with its first line and by how much.
+    /// Position whose force is farthest from 1 g: its index, first line, force and deviation in g.
     fn worst(&self) -> Option<(usize, u64, [f64; 3], f64)> {
         let off = |(p, line, f): (usize, u64, [f64; 3])| (p, line, f, (length(&f) - 1.0).abs());
         self.usual().map(off).max_by(|a, b| a.3.total_cmp(&b.3))
     }
 
-    /// Refuses numbers that are of other units than the header has: whole columns, then single rows; `units`
-    /// with what one of each is in g, those of the other kind (forces or increments of velocity) for whole
-    /// columns.
+    /// Checks that the numbers have the units of the header, first in whole columns, then in single rows.
+    /// `units` have their values in g; for whole columns those of the other kind (forces or increments of
+    /// velocity) are included.
     pub(crate) fn check_units(
         &self,
         record: &str,
@@ -243,7 +243,7 @@ impl Forces {
         }
     }
 
-    /// True if `force` is that of the samples of one g that are nearest to a suspect in the record.
+    /// True if `force` agrees with the nearest samples of 1 g about a suspect in the record.
     fn is_beside(
         &self,
         &(p, line, _): &(usize, u64, [f64; 3]),
@@ -253,7 +253,7 @@ impl Forces {
         let right = self.pieces[p].iter().filter(|x| (x.length - 1.0).abs() <= CLOSE);
         let nearest = right.min_by_key(|x| x.lines.0.abs_diff(line).min(x.lines.1.abs_diff(line)));
         let (beside, within) = nearest.map_or_else(
-            // the specific force of a platform that is where the scheme has it
+            // specific force of a platform at the attitude of the scheme
             || (attitudes[p][1], ALONG),
             |x| (x.force, BESIDE),
         );
@@ -261,9 +261,9 @@ impl Forces {
         length(&off) <= within && (length(force) - 1.0).abs() <= CLOSE
     }
 
-    /// Refuses positions whose force is not that of the scheme's attitude. A platform that drifts by degrees
-    /// tilts further and further, but not at once: where psi goes on in n (`inertial`), the vertical of a
-    /// position begins where that of the one before ended.
+    /// Checks that the force of every position fits the scheme's attitude. A platform that drifts by degrees
+    /// tilts more and more, but gradually. If psi continues in n (`inertial`), the vertical of a position
+    /// begins where that of the one before ended.
     pub(crate) fn check_attitudes(
         &self,
         record: &str,
@@ -272,12 +272,11 @@ impl Forces {
         inertial: bool,
     ) -> Result<(), CalibrationError> {
         const UP: [f64; 3] = [0.0, 1.0, 0.0];
-        // of the position before: the vertical of its second half in n, and by how much it moved from the
-        // first
+        // for the position before: the vertical of its second half in n, and its move from the first half
         let mut before: Option<([f64; 3], f64)> = None;
         let mut moves = 0.0;
         for (p, line, _) in self.usual() {
-            // medians, which rows at the wrong position do not move
+            // medians, which single rows at the wrong position do not move
             let pieces = &self.pieces[p];
             let half = pieces.len().div_ceil(2);
             let usual = |of: &[Piece]| std::array::from_fn(|i| median(of.iter().map(|x| x.force[i])));
@@ -291,13 +290,13 @@ impl Forces {
             let own = off(p);
             let nearest = (0..names.len()).map(off).fold(f64::INFINITY, f64::min);
             moves += moved;
-            // from the middle of a half to that of the next drift makes half of both moves, and turns are
-            // short beside positions: twice that is the furthest
+            // drift from the middle of a half to that of the next makes half of both moves, since turns are
+            // short beside positions: twice that is the limit
             let about = before.map(|(_, by)| by + moved);
             let held = about.map_or(f64::INFINITY, |by| JUMP_DEG + MOVES * by);
             let reach = about.map_or(JUMP_DEG + REACH * moves, |by| JUMP_DEG + by);
             let furthest = TILT_DEG.max(reach);
-            // where psi does not go on in n, another position may be nearer by drift alone
+            // if psi does not continue in n, drift alone may bring another position nearer
             let least = if before.is_some() || reach < TILT_DEG { TILT_DEG.min(held) } else { furthest };
             let wrong = own > furthest || (own > least && own > NEARER * nearest);
             if !wrong {
@@ -318,8 +317,8 @@ impl Forces {
         Ok(())
     }
 
-    /// The axes by which every position is where the scheme has it, where others in the place of these do
-    /// that in one way only.
+    /// Permutation and signs of the axes with which every position fits the scheme; `None` unless exactly one
+    /// does.
     fn other_axes(&self, attitudes: &[Matrix3<f64>]) -> Option<String> {
         const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         let all: Vec<(usize, [f64; 3])> = self.usual().map(|(p, _, force)| (p, force)).collect();
@@ -339,13 +338,14 @@ impl Forces {
         };
         let names = [0, 1, 2].map(name).join(", ");
         Some(format!(
-            "; with {names} in the place of fx, fy, fz every position is where the scheme has it: axes or signs are others than the header has"
+            "; with {names} in the place of fx, fy, fz every position is where the scheme has it: axes or \
+             signs are others than the header has"
         ))
     }
 
-    /// Refuses positions at whose beginning or end the platform is not there yet, or no longer. One sample is
-    /// an outlier where bins have so many that it is left out of them, unless other positions have one too.
-    /// `timeline` says when positions begin and end, where that is all there is.
+    /// Checks that the platform is at rest from the beginning to the end of every position. One sample is an
+    /// outlier if bins have enough samples to leave it out, unless other positions have one too. `timeline`
+    /// has the begins and ends of positions if no labels do.
     pub(crate) fn check_ends(
         &self,
         record: &str,
@@ -371,7 +371,7 @@ impl Forces {
             if dense && some.len() < 2 && samples(p, away[side]) < 2 {
                 continue;
             }
-            // the sample furthest from the position, and the lines between which the platform comes or goes
+            // sample farthest from the position, and the lines between which the platform arrives or leaves
             let (pieces, count) = (&self.pieces[p], away[side]);
             let first = pieces.len() - count;
             let (outer, from, to) = match begins {
@@ -401,8 +401,8 @@ impl Forces {
 }
 
 impl Forces {
-    /// How the turns of the record lie beside those of the timeline: by a clock that is fast or slow, or all
-    /// as late.
+    /// Offset of the record's turns from those of the timeline, in words: a fast or slow clock, or a common
+    /// delay; `None` if neither explains it.
     fn clock(&self, all: &[(usize, [f64; 3], [usize; 2])], bounds: &[(f64, f64)]) -> Option<String> {
         let mut between: f64 = 0.0;
         let mut middle = |a: &Piece, b: &Piece| {
@@ -437,13 +437,13 @@ impl Forces {
     }
 }
 
-/// How many pieces at the beginning and at the end are away from where the position goes on steadily from the
-/// piece that is nearest to its usual `force`.
+/// Numbers of pieces at the beginning and at the end that do not continue steadily from the piece nearest to
+/// the position's usual `force`.
 fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
     let off = |x: &Piece| angle(&x.force, force);
     let nearest = (0..pieces.len()).min_by(|a, b| off(&pieces[*a]).total_cmp(&off(&pieces[*b])));
     let Some(start) = nearest.filter(|_| pieces.len() >= FEWEST) else { return [0, 0] };
-    // what noise makes of the direction of a sample, from pieces of any size
+    // noise of the direction of one sample, from pieces of any size
     let spread = |w: &[Piece]| {
         let of = |x: &Piece| 1.0 / x.samples as f64;
         angle(&w[0].force, &w[1].force) / (of(&w[0]) + of(&w[1])).sqrt()
@@ -466,15 +466,15 @@ fn away(pieces: &[Piece], force: &[f64; 3]) -> [usize; 2] {
     [run(&mut pieces[..start].iter().rev()), run(&mut pieces[start + 1..].iter())]
 }
 
-/// The columns whose numbers are of another unit, and that: with it all these forces are `right`. Of several
-/// ways that with the fewest columns, then that with lengths nearest to one g.
+/// Columns in another unit, and that unit, with which all these forces are `right`. Of several choices the
+/// one with the fewest columns wins, then the one with lengths nearest to 1 g.
 fn other_units(
     all: &[[f64; 3]],
     own: &[ForceColumn; 3],
     units: &[(&str, f64)],
     right: &dyn Fn(&[f64; 3]) -> bool,
 ) -> Option<(String, String)> {
-    // of every column its own unit, or another
+    // for every column its own unit, or another
     let choices: Vec<Option<usize>> = std::iter::once(None).chain((0..units.len()).map(Some)).collect();
     let mut found: Option<(usize, f64, [Option<usize>; 3])> = None;
     for code in 0..choices.len().pow(3) {

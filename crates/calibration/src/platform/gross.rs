@@ -1,9 +1,10 @@
-//! Cells of a record that cannot be: a robust pass over every position before anything is estimated.
+//! Gross errors in cells of a record, found by a robust pass over every position before anything is
+//! estimated.
 //!
-//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row that is
-//! furthest from the cubic of all others is left out, and the cubic is fitted again, until none is far.
-//! Scatter is that of third differences, which neither a slow turn nor single rows move. Values that repeat
-//! to the last digit, and are far from their neighbours, are codes of missing values.
+//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row farthest
+//! from the cubic of all others is left out, and the cubic is fitted again, until no row is far. The scatter
+//! comes from third differences, which neither a slow turn nor single rows change. Values that repeat to the
+//! last digit, and are far from their neighbours, are codes of missing values.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -67,13 +68,13 @@ pub(crate) struct Cell {
     pub why: Why,
 }
 
-/// The median of some numbers; zero of none.
+/// Median of some numbers; zero for none.
 pub(crate) fn median(mut of: Vec<f64>) -> f64 {
     let middle = of.len() / 2;
     if of.is_empty() { 0.0 } else { *of.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
-/// The standard deviation of a sample by third differences.
+/// Standard deviation of a sample, by third differences.
 fn scatter(values: &[f64]) -> f64 {
     let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
     1.4826 * median(values.windows(4).map(third).collect()) / 20f64.sqrt()
@@ -88,8 +89,7 @@ fn beside(values: &[f64], i: usize) -> f64 {
     off.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
-/// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard
-/// deviation of a row.
+/// Gross cells of a window: index, sigmas and reason. `noise` is an approximate standard deviation of a row.
 fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
     let n = values.len();
     let mut sorted = values.to_vec();
@@ -108,7 +108,7 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
         }
     }
     let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
-    // values that hardly ever repeat, and then do many times in a row
+    // values that otherwise hardly repeat, in long runs of equal ones
     for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
         *at += run.len();
         Some(*at - run.len()..*at)
@@ -129,7 +129,7 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
         let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
         let q = a.qr().q();
         let left = &y - &q * (q.transpose() * &y);
-        // what all others leave of a row
+        // residual of a row from the cubic of all others
         let alone = |i: usize| {
             let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
             (i, left[i] / free.sqrt() / s)
@@ -138,14 +138,14 @@ fn window(t: &[f64], values: &[f64], noise: f64) -> Vec<(usize, f64, Why)> {
         let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
         out.push((kept.remove(i), sigmas, Why::Far));
     }
-    // so much is no matter of single cells
+    // so many are no errors of single cells
     if out.len() as f64 >= MOST * n as f64 {
         out.retain(|o| o.2 == Why::Code)
     }
     out
 }
 
-/// The gross cells of the rows of a position; `noise` is about the standard deviation of a sample.
+/// Gross cells of the rows of a position; `noise` is an approximate standard deviation of a sample.
 pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
     let mut out = Vec::new();
     let mut from = 0;
@@ -173,7 +173,7 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
         }
         from = to;
     }
-    // a run of equal values that a window ends in
+    // a run of equal values that ends within a window
     let stuck: Vec<(usize, f64)> =
         out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
     for cell in out.iter_mut().filter(|c| c.why == Why::Far && stuck.contains(&(c.axis, c.value))) {
@@ -187,8 +187,8 @@ pub(crate) fn cells(rows: &[Row], noise: f64) -> Vec<Cell> {
 const LONG: f64 = 1e-3;
 const TURNS_DEG: f64 = 1.0;
 
-/// Keeps rows at the beginning and the end of a position whose force is as long as usual, and elsewhere:
-/// there the platform turns.
+/// Keeps rows at the beginning and the end of a position whose force has the usual length and another
+/// direction: the platform turns there.
 pub(crate) fn keep_turns(rows: &[Row], found: &mut Vec<Cell>) {
     let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let is_found = |r: &Row| found.iter().any(|c| c.lines == r.lines && c.why == Why::Far);
@@ -212,7 +212,7 @@ mod tests {
 
     use super::*;
 
-    /// A platform that drifts by thirteen degrees an hour about its second axis, with noise of 1e-5.
+    /// Rows of a platform that drifts by thirteen degrees an hour about its second axis, with noise of 1e-5.
     fn rows(seed: u64) -> Vec<Row> {
         let mut noise = Noise::new(seed, 0);
         let of = |i: usize| {

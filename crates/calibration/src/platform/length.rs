@@ -1,9 +1,9 @@
-//! Why the specific force of a record is not one g long: all axes alike (scale, gravity), one axis (its
-//! scale, its zero), or neither.
+//! Causes of a specific force whose length is not 1 g: all axes alike (scale, gravity), one axis (its scale
+//! or zero), or neither.
 //!
-//! An output `f_i = (1 + s) t_i + b` of a force `t` that is one g long makes
-//! `|f|^2 - 1 = (1 - (1 + s)^-2) f_i^2` of a scale error s alone, and `2 b f_i - b^2` of a zero b alone:
-//! straight lines over `f_i^2` and `f_i` of the positions.
+//! For a force `t` of length 1 g, an output `f_i = (1 + s) t_i + b` with a scale error s alone gives
+//! `|f|^2 - 1 = (1 - (1 + s)^-2) f_i^2`. A zero b alone gives `2 b f_i - b^2`. Both are straight lines, over
+//! `f_i^2` and `f_i` of the positions.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::consistency::chi_square_band;
@@ -11,57 +11,57 @@ use obsdeg_ekf::consistency::chi_square_band;
 use super::STRICT;
 use crate::answer::{ForceCause, ForceError};
 
-/// The length is off one g by this before gravity or a scale of all axes is doubted.
+/// Smallest deviation of the length from 1 g, in g, for which gravity or a scale of all axes is doubted.
 const ALIKE: f64 = 3e-4;
-/// Lengths of positions that differ by less do not matter, in g.
+/// Largest difference between lengths of positions that does not matter, in g.
 const DIFFER: f64 = 1e-5;
-/// What leaves less than this part of what there was explains it, however small sigmas are.
+/// Relative residual up to which a cause explains the lengths, however small the sigmas are.
 const PART: f64 = 0.1;
-/// What leaves so many times as much as the best does not explain it as well.
+/// Ratio to the best residual up to which a cause explains the lengths equally well.
 const WORSE: f64 = 3.0;
-/// The outputs of the accelerometers.
+/// Names of the outputs of the accelerometers.
 const AXES: [&str; 3] = ["fx", "fy", "fz"];
 
-/// The specific force of a position.
+/// Specific force of a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Length {
-    /// In g, and its standard deviation.
+    /// Length in g; `sigma` is its standard deviation.
     pub length: f64,
     pub sigma: f64,
-    /// In platform axes, in g.
+    /// Force in platform axes, in g.
     pub force: [f64; 3],
 }
 
-/// What is wrong with the lengths, by position.
+/// Deviation of the lengths, by position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Wrong {
-    /// The positions with the least and the greatest length.
+    /// Indices of the positions with the least and the greatest length.
     pub ends: [usize; 2],
-    /// True if all are alike.
+    /// True if all lengths are equal.
     pub alike: bool,
-    /// Each of these alone explains them.
+    /// Causes, each of which explains the lengths alone.
     pub causes: Vec<ForceCause>,
 }
 
-/// A straight line through the squares of the lengths.
+/// Straight line through the squares of the lengths.
 struct Line {
     coefficients: DVector<f64>,
-    /// The standard deviation of the last.
+    /// Standard deviation of the last coefficient.
     sigma: f64,
-    /// What it leaves, in sigma, and the root of its mean square in g^2.
+    /// Residuals: chi-square, and the root of the mean square `left`, in g^2.
     chi_square: f64,
     left: f64,
     free: usize,
 }
 
-/// Least squares of `|f|^2 - 1` by `columns`.
+/// Least-squares fit of `|f|^2 - 1` by `columns`.
 fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<Line> {
     let (m, n) = (all.len(), columns.len());
     let weights: Vec<f64> = all.iter().map(|l| 1.0 / (2.0 * l.length * l.sigma)).collect();
     let y = DVector::from_fn(m, |i, _| all[i].length.powi(2) - 1.0);
     let a = DMatrix::from_fn(m, n, |i, j| columns[j][i]);
     let whitened = DMatrix::from_fn(m, n, |i, j| a[(i, j)] * weights[i]);
-    // columns that are nearly the same decide nothing
+    // nearly equal columns decide nothing
     let unit = DMatrix::from_columns(&whitened.column_iter().map(|c| c.normalize()).collect::<Vec<_>>());
     let gram = unit.transpose() * &unit;
     if m <= n || !gram.iter().all(|x| x.is_finite()) || gram.determinant() < 1e-6 {
@@ -82,7 +82,7 @@ impl Line {
         free > 0.0 && self.chi_square <= chi_square_band(free, 1.0, STRICT).1
     }
 
-    /// The scale error or the zero of an axis that the last coefficient is, with its standard deviation.
+    /// Scale error or zero of an axis from the last coefficient, with its standard deviation.
     fn cause(&self, error: ForceError, axis: usize, offset: bool) -> Option<ForceCause> {
         let k = *self.coefficients.iter().next_back()?;
         let (by, sigma) = match error {
@@ -97,7 +97,7 @@ impl Line {
     }
 }
 
-/// What is wrong with the lengths of the force at the positions of a record; `None` where nothing is.
+/// Deviation of the lengths of the force at the positions of a record; `None` if there is none.
 pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
     let places: Vec<usize> = (0..lengths.len()).filter(|&p| lengths[p].is_some()).collect();
     let all: Vec<Length> = lengths.iter().copied().flatten().collect();
@@ -112,7 +112,7 @@ pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
     if !differ && (mean - 1.0).abs() <= ALIKE {
         return None;
     }
-    // what one axis makes of them, alone, or beside what all have in common
+    // causes in one axis, alone or beside a common one
     let explain = |offset: bool| -> Vec<(f64, ForceCause)> {
         let before = same.as_ref().map_or(0.0, |l| if offset { l.left } else { rms(&all) });
         let mut found = Vec::new();
@@ -143,7 +143,7 @@ pub(crate) fn wrong(lengths: &[Option<Length>]) -> Option<Wrong> {
     Some(Wrong { ends, alike: !differ, causes: found.into_iter().map(|f| f.1).collect() })
 }
 
-/// The root of the mean square of what is beyond one g^2.
+/// Root of the mean square of `|f|^2 - 1`, in g^2.
 fn rms(all: &[Length]) -> f64 {
     let squares: f64 = all.iter().map(|l| (l.length.powi(2) - 1.0).powi(2)).sum();
     (squares / all.len() as f64).sqrt()
@@ -153,7 +153,7 @@ fn rms(all: &[Length]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Directions by hand, with what an output of each axis makes of them: scale errors and zeros.
+    /// Lengths for given directions, computed from scale errors and zeros of the outputs.
     fn lengths(scale: [f64; 3], zero: [f64; 3], directions: &[[f64; 3]]) -> Vec<Option<Length>> {
         let of = |d: &[f64; 3]| {
             let n = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         assert_eq!(wrong(&lengths([0.0; 3], [0.0; 3], &SIX)), None);
-        // gravity by a tenth of what is doubted, and four times it
+        // gravity off by a tenth of the limit of doubt, then by four times the limit
         assert_eq!(wrong(&lengths([3e-5; 3], [0.0; 3], &SIX)), None);
         let all = wrong(&lengths([1.2e-3; 3], [0.0; 3], &SIX)).expect("wrong");
         assert!(all.alike && all.causes.is_empty(), "{all:?}");
@@ -199,12 +199,12 @@ mod tests {
         assert_eq!((cause.error, cause.axis.as_str()), (ForceError::Scale, "fx"));
         assert!((cause.by / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
         assert!((cause.besides.expect("there") / 1e-3 - 1.0).abs() < 1e-2, "{cause:?}");
-        // two axes are none
+        // errors of two axes have no single cause
         let two = wrong(&lengths([5e-4, -4e-4, 0.0], [0.0; 3], &SIX)).expect("wrong");
         assert!(!two.alike && two.causes.is_empty() && two.ends == [4, 3], "{two:?}");
     }
 
-    /// Where y is vertical throughout, its scale is as good a reason as that of all.
+    /// If y is vertical throughout, its scale explains the lengths as well as a common one.
     #[test]
     fn what_is_not_told_is_not() {
         let two = wrong(&lengths([0.0, 5e-4, 0.0], [0.0; 3], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));

@@ -1,5 +1,5 @@
-//! The minimum that is reported: first by multiple shooting, then the lowest of those about an estimate that
-//! bends.
+//! Minimum of the reported estimate: found first by multiple shooting; then the lowest minimum about an
+//! estimate with curvature.
 
 use nalgebra::DVector;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
@@ -15,7 +15,7 @@ const AWAY: [f64; 4] = [3.0, -3.0, 10.0, -10.0];
 /// Number of first estimates that are drawn from the priors, and the seed of these draws.
 const DRAWS: usize = 12;
 const SEED: u64 = 1;
-/// Most bins times squared unknowns of records whose minima are sought where nothing bends.
+/// Most bins times squared unknowns of records whose minima are sought without curvature.
 const SEARCHED: usize = 1_000_000;
 /// Least difference by which a sum of squares is lower than another.
 const LOWER: f64 = 1e-2;
@@ -26,8 +26,8 @@ const RIVAL: f64 = 14.0;
 const APART: f64 = 5.0;
 
 impl Problem<'_> {
-    /// The estimate from `x`: where `first` is true from the start by multiple shooting (from `x` itself,
-    /// too, if that does not settle or fits poorly), and the lowest of the minima about it.
+    /// Estimate from `x`. If `first`, it starts by multiple shooting (also from `x` itself, if that does not
+    /// converge or fits poorly), and is the lowest of the minima about it.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
@@ -40,7 +40,7 @@ impl Problem<'_> {
         Ok(Estimate { passes: self.passes.get() - before, ..found })
     }
 
-    /// The same without a search for a lower minimum.
+    /// Estimate without a search for a lower minimum.
     fn first(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
         let shot = self.shoot(&x).ok().flatten();
         let Some(start) = shot else { return self.settle(x) };
@@ -59,10 +59,10 @@ impl Problem<'_> {
         }
     }
 
-    /// The lowest of the minima about an estimate that bends; others nearly as low are counted as rivals. A
-    /// bent sum of squares has several minima, and the first that is found need not be the most probable one.
-    /// Where the scheme leaves directions undetermined, such a minimum may be far from the most probable one
-    /// and not bent itself, so minima are sought from the priors there too.
+    /// Lowest of the minima about an estimate with curvature; others nearly as low are counted as rivals. A
+    /// nonlinear sum of squares has several minima, and the first one found need not be the most probable.
+    /// Where the scheme leaves directions undetermined, a minimum without curvature may be far from the most
+    /// probable one too, so minima are sought from the priors.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
@@ -102,7 +102,8 @@ impl Problem<'_> {
         Ok(best)
     }
 
-    /// Starts along the axes of the posterior of an estimate, both ways, and those drawn from the priors.
+    /// Starts along the axes of the posterior of an estimate, in both directions, and starts drawn from the
+    /// priors.
     fn starts_about(&self, estimate: &Estimate) -> Vec<Vec<PlatformState>> {
         let from = &estimate.at.x;
         let axes = self.axes(estimate);
@@ -117,7 +118,7 @@ impl Problem<'_> {
         let (mut noise, mut out) = (Noise::new(SEED, 1), Vec::new());
         for _ in 0..DRAWS {
             let d = DVector::from_fn(self.unknowns.n, |i, _| self.unknowns.prior[i] * noise.normal());
-            // a start that cannot be followed is none
+            // a start with an invalid trajectory is skipped
             out.extend(self.shoot(&self.moved(&self.at_rest(), &d)).ok().flatten());
         }
         out

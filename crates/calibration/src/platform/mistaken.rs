@@ -1,96 +1,102 @@
-//! What a record is mistaken in, before anything is estimated.
+//! Contradictions within a record, found before anything is estimated.
 
-/// A record that is not what it says it is.
+/// Contradiction between a record and its header or labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Mistaken {
     /// Numbers of another unit.
     #[error(
-        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by what the header says, expected about 1; with the numbers as {units} it is"
+        "{record}: line {line}, columns {columns}: at {position} the specific force is {length_g} g long by \
+         what the header says, expected about 1; with the numbers as {units} it is"
     )]
     ForceUnit {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The first line of the position.
+        /// First line of the position.
         line: u64,
-        /// The columns.
+        /// Names of the columns.
         columns: String,
-        /// Where it is furthest from 1 g.
+        /// Name of the position farthest from 1 g.
         position: String,
-        /// What it is there.
+        /// Length of the force there, in g.
         length_g: String,
-        /// The units that the numbers are as of.
+        /// Units that fit the numbers.
         units: String,
     },
-    /// Rows of another unit than the others.
+    /// Rows in another unit than the others.
     #[error(
-        "{record}: line {line}, columns {columns}: the specific force is {length_g} g long there; with these numbers as {units} it is as in the rows beside it{more}; expected every row in the units of the header"
+        "{record}: line {line}, columns {columns}: the specific force is {length_g} g long there; with these \
+         numbers as {units} it is as in the rows beside it{more}; expected every row in the units of the header"
     )]
     RowUnit {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line of the first.
+        /// Line of the first such row.
         line: u64,
-        /// The columns.
+        /// Names of the columns.
         columns: String,
-        /// What it is by what the header says.
+        /// Length of the force by the header, in g.
         length_g: String,
-        /// The units that these numbers are as of.
+        /// Units that fit these numbers.
         units: String,
-        /// How many more such rows there are, if any.
+        /// Number of further such rows, in words; empty if there are none.
         more: String,
     },
-    /// A force that is none of gravity.
+    /// A force that does not fit gravity in any unit.
     #[error(
-        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and no unit of forces makes it that"
+        "{record}: line {line}: at {position} the specific force is {length_g} g long; expected about 1, and \
+         no unit of forces makes it that"
     )]
     ForceLength {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The first line of the position.
+        /// First line of the position.
         line: u64,
-        /// Where it is furthest from 1 g.
+        /// Name of the position farthest from 1 g.
         position: String,
-        /// What it is there.
+        /// Length of the force there, in g.
         length_g: String,
     },
     /// Times of another unit.
     #[error(
-        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
+        "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the \
+         scheme {expected} s, and all others alike; with the numbers as [{unit}] they agree"
     )]
     TimeUnit {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// How long the first position lasts, in s.
+        /// Duration of the first position, in s.
         found: String,
-        /// How long it does in the scheme.
+        /// Duration of the first position in the scheme, in s.
         expected: String,
-        /// The unit that the numbers are as of.
+        /// Unit that fits the numbers.
         unit: &'static str,
     },
-    /// The platform leaves a position while samples are still said to be of it, or comes later.
+    /// The platform leaves a position while samples still have its label, or arrives after the first of them.
     #[error(
-        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or by time) that begin and end where the platform does{clock}"
+        "{record}: between lines {from} and {to} the platform {what} {position}: the samples of {position} \
+         {side} that are up to {off_deg} deg from the others, as at {like}; expected positions (by label or \
+         by time) that begin and end where the platform does{clock}"
     )]
     Shifted {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// It happens after this line.
+        /// Last line before the motion.
         from: u64,
-        /// And before this one.
+        /// First line after it.
         to: u64,
-        /// The position.
+        /// Name of the position.
         position: String,
-        /// What happens.
+        /// Motion in words: comes to rest at, or leaves.
         what: &'static str,
-        /// Which samples are not of it.
+        /// Side of the motion with the wrong samples: before or after.
         side: &'static str,
-        /// How far the first or the last of them is from the others.
+        /// Angle between the outermost of these samples and the others, in deg.
         off_deg: String,
-        /// What position has such a force.
+        /// Name of the position that such a force fits.
         like: String,
-        /// What the clock of the record has to do with it.
+        /// Relation to the clock of the record, in words.
         clock: String,
     },
 }

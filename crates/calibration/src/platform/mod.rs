@@ -1,4 +1,4 @@
-//! A torquing scheme calibrated from the records of its runs.
+//! Calibration of a torquing scheme from the records of its runs.
 
 mod clock;
 mod curvature;
@@ -47,161 +47,165 @@ pub use mistaken::Mistaken;
 pub(crate) use observe::TIMES;
 pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
 
-/// Why a scheme cannot be calibrated.
+/// Reason why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
-    /// The record.
+    /// Error of the record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A label of no position.
+    /// A label that is no position of the scheme.
     #[error("{record}: line {line}, column `position`: no position is called `{found}`; expected {expected}")]
     UnknownPosition {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line.
+        /// Line of the record.
         line: u64,
-        /// The label.
+        /// Label that was found.
         found: String,
-        /// The names of the scheme.
+        /// Names of the positions of the scheme.
         expected: String,
     },
-    /// Positions in another order.
+    /// Positions in another order than in the scheme.
     #[error("{record}: line {line}, column `position`: found `{found}`, expected {expected}")]
     Order {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line.
+        /// Line of the record.
         line: u64,
-        /// The label.
+        /// Label that was found.
         found: String,
-        /// What the scheme has there.
+        /// Position that the scheme expects there.
         expected: String,
     },
     /// A position without samples.
     #[error("{record}: the position {position} of the scheme has no samples: {hint}")]
     NoSamples {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The position.
+        /// Name of the position.
         position: String,
-        /// What may be the matter.
+        /// Possible cause.
         hint: String,
     },
-    /// A force that points elsewhere.
+    /// A force in another direction than the scheme has.
     #[error(
-        "{record}: line {line}: at {position} the specific force is {off_deg} deg from where the scheme has it; it is that of {like}"
+        "{record}: line {line}: at {position} the specific force is {off_deg} deg from where the scheme has \
+         it; it is that of {like}"
     )]
     Attitude {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The first line of the position.
+        /// First line of the position.
         line: u64,
-        /// The position.
+        /// Name of the position.
         position: String,
-        /// By how much.
+        /// Angle of the difference, in deg.
         off_deg: String,
-        /// Positions that it fits.
+        /// Positions that the force fits.
         like: String,
     },
-    /// A record that is not what it says it is.
+    /// A record that contradicts itself.
     #[error(transparent)]
     Mistaken(Box<Mistaken>),
-    /// Other intervals at rest than positions.
+    /// Another number of intervals at rest than of positions.
     #[error(
-        "{record}: {found} intervals at rest; expected {expected}, one for each position of the scheme{spans} (record.static says how they are found; a column `position` says what is where)"
+        "{record}: {found} intervals at rest; expected {expected}, one for each position of the \
+         scheme{spans} (record.static says how they are found; a column `position` says what is where)"
     )]
     Rests {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// How many there are.
+        /// Number of intervals found.
         found: usize,
-        /// How many there should be.
+        /// Number of positions.
         expected: usize,
-        /// Where they are.
+        /// Times of the intervals.
         spans: String,
     },
-    /// Gimbals that point elsewhere.
+    /// Gimbals at another attitude than the scheme has.
     #[error(
         "{record}: line {line}: at {position} the gimbals are {off_deg} deg from where the scheme has them"
     )]
     Gimbals {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line.
+        /// Line of the record.
         line: u64,
-        /// The position.
+        /// Name of the position.
         position: String,
-        /// By how much.
+        /// Angle of the difference, in deg.
         off_deg: String,
     },
-    /// A standard deviation that is none.
+    /// A missing or invalid standard deviation.
     #[error(
         "{record}: line {line}: no standard deviation of {channel}; expected one above zero beside every value"
     )]
     Sigma {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line.
+        /// Line of the record.
         line: u64,
-        /// The component.
+        /// Component of Z.
         channel: String,
     },
-    /// A gap that is too short.
+    /// A gap too short for the slew.
     #[error(
-        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the scheme takes {slew_s:.3} s{clock}"
+        "{record}: {gap_s:.3} s between the last sample before {position} and its first; the slew of the \
+         scheme takes {slew_s:.3} s{clock}"
     )]
     Slew {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// Where it goes.
+        /// Name of the position after the gap.
         position: String,
-        /// The gap.
+        /// Duration of the gap, in s.
         gap_s: f64,
-        /// The slew.
+        /// Duration of the slew, in s.
         slew_s: f64,
-        /// What the clock of the record has to do with it.
+        /// Relation to the clock of the record, in words.
         clock: String,
     },
-    /// Turning positions.
+    /// Rotating segments, which are not supported.
     #[error(
         "a record of a rotating segment cannot be calibrated yet; expected positions at rest, found {position}"
     )]
     Rotates {
-        /// The segment.
+        /// Name of the segment.
         position: String,
     },
-    /// Interrupted before there was anything.
+    /// The caller stopped the work before there was an estimate.
     #[error("interrupted before anything was estimated")]
     Interrupted,
-    /// Nothing to estimate.
+    /// No unknown is determined.
     #[error("nothing is determined by these records: no unknown and no combination")]
     Nothing,
-    /// No record at all.
+    /// No record was given.
     #[error("found no record; expected one of each run of the scheme, at least one")]
     NoRecord,
     /// A record that counts already.
     #[error(
-        "{record} has the same numbers as {other}; expected records of different runs, since what is the same says nothing twice"
+        "{record} has the same numbers as {other}; expected records of different runs, since what is the \
+         same says nothing twice"
     )]
     SameRecord {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The one that it is.
+        /// Name of the equal record.
         other: String,
     },
-    /// A calibration of sensors that are mounted otherwise.
+    /// A prior calibration of another platform.
     #[error("the prior calibration is of a platform with {what}; expected one of this platform")]
     OtherPlatform {
-        /// What is different.
+        /// Differences, in words.
         what: String,
     },
-    /// A calibration that is none of this platform.
+    /// A prior calibration without unknowns of this platform.
     #[error("the prior calibration says nothing of this scheme: it has {found}")]
     Prior {
-        /// What it has.
+        /// Unknowns of the prior calibration.
         found: String,
     },
-    /// The scheme or its conditions.
+    /// Error of the scheme or its conditions.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
 }
@@ -224,16 +228,16 @@ impl From<SchemeError> for CalibrationError {
     }
 }
 
-/// How a record is taken.
+/// Options of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// What one g is, in m/s^2.
+    /// Acceleration of 1 g, in m/s^2.
     pub gravity_m_s2: f64,
     /// True if the noise is estimated from the records.
     pub estimate_noise: bool,
     /// Probability that no measurement of a right record is left out as an outlier; 1 leaves none out.
     pub gate: f64,
-    /// A calibration before.
+    /// Prior calibration of the same platform.
     pub prior: Option<Before<Setup>>,
     /// Seed of the exact verdicts.
     pub seed: u64,
@@ -245,14 +249,14 @@ impl Default for Options {
     }
 }
 
-/// The probability with which a right record is in its bands.
+/// Probability with which a right record lies in its bands.
 const STRICT: f64 = 0.999;
-/// Rounds in which outliers are looked for, or the noise is estimated.
+/// Most rounds of leaving out outliers, or of estimating the noise.
 const ROUNDS: usize = 6;
-/// More than this part of all measurements are no outliers.
+/// Largest fraction of all measurements that may be outliers.
 const MOST_OUTLIERS: f64 = 0.02;
 
-/// Checks that records of this scheme can be read: positions at rest, at least one record.
+/// Checks that records of this scheme are supported: positions at rest, at least one record.
 fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> {
     if let Some(p) = scheme.positions.iter().find(|p| p.rotation.is_some()) {
         return Err(CalibrationError::Rotates { position: p.name.clone() });
@@ -260,9 +264,9 @@ fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> 
     if records.is_empty() { Err(CalibrationError::NoRecord) } else { Ok(()) }
 }
 
-/// Calibrates `scheme` from records of its runs; `conditions` say noise, steps (the length of bins) and
-/// slews. `going` hears now and then how far it is; where it says no while a record is read there is none,
-/// later the estimate is where the iteration is then, and a finding.
+/// Calibrates `scheme` from records of its runs. `conditions` give noise, steps (the length of bins) and
+/// slews. The progress callback `going` can stop the work: while a record is read there is then no answer,
+/// later the answer is the current iterate, with a finding.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -310,7 +314,7 @@ pub fn calibrate(
     let start = RunStart::new(&planned, &own)?;
     let (n, coefficients, biases) =
         (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
-    // what a calibration before holds already does not count again
+    // priors that a prior calibration already includes do not count again
     let held =
         |name: &String| before.is_some_and(|b| b.priors.contains(name) && b.estimates.names.contains(name));
     let counts = |name: &String| own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
@@ -445,7 +449,7 @@ pub fn calibrate(
     }
 }
 
-/// Beyond how many standard deviations a measurement of so many is left out.
+/// Distance, in standard deviations, beyond which a measurement out of `of` is left out.
 fn gate(probability: f64, of: usize) -> f64 {
     if probability >= 1.0 {
         return f64::INFINITY;
@@ -453,8 +457,7 @@ fn gate(probability: f64, of: usize) -> f64 {
     chi_square_quantile(1.0, 1.0 - (1.0 - probability) / of.max(1) as f64).sqrt()
 }
 
-/// Rows of what a calibration before says of the coefficients and their combinations, with unit errors, and
-/// their names.
+/// Prior information on the coefficients and their combinations: rows with unit errors, and names.
 type Known = ((DMatrix<f64>, DVector<f64>), Vec<String>);
 
 fn known(
@@ -470,7 +473,7 @@ fn known(
         let of = |c: &obsdeg_evidence::prediction::PredictedCombination| c.expression == *name;
         let terms =
             single.or_else(|| prediction.combinations.iter().find(|c| of(c)).map(|c| c.terms.clone()))?;
-        // psi is that of another run
+        // psi belongs to another run
         let scale = si_per_shown(units[terms[0].0]);
         terms.iter().all(|(i, _)| *i >= psi).then_some((terms, scale))
     };

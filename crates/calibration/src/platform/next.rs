@@ -1,9 +1,9 @@
-//! Further runs that would bring a coefficient to its requirement, each computed.
+//! Further runs that would bring a coefficient to its requirement, each of them computed.
 //!
-//! A run is a dwell at one attitude, calibrated with this answer as knowledge of the coefficients and a psi
-//! of its own. Attitudes are the 24 cardinal ones and those of the scheme. Sigmas are those of the linear
-//! model with all coefficients zero, with the noise and the random drift of this answer, by samples as dense
-//! as its records have them.
+//! A run is a dwell at one attitude, calibrated with this answer as prior information on the coefficients,
+//! and a psi of its own. Attitudes are the 24 cardinal ones and those of the scheme. Sigmas are those of the
+//! linear model with all coefficients zero, with the noise and the random drift of this answer, and the
+//! sampling density of its records.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Dwell, Euler, Position, Scheme, cardinal, cardinal_name, cardinal_names};
@@ -18,7 +18,7 @@ use crate::least_squares::{Information, Linearised, Rows, Solution};
 
 /// Longest dwell, in longest dwells of the scheme.
 const LONGEST: f64 = 16.0;
-/// Steps of a dwell: noise of samples and random drift are those of the mean over a step.
+/// Number of steps of a dwell: sample noise and random drift are those of the mean over a step.
 const STEPS: usize = 100;
 /// Largest relative error of a dwell.
 const EXACT: f64 = 0.01;
@@ -40,14 +40,13 @@ fn candidates(scheme: &Scheme) -> Vec<(String, Euler)> {
 struct Further<'p, 'a> {
     parts: &'p Parts<'a>,
     table: CovarianceTable,
-    /// Variance of a mean over one second of each channel, as the fit has it.
+    /// Variance of a mean over one second, by channel, as the fit has it.
     variances: Vec<f64>,
 }
 
 impl Parts<'_> {
-    /// For every requirement that is missed: the attitude of a further run that brings the coefficient
-    /// closest to it, and the dwell that meets it. `bench` has what a bench adds by name, which no run makes
-    /// smaller.
+    /// Further runs, one per missed requirement: the attitude that brings the coefficient closest to it, and
+    /// the dwell that meets it. `bench` has the contributions of a bench by name, which no run reduces.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
@@ -57,7 +56,7 @@ impl Parts<'_> {
         bench: &[(String, f64)],
     ) -> Result<Vec<NextRun>, CalibrationError> {
         let added = |name: &str| bench.iter().find(|(of, _)| of == name).map_or(0.0, |(_, added)| *added);
-        // sigma that is required of the records, and which of them miss it
+        // sigma that is required of the records, and the requirements that they miss
         let target = |e: &Estimated| {
             let sigma = (e.required_sigma?.powi(2) - added(&e.name).powi(2)).max(0.0).sqrt();
             let own = e.sigma_rescaled.zip(e.sigma).map(|(r, s)| r.max(s));
@@ -80,13 +79,13 @@ impl Parts<'_> {
         let mut sigmas: Vec<(&Euler, Vec<f64>)> = Vec::new();
         let all = candidates(self.scheme);
         for (_, angles) in &all {
-            // an attitude that no plan takes is none
+            // skip attitudes that no plan accepts
             let Ok(solution) = further.with(angles, dwell) else { continue };
             sigmas.push((angles, missed.iter().map(|(e, _)| further.sigma(&solution, &e.name)).collect()));
         }
         let mut out = Vec::new();
         for (k, (e, required)) in missed.iter().enumerate() {
-            // what the bench adds is more than is allowed: no run helps
+            // the contribution of the bench exceeds the requirement: no run helps
             if *required == 0.0 {
                 out.push(NextRun {
                     unknown: e.name.clone(),
@@ -122,7 +121,7 @@ impl Parts<'_> {
 }
 
 impl Further<'_, '_> {
-    /// The coefficients by this answer and a dwell of `dwell_s` at an attitude.
+    /// Coefficients by this answer and a dwell of `dwell_s` at an attitude.
     fn with(&self, angles: &Euler, dwell_s: f64) -> Result<Solution, CalibrationError> {
         let (scheme, conditions) = (self.parts.scheme, self.parts.conditions);
         let own = Position {
@@ -157,7 +156,7 @@ impl Further<'_, '_> {
         rows.add(&wide, &DVector::zeros(wide.nrows()));
         let ((before, _), _) = known(&self.table, &plan, &prediction, &unknowns)?;
         rows.add(&before, &DVector::zeros(before.nrows()));
-        // random biases have a prior that is theirs
+        // random biases have priors of their own
         let pull = unknowns.prior.iter().enumerate();
         let pull = pull.map(|(i, s)| 1.0 / if unknowns.biases.contains(&i) { *s } else { WEAK * s });
         let pull = DVector::from_iterator(unknowns.n, pull);
@@ -165,7 +164,7 @@ impl Further<'_, '_> {
         Ok(rows.solve()?)
     }
 
-    /// The plan as it is linearised where all unknowns are zero, a measurement at the end of every step.
+    /// Plan linearised at zero unknowns, with a measurement at the end of every step.
     fn run(&self, plan: &Plan, step: f64) -> Linearised {
         let mut out = Linearised::default();
         for (segment, stage) in plan.stages.iter().enumerate() {
@@ -181,10 +180,10 @@ impl Further<'_, '_> {
         out
     }
 
-    /// Sigma of a coefficient in its shown unit.
+    /// Sigma of a coefficient, in its shown unit.
     fn sigma(&self, of: &Solution, name: &str) -> f64 {
         let platform = &self.parts.planned.platform;
-        // psi of a run of one position is the same as that of the scheme: coefficients follow
+        // a run of one position has the psi of the scheme: the coefficients follow it
         let coefficients = platform.coefficients();
         let first = platform.names().len() - coefficients;
         let Some(k) = platform.names().iter().position(|n| n == name).and_then(|k| k.checked_sub(first))
@@ -195,8 +194,8 @@ impl Further<'_, '_> {
         of.sigma(&[(n - coefficients + k, 1.0)]) / si_per_shown(platform.units()[first + k])
     }
 
-    /// The least dwell at an attitude with which a coefficient has a sigma of `required`, and that sigma; the
-    /// longest where none has. `from` is a dwell with its sigma.
+    /// Shortest dwell at an attitude with which a coefficient has a sigma of at most `required`, and that
+    /// sigma; the longest dwell if none has. `from` is a dwell with its sigma.
     fn dwell(
         &self,
         angles: &Euler,

@@ -1,5 +1,4 @@
-//! A record of a platform: which columns it has, at which position every sample was taken, and bins of them
-//! in n.
+//! Reading of a platform's record: its columns, the position of every sample, and bins of samples in n.
 
 use std::cmp::Ordering;
 
@@ -18,22 +17,21 @@ use crate::Going;
 use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
 use crate::record::{Column, Record, Row, Wanted};
-use crate::still::{Detector, Told};
+use crate::still::{DecidedSample, Detector};
 
-/// Units of forces, and what they are of g where gravity is as it is (`None`: that of a metre per second
-/// squared).
+/// Units of forces, with their values in g (`None`: a metre per second squared, which depends on gravity).
 const FORCES: [(&str, Option<f64>); 4] =
     [("g", Some(1.0)), ("mg", Some(1e-3)), ("ug", Some(1e-6)), ("m/s^2", None)];
-/// Units of the increments of velocity over the time since the sample before, and what they are of m/s: their
-/// quotient is the mean of the force meanwhile.
+/// Units of increments of velocity over the time since the sample before, with their values in m/s. The
+/// quotient is the mean force in this interval.
 const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("um/s", 1e-6)];
-/// An interval so many times as long as the one before is a gap, in which increments may be lost.
+/// Ratio to the interval before from which an interval is a gap, in which increments may be lost.
 const GAP: f64 = 1.5;
-/// By this part of an interval the stamps of rows may differ from the timeline of the scheme, where the file
-/// states none.
+/// Largest deviation of the time stamps from the timeline of the scheme, as a fraction of an interval, unless
+/// the file states one.
 const TOLERANCE: f64 = 0.05;
-/// By this part of an interval a row may be late by rounding alone, where positions follow each other at
-/// once.
+/// Largest delay of a row by rounding, as a fraction of an interval, where positions follow each other
+/// directly.
 const ROUNDED: f64 = 1e-3;
 const ANGLES: [(&str, f64); 4] = [
     ("rad", 1.0),
@@ -48,13 +46,13 @@ pub(crate) const TIMES: [(&str, f64); 6] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
 /// Number of samples of a dense bin from which its median is taken.
 const SOME: usize = 64;
-/// What the gimbals read is no further from the attitude of the scheme than this, in deg.
+/// Largest angle of the gimbal readings from the attitude of the scheme, in deg.
 const GIMBALS_DEG: f64 = 5.0;
 
-/// It is told that a record is read every so many samples.
+/// Interval of progress reports, in samples.
 const OFTEN: usize = 10_000;
 
-/// What the three columns of a record are.
+/// Meaning of the three observed columns of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Observed {
     /// Outputs of the accelerometers in platform axes.
@@ -65,64 +63,65 @@ enum Observed {
     Geographic,
 }
 
-/// How samples came to their positions.
+/// Source of the positions of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum By {
-    /// By a column of labels.
+    /// Column of labels.
     Label,
-    /// By the timeline of the scheme.
+    /// Timeline of the scheme.
     Timeline,
-    /// By labels that agree with the timeline.
+    /// Labels that agree with the timeline.
     Both,
-    /// By intervals at rest that were found.
+    /// Intervals at rest that were found.
     Static,
 }
 
-/// A record beside its scheme.
+/// Record with its samples at the positions of its scheme.
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
     pub name: String,
     pub by: By,
-    /// Bins of every position, times in s from the first sample (labels) or from the start of the scheme.
+    /// Bins by position, with times in s from the first sample (labels) or from the start of the scheme.
     pub bins: Vec<Vec<Bin>>,
-    /// Per bin, as these: true if most of its forces point below the horizon of n (a tilt beyond 90 deg);
-    /// false where the record does not say.
+    /// Flags of the bins: true if most forces point below the horizon of n (a tilt beyond 90 deg); false also
+    /// where the record has no forces.
     pub over: Vec<Vec<bool>>,
-    /// The time of the record, in s, that is 0 there.
+    /// Time of the record at time 0 of the bins, in s.
     pub origin: f64,
-    /// Earliest and latest origin, in s, where labels leave it open and it is not that of the scheme's clock.
+    /// Earliest and latest origin, in s; `None` unless labels leave it open and it differs from the scheme's
+    /// clock.
     pub open: Option<(f64, f64)>,
-    /// The usual interval between rows, in s.
+    /// Usual interval between rows, in s.
     pub interval: f64,
-    /// Where rows are missing.
+    /// Intervals with missing rows.
     pub gaps: Vec<Gap>,
-    /// First and last sample of every position, in s alike.
+    /// Times of the first and the last sample, by position, in s.
     pub stays: Vec<(f64, f64)>,
-    /// The row after the last of every position, in s alike; infinite for the last of the record.
+    /// Times of the first row behind each position, in s; infinite at the end of the record.
     pub after: Vec<f64>,
     pub spikes: Vec<Spike>,
-    /// Cells that do not count, with the text of their column.
+    /// Cells that are left out, with the text of their column.
     pub cells: Vec<(gross::Cell, String)>,
-    /// By column that is read: its text, and how many of its cells are empty at positions.
+    /// Columns that were read: text, and number of empty cells at positions.
     pub missing: Vec<(String, usize)>,
     pub samples: usize,
-    /// Samples at no position.
+    /// Number of samples at no position.
     pub unused: usize,
-    /// First and last time as they are in the record, in s.
+    /// First and last time by the clock of the record, in s.
     pub span: (f64, f64),
-    /// Columns that nothing was made of.
+    /// Columns that are not used.
     pub ignored: Vec<String>,
-    /// The mean length of the specific force, in g, where the record has it.
+    /// Mean length of the specific force, in g; `None` if the record has no forces.
     pub force: Option<f64>,
-    /// By position: that length, there.
+    /// Lengths of the specific force, by position.
     pub lengths: Vec<Option<Length>>,
-    /// How far the gimbals are off at most, in deg, where the record has their angles.
+    /// Largest angle of the gimbal readings from the scheme, in deg; `None` if the record has none.
     pub gimbals: Option<f64>,
-    /// The digest of its numbers.
+    /// Digest of the numbers.
     pub digest: String,
-    /// The columns that are used, and what one of their numbers is in s, g, g s, rad or degC.
+    /// Columns that are used, with the value of one of their numbers in s, g, g s, rad or degC.
     pub columns: Vec<(String, f64)>,
-    /// Separator and decimal mark; none where columns are separated by commas.
+    /// Separator and decimal mark in words; `None` for commas and points.
     pub written: Option<String>,
 }
 
@@ -138,7 +137,7 @@ impl From<By> for PositionsBy {
 }
 
 impl Reading {
-    /// The same with the scheme beginning `by` s later by the clock of the record.
+    /// Reading with the scheme beginning `by` s later by the clock of the record.
     pub(crate) fn later(&self, by: f64) -> Self {
         let mut out = self.clone();
         out.origin += by;
@@ -150,7 +149,7 @@ impl Reading {
         out
     }
 
-    /// Where rows are missing, by the names of positions.
+    /// Intervals with missing rows, by the names of positions.
     pub(crate) fn gaps(&self, scheme: &Scheme) -> Vec<answer::Gap> {
         let name = |p: usize| scheme.positions[p].name.clone();
         let place = |between: [Option<usize>; 2]| match between {
@@ -170,7 +169,8 @@ impl Reading {
         self.missing.iter().map(of).collect()
     }
 
-    /// The part by which its clock is fast as positions begin and end, where the record says that.
+    /// Fraction by which the clock is fast, by the durations of positions; `None` if the record does not show
+    /// it.
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
         let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
@@ -179,29 +179,29 @@ impl Reading {
     }
 }
 
-/// Whose columns are read, in which order: time, three of Z or of the force, the azimuth, standard deviations
-/// of the three, gimbal angles, temperature.
+/// Layout of the requested numbers of a row: time, three of Z or of the force, the azimuth, standard
+/// deviations of the three, gimbal angles, temperature.
 struct Layout {
     observed: Observed,
-    /// The columns of the force, where these are what is observed.
+    /// Columns of the force; `None` if Z is observed.
     forces: Option<[ForceColumn; 3]>,
-    /// That of the time: as it is written, and what one of its numbers is in s.
+    /// Column of the time: its text, and the value of one of its numbers in s.
     time: (String, f64),
     wanted: Vec<Wanted>,
     azimuth: bool,
     sigmas: bool,
     /// True if forces are increments of velocity, which are read in g s.
     increments: bool,
-    /// The first of the three gimbal angles among what is wanted.
+    /// Index of the first of the three gimbal angles among the requested numbers.
     gimbals: Option<usize>,
     temperature: Option<usize>,
     label: Option<usize>,
     ignored: Vec<String>,
-    /// Texts of the three columns that are observed.
+    /// Texts of the three observed columns.
     columns: [String; 3],
 }
 
-/// Units of the force, or of increments of velocity, with what they are of g, or of g s.
+/// Units of the force in g, or of increments of velocity in g s.
 fn units_of_force(increments: bool, gravity: f64) -> [(&'static str, f64); 4] {
     match increments {
         true => INCREMENTS.map(|(u, size)| (u, size / gravity)),
@@ -220,7 +220,8 @@ impl Layout {
         ];
         let there = |names: &[&str; 3]| names.iter().any(|n| record.find(n).is_some());
         let mut of = families.iter().filter(|(_, names)| there(names));
-        let expected = "`fx [g]`, `fy [g]`, `fz [g]` (outputs of the accelerometers in platform axes), or `Zx`, `Zy`, `Zz`, or `Z1`, `Z3`";
+        let expected = "`fx [g]`, `fy [g]`, `fz [g]` (outputs of the accelerometers in platform axes), or \
+            `Zx`, `Zy`, `Zz`, or `Z1`, `Z3`";
         let &(observed, names) = of.next().ok_or_else(|| record.missing(expected))?;
         if let Some((_, others)) = of.next() {
             let also = format!("either {}, {}, {} or {}", names[0], names[1], names[2], others.join(", "));
@@ -302,13 +303,12 @@ impl Layout {
         })
     }
 
-    /// True if the record has the column `i` of the three that are observed: where it has none, the number is
-    /// that of the time.
+    /// True if the record has the observed column `i` of three; otherwise its number is that of the time.
     fn own(&self, i: usize) -> bool {
         self.wanted[i + 1].column != self.wanted[0].column
     }
 
-    /// The columns that are used, in their order, with what one of their numbers is.
+    /// Columns that are used, in their order, with the value of one of their numbers.
     fn used(&self, record: &Record) -> Vec<(String, f64)> {
         let mut all: Vec<&Wanted> = self.wanted.iter().collect();
         all.sort_by_key(|w| w.column);
@@ -316,7 +316,7 @@ impl Layout {
         all.into_iter().map(|w| (record.columns()[w.column].text.clone(), w.scale)).collect()
     }
 
-    /// The columns with empty cells, with their number.
+    /// Columns with empty cells, and their number.
     fn missing(&self, columns: &[String], empty: &[usize]) -> Vec<(String, usize)> {
         let mut out: Vec<(usize, usize)> =
             self.wanted.iter().zip(empty).map(|(w, n)| (w.column, *n)).filter(|(_, n)| *n > 0).collect();
@@ -325,8 +325,8 @@ impl Layout {
         out.into_iter().map(|(c, n)| (columns[c].clone(), n)).collect()
     }
 
-    /// Makes mean forces of the increments of a row, those over `dt` s; nothing of them where it is not known
-    /// over which time they are.
+    /// Divides the increments of a row by the interval `dt` (s) into mean forces; an unknown interval leaves
+    /// none.
     fn divide(&self, numbers: &mut [Option<f64>], dt: Option<f64>) {
         let first = if self.azimuth { 5 } else { 4 };
         let sigmas = if self.sigmas { first..first + 3 } else { 0..0 };
@@ -335,7 +335,7 @@ impl Layout {
         }
     }
 
-    /// Components 1, 2, 3 of Z in n, and the azimuth, of a row taken where `C_c^n` is `c`.
+    /// Components 1, 2, 3 of Z in n, and the azimuth, of a row at the attitude `c`.
     fn in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> [Option<f64>; 4] {
         let azimuth = if self.azimuth { n[4] } else { None };
         let turned = match (n[1], n[2], n[3]) {
@@ -352,7 +352,7 @@ impl Layout {
         }
     }
 
-    /// How far the attitude that the gimbals read is from `c`, in deg: the angle of the turn between them.
+    /// Angle of the turn between the gimbal readings and the attitude `c`, in deg.
     fn gimbals_off(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<f64> {
         let first = self.gimbals?;
         let [alpha, beta, gamma] = [n[first]?, n[first + 1]?, n[first + 2]?];
@@ -362,8 +362,8 @@ impl Layout {
         Some(((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees())
     }
 
-    /// Their standard deviations where the record has them: those of platform axes turned, without their
-    /// correlation.
+    /// Standard deviations of the components in n; `None` if the record has none. Those of platform axes are
+    /// turned without their correlation.
     fn sigmas_in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
         let first = if self.azimuth { 5 } else { 4 };
         let own = self.sigmas.then(|| [n[first], n[first + 1], n[first + 2]])?;
@@ -378,68 +378,67 @@ impl Layout {
     }
 }
 
-/// The position of a time of the scheme, while Z is observed; a stamp may be late by `rounding` s where one
-/// position follows another at once.
+/// Index of the position at a time of the scheme while Z is observed. A stamp may be late by `rounding` s
+/// where one position follows another directly.
 fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
     let slew = |k: usize| plan.segments.get(k).is_none_or(|s| matches!(s.kind, SegmentKind::Slew(_)));
     let within = |(k, s): &(usize, &obsdeg_evidence::simulation::Segment)| {
         let late = if slew(*k) || slew(k + 1) { 0.0 } else { rounding };
         t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + late.max(1e-9)
     };
-    // the end of one position is rather that than the start of the next
+    // a time on the border belongs to the end of the first position
     let (k, found) = plan.segments.iter().enumerate().find(within)?;
     (!slew(k)).then_some(found.position)
 }
 
-/// A row that is kept: its line, its numbers, and how long before it the one before was.
+/// Row in the detector: its line, its numbers, and the interval before it.
 type Kept = (u64, Vec<Option<f64>>, Option<f64>);
 
-/// What happens to a sample.
-struct Taking<'a> {
+/// State of the assignment of samples to positions and bins.
+struct SampleAssignment<'a> {
     layout: &'a Layout,
     plan: &'a Plan,
-    /// Components of Z, in the order of the channels.
+    /// Bins of the components of Z, in the order of the channels.
     binner: Binner,
     out: Reading,
-    /// The position of the bin, and the time of the first sample.
+    /// Index of the position of the bin; `begin` is the time of the first sample.
     now: Option<usize>,
     begin: f64,
-    /// The forces, and the sum of their lengths with their number.
+    /// Forces, and the sum and number of their lengths (`length`).
     forces: Forces,
     length: (f64, usize),
-    /// The noise of a sample, in g.
+    /// Noise of a sample, in g.
     noise: f64,
-    /// The time of the sample before, and how long before it the one before that was.
+    /// Time of the sample before, and the interval before that sample.
     before: Option<(f64, Option<f64>)>,
     /// Intervals between rows.
     intervals: Intervals,
-    /// Finds the positions, where the file says how.
+    /// Detector of intervals at rest, if the file requests it.
     detector: Option<Detector<Kept>>,
-    told: Vec<Told<Kept>>,
+    decided: Vec<DecidedSample<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
-    /// Line, time and values of the samples of the bin, then what the robust pass is to see of every
-    /// position.
+    /// Line, time and values of the samples of the bin; `rows` has the input of the robust pass, by position.
     samples: Vec<(u64, f64, [f64; 3])>,
     /// Number of samples of the bin with a force below the horizon of n.
     over: usize,
     rows: Vec<Vec<gross::Row>>,
-    /// By wanted number: how many cells are empty at positions.
+    /// Number of empty cells at positions, by requested number.
     empty: Vec<usize>,
-    /// Numbers of the row that is taken.
+    /// Numbers of the current row.
     numbers: Vec<Option<f64>>,
-    /// The position whose gimbals are furthest off, by how much in deg, and the line.
+    /// Position with the largest error of the gimbals, the error in deg, and its line.
     gimbals: Option<(usize, f64, u64)>,
 }
 
-impl Taking<'_> {
+impl SampleAssignment<'_> {
     fn names(&self) -> String {
         let names: Vec<&str> =
             self.plan.platform.scheme().positions.iter().map(|p| p.name.as_str()).collect();
         names.join(", ")
     }
 
-    /// The position of a row.
+    /// Position of a row.
     fn position(&self, row: &Row<'_>, t: f64, dt: Option<f64>) -> Result<Option<usize>, CalibrationError> {
         let positions = &self.plan.platform.scheme().positions;
         match self.out.by {
@@ -481,7 +480,7 @@ impl Taking<'_> {
         let mut numbers = std::mem::take(&mut self.numbers);
         numbers.clear();
         numbers.extend_from_slice(row.numbers);
-        // values that the file says are missing ones
+        // codes of missing values by the file
         let codes = &self.plan.platform.scheme().recording.missing;
         if !codes.is_empty() {
             for (number, w) in numbers.iter_mut().zip(&self.layout.wanted).skip(1) {
@@ -493,12 +492,12 @@ impl Taking<'_> {
             self.layout.divide(&mut numbers, dt);
         }
         if let Some(mut detector) = self.detector.take() {
-            // a row without forces says nothing of rest
+            // a row without forces shows no rest
             if let [Some(x), Some(y), Some(z)] = numbers[1..4] {
-                let mut told = std::mem::take(&mut self.told);
-                detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut told);
-                told.drain(..).try_for_each(|one| self.at_rest(&one))?;
-                self.told = told;
+                let mut decided = std::mem::take(&mut self.decided);
+                detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut decided);
+                decided.drain(..).try_for_each(|one| self.at_rest(&one))?;
+                self.decided = decided;
             } else {
                 self.out.unused += 1;
             }
@@ -509,7 +508,7 @@ impl Taking<'_> {
         let found = self.position(row, time, dt)?;
         self.intervals.push(time, row.line, found);
         if self.layout.increments && found != self.now {
-            // a part of it is of the way here
+            // a part of the increment belongs to the motion to this position
             self.layout.divide(&mut numbers, None);
         }
         let taken = self.put((row.line, &numbers, dt), time, found);
@@ -517,7 +516,7 @@ impl Taking<'_> {
         taken
     }
 
-    /// How long before `time` the sample before was, unless there is a gap between them.
+    /// Interval between `time` and the sample before; `None` across a gap.
     fn interval(&mut self, time: f64) -> Option<f64> {
         let dt = self.before.map(|(t, _)| time - t);
         let regular =
@@ -526,23 +525,23 @@ impl Taking<'_> {
         regular
     }
 
-    /// A sample of which it is known whether it is at rest.
-    fn at_rest(&mut self, told: &Told<Kept>) -> Result<(), CalibrationError> {
-        let Some(time) = told.sample.1[0] else { return Ok(()) };
-        if let Some(k) = told.interval {
+    /// Assigns a sample that the detector has decided.
+    fn at_rest(&mut self, decided: &DecidedSample<Kept>) -> Result<(), CalibrationError> {
+        let Some(time) = decided.sample.1[0] else { return Ok(()) };
+        if let Some(k) = decided.interval {
             if k == self.rests.len() {
                 self.rests.push((time, time));
             }
             self.rests[k].1 = time;
         }
         let positions = self.plan.attitudes.len();
-        let found = told.interval.filter(|k| *k < positions);
-        self.intervals.push(time, told.sample.0, found);
-        let (line, numbers, dt) = &told.sample;
+        let found = decided.interval.filter(|k| *k < positions);
+        self.intervals.push(time, decided.sample.0, found);
+        let (line, numbers, dt) = &decided.sample;
         self.put((*line, numbers, *dt), time, found)
     }
 
-    /// Puts a sample where it was taken.
+    /// Assigns a sample to its position.
     fn put(
         &mut self,
         (line, numbers, dt): (u64, &[Option<f64>], Option<f64>),
@@ -581,11 +580,11 @@ impl Taking<'_> {
             self.gimbals = Some((p, off, line));
         }
         let in_n = self.layout.in_n(numbers, c);
-        // Z2 may not be there
+        // Z2 may be missing
         if let ([Some(x), Some(y), Some(z), _], true) = (in_n, self.layout.observed != Observed::Geographic) {
             let f = [x, y + 1.0, z];
             let own = std::array::from_fn(|j| (0..3).map(|i| c[i][j] * f[i]).sum());
-            // the length is what goes up
+            // the vertical component determines the length
             let up = self.layout.sigmas_in_n(numbers, c).and_then(|s| s[1]);
             self.forces.push(p, line, time, own, up.unwrap_or(self.noise));
             // codes of missing values have no length
@@ -606,7 +605,7 @@ impl Taking<'_> {
             for (sigma, &k) in all.iter_mut().zip(components).filter(|(_, k)| **k != AZIMUTH) {
                 *sigma = own[k - 1].unwrap_or(f64::NAN);
             }
-            // a value with a sigma that is none is a mistake; without a value nobody asks
+            // a value with an invalid sigma is an error; without a value the sigma does not matter
             if let Some(k) =
                 (0..components.len()).find(|&k| z[k].is_some() && (all[k].is_nan() || all[k] <= 0.0))
             {
@@ -619,7 +618,7 @@ impl Taking<'_> {
             sigma = Some(all);
         }
         let temperature = self.layout.temperature.and_then(|i| numbers[i]);
-        // a mean is of the middle
+        // a mean belongs to the middle of its interval
         let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
         let spikes = self.out.spikes.len();
         let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
@@ -644,8 +643,8 @@ impl Taking<'_> {
         }
     }
 
-    /// Takes a bin of a position, whose spikes are those from `spikes` on: of the samples of each the column
-    /// that is furthest off is named.
+    /// Adds a bin of a position. Its spikes are those from index `spikes` on; each is replaced by a cell in
+    /// the column that is farthest off.
     fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
         let samples = std::mem::take(&mut self.samples);
         let index = self.out.bins[p].len();
@@ -662,7 +661,7 @@ impl Taking<'_> {
             self.rows[p].extend(samples.iter().map(row));
             return;
         }
-        // some of many say what is usual
+        // the median of a part of the samples is the usual value
         let some = samples.iter().step_by(samples.len().div_ceil(SOME));
         let usual: [f64; 3] = std::array::from_fn(|i| {
             gross::median(some.clone().map(|s| s.2[i]).filter(|x| x.is_finite()).collect())
@@ -693,14 +692,14 @@ impl Taking<'_> {
         }
     }
 
-    /// Takes a cell that does not count, with its value as it is written.
+    /// Adds a cell that is left out, with its value as written in the record.
     fn cell(&mut self, mut cell: gross::Cell) {
         cell.value /= self.layout.wanted[cell.axis + 1].scale;
         self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
     }
 
-    /// Leaves out what a robust pass over every position finds gross. What is a turn (one g long still, at
-    /// either end) is left to say so.
+    /// Leaves out the cells that a robust pass over every position finds gross. A turn (length of 1 g, at
+    /// either end) is kept for the check of positions.
     fn leave_out_gross(&mut self) {
         let noise = self.noise;
         for p in 0..self.rows.len() {
@@ -718,7 +717,7 @@ impl Taking<'_> {
             }
             found.into_iter().for_each(|cell| self.cell(cell));
         }
-        // one value that is far from its neighbours here and there in the record is a code too
+        // a value far from its neighbours that occurs several times in the record is a code too
         let all: Vec<(usize, f64)> = self.out.cells.iter().map(|(c, _)| (c.axis, c.value)).collect();
         let again = |c: &gross::Cell| all.iter().filter(|a| **a == (c.axis, c.value)).count() > 1;
         for (cell, _) in self.out.cells.iter_mut().filter(|(c, _)| c.why == gross::Why::Far && again(c)) {
@@ -727,8 +726,8 @@ impl Taking<'_> {
     }
 }
 
-/// Refuses times in another unit than that of the header: all positions then last so many times as long as
-/// the scheme has them.
+/// Checks for times in another unit than that of the header: all durations then have the same ratio to those
+/// of the scheme.
 fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) -> Result<(), Box<Mistaken>> {
     let dwells: Vec<f64> = bounds(plan).iter().map(|(from, to)| to - from).collect();
     let lasts: Vec<f64> = reading.stays.iter().map(|(from, to)| to - from).collect();
@@ -749,9 +748,9 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
     }
 }
 
-/// Lays positions that are known by labels on the timeline of the scheme, which says when each begins and
-/// ends where rows only say what is between; where they lie inside no such timeline they were held otherwise,
-/// and end with their last rows.
+/// Places positions known by labels on the timeline of the scheme, which says when each begins and ends
+/// between the rows. Positions that do not fit the timeline were held for other durations, and end with their
+/// last rows.
 fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
     let by_clock: Vec<(f64, f64)> =
         reading.stays.iter().map(|(from, to)| (from + reading.origin, to + reading.origin)).collect();
@@ -764,13 +763,13 @@ fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
     }
 }
 
-/// The name of a component of Z.
+/// Name of a component of Z.
 pub(crate) fn channel_name(component: usize) -> String {
     if component == AZIMUTH { "Za".into() } else { format!("Z{component}") }
 }
 
-/// Reads `record` beside the timeline of `plan`, into bins of at most `bin_s`; `sigmas` are about those of a
-/// sample, by channel.
+/// Reads `record` with the timeline of `plan`, into bins of at most `bin_s`; `sigmas` are approximate ones of
+/// a sample, by channel.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -819,7 +818,7 @@ pub(crate) fn observe(
     let of_force = plan.components.iter().zip(&sigmas).find(|(k, _)| **k != AZIMUTH);
     let noise = of_force.map_or(0.0, |(_, sigma)| *sigma);
     let binner = Binner::new(bin_s, sigmas);
-    let mut taking = Taking {
+    let mut assignment = SampleAssignment {
         layout: &layout,
         plan,
         binner,
@@ -832,7 +831,7 @@ pub(crate) fn observe(
         before: None,
         intervals: Intervals::default(),
         detector: still.map(Detector::new),
-        told: Vec::new(),
+        decided: Vec::new(),
         rests: Vec::new(),
         samples: Vec::new(),
         over: 0,
@@ -848,63 +847,63 @@ pub(crate) fn observe(
         if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
             return Err(CalibrationError::Interrupted);
         }
-        taking.take(&row)
+        assignment.take(&row)
     })?;
-    if let Some(mut detector) = taking.detector.take() {
-        let mut told = Vec::new();
-        detector.end(&mut told);
-        told.iter().try_for_each(|one| taking.at_rest(one))?;
-        if taking.rests.len() != positions {
-            let spans: Vec<String> = taking.rests.iter().map(|(a, b)| format!("{a} to {b}")).collect();
+    if let Some(mut detector) = assignment.detector.take() {
+        let mut decided = Vec::new();
+        detector.end(&mut decided);
+        decided.iter().try_for_each(|one| assignment.at_rest(one))?;
+        if assignment.rests.len() != positions {
+            let spans: Vec<String> = assignment.rests.iter().map(|(a, b)| format!("{a} to {b}")).collect();
             return Err(CalibrationError::Rests {
-                record: taking.out.name,
+                record: assignment.out.name,
                 found: spans.len(),
                 expected: positions,
                 spans: if spans.is_empty() { String::new() } else { format!(": {} s", spans.join(", ")) },
             });
         }
     }
-    taking.end();
-    taking.forces.end();
-    taking.out.missing = layout.missing(&record_columns, &taking.empty);
+    assignment.end();
+    assignment.forces.end();
+    assignment.out.missing = layout.missing(&record_columns, &assignment.empty);
     let names: Vec<&str> =
         plan.platform.scheme().positions.iter().map(|position| position.name.as_str()).collect();
-    // forces that are increments of velocity by what the header says, or the other way round
-    let (between, gaps) = std::mem::take(&mut taking.intervals).finish(plan);
-    (taking.out.interval, taking.out.gaps) = (between, gaps);
+    // forces that are increments of velocity by the header, or the other way round
+    let (between, gaps) = std::mem::take(&mut assignment.intervals).finish(plan);
+    (assignment.out.interval, assignment.out.gaps) = (between, gaps);
     let per =
         |(u, size): (&'static str, f64)| (u, size * between.powi(if layout.increments { 1 } else { -1 }));
     let others = units_of_force(!layout.increments, gravity).map(per);
-    taking.forces.check_units(
-        &taking.out.name,
+    assignment.forces.check_units(
+        &assignment.out.name,
         &names,
         &plan.attitudes,
         layout.forces.as_ref(),
         &units_of_force(layout.increments, gravity),
         &others,
     )?;
-    taking.leave_out_gross();
+    assignment.leave_out_gross();
     let inertial = plan.platform.scheme().carry == Carry::Inertial;
-    taking.forces.check_attitudes(&taking.out.name, &names, &plan.attitudes, inertial)?;
+    assignment.forces.check_attitudes(&assignment.out.name, &names, &plan.attitudes, inertial)?;
     if matches!(by, By::Label | By::Static) {
-        check_times(&taking.out, plan, &layout.time)?;
+        check_times(&assignment.out, plan, &layout.time)?;
     }
     let timeline = (by == By::Timeline).then(|| bounds(plan));
-    taking.forces.check_ends(&taking.out.name, &names, &plan.attitudes, timeline.as_deref())?;
-    if let Some((p, off, line)) = taking.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
+    assignment.forces.check_ends(&assignment.out.name, &names, &plan.attitudes, timeline.as_deref())?;
+    if let Some((p, off, line)) = assignment.gimbals.filter(|(_, off, _)| *off > GIMBALS_DEG) {
         return Err(CalibrationError::Gimbals {
-            record: taking.out.name.clone(),
+            record: assignment.out.name.clone(),
             line,
             position: plan.platform.scheme().positions[p].name.clone(),
             off_deg: format!("{off:.1}"),
         });
     }
-    let (length, count) = taking.length;
+    let (length, count) = assignment.length;
     let force = (layout.observed == Observed::Force && count > 0).then(|| length / count as f64);
-    let begin = taking.begin;
-    let gimbals = taking.gimbals.map(|(_, off, _)| off);
-    let lengths = force.map(|_| taking.forces.lengths());
-    let mut out = taking.out;
+    let begin = assignment.begin;
+    let gimbals = assignment.gimbals.map(|(_, off, _)| off);
+    let lengths = force.map(|_| assignment.forces.lengths());
+    let mut out = assignment.out;
     out.lengths = lengths.unwrap_or(out.lengths);
     (out.force, out.gimbals, out.digest) = (force, gimbals, digest);
     out.origin = if matches!(by, By::Label | By::Static) { begin } else { 0.0 };

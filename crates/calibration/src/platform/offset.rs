@@ -1,8 +1,8 @@
-//! The moment at which the scheme begins by the clock of a record, where labels leave it open: drift differs
-//! from position to position, so a beginning that is wrong by some seconds shows at every change of position.
+//! Beginning of the scheme by the clock of a record, where labels leave it open. Drift differs from position
+//! to position, so a beginning that is wrong by some seconds shows at every change of position.
 //!
-//! The sum of squares that is left when all unknowns follow is a parabola of that moment. Labels bound it: it
-//! is uniform between these bounds beforehand, which is taken as a normal distribution of the same variance.
+//! The sum of squares with all unknowns free is a parabola of the beginning. Labels bound it. Its prior is
+//! uniform between these bounds, represented by a normal distribution of the same variance.
 
 use nalgebra::DVector;
 use obsdeg_ekf::consistency::chi_square_band;
@@ -13,44 +13,46 @@ use super::run::Run;
 use super::{CalibrationError, STRICT};
 use crate::least_squares::Information;
 
-/// Part of the open interval by which the beginning is moved to see what that does.
+/// Step for finite differences of the beginning, as a fraction of the open interval.
 const MOVED: f64 = 0.02;
-/// Part of its sigma within which the beginning has settled.
+/// Largest change of a settled beginning, as a fraction of its sigma.
 pub(super) const SETTLED: f64 = 0.1;
-/// Standard deviations from which on a beginning that is not that of the scheme's clock is believed.
+/// Significance, in standard deviations, from which a beginning other than that of the scheme's clock is
+/// accepted.
 const BELIEVED: f64 = 4.0;
 
-/// Such a beginning leaves less than this part of the sum of squares: far from it the parabola is not all.
+/// Largest fraction of the sum of squares that such a beginning may leave: far from it the parabola is not
+/// exact.
 const EXPLAINED: f64 = 0.2;
 
-/// A better beginning of a run.
+/// Better beginning of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Offset {
     /// Shift of the beginning, in s; positive is later.
     pub by: f64,
-    /// Its standard deviation, in s.
+    /// Standard deviation of the shift, in s.
     pub sigma: f64,
-    /// The sum of squares that is left there.
+    /// Sum of squares at the new beginning.
     pub left: f64,
     /// Change of all unknowns per second of shift.
     pub direction: DVector<f64>,
 }
 
-/// Change of the measurements of a run with its beginning, unknowns as they are.
+/// Change of the measurements of a run with its beginning, at fixed unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Later {
     /// Change of every residual per second, in the order of the rows.
     pub column: Vec<f64>,
-    /// Weight of the labels: one over the variance that they leave the beginning, in 1/s^2.
+    /// Weight of the labels: inverse variance of the beginning by the labels alone, in 1/s^2.
     pub weight: f64,
 }
 
 impl Problem<'_> {
-    /// The beginning of run `r` that fits best between `from` and `to` (s of its clock) when all unknowns
-    /// follow; `lay` lays a reading on the timeline.
+    /// Best beginning of run `r` between `from` and `to` (s of its clock) with all unknowns free; `lay`
+    /// places a reading on the timeline.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn offset(
         &self,
         estimate: &Estimate,
@@ -71,7 +73,7 @@ impl Problem<'_> {
             Ok((information.left + solution.left + before, solution.x))
         };
         let [(low, x), (same, _), (high, y)] = [left(-step)?, left(0.0)?, left(step)?];
-        // at least what the labels say
+        // at least the information of the labels
         let curvature = ((low - 2.0 * same + high) / (step * step)).max(2.0 / (width * width));
         let slope = (high - low) / (2.0 * step);
         let best = -slope / curvature;
@@ -84,10 +86,10 @@ impl Problem<'_> {
         })
     }
 
-    /// The beginnings that labels leave open, by run.
+    /// Beginnings that labels leave open, by run.
     ///
     /// # Errors
-    /// As [`Self::offset`].
+    /// See [`Self::offset`].
     pub(super) fn open(
         &self,
         estimate: &Estimate,
@@ -99,11 +101,11 @@ impl Problem<'_> {
         self.runs.iter().enumerate().map(of).collect()
     }
 
-    /// Changes with the beginnings of the runs where labels leave them open. `None` too where a shift moves
-    /// measurements to other bins.
+    /// Changes of the measurements with the beginnings, for runs in which labels leave them open. `None` also
+    /// where a shift moves measurements to other bins.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn later(
         &self,
         estimate: &Estimate,
@@ -130,7 +132,7 @@ impl Problem<'_> {
     /// between rows.
     ///
     /// # Errors
-    /// As [`Self::offset`].
+    /// See [`Self::offset`].
     pub(super) fn begins_elsewhere(
         &self,
         estimate: &Estimate,

@@ -1,4 +1,4 @@
-//! How records are read, before anything is estimated.
+//! Report on how records are read, before anything is estimated.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_evidence::simulation::{Conditions, Plan};
@@ -15,11 +15,11 @@ use crate::record::Record;
 /// Reading of records, as `calibrate --dry-run` shows it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RecordsRead {
-    /// `obsdeg.records/1`.
+    /// Layout of this answer: `obsdeg.records/1`.
     pub schema: String,
-    /// Version of the program.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The records, in the order in which they are given.
+    /// Records, in the order in which they are given.
     pub records: Vec<RecordRead>,
 }
 
@@ -42,12 +42,13 @@ pub struct RecordRead {
     pub interval_s: f64,
     /// First and last time, in s as they are in the record.
     pub span_s: (f64, f64),
-    /// What says where each sample was taken.
+    /// Source of the position of each sample: labels, timeline, both, or intervals at rest.
     pub positions_by: PositionsBy,
-    /// Time of the record, in s, that is 0 of the timeline: the start of the scheme, or of its first row at a
-    /// position where only rows say when positions begin.
+    /// Time of the record, in s, at time 0 of the timeline: the start of the scheme, or the first row at a
+    /// position if only rows show when positions begin.
     pub origin_s: f64,
-    /// Earliest and latest such time, in s, where the labels leave it open; `calibrate` estimates it.
+    /// Earliest and latest time 0 of the timeline, in s, if the labels leave it open; `calibrate` estimates
+    /// it. Null if they do not.
     pub origin_open_s: Option<(f64, f64)>,
     /// Positions of the scheme.
     pub positions: Vec<PositionRead>,
@@ -102,7 +103,7 @@ pub struct CellRead {
     pub why: &'static str,
 }
 
-/// Reads records as [`super::calibrate`] does, and estimates nothing.
+/// Reads records as [`super::calibrate`] does, without an estimate.
 ///
 /// # Errors
 /// [`CalibrationError`].

@@ -1,24 +1,24 @@
-//! What is left of the measurements over time: correlations, the temperature, Allan deviations.
+//! Residuals of the measurements over time: correlations, the temperature, Allan deviations.
 
 use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail, ljung_box};
 
-use super::diagnose::{Left, Parts};
+use super::diagnose::{MeasurementResidual, Parts};
 use super::observe::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
-/// Fewest residuals of which a correlation is told.
+/// Fewest residuals for which a correlation is reported.
 const FEWEST: usize = 40;
-/// Fewest residuals of a position whose correlation with the temperature is told.
+/// Fewest residuals of a position for which the correlation with the temperature is reported.
 const FEWEST_WARM: usize = 10;
 /// Most points of a series.
 const POINTS: usize = 1000;
-/// Lags of the correlation.
+/// Largest lag of the correlation, in residuals.
 const LAGS: usize = 20;
 
 impl Parts<'_> {
-    /// Probability that independent residuals are correlated as these are.
+    /// Probability that independent residuals are as correlated as these.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
         let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
         let series: Vec<f64> = own.map(|l| l.normalised).collect();
@@ -26,8 +26,8 @@ impl Parts<'_> {
         (series.len() >= FEWEST).then(|| ljung_box(&autocorrelation(&series, lags), series.len()))
     }
 
-    /// How the residuals of a channel go with the temperature, position by position: what is fixed to the
-    /// platform changes its sign in n.
+    /// Correlation of the residuals of a channel with the temperature, position by position: an effect fixed
+    /// to the platform changes its sign in n.
     pub(super) fn warmth(&self, run: usize, channel: usize) -> Option<Warmth> {
         let reading = &self.problem.runs[run].reading;
         let places: Vec<(usize, usize)> = self.problem.runs[run].bins.iter().flatten().copied().collect();
@@ -36,7 +36,7 @@ impl Parts<'_> {
             let (position, i) = places[l.key.bin];
             pairs[position].extend(reading.bins[position][i].temperature.map(|t| (t, l.normalised)));
         }
-        // of independent ones artanh r is normal, with variance 1/(n - 3)
+        // for independent pairs artanh r is normal, with variance 1/(n - 3)
         let all = pairs.iter().filter(|p| p.len() >= FEWEST_WARM).filter_map(|p| {
             let r = correlation(p)?;
             Some((r, r.clamp(-1.0, 1.0).atanh() * (p.len() as f64 - 3.0).sqrt()))
@@ -56,7 +56,7 @@ impl Parts<'_> {
                 run.bins.iter().flatten().map(of).collect()
             })
             .collect();
-        let of = |l: &Left| Residual {
+        let of = |l: &MeasurementResidual| Residual {
             record: l.run,
             position: l.key.position,
             channel: l.key.channel,
@@ -68,7 +68,7 @@ impl Parts<'_> {
         self.found.all.iter().map(of).collect()
     }
 
-    /// What is left over time.
+    /// Residuals over time, by channel.
     pub(super) fn series(&self) -> Vec<ResidualSeries> {
         let all = self.residuals();
         let mut out = Vec::new();
@@ -109,7 +109,7 @@ impl Parts<'_> {
     }
 }
 
-/// The coefficient of correlation; `None` where one of the two is constant.
+/// Coefficient of correlation; `None` where one of the two is constant.
 fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len() as f64;
     let (x, y) = pairs.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));

@@ -1,4 +1,4 @@
-//! The record of one run on its own timeline: the scheme with the times of the record, linearised along a
+//! Record of one run on its own timeline: the scheme with the times of the record, linearised along a
 //! trajectory.
 
 use nalgebra::{DMatrix, DVector};
@@ -14,38 +14,37 @@ use super::timeline::slews;
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;
 
-/// No two bins are closer, in s.
+/// Smallest distance between two bins, in s.
 const CLOSEST: f64 = 1e-6;
 
-/// A run with its bins on its timeline.
+/// Run with its bins on its timeline.
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
     pub reading: Reading,
     pub plan: Plan,
-    /// The bin at the end of each segment of the plan, by position.
+    /// Bin at the end of each segment of the plan, as (position, index).
     pub bins: Vec<Option<(usize, usize)>>,
-    /// Per bin (in order) and channel: whether it counts.
+    /// Flags by bin (in order) and channel: true if the measurement counts.
     pub counts: Vec<Vec<bool>>,
 }
 
-/// Which measurement a row of a linearised run is.
+/// Measurement of a row of a linearised run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Key {
     pub position: usize,
-    /// The bin of the run, in order.
+    /// Index of the bin in the run.
     pub bin: usize,
     pub channel: usize,
 }
 
-/// The conditions of an estimate: random drift is a density, since the bins of a record are as long as they
-/// are.
+/// Conditions of an estimate: random drift is a density, since the bins of a record have different lengths.
 pub(crate) fn conditions(of: &Conditions) -> Conditions {
     let density = of.drift_noise.density_deg_sqrt_h(of.drift_noise_step_s);
     Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
 }
 
-/// Parts of a position that begins at `begin`: the steps to its bins, and what is left of it. Bins are inside
-/// it, whatever their stamps.
+/// Parts of a position that begins at `begin`: the steps to its bins, and the rest. Bins lie inside the
+/// position, whatever their stamps.
 fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
     let mut at = begin;
     let mut out: Vec<(usize, f64)> = Vec::with_capacity(bins.len() + 1);
@@ -62,8 +61,8 @@ fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
 }
 
 impl Run {
-    /// Lays a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as
-    /// the record says.
+    /// Places a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as
+    /// in the record.
     ///
     /// # Errors
     /// [`CalibrationError`].
@@ -79,15 +78,15 @@ impl Run {
         let slews = slews(planned);
         let slew_s = |p: usize| slews[p];
         if reading.by == By::Static {
-            // a window is no longer at rest before and behind a turn alike: the turn is in the middle of the
-            // gap
+            // a window is not at rest for equal times before and behind a turn: the turn is in the middle of
+            // the gap
             for p in 1..stays.len() {
                 stays[p - 1].1 += ((stays[p].0 - stays[p - 1].1 - slew_s(p)) / 2.0).max(0.0);
             }
         }
         if matches!(reading.by, By::Label | By::Static) {
-            // the platform leaves a position after its last sample, and what of a gap is no slew is spent at
-            // the next
+            // the platform leaves a position after its last sample, and spends the rest of a gap without slew
+            // at the next position
             let mut left = 0.0;
             for (p, position) in own.positions.iter_mut().enumerate() {
                 let turned = slew_s(p);
@@ -130,12 +129,12 @@ impl Run {
         Ok(Self { reading, plan, bins, counts })
     }
 
-    /// The number of its bins.
+    /// Number of bins.
     pub(crate) fn len(&self) -> usize {
         self.counts.len()
     }
 
-    /// What its bins say, with the time of each from its start, in order.
+    /// Measurements of the run in order, with their keys and bins.
     pub(crate) fn measured(&self) -> impl Iterator<Item = (Key, Mean, &Bin)> + '_ {
         let of = self.bins.iter().flatten().enumerate();
         of.flat_map(move |(bin, &(position, i))| {
@@ -148,7 +147,7 @@ impl Run {
     /// Tilts of the platform along the trajectory from `x0`, step by step.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn tilts(
         &self,
         conditions: &Conditions,
@@ -160,11 +159,11 @@ impl Run {
         Ok(self.plan.segments.iter().enumerate().map(tilt).collect::<Result<_, _>>()?)
     }
 
-    /// Linearised along the trajectory from `x0`, with all of its bins that count; `sigmas` are those of a
+    /// Run linearised along the trajectory from `x0`, with all bins that count; `sigmas` are those of a
     /// sample, by channel.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(crate) fn along(
         &self,
         conditions: &Conditions,
@@ -174,11 +173,11 @@ impl Run {
         self.along_parts(conditions, sigmas, x0, &[])
     }
 
-    /// The same along a trajectory in parts: each node says at which segment its part begins, and with which
-    /// attitude (the constants are those of the trajectory).
+    /// Run linearised along a trajectory in parts: each node has the segment at which its part begins, and
+    /// its attitude (the constants are those of the trajectory).
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn along_parts(
         &self,
         conditions: &Conditions,
@@ -224,7 +223,7 @@ impl Run {
     }
 }
 
-/// The root of the noise of a segment of a plan on all `n` states, without directions of none.
+/// Root of the noise of a segment of a plan on all `n` states, without directions of zero noise.
 pub(super) fn noise_root(plan: &Plan, segment: usize, n: usize) -> DMatrix<f64> {
     let root = &plan.noise_roots[segment];
     let moved: Vec<usize> = plan.psi_columns(segment).iter().copied().chain(plan.unknowns()..n).collect();

@@ -1,12 +1,12 @@
-//! The start of the iteration, by multiple shooting ("lifted" Gauss-Newton; Bock, Plitt 1984,
+//! Start of the iteration, by multiple shooting ("lifted" Gauss-Newton; Bock, Plitt 1984,
 //! doi:10.1016/S1474-6670(17)61205-9).
 //!
-//! Large drifts turn the platform by tens of degrees in a run, so a trajectory that starts where all unknowns
-//! are zero is nowhere near the run, and its late measurements say nothing of the unknowns. So the trajectory
-//! is in parts, two for every dwell. Each begins with the attitude that turns gravity to where it was
-//! measured by the smallest angle. The gaps between the parts are condensed into the unknowns of the run: a
-//! pass costs what one without parts does. A step is cut by what it turns any part by; the gaps are in no sum
-//! of squares, so cost decides nothing here.
+//! Large drifts turn the platform by tens of degrees in a run. A trajectory from zero unknowns is then far
+//! from the run, and its late measurements carry no information on the unknowns. The trajectory is therefore
+//! divided into parts, two per dwell. Each begins with the attitude that turns gravity to its measured
+//! direction by the smallest angle. The gaps between the parts are condensed into the unknowns of the run, so
+//! that a pass costs as much as one without parts. A step is limited by the turn of any part. The gaps are in
+//! no sum of squares, so cost does not decide here.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Manifold, Update};
@@ -18,21 +18,20 @@ use super::run::Run;
 
 /// Most passes.
 const PASSES: usize = 40;
-/// Parts of a dwell.
+/// Number of parts of a dwell.
 const PARTS: usize = 2;
 /// Fewest bins of a part.
 const FEWEST: usize = 4;
-/// Parts have settled when no step turns the beginning of one by more, in rad.
+/// Convergence limit: largest turn of the beginning of a part, in rad.
 const SETTLED: f64 = 1e-5;
 
-/// A run in parts: where it starts, and the segments at which later parts begin, each with its attitude.
+/// Run in parts: its start, and the segments at which later parts begin, with their attitudes.
 struct Parts {
     start: PlatformState,
     nodes: Vec<(usize, PlatformState)>,
 }
 
-/// The value at time 0 of the parabola through points (of a line or a constant, where they are few), by least
-/// squares.
+/// Value at time 0 of the least-squares parabola through points (of a line or a constant, if they are few).
 fn at_zero(points: &[(f64, f64)]) -> Option<f64> {
     let degree = match points.len() {
         0 => return None,
@@ -48,8 +47,8 @@ fn at_zero(points: &[(f64, f64)]) -> Option<f64> {
 }
 
 impl Run {
-    /// Gravity in n as it was measured at the beginning of the first of some segments, by the bins in all of
-    /// them; `None` where too little was measured.
+    /// Gravity in n as measured at the beginning of the first of some segments, by the bins in all of them;
+    /// `None` without enough measurements.
     fn gravity(&self, segments: &[usize]) -> Option<[f64; 3]> {
         let mut t = 0.0;
         let mut points: [Vec<(f64, f64)>; 3] = Default::default();
@@ -71,13 +70,13 @@ impl Run {
         }
         let [z1, z2, z3] = points.map(|p| at_zero(&p));
         let (x, z) = (-z1?, -z3?);
-        // one g long, where Z2 is not measured
+        // length of 1 g, where Z2 is not measured
         let up = (1.0 - x * x - z * z).max(0.0).sqrt();
         let y = z2.map_or(if 2 * over > bins { up } else { -up }, |z2| -1.0 - z2);
         Some([x, y, z])
     }
 
-    /// The run in parts, each beginning level with what was measured, from `start` where nothing was.
+    /// Run in parts, each levelled by its measurements, or beginning from `start` where there are none.
     fn in_parts(&self, conditions: &Conditions, start: &PlatformState) -> Result<Parts, CalibrationError> {
         let filter = Extended::new(&self.plan, conditions, Update::default())?;
         let mut out = Parts { start: start.clone(), nodes: Vec::new() };
@@ -110,11 +109,11 @@ impl Run {
 }
 
 impl Problem<'_> {
-    /// The start of every run by multiple shooting, with constants from those of `x`; where it is when it is
-    /// stopped, `None` where the parts do not settle.
+    /// Starts of all runs by multiple shooting, with constants from those of `x`. If the work is stopped, the
+    /// current starts; `None` if the parts do not converge.
     ///
     /// # Errors
-    /// [`CalibrationError`] when a number is none.
+    /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn shoot(&self, x: &[PlatformState]) -> Result<Option<Vec<PlatformState>>, CalibrationError> {
         let each = self.runs.iter().zip(x).map(|(run, x)| run.in_parts(self.conditions, x));
         let mut parts = each.collect::<Result<Vec<Parts>, _>>()?;
@@ -165,7 +164,7 @@ mod tests {
     use crate::platform::observe::observe;
     use crate::record::Record;
 
-    /// Three positions with turns of 1 deg/s between them, and a record of next to nothing.
+    /// Three positions with turns of 1 deg/s between them, and a minimal record.
     fn run(terms: &str) -> (Run, Conditions, Vec<f64>) {
         let attitudes = ["NUE", "ENU", "DSW"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
@@ -192,7 +191,7 @@ mod tests {
         (Run::new(reading, &scheme, &plan, &conditions).expect("a run"), conditions, sigmas)
     }
 
-    /// A start far from zero: psi 10 deg, drifts 13 deg/h and 5 deg/h/g, all else 3e-4.
+    /// A start far from zero: psi 10 deg, drifts 13 deg/h and 5 deg/h/g, all other unknowns 3e-4.
     fn far(run: &Run) -> PlatformState {
         let size = |unit: &str| match unit {
             "rad" => 10f64.to_radians() / 3f64.sqrt(),
@@ -206,8 +205,8 @@ mod tests {
         PlatformState::of_unknowns(&x, run.plan.constants())
     }
 
-    /// Largest difference of the rows of a run and the differences of its own prediction, over the largest
-    /// row of the same unknown.
+    /// Largest difference between the rows of a run and the differences of its own prediction, over the
+    /// largest row of the same unknown.
     fn gap(terms: &str) -> f64 {
         let (run, conditions, sigmas) = run(terms);
         let x = far(&run);
@@ -244,8 +243,8 @@ mod tests {
     }
 
     /// The rows of a run, dwells and slews, are the derivatives of its own prediction by the start, at drifts
-    /// of 13 deg/h and a psi of 10 deg. Differences of 1e-9 rad/s and 1e-5 rad are cut off at 1e-10 and have
-    /// rounding of 1e-10.
+    /// of 13 deg/h and a psi of 10 deg. Differences of 1e-9 rad/s and 1e-5 rad have a truncation error of
+    /// 1e-10 and a rounding error of 1e-10.
     #[test]
     fn rows_are_derivatives_of_the_prediction_far_from_zero() {
         for terms in ["F,I,O,S", "all"] {
@@ -254,7 +253,7 @@ mod tests {
         }
     }
 
-    /// Levelled parts see gravity where it was measured.
+    /// Levelled parts have gravity in its measured direction.
     #[test]
     fn parts_begin_level() {
         let (run, conditions, _) = run("F,I,O,S");
@@ -268,7 +267,7 @@ mod tests {
         let psi = motion.levelled(&seen).expect("not upside down");
         let x = zero.with_psi(motion.block(), &psi);
         let z = obsdeg_ekf::Measurement::h(&motion, 0.0, &x);
-        // Z = g - what is seen, components 1 and 3
+        // Z = g - measured gravity, components 1 and 3
         let expected = [-seen[0] / length, -seen[2] / length];
         assert!(z.iter().zip(expected).all(|(z, e)| (z - e).abs() < 1e-12), "{z}");
     }

@@ -1,10 +1,11 @@
-//! Suspects: errors that the scheme does not estimate and that would explain what the fit leaves.
+//! Suspects: errors that the scheme does not estimate and that would explain the residuals of the fit.
 //!
-//! Residuals and the column of every omitted error go through the same filter, whose start says nothing: its
-//! whitened innovations are residuals from which every change of the unknowns is taken out, with the random
-//! drift of the run. Columns are those at the estimated attitudes: beside a tilt of degrees those of the
-//! scheme would be no combination of the unknowns where the true ones are. Where labels leave the beginning
-//! of the scheme open, it is one more unknown. Of several records each has unknowns of its own.
+//! Residuals and the column of every omitted error pass through the same filter with a diffuse start. Its
+//! whitened innovations are residuals without the part that changes of the unknowns explain, with the random
+//! drift of the run. Columns are those at the estimated attitudes: with a tilt of degrees, columns at the
+//! scheme's attitudes would no longer be the combinations of the unknowns that the true ones are. Where
+//! labels leave the beginning of the scheme open, it is one more unknown. Each of several records has
+//! unknowns of its own.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::Assignment;
@@ -25,13 +26,13 @@ use super::offset::Later;
 use super::run::{Key, Run};
 use crate::answer::{Estimated, Omitted, SilentError};
 
-/// How many times wider than the prior the start of the filter is.
+/// Factor by which the start of the filter is wider than the prior.
 const WIDE: f64 = 1e4;
 /// Most estimates whose change is listed.
 const CHANGES: usize = 3;
 
-/// Uncertainty of the coefficients by what is not estimated, in their shown units, by the weights of the
-/// first record.
+/// Uncertainty of the coefficients by omitted errors, in their shown units, by the weights of the first
+/// record.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outside {
     /// Contribution of a bench to the sigma of every coefficient, by name (root of the sum of squares).
@@ -62,8 +63,8 @@ pub(super) struct FamilyChange {
     pub changes: Vec<(String, f64)>,
 }
 
-/// The omitted errors of a calibration: those that explain residuals, and those that no record of the scheme
-/// shows; beside them the uncertainty of the coefficients by what is not estimated.
+/// Omitted errors of a calibration: those that explain residuals, and those that no record of the scheme
+/// shows. Also returns the uncertainty of the coefficients by omitted errors.
 ///
 /// # Errors
 /// [`CalibrationError`] for a number that is not finite.
@@ -139,7 +140,7 @@ fn families(
     out
 }
 
-/// Changes by errors that no record shows: they do not depend on the weights, so that no prior takes part.
+/// Changes by errors that no record shows: they depend neither on the weights nor on a prior.
 struct Silent<'a> {
     platform: &'a Platform,
     /// Change of every unknown per unit of every error, in shown units.
@@ -172,10 +173,10 @@ impl<'a> Silent<'a> {
     }
 }
 
-/// Sums of all runs, and the change of every coefficient of the platform per SI unit of every error.
+/// Sums over all runs, and the change of every coefficient of the platform per SI unit of every error.
 struct Tested {
     score: Score,
-    /// By name of the coefficient, with its unit.
+    /// Changes by coefficient: name, unit, and one change per error.
     changes: Vec<(String, &'static str, Vec<f64>)>,
 }
 
@@ -236,7 +237,7 @@ fn tested(
         score.degrees_of_freedom += own.len() as f64 - unknowns as f64;
         if let Some(later) = &later[r] {
             let (x, mut of_beginning) = through(&later.column)?;
-            // one more measurement: what labels say of the beginning. The fit has settled with it
+            // one more measurement, of the beginning by the labels; the fit has settled with it
             let known = later.weight.sqrt();
             own.push(-dot(&of_beginning, &own) / known);
             of_beginning.push(known);
@@ -272,7 +273,7 @@ fn tested(
     Ok(Tested { score, changes })
 }
 
-/// The columns of all errors in the measurements of a run, in their order, at these tilts.
+/// Columns of all errors in the measurements of a run, in their order, at these tilts.
 fn columns(
     run: &Run,
     model: &OmittedModel,
@@ -315,11 +316,11 @@ fn suspicion(
             indistinguishable: names(group),
         }
     });
-    // each of a group explains the residuals as well, and may change the estimates in another way
+    // each error of a group explains the residuals as well, and may change the estimates differently
     let alone = |&j: &usize| vec![(j, tested.score.against[j] / tested.score.products[(j, j)])];
     let best: Vec<(usize, f64)> =
         found.errors.iter().zip(&found.estimates).map(|(&j, e)| (j, e[0])).collect();
-    // of a pair the others of its groups are named, without a range of changes
+    // for a pair the other members of its groups are named, without a range of changes
     let group = if found.errors.len() == 1 { &found.groups[0][..] } else { &[] };
     let members: Vec<Vec<(usize, f64)>> = std::iter::once(best).chain(group.iter().map(alone)).collect();
     let mut changes: Vec<(f64, SuspectedChange)> = Vec::new();

@@ -1,34 +1,32 @@
-//! The clock of a record beside the timeline of its scheme: when the scheme begins by that clock, and where
-//! rows are missing.
+//! Clock of a record compared with the timeline of its scheme: the beginning of the scheme by that clock, and
+//! intervals with missing rows.
 //!
-//! A row labelled with a position lies inside it. So the first and the last row of every position bound the
-//! moment at which the scheme begins. Where these bounds hold zero, the clock of the record is that of the
-//! scheme.
+//! A row labelled with a position lies inside it, so the first and the last row of every position bound the
+//! beginning of the scheme. If these bounds contain zero, the clock of the record is that of the scheme.
 
 use obsdeg_evidence::simulation::{Plan, Segment, SegmentKind};
 
 use super::clock::bounds;
 
-/// An interval between rows that is longer than so many usual ones is a gap.
+/// Ratio to the usual interval from which an interval between rows is a gap.
 const GAP: f64 = 3.0;
 /// Most gaps that are kept.
 const MOST: usize = 1000;
 /// Smallest difference of times, in s: below it they are equal but for rounding.
 const ROUNDING_S: f64 = 1e-9;
-/// Largest rate of a clock that is tried, as a part.
+/// Largest rate of a clock that is tried, as a fraction.
 const FASTEST: f64 = 0.1;
 
-/// The moments of a record's clock at which its scheme may begin.
+/// Beginning of a scheme by the clock of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Begin {
-    /// The one that is taken, in s.
+    /// Beginning that is used, in s.
     pub at: f64,
-    /// The earliest and the latest, in s; `None` where the one that is taken is that of the scheme's own
-    /// clock.
+    /// Earliest and latest beginning, in s; `None` where the beginning is that of the scheme's own clock.
     pub open: Option<(f64, f64)>,
 }
 
-/// Bounds of the beginning where positions last `1 + rate` times as long as in the scheme.
+/// Bounds of the beginning if positions last `1 + rate` times as long as in the scheme.
 fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) {
     let each = || stays.iter().zip(bounds);
     let from = each().map(|(stay, own)| stay.1 - (1.0 + rate) * own.1).fold(f64::NEG_INFINITY, f64::max);
@@ -36,9 +34,9 @@ fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) 
     (from, to)
 }
 
-/// When the scheme begins by the clock of a record whose positions have their first and last rows at `stays`
-/// (s): all of these lie inside the positions of the timeline, but for `tolerance` s. `None` where no
-/// beginning makes them.
+/// Beginning of the scheme by the clock of a record with the first and last rows of its positions at `stays`
+/// (s). All of these lie inside the positions of the timeline, within `tolerance` s. `None` where no
+/// beginning satisfies this.
 pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option<Begin> {
     let (from, to) = window(stays, &bounds(plan), 0.0);
     let tolerance = tolerance.max(ROUNDING_S);
@@ -49,12 +47,12 @@ pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option
     let nearest = 0.0_f64.clamp(from, to);
     let at = if nearest.abs() <= ROUNDING_S { 0.0 } else { nearest };
     let open = (at.abs() > tolerance && to - from > tolerance).then_some((from, to));
-    // rows of a position that are all there leave one interval open: its middle is as likely as any
+    // complete rows of a position leave one interval open: its middle is as likely as any other time
     Some(Begin { at: open.map_or(at, |(from, to)| (from + to) / 2.0), open })
 }
 
-/// The rate, as a part, by which positions last longer than in the scheme so that all rows lie inside them:
-/// the middle of the rates that do.
+/// Excess duration of the positions over the scheme, as a fraction, with which all rows lie inside them: the
+/// middle of the possible values.
 fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
     let beyond = |rate: f64| {
         let (from, to) = window(stays, bounds, rate);
@@ -87,9 +85,8 @@ pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
     (0..plan.attitudes.len()).map(of).collect()
 }
 
-/// The ends of positions that were held otherwise than in the scheme: the last row of each or, where rows are
-/// missing behind it, so many intervals later as a common rate has it;
-/// `after` has the next row of any kind.
+/// Ends of positions with other durations than in the scheme: the last row of each or, where rows are missing
+/// behind it, as many intervals later as a common rate requires. `after` has the next row of any kind.
 pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interval: f64, tolerance: f64) {
     let (own, slews) = (bounds(plan), slews(plan));
     let Some(rate) = rate(stays, &own, tolerance) else { return };
@@ -104,22 +101,22 @@ pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interva
     }
 }
 
-/// An interval without rows.
+/// Interval without rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gap {
-    /// The rows before and after it, in s of the record's clock.
+    /// Times of the rows before (`from`) and after it, in s of the record's clock.
     pub from: f64,
     pub to: f64,
-    /// The line of the row after it.
+    /// Line of the row after the gap.
     pub line: u64,
-    /// The positions of these rows.
+    /// Positions of these rows.
     pub between: [Option<usize>; 2],
 }
 
 /// Intervals between the rows of a record.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Intervals {
-    /// The first ones, until the usual one is known.
+    /// First intervals, kept until the usual one is known.
     first: Vec<Gap>,
     usual: Option<f64>,
     last: Option<(f64, Option<usize>)>,
@@ -130,7 +127,7 @@ pub(crate) struct Intervals {
 const FIRST: usize = 101;
 
 impl Intervals {
-    /// Takes a row.
+    /// Adds a row.
     pub(crate) fn push(&mut self, t: f64, line: u64, position: Option<usize>) {
         if let Some((from, before)) = self.last.replace((t, position)) {
             let gap = Gap { from, to: t, line, between: [before, position] };
@@ -152,7 +149,7 @@ impl Intervals {
         }
     }
 
-    /// The record is over, or its usual interval is known.
+    /// Determines the usual interval from the first ones, at the end of the record at the latest.
     fn end(&mut self) {
         let mut all: Vec<f64> = self.first.iter().map(|g| g.to - g.from).collect();
         let middle = all.len() / 2;
@@ -163,8 +160,8 @@ impl Intervals {
         }
     }
 
-    /// The usual interval in s, one second of a single row; and the gaps: of those over a slew what of them
-    /// is longer than it.
+    /// Usual interval in s (one second for a single row), and the gaps; a slew within a gap does not count as
+    /// missing rows.
     pub(crate) fn finish(mut self, plan: &Plan) -> (f64, Vec<Gap>) {
         if self.usual.is_none() {
             self.end();

@@ -1,4 +1,4 @@
-//! What a calibration of a system says, and why there is none.
+//! Answer of a calibration of a system, and the reasons why there is none.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::ModelError;
@@ -200,157 +200,162 @@ pub struct Profile {
     pub flat: bool,
 }
 
-/// A measurement and what is left of it.
+/// Residual of one measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemResidual {
-    /// The output, from 0.
+    /// Index of the output, from 0.
     pub output: usize,
-    /// The experiment, from 0.
+    /// Index of the experiment, from 0.
     pub experiment: usize,
-    /// The line.
+    /// Line of the record.
     pub line: u64,
-    /// The time.
+    /// Time of the measurement, in the unit of the model.
     pub t: f64,
-    /// What was measured.
+    /// Measured value.
     pub measured: f64,
     /// Measurement minus estimate.
     pub residual: f64,
-    /// Its sigma.
+    /// Standard deviation of the measurement.
     pub sigma: f64,
-    /// What the others leave of it, in sigma.
+    /// Difference from the value that all other measurements predict, in sigma.
     pub normalised: f64,
 }
 
-/// Why a system cannot be calibrated.
+/// Reason why a system cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SystemCalibrationError {
-    /// The model.
+    /// Error of the model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The record.
+    /// Error of the record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// What records of some kinds cannot have.
+    /// A property of the model that calibrations do not support.
     #[error("a model with {what} cannot be calibrated yet; expected one without")]
     NotYet {
-        /// What it has.
+        /// Name of the property.
         what: &'static str,
     },
     /// Too many columns.
     #[error("{found} columns are needed; expected at most {MOST}")]
     TooMany {
-        /// How many.
+        /// Number of columns.
         found: usize,
     },
-    /// Times that take too long to follow.
+    /// The times need too many integration steps.
     #[error(
-        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
+        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected \
+         at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
     )]
     TooLong {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The last time.
+        /// Last time.
         last: f64,
-        /// How many steps they take.
+        /// Number of steps that the times need.
         found: f64,
-        /// The longest step.
+        /// Longest step.
         longest: f64,
-        /// How many there may be.
+        /// Largest number of steps allowed.
         most: f64,
     },
-    /// Rows that the model cannot have.
+    /// A value that the model excludes.
     #[error("{record}: line {line}, column `{column}`: found {found}, expected {expected}")]
     Value {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The line.
+        /// Line of the record.
         line: u64,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// What there is.
+        /// Value that was found.
         found: String,
-        /// Changes that would meet every requirement.
+        /// Expected values.
         expected: String,
     },
-    /// Less data than unknowns.
+    /// Fewer measurements than unknowns.
     #[error("{found} measurements of {unknowns} unknowns that the model determines; expected more")]
     TooFew {
-        /// Measurements.
+        /// Number of measurements.
         found: usize,
-        /// Unknowns.
+        /// Number of unknowns.
         unknowns: usize,
     },
-    /// Interrupted before there was anything.
+    /// The caller stopped the work before there was an estimate.
     #[error("interrupted before anything was estimated")]
     Interrupted,
-    /// A record that counts already.
+    /// A record counts already.
     #[error(
         "{record} has the same numbers as {other}; expected another record, since what is the same says nothing twice"
     )]
     SameRecord {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// The one that it is.
+        /// Name of the equal record.
         other: String,
     },
-    /// A calibration of another system.
+    /// A prior calibration of another system.
     #[error("the prior calibration says nothing of this model: it has {found}")]
     Prior {
-        /// What it has.
+        /// Unknowns of the prior calibration.
         found: String,
     },
-    /// A calibration of a system with constraints, for one without.
+    /// A prior calibration with constraints, for a model without them.
     #[error(
-        "the prior calibration knows {found} as constraints make them, which the model has not; expected the same `constraints`"
+        "the prior calibration knows {found} as constraints make them, which the model has not; expected the \
+         same `constraints`"
     )]
     PriorHeld {
-        /// What it has of the unknowns of the model.
+        /// Unknowns of the model that the prior calibration constrains.
         found: String,
     },
     /// Constraints that cannot be met.
     #[error(
-        "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected constraints that hold at once, and values under [simulation.values] near the solution"
+        "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected \
+         constraints that hold at once, and values under [simulation.values] near the solution"
     )]
     Unheld {
-        /// How many were tried.
+        /// Number of starts that were tried.
         starts: usize,
-        /// The first that does not.
+        /// First constraint that does not hold.
         constraint: String,
     },
-    /// A constraint that says nothing where it holds.
+    /// A constraint without slope at the solution.
     #[error(
-        "the constraint {constraint} has no slope at the solution, as a square has none where it is zero; expected one that changes with the unknowns in it"
+        "the constraint {constraint} has no slope at the solution, as a square has none where it is zero; \
+         expected one that changes with the unknowns in it"
     )]
     Flat {
-        /// The constraint.
+        /// Name of the constraint.
         constraint: String,
     },
-    /// Nothing to learn from intervals at rest.
+    /// Too few intervals at rest.
     #[error(
         "{record}: {found} intervals at rest; expected two at least (record.static says how they are found)"
     )]
     NoRest {
-        /// The record.
+        /// Name of the record.
         record: String,
-        /// How many there are.
+        /// Number of intervals found.
         found: usize,
     },
-    /// Nowhere a number.
+    /// No start gives numbers at all rows.
     #[error(
-        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values under [simulation.values] near the solution"
+        "from none of {starts} starts does the model give numbers at all rows: {reason}; expected values \
+         under [simulation.values] near the solution"
     )]
     Nowhere {
-        /// How many were tried.
+        /// Number of starts that were tried.
         starts: usize,
-        /// What the first said.
+        /// Error of the first start.
         reason: EkfError,
     },
-    /// A profile of nothing.
+    /// A profile of a name that is no unknown.
     #[error("no unknown is called `{found}`; expected one of {expected}")]
     NoUnknown {
-        /// The name.
+        /// Name that was found.
         found: String,
-        /// Those that there are.
+        /// Names of the unknowns.
         expected: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What a calibration before says of the unknowns of a model.
+//! Information of a prior calibration on the unknowns of a model.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,12 +7,12 @@ use super::constraints::bound_and_free;
 use super::fit::{Problem, size};
 use crate::answer::CovarianceTable;
 
-/// The variance of what a constraint of the calibration before held, as a part of all variances: rounding.
+/// Relative variance, by the trace, below which a direction counts as constrained by the prior calibration.
 const HELD: f64 = 1e-14;
 
-/// Rows and values of what `table` says of the free unknowns `names` of `problem`, with unit errors. Where
-/// the constraints of the model bind what was held before, only what it says along them counts: they hold by
-/// themselves, and are not straight.
+/// Rows and values of the information of `table` on the free unknowns `names` of `problem`, with unit errors.
+/// Along directions that the prior calibration had constrained and the model constrains too, the prior adds
+/// nothing: the nonlinear constraints hold by themselves.
 pub(super) fn said_before(
     table: &CovarianceTable,
     names: &[&str],
@@ -37,12 +37,12 @@ pub(super) fn said_before(
     let m = found.len();
     let mut x = DVector::from_iterator(names.len(), problem.free.iter().map(|&i| base[i]));
     found.iter().for_each(|&(k, j)| x[j] = table.estimates[k]);
-    // in parts of the unknowns
+    // relative to the sizes of the unknowns
     let sizes: Vec<f64> = found.iter().map(|&(_, j)| size(x[j])).collect();
     let entry = |i: usize, j: usize| table.covariance[found[i].0][found[j].0] / sizes[i] / sizes[j];
     let mut p = DMatrix::from_fn(m, m, entry);
     let whole = p.trace();
-    // what constraints say of these unknowns alone: their rows without what others could make up for
+    // constraints on these unknowns alone: their rows without the part that other unknowns can compensate
     let rows = problem.bounds(base, &x);
     let own = DMatrix::from_fn(rows.nrows(), m, |i, k| rows[(i, found[k].1)]);
     let mut others = rows;

@@ -1,5 +1,5 @@
-//! What constraints leave of the unknowns: values at which they hold, and the directions in which these may
-//! still go.
+//! Constraints on the unknowns: values at which they hold, and the directions in which the unknowns stay
+//! free.
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 use obsdeg_ekf::EkfError;
@@ -7,32 +7,32 @@ use obsdeg_ekf::decomposition::singular_values;
 
 use super::fit::{Problem, size};
 
-/// Steps back to where constraints hold.
+/// Most steps back to a point where the constraints hold.
 const BACK: usize = 30;
-/// A constraint holds where what is left of it is this part of the terms in it; rounding may leave more, not
-/// as much as `ROUGHLY`.
+/// Residual of a constraint, relative to its terms, at which it holds. Rounding may leave more, up to
+/// `ROUGHLY`.
 const HOLDS: f64 = 1e-15;
 const ROUGHLY: f64 = 1e-10;
-/// Constraints say the same where their rows, of unit length, have singular values below.
+/// Singular value of rows of unit length below which constraints are redundant.
 const SAME: f64 = 1e-9;
-/// A constraint has no slope where it has this part of what it has nearby.
+/// Slope of a constraint, relative to that nearby, below which it has none.
 const FLAT: f64 = 1e-4;
 
-/// Constraints at some unknowns.
-struct Left {
-    /// What is left of them, as parts of the terms in them.
+/// Residuals and derivatives of the constraints.
+struct ConstraintResiduals {
+    /// Relative residuals, by the terms of the constraints.
     over: DVector<f64>,
-    /// The same as distances along `rows`.
+    /// Residuals as distances along `rows`.
     far: DVector<f64>,
-    /// Their derivatives (constraints x free unknowns) by the unknowns in parts of their sizes, of unit
-    /// length; zero where all in them is known.
+    /// Derivatives (constraints x free unknowns) by the unknowns relative to their sizes, rows of unit
+    /// length; zero for a constraint among known quantities.
     rows: DMatrix<f64>,
-    /// The terms in them.
+    /// Sizes of the terms of the constraints.
     terms: Vec<f64>,
 }
 
 impl Problem<'_> {
-    fn left(&self, base: &DVector<f64>, x: &DVector<f64>, fixed: Option<usize>) -> Left {
+    fn left(&self, base: &DVector<f64>, x: &DVector<f64>, fixed: Option<usize>) -> ConstraintResiduals {
         let all = self.all(base, x);
         let (over, by_all) = self.numeric.constraints(&all);
         let by = |i: usize, j: usize| match fixed == Some(j) {
@@ -48,7 +48,7 @@ impl Problem<'_> {
             row.iter_mut().for_each(|c| *c = part(*c, *length));
         }
         let distance = |i: usize, _| if lengths[i] == 0.0 { 0.0 } else { over[i] / lengths[i] };
-        Left {
+        ConstraintResiduals {
             over: DVector::from_fn(over.len(), |i, _| part(over[i], terms[i])),
             far: DVector::from_fn(over.len(), distance),
             rows,
@@ -56,11 +56,11 @@ impl Problem<'_> {
         }
     }
 
-    /// Values near `x` at which the constraints hold, by steps that are least in parts of the unknowns; the
-    /// unknown `fixed` stays.
+    /// Values near `x` at which the constraints hold, by the least steps relative to the sizes of the
+    /// unknowns; the unknown `fixed` stays.
     ///
     /// # Errors
-    /// The number of the constraint of which most is left.
+    /// Index of the constraint with the largest residual.
     pub(super) fn held(
         &self,
         base: &DVector<f64>,
@@ -68,7 +68,7 @@ impl Problem<'_> {
         fixed: Option<usize>,
     ) -> Result<DVector<f64>, usize> {
         for _ in 0..BACK {
-            let Left { over, far, rows, .. } = self.left(base, &x, fixed);
+            let ConstraintResiduals { over, far, rows, .. } = self.left(base, &x, fixed);
             let finite = far.iter().chain(rows.iter()).all(|c| c.is_finite());
             if !finite || over.iter().all(|c| c.abs() <= HOLDS) {
                 break;
@@ -81,8 +81,8 @@ impl Problem<'_> {
         if over.iter().all(|c| *c <= ROUGHLY) { Ok(x) } else { Err(over.imax()) }
     }
 
-    /// The directions (free unknowns x any) in which constraints leave the unknowns free at `x`, orthonormal
-    /// in parts of their sizes; the unknown `fixed` counts as free.
+    /// Directions (free unknowns x any) in which constraints leave the unknowns free at `x`, orthonormal
+    /// relative to their sizes; the unknown `fixed` counts as free.
     pub(super) fn ways(
         &self,
         base: &DVector<f64>,
@@ -92,24 +92,24 @@ impl Problem<'_> {
         Ok(bound_and_free(&self.left(base, x, fixed).rows)?.1)
     }
 
-    /// The rows of the constraints at `x` (constraints x free unknowns), of unit length, by the unknowns in
-    /// parts of their sizes.
+    /// Rows of the constraints at `x` (constraints x free unknowns), of unit length, by the unknowns relative
+    /// to their sizes.
     pub(super) fn bounds(&self, base: &DVector<f64>, x: &DVector<f64>) -> DMatrix<f64> {
         self.left(base, x, None).rows
     }
 
-    /// A constraint whose slope vanishes at `x`, as that of a square does where it is zero: it says nothing
-    /// there.
+    /// Index of a constraint whose slope vanishes at `x`, as that of a square does at zero: it determines
+    /// nothing there.
     pub(super) fn flat(&self, base: &DVector<f64>, x: &DVector<f64>) -> Option<usize> {
         let here = self.left(base, x, None).terms;
-        // somewhere near, as far in no two unknowns
+        // a point nearby, at a different distance for each unknown
         let moved = |j: usize, _| x[j] + 1e-3 * size(x[j]) * (1.0 + (1.618 * (j + 1) as f64).fract());
         let near = self.left(base, &DVector::from_fn(x.len(), moved), None).terms;
         (0..here.len()).find(|&i| here[i] < FLAT * near[i])
     }
 }
 
-/// The shortest of the steps that come nearest to `rows` times it being `far`.
+/// Shortest step among those for which `rows` times the step is nearest to `far`.
 fn least(rows: &DMatrix<f64>, far: &DVector<f64>) -> Result<DVector<f64>, EkfError> {
     let (m, n) = rows.shape();
     let (values, directions) = singular_values(&rows.clone().resize_vertically(m.max(n), 0.0))?;

@@ -1,4 +1,4 @@
-//! The data of a model: the rows of a record, by experiment.
+//! Data of a model: the rows of a record, by experiment.
 
 use std::ops::Range;
 
@@ -11,61 +11,61 @@ use crate::Going;
 use crate::record::{MOST, Record, RecordError, Row, Wanted};
 use crate::still::Detector;
 
-/// It is told that a record is read every so many samples.
+/// Interval of progress reports, in samples.
 const OFTEN: usize = 10_000;
 
-/// A row of the record.
+/// Row of the record.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
     pub(super) line: u64,
     pub(super) experiment: usize,
-    /// Rows of another run begin at the start anew.
+    /// Number of the run; rows of another run begin at the start again.
     pub(super) run: usize,
-    /// Of the timeline: a segment begins with its first row.
+    /// Index of the segment, which begins with its first row.
     pub(super) segment: usize,
     pub(super) t: f64,
-    /// Values of inputs, and their standard deviations.
+    /// Values of the inputs, with their standard deviations.
     pub(super) inputs: Vec<(f64, f64)>,
-    /// By output.
+    /// Measurements by output; `None` where the cell is empty.
     pub(super) outputs: Vec<Option<f64>>,
-    /// By output, where the record says so.
+    /// Standard deviations by output; `None` where the record states none.
     pub(super) sigmas: Vec<Option<f64>>,
 }
 
-/// The data of a model.
+/// Data of a model.
 pub(super) struct Read {
     pub(super) rows: Vec<Data>,
-    /// Known inputs that have values in every row.
+    /// Known inputs with values in every row.
     pub(super) inputs: Vec<usize>,
-    /// The record and the digest of its numbers.
+    /// Name of the record; `digest` is that of its numbers.
     pub(super) name: String,
     pub(super) digest: String,
     pub(super) ignored: Vec<String>,
     pub(super) samples: usize,
-    /// The time of the record that is the start of the model, where it is not 0.
+    /// Time of the record at the start of the model; `None` if it is 0.
     pub(super) begins: Option<f64>,
-    /// Intervals at rest, where they are sought.
+    /// Number of intervals at rest; `None` unless they are sought.
     pub(super) intervals: Option<usize>,
 }
 
-/// Where the value of a known input comes from.
+/// Source of the value of a known input.
 #[derive(Debug, Clone, Copy)]
 enum From {
-    /// A wanted number, and that of its standard deviation.
+    /// Index of the requested number, and that of its standard deviation.
     Column(usize, Option<usize>),
-    /// The mean of another of the inputs in the interval before.
+    /// Mean of another input in the interval before.
     Before(usize),
 }
 
-/// Which wanted numbers of a row are what.
+/// Meaning of the requested numbers of a row.
 struct Columns {
     wanted: Vec<Wanted>,
-    /// Known inputs with values in every row, and where these come from.
+    /// Known inputs with values in every row, and their sources.
     inputs: Vec<(usize, From)>,
-    /// Outputs: a column and that of its standard deviation, or what it is known to be.
+    /// Outputs: the indices of the number and of its standard deviation, or a known value.
     outputs: Vec<Result<(usize, Option<usize>), f64>>,
     label: Option<usize>,
-    /// The wanted number of the segment.
+    /// Index of the requested number of the segment.
     segment: Option<usize>,
     ignored: Vec<String>,
 }
@@ -159,7 +159,7 @@ pub(super) fn read(
     let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
     let mut rows: Vec<Data> = Vec::new();
     let segments = model.segments.len().max(1);
-    // the segment and the time of the last row of every experiment
+    // segment and time of the last row of every experiment
     let mut reached = vec![(0, f64::NEG_INFINITY); experiments];
     let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
         let samples = rows.len() + 1;
@@ -182,7 +182,7 @@ pub(super) fn read(
             }
         };
         let t = row.numbers[0].unwrap_or(f64::NAN);
-        // an experiment may go on behind rows of another
+        // an experiment may continue behind rows of another
         let (last, time) = reached[experiment];
         let mut segment = last;
         if let Some(i) = columns.segment {
@@ -256,7 +256,7 @@ pub(super) fn read(
             ways(&rows, &found, &columns.inputs)
         };
     } else {
-        // each experiment in one piece
+        // rows of each experiment together
         rows.sort_by_key(|r| r.experiment);
         begins = from_first_rows(&mut rows);
     }
@@ -264,11 +264,11 @@ pub(super) fn read(
     Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
 }
 
-/// A record that begins so many times its own length after 0 has times of another clock.
+/// Ratio of first time to duration from which a record uses another clock than the model.
 const CLOCK: f64 = 100.0;
 
-/// Times from the first row of every experiment, where all of them begin by another clock than that of the
-/// model; gives the first such row's time.
+/// Changes times to those from the first row of every experiment, if all experiments use another clock than
+/// the model. Returns the time of the first row.
 fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
     let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
     let other = |of: &[Data]| {
@@ -286,15 +286,15 @@ fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
     Some(begins)
 }
 
-/// The intervals at rest, by the inputs `by`.
+/// Intervals at rest by the inputs `by`, as ranges of rows.
 fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
-    let (mut detector, mut told) = (Detector::new(still), Vec::new());
+    let (mut detector, mut decided) = (Detector::new(still), Vec::new());
     for (i, row) in rows.iter().enumerate() {
-        detector.push(row.t, by.iter().map(|&k| row.inputs[k].0).collect(), i, &mut told);
+        detector.push(row.t, by.iter().map(|&k| row.inputs[k].0).collect(), i, &mut decided);
     }
-    detector.end(&mut told);
+    detector.end(&mut decided);
     let mut out: Vec<Range<usize>> = Vec::with_capacity(detector.found());
-    for one in told {
+    for one in decided {
         match one.interval {
             Some(k) if k + 1 == out.len() => out[k].end = one.sample + 1,
             Some(_) => out.push(one.sample..one.sample + 1),
@@ -304,8 +304,8 @@ fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
     out
 }
 
-/// The mean of some rows, with the standard deviations of all means: those of independent samples. Inputs of
-/// the interval before are those of `before`.
+/// Mean of some rows, with the standard deviations of the means of independent samples. Inputs of the
+/// interval before come from `before`.
 fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();
@@ -332,13 +332,13 @@ fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data 
         t: (first.t + last.t) / 2.0,
         inputs: inputs.iter().enumerate().map(input).collect(),
         outputs: outputs.iter().map(|o| o.map(|(mean, _)| mean)).collect(),
-        // what is the same in every row is known
+        // a value equal in every row is exact
         sigmas: outputs.iter().map(|o| o.map(|(_, sigma)| sigma).filter(|s| *s > 0.0)).collect(),
     }
 }
 
-/// The ways from each interval to the next, a run each: the samples between them, then the means of the next,
-/// where outputs are measured.
+/// Motions from each interval to the next, one run each: the samples between them, then the means of the next
+/// interval with the measured outputs.
 fn ways(rows: &[Data], intervals: &[Range<usize>], inputs: &[(usize, From)]) -> Vec<Data> {
     let mut out = Vec::new();
     for (run, pair) in intervals.windows(2).enumerate() {

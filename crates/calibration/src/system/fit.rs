@@ -1,4 +1,4 @@
-//! Least squares of a model on the rows of its data: Levenberg and Marquardt with the Jacobians of its graph.
+//! Least squares of a model on the rows of its data: Levenberg-Marquardt with the Jacobians of its graph.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_ekf::decomposition::singular_values;
@@ -12,57 +12,57 @@ use crate::least_squares::{Rows, Solution};
 
 /// Most iterations from a start.
 const PASSES: usize = 200;
-/// Rows of a long evaluation between two questions whether to go on.
+/// Number of rows of a long evaluation between two calls of `going`.
 const OFTEN: usize = 256;
-/// Steps of integration from which on an evaluation takes long.
+/// Number of integration steps from which an evaluation counts as long.
 pub(super) const LONG: f64 = 20_000.0;
-/// An iteration has settled when it moves by less than this, in standard deviations as the fit has them.
+/// Convergence limit: largest step, in standard deviations by the fit.
 const SETTLED: f64 = 1e-5;
-/// A pull is weak: so many times wider than an unknown is large.
+/// Width of a weak pull, relative to the size of an unknown.
 pub(super) const WEAK: f64 = 1e7;
 
-/// A model with its data.
+/// Model with its data.
 pub(super) struct Problem<'a> {
     pub(super) numeric: Numeric<'a>,
     pub(super) data: &'a Read,
     /// Filter states that are estimated.
     pub(super) free: Vec<usize>,
-    /// By output: the noise of the model's file, or as estimated; what a record says comes first.
+    /// Noise by output: from the model's file, or as estimated; a sigma of the record takes precedence.
     pub(super) noise: Vec<f64>,
     /// Longest step of integration.
     pub(super) longest: f64,
-    /// Rows and values of what was known before of the free unknowns, with unit errors.
+    /// Rows and values of the prior information on the free unknowns, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
-    /// True if an evaluation takes long: then it is asked on the way too, and may end there.
+    /// True if an evaluation is long: `going` is then also called within it, and can end it.
     pub(super) long: bool,
-    /// Hears of every evaluation; where it says no, iterations end.
+    /// Progress callback, called for every evaluation; iterations end when it returns false.
     pub(super) going: &'a dyn Fn(Going<'_>) -> bool,
-    /// How many there were.
+    /// Number of evaluations.
     pub(super) passes: usize,
-    /// True if it said no.
+    /// True if the callback returned false.
     pub(super) stopped: bool,
 }
 
-/// Rows of the model at some unknowns: a row of derivatives by the free unknowns, what is left, and sigma.
+/// Rows of the model at some unknowns: derivatives by the free unknowns, residuals, and sigmas.
 pub(super) struct At {
     pub(super) rows: DMatrix<f64>,
     pub(super) left: DVector<f64>,
     pub(super) sigmas: Vec<f64>,
-    /// Row of the data and output.
+    /// Row of the data and index of the output, by row.
     pub(super) keys: Vec<(usize, usize)>,
-    /// The same of what was known before, with unit errors.
+    /// Rows and residuals of the prior information, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
-    /// Where unknowns may go ([`Problem::ways`]).
+    /// Directions in which the unknowns are free ([`Problem::ways`]).
     pub(super) ways: DMatrix<f64>,
 }
 
 impl At {
-    /// The sum of squares in sigma.
+    /// Sum of squares in sigma.
     pub(super) fn cost(&self) -> f64 {
         self.cost_by(&self.sigmas)
     }
 
-    /// The same with other sigmas: those of errors of inputs are what they are at the unknowns of the moment.
+    /// Sum of squares with other sigmas: those by errors of the inputs change with the unknowns.
     pub(super) fn cost_by(&self, sigmas: &[f64]) -> f64 {
         let measured: f64 = self.left.iter().zip(sigmas).map(|(e, s)| (e / s).powi(2)).sum();
         measured + self.known.1.norm_squared()
@@ -70,7 +70,7 @@ impl At {
 }
 
 impl Problem<'_> {
-    /// All filter states of free values `x`, known starts from the others.
+    /// All filter states at the free values `x`; known starts follow from the others.
     pub(super) fn all(&self, base: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
         let mut out = base.clone();
         self.free.iter().zip(x.iter()).for_each(|(&i, v)| out[i] = *v);
@@ -78,7 +78,7 @@ impl Problem<'_> {
         out
     }
 
-    /// The derivatives of all filter states at the start by the free ones.
+    /// Derivatives of all filter states at the start by the free ones.
     pub(super) fn of_free(&self, base: &DVector<f64>, x: &DVector<f64>) -> DMatrix<f64> {
         let n = base.len();
         let mut out = DMatrix::zeros(n, self.free.len());
@@ -95,7 +95,7 @@ impl Problem<'_> {
         out
     }
 
-    /// The model at free values `x`, in steps `1/finer` as long.
+    /// Rows of the model at the free values `x`, with integration steps `1/finer` as long.
     pub(super) fn at(&mut self, base: &DVector<f64>, x: &DVector<f64>, finer: usize) -> Result<At, EkfError> {
         self.passes += 1;
         self.stopped |= !(self.going)(Going::Passes(self.passes));
@@ -127,7 +127,7 @@ impl Problem<'_> {
                 return Err(EkfError::Interrupted);
             }
             let part = row.experiment * segments + segment;
-            // what was held until here, then what is held from here on
+            // the values held until here, then those held from here on
             if row.t > now.1 {
                 let process = self.numeric.process(part);
                 let steps = ((row.t - now.1) / self.longest).ceil().max(1.0) as usize * finer;
@@ -169,7 +169,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The variance that errors of the inputs of a row make of every output.
+    /// Variance of every output by the errors of a row's inputs.
     pub(super) fn by_inputs(&mut self, part: usize, row: &Data, x: &DVector<f64>, ones: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; ones.len()];
         for (&input, &(value, sigma)) in self.data.inputs.iter().zip(&row.inputs) {
@@ -188,13 +188,13 @@ impl Problem<'_> {
     }
 }
 
-/// How large an unknown is, for a pull.
+/// Size of an unknown, for a pull.
 pub(super) fn size(x: f64) -> f64 {
     x.abs().max(1e-3)
 }
 
-/// The step from `at`, pulled by `pull` per size of an unknown, as far as constraints leave a way: the root
-/// of the solution is by these ways.
+/// Step from `at`, with a pull of `pull` per size of an unknown, along the directions that constraints leave
+/// free. The root of the solution refers to these directions.
 pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
     let mut ways = at.ways.clone();
     ways.row_iter_mut().zip(x.iter()).for_each(|(mut row, x)| row.scale_mut(size(*x)));
@@ -210,12 +210,12 @@ pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, Ekf
     Ok(Solution { x: &ways * found.x, inverse_root: &ways * found.inverse_root, ..found })
 }
 
-/// Why there is no end of an iteration.
+/// Reason why an iteration does not end.
 #[derive(Debug, Clone)]
 pub(super) enum Stuck {
-    /// The model gives no numbers.
+    /// The model gives no finite numbers.
     Numbers(EkfError),
-    /// The constraint of this number does not hold.
+    /// The constraint of this index does not hold.
     Held(usize),
 }
 
@@ -225,7 +225,7 @@ impl From<EkfError> for Stuck {
     }
 }
 
-/// Where an iteration ended.
+/// End of an iteration.
 #[derive(Debug, Clone)]
 pub(super) struct Settled {
     pub(super) x: DVector<f64>,
@@ -233,7 +233,7 @@ pub(super) struct Settled {
     pub(super) converged: bool,
 }
 
-/// Levenberg and Marquardt from `x`; unknowns with `fixed` stay.
+/// Levenberg-Marquardt from `x`; the unknown `fixed` stays.
 pub(super) fn settle(
     problem: &mut Problem<'_>,
     base: &DVector<f64>,
@@ -253,7 +253,7 @@ pub(super) fn settle(
     x = problem.held(base, x, fixed).map_err(Stuck::Held)?;
     let mut at = there(problem, &x)?;
     let mut cost = at.cost();
-    // a pull as strong as the data say little at first
+    // an initial pull much weaker than the data
     let mut pull = 1e-2 * (cost.max(1.0)).sqrt();
     let mut converged = false;
     for _ in 0..PASSES {
@@ -265,7 +265,7 @@ pub(super) fn settle(
         let next = moved.and_then(|moved| Some((there(problem, &moved).ok()?, moved)));
         let next = next.filter(|(n, _)| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
         let scale = (cost / at.sigmas.len() as f64).max(1.0).sqrt();
-        // how far it would go without the pull
+        // remaining step without the pull
         let weak = step(&at, &x, 1.0 / WEAK)?;
         let left = determined_part(&at, &weak);
         if left <= SETTLED * scale {
@@ -288,22 +288,22 @@ pub(super) fn settle(
     Ok(Settled { x, cost, converged })
 }
 
-/// How far a step moves the outputs, in sigma.
+/// Change of the outputs by a step, in sigma.
 pub(super) fn determined_part(at: &At, solution: &Solution) -> f64 {
     let moved = &at.rows * &solution.x;
     let measured: f64 = moved.iter().zip(&at.sigmas).map(|(m, s)| (m / s).powi(2)).sum();
     (measured + (&at.known.0 * &solution.x).norm_squared()).sqrt()
 }
 
-/// The part of a measurement that follows it.
+/// Leverage of a measurement: the fraction of it that the fit follows.
 pub(super) fn leverage(at: &At, solution: &Solution, i: usize) -> f64 {
     let row = at.rows.row(i) * &solution.inverse_root;
     (row.norm() / at.sigmas[i]).powi(2)
 }
 
-/// The number of combinations that the data determine: a pull is all there is of the others.
+/// Number of combinations that the data determine; only the pull holds the others.
 pub(super) fn rank(solution: &Solution) -> usize {
-    // of unknowns in parts of their size the root has singular values of the pull, or far larger ones
+    // relative to sizes, singular values of the root are those of the pull, or far larger
     let values = singular_values(&solution.root).map(|(v, _)| v).unwrap_or_default();
     values.iter().filter(|v| **v > 10.0 / WEAK).count()
 }

@@ -1,4 +1,4 @@
-//! Any system calibrated from data: Gauss and Newton with the Jacobians of the model's own graph, from
+//! Calibration of any system from data: Gauss-Newton with the Jacobians of the model's own graph, from
 //! several starts.
 
 mod answer;
@@ -37,28 +37,28 @@ use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size,
 
 /// Name and version of the JSON layout.
 const SCHEMA: &str = "obsdeg.system-calibration/1";
-/// A pull ten times as weak leaves the sigma of what is determined.
+/// Largest ratio of sigmas, for a pull ten times as weak, of a determined unknown.
 const DETERMINED: f64 = 1.05;
-/// The probability with which right data are in their bands.
+/// Probability with which right data lie in their bands.
 const STRICT: f64 = 0.999;
-/// Most steps of integration over all rows, and for each row besides.
+/// Most integration steps over all rows, and in addition per row.
 const STEPS: f64 = 50_000.0;
 const STEPS_A_ROW: f64 = 50.0;
-/// Doublings of the steps of integration that are tried.
+/// Most doublings of the number of integration steps.
 const DOUBLINGS: usize = 6;
-/// Rounds in which the noise is estimated.
+/// Most rounds of estimating the noise.
 const ROUNDS: usize = 30;
 
-/// What is wanted.
+/// Options of a system calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemOptions {
-    /// How many starts.
+    /// Number of starts.
     pub starts: usize,
-    /// Unknowns of which a profile is wanted.
+    /// Names of the unknowns with a requested profile.
     pub profiles: Vec<String>,
-    /// A calibration before: what it says of unknowns of the same names.
+    /// Prior calibration: it applies to unknowns of the same names.
     pub prior: Option<Before<String>>,
-    /// Seed.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 /// Calibrates `model` from a record.
@@ -87,19 +87,19 @@ pub fn calibrate_system(
         !stopped.get()
     };
     let found = Calibrating::new(model, &compiled, numeric, &data, options, &going)?.run();
-    // an evaluation that ended on its way leaves no numbers
+    // an evaluation that was stopped leaves no numbers
     found.map_err(|e| if stopped.get() { SystemCalibrationError::Interrupted } else { e })
 }
 
-/// The digest of a model: of what its verdicts depend on.
+/// Digest of a model, by everything that its verdicts depend on.
 fn digest(model: &SystemModel) -> String {
     format!("{:016x}", model.random(0, "calibration").next_u64())
 }
 
-/// A combination: its text, its degree, its value, and its derivatives by unknowns.
+/// Combination: its text, degree, value, and derivatives by unknowns.
 type OfInvariant = (String, Option<usize>, f64, Vec<(usize, f64)>);
 
-/// Everything on the way.
+/// State of a calibration.
 struct Calibrating<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
@@ -108,7 +108,7 @@ struct Calibrating<'a> {
     problem: Problem<'a>,
     /// All filter states at the first start.
     base: DVector<f64>,
-    /// Whether the noise of an output is estimated.
+    /// True for each output whose noise is estimated.
     estimated: Vec<bool>,
 }
 
@@ -159,7 +159,7 @@ impl<'a> Calibrating<'a> {
         }
         let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
         let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
-        // counted before anything begins
+        // checked before the work begins
         let mut found = 0.0;
         for run in data.rows.chunk_by(|a, b| (a.experiment, a.run) == (b.experiment, b.run)) {
             let steps = |from: f64, to: f64| ((to - from) / longest).ceil().max(1.0);
@@ -206,7 +206,7 @@ impl<'a> Calibrating<'a> {
         if let Some(i) = self.problem.flat(&self.base, &best.x) {
             return Err(SystemCalibrationError::Flat { constraint: constraint(i) });
         }
-        // steps of integration until finer ones change nothing that shows
+        // more integration steps until the solution does not change visibly
         let mut finer = 1;
         let mut best = best;
         for _ in 0..DOUBLINGS {
@@ -228,7 +228,7 @@ impl<'a> Calibrating<'a> {
             finer *= 2;
             best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(stuck)?;
         }
-        // noise that nobody gave
+        // noise that is not stated
         for _ in 0..ROUNDS {
             let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
             let factors = self.factors(&at, &best.x).map_err(nowhere)?;
@@ -288,7 +288,7 @@ impl<'a> Calibrating<'a> {
                 estimate(&c.text, "", Some(v.status), v.degree, determined, values[i], &terms)
             });
         let mut combinations: Vec<SystemEstimated> = combinations.collect();
-        // what the symmetries of the model leave observable of what is not
+        // identifiable combinations of unknowns that are not determined alone, by the symmetries of the model
         for (text, degree, value, terms) in self.invariants(&judged, &names, &best.x)? {
             if combinations.iter().any(|c| c.name == text) {
                 continue;
@@ -366,8 +366,8 @@ impl<'a> Calibrating<'a> {
         })
     }
 
-    /// Products and sums of what is not determined alone that the model determines: as text, with the degree,
-    /// their values at `x` and their derivatives by the unknowns `names`. Those of known starts are none.
+    /// Identifiable products and sums of unknowns that are not determined alone: their text, degree, value at
+    /// `x`, and derivatives by the unknowns `names`. Combinations with known starts are left out.
     fn invariants(
         &self,
         judged: &Judgement,
@@ -394,7 +394,7 @@ impl<'a> Calibrating<'a> {
         Ok(found.invariants.iter().zip(reports).filter_map(of).collect())
     }
 
-    /// The records that the estimates rest on.
+    /// Records that the estimates rest on.
     fn rests_on(&self) -> Vec<Basis> {
         let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
         let before = self.options.prior.iter().flat_map(|b| b.rests_on.iter());
@@ -402,7 +402,7 @@ impl<'a> Calibrating<'a> {
         std::iter::once(own.clone()).chain(before.cloned()).collect()
     }
 
-    /// True if the calibration before rests on the same record.
+    /// True if the prior calibration rests on the same record.
     fn shared(&self) -> bool {
         let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
         self.options.prior.as_ref().is_some_and(|b| own.among(&b.rests_on).is_some())
@@ -417,7 +417,7 @@ impl<'a> Calibrating<'a> {
         }
     }
 
-    /// What the noise of every output is to be multiplied by: 1 where it is given.
+    /// Factors on the noise of the outputs: 1 where it is given.
     fn factors(&self, at: &At, x: &DVector<f64>) -> Result<Vec<f64>, EkfError> {
         let solution = step(at, x, 1.0 / WEAK)?;
         let of = |j: usize| {
@@ -430,7 +430,7 @@ impl<'a> Calibrating<'a> {
         Ok((0..self.estimated.len()).map(of).collect())
     }
 
-    /// Profiles: an unknown at values about its estimate, all others following.
+    /// Profiles: chi-square at values of an unknown about its estimate, with all others fitted.
     fn profiles(
         &mut self,
         names: &[String],
@@ -443,7 +443,7 @@ impl<'a> Calibrating<'a> {
             let j = names.iter().position(|n| n == name).ok_or_else(|| {
                 SystemCalibrationError::NoUnknown { found: name.clone(), expected: names.join(", ") }
             })?;
-            // three sigma, or half of what nobody knows
+            // three sigma, or half of the size where sigma is large
             let width = (3.0 * solution.sigma(&[(j, 1.0)])).min(0.5 * size(best.x[j]));
             let mut points = vec![(best.x[j], 0.0)];
             for side in [-1.0, 1.0] {
@@ -458,7 +458,7 @@ impl<'a> Calibrating<'a> {
                 }
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            // what constraints alone make it has no other values
+            // an unknown that constraints alone determine has no other values
             points.dedup_by(|a, b| a.0 == b.0);
             let flat = points.len() > 1 && points.iter().all(|p| p.1.abs() < 0.01);
             out.push(Profile { name: name.clone(), points, flat });
@@ -467,12 +467,12 @@ impl<'a> Calibrating<'a> {
     }
 }
 
-/// The name without its experiment.
+/// Name of an unknown without its experiment.
 fn plain(name: &str) -> &str {
     name.split_once('@').map_or(name, |(n, _)| n)
 }
 
-/// A first noise of an output: a tenth of its standard deviation.
+/// First estimate of the noise of an output: a tenth of its standard deviation.
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let n = values.clone().count().max(1) as f64;
     let mean = values.clone().sum::<f64>() / n;

@@ -1,4 +1,4 @@
-//! What is left of every measurement, by output, and which of them the others do not explain.
+//! Residuals of the measurements by output, and measurements that disagree with the others.
 
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_quantile, ljung_box, student_quantile};
 
@@ -7,7 +7,7 @@ use super::fit::{At, leverage};
 use super::{Calibrating, STRICT};
 use crate::least_squares::Solution;
 
-/// Fewest residuals of which a correlation is told.
+/// Fewest residuals of which a correlation is reported.
 const FEWEST: usize = 40;
 
 impl Calibrating<'_> {
@@ -64,9 +64,9 @@ impl Calibrating<'_> {
         (0..self.model.outputs.len()).map(of).collect()
     }
 
-    /// Measurements that the others do not explain: residuals studentised without the measurement itself
-    /// (Cook, Weisberg 1982, 2.2.1), so that one that is far off does not hide in the sigma that it makes.
-    /// Where sigmas are given, only what is far off by these as well.
+    /// Measurements that disagree with the others: residuals studentised without the measurement itself
+    /// (Cook, Weisberg 1982, 2.2.1), so that an outlier does not hide in the sigma that it causes. Where
+    /// sigmas are given, it must be far off by these as well.
     pub(super) fn outliers(&self, residuals: &[SystemResidual], outputs: &[OutputFit]) -> Vec<SystemFinding> {
         let normal = student_gate(f64::INFINITY, residuals.len());
         let of = |r: &SystemResidual| {
@@ -81,8 +81,8 @@ impl Calibrating<'_> {
         residuals.iter().filter_map(of).collect()
     }
 
-    /// Chi-square and degrees of freedom of the measurements that say how large the noise of an output is:
-    /// its own where that is estimated, else all whose noise is given.
+    /// Chi-square and degrees of freedom of the measurements that determine the noise of an output: its own
+    /// where that is estimated, otherwise all whose noise is given.
     fn group(&self, output: usize, outputs: &[OutputFit]) -> (f64, f64) {
         let own = |j: &usize| if self.estimated[output] { *j == output } else { !self.estimated[*j] };
         let some = (0..outputs.len()).filter(own);
@@ -94,20 +94,20 @@ impl Calibrating<'_> {
         })
     }
 
-    /// The same with the gates of all outputs.
+    /// Outputs with their gates for outliers.
     pub(super) fn with_gates(&self, mut outputs: Vec<OutputFit>) -> Vec<OutputFit> {
         let count = outputs.iter().map(|o| o.measurements).sum();
         for j in 0..outputs.len() {
             let free = self.group(j, &outputs).1 - 1.0;
-            // of one other no sigma is told
+            // one other measurement gives no sigma
             outputs[j].outlier_gate = (free >= 1.0).then(|| student_gate(free, count));
         }
         outputs
     }
 }
 
-/// Beyond what no right residual of so many is, but with a probability of one in a thousand, where sigma is
-/// that of others with `free` degrees of freedom.
+/// Gate in sigma that right residuals, `of` in number, exceed with a probability of one in a thousand in all;
+/// sigma comes from others with `free` degrees of freedom.
 fn student_gate(free: f64, of: usize) -> f64 {
     let each = (1.0 - STRICT) / of.max(1) as f64;
     match free.is_finite() {

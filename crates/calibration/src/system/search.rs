@@ -1,4 +1,4 @@
-//! Where iterations start, when there have been enough of them, and where they end.
+//! Starts of the iterations, the rule that ends the search, and the comparison of the solutions.
 
 use nalgebra::DVector;
 use obsdeg_evidence::simulation::Noise;
@@ -8,17 +8,17 @@ use super::answer::{OtherSolution, OtherStarts};
 use super::fit::{Settled, Stuck, settle, size};
 use crate::least_squares::Solution;
 
-/// Two solutions are one when all that is determined differs by less, in sigma.
+/// Difference in sigma of the determined unknowns below which two solutions are the same.
 const SAME: f64 = 1e-2;
-/// A solution is listed beside the best when its sum of squares is not larger by more, in units of what is
-/// left per degree of freedom.
+/// Largest excess of the sum of squares of a listed solution over the best, in units of the residual
+/// chi-square per degree of freedom.
 const NEAR: f64 = 25.0;
-/// How far starts are from each other: standard deviation of their logarithm.
+/// Scatter of the starts: standard deviation of their logarithm.
 const SPREAD: f64 = 1.5;
-/// Two ends of iterations are one solution when what is observable differs by less, as a part.
+/// Relative difference of the observable unknowns below which two ends of iterations are the same solution.
 const ALIKE: f64 = 1e-3;
 
-/// Ends that settled, one of each solution by what `counts`, with their number.
+/// Converged ends, one of each solution by the unknowns that `counts` selects, with the number of ends at it.
 fn apart<'a>(ends: &'a [Settled], counts: &dyn Fn(usize) -> bool) -> Vec<(&'a Settled, usize)> {
     let mut out: Vec<(&Settled, usize)> = Vec::new();
     for end in ends.iter().filter(|e| e.converged) {
@@ -35,15 +35,16 @@ fn apart<'a>(ends: &'a [Settled], counts: &dyn Fn(usize) -> bool) -> Vec<(&'a Se
     out
 }
 
-/// True if no more solutions are expected than were found: with w of them from n starts, w (n - 1) / (n - w -
-/// 2) < w + 1/2 (C. G. E. Boender, A. H. G. Rinnooy Kan, Math. Programming 37, 1987, doi:10.1007/BF02591684).
+/// True if no more solutions are expected than were found. The criterion for w solutions from n starts is
+/// `w (n - 1) / (n - w - 2) < w + 1/2` (C. G. E. Boender, A. H. G. Rinnooy Kan, Math. Programming 37, 1987,
+/// doi:10.1007/BF02591684).
 fn enough(found: usize, starts: usize) -> bool {
     let (w, n) = (found as f64, starts as f64);
     n > w + 2.0 && w * (n - 1.0) / (n - w - 2.0) < w + 0.5
 }
 
 impl Calibrating<'_> {
-    /// The starts: that of the file, then others about it, where constraints bind an unknown of either sign.
+    /// Starts: that of the file, then others about it; a constrained unknown starts with either sign.
     pub(super) fn starts(&self) -> Vec<DVector<f64>> {
         let mut noise = Noise::new(self.options.seed, 18);
         let first: Vec<f64> = self.problem.free.iter().map(|&i| self.base[i]).collect();
@@ -63,8 +64,8 @@ impl Calibrating<'_> {
             .collect()
     }
 
-    /// Iterates from `starts` until there have been enough; `counts` says which unknowns tell solutions
-    /// apart. Where they ended, how many there were, and why the first failed that did.
+    /// Iterates from `starts` until they suffice; `counts` selects the unknowns that distinguish solutions.
+    /// Returns the ends, the number of starts tried, and the first error.
     pub(super) fn search(
         &mut self,
         starts: &[DVector<f64>],
@@ -73,7 +74,7 @@ impl Calibrating<'_> {
         let (mut ends, mut tried, mut first_error): (Vec<Settled>, usize, Option<Stuck>) =
             (Vec::new(), 0, None);
         for x in starts {
-            // what there is so far is the answer
+            // the solutions so far are the answer
             if self.problem.stopped && !ends.is_empty() {
                 break;
             }
@@ -93,8 +94,8 @@ impl Calibrating<'_> {
         (ends, tried, first_error)
     }
 
-    /// Solutions apart from the best that fit nearly as well, how many starts led to the best, and what
-    /// became of the others but those that failed.
+    /// Solutions other than the best that fit nearly as well, and the number of starts that led to the best.
+    /// The last value counts the outcomes of the other starts, without those that failed.
     pub(super) fn others(
         &mut self,
         ends: &[Settled],
@@ -114,7 +115,7 @@ impl Calibrating<'_> {
         let unsettled = ends.iter().filter(|e| !e.converged).count();
         let mut starts = OtherStarts { unsettled, ..OtherStarts::default() };
         for (end, count) in apart(ends, &|j| determined[j]) {
-            // with the noise and the steps of the solution
+            // with the noise and the integration steps of the solution
             let again = settle(&mut self.problem, &self.base, end.x.clone(), finer, None).ok();
             let Some(end) = again.filter(|end| end.converged) else {
                 starts.unsettled += count;

@@ -1,4 +1,4 @@
-//! Units of a record's columns against those of a model.
+//! Conversion of a record's columns to the units of a model.
 
 use obsdeg_core::system::SystemModel;
 
@@ -6,7 +6,7 @@ use crate::record::{Record, RecordError, STANDARD_GRAVITY, Wanted};
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
-/// Units of one kind, and what each is of the first.
+/// Units by kind, with their values in the first of the kind.
 const KINDS: [&[(&str, f64)]; 5] = [
     &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0), ("d", 86400.0)],
     &[("rad", 1.0), ("mrad", 1e-3), ("deg", DEG), ("arcsec", DEG / 3600.0)],
@@ -19,10 +19,10 @@ const KINDS: [&[(&str, f64)]; 5] = [
     ],
     &[("m", 1.0), ("km", 1e3), ("cm", 1e-2), ("mm", 1e-3)],
 ];
-/// Units of time that are sought in those of a model; a year is none of the others.
+/// Units of time that are sought in those of a model; the year `a` has no fixed ratio to the others.
 const TIMES: [&str; 7] = ["s", "ms", "us", "min", "h", "d", "a"];
 
-/// What one `found` is of `own`, where both are of one kind.
+/// Factor from the unit `found` to the unit `own`; `None` unless both are of one kind.
 fn scale(found: &str, own: &str) -> Option<f64> {
     let of = |kind: &&[(&str, f64)]| {
         let size = |unit: &str| kind.iter().find(|(name, _)| *name == unit).map(|(_, size)| *size);
@@ -31,7 +31,7 @@ fn scale(found: &str, own: &str) -> Option<f64> {
     if found == own { Some(1.0) } else { KINDS.iter().find_map(of) }
 }
 
-/// A column in the unit `own` of the model, which may be none, as may be that of the header.
+/// Column with the factor to the unit `own` of the model; either unit may be missing.
 pub(super) fn wanted(record: &Record, column: usize, own: &str) -> Result<Wanted, RecordError> {
     let found = record.columns()[column].unit.as_deref().filter(|_| !own.is_empty());
     match found.map_or(Some(1.0), |found| scale(found, own)) {
@@ -40,7 +40,7 @@ pub(super) fn wanted(record: &Record, column: usize, own: &str) -> Result<Wanted
     }
 }
 
-/// The units of time in those of a model: `h` in `1/h` and `km/h^2`, `s` by itself.
+/// Units of time in those of a model: `h` in `1/h` and `km/h^2`, `s` by itself.
 fn times(model: &SystemModel) -> Vec<&'static str> {
     let states = model.states.iter().map(|s| &s.named);
     let inputs = model.known_inputs.iter().map(|i| &i.0).chain(model.unknown_inputs.iter().map(|i| &i.0));
@@ -61,7 +61,7 @@ fn times(model: &SystemModel) -> Vec<&'static str> {
     out
 }
 
-/// The time, in the unit that those of the model have it in, if they do.
+/// Time column with the factor to the unit of time of the model, if its units have one.
 pub(super) fn time(record: &Record, column: usize, model: &SystemModel) -> Result<Wanted, RecordError> {
     let own = times(model);
     let as_it_is = Wanted { column, scale: 1.0 };

@@ -1,5 +1,5 @@
-//! Records of random platforms, drawn from stated distributions: every right record gives an answer that is
-//! as good as its sigmas say, or says why it is not.
+//! Records of random platforms, drawn from stated distributions: every right record gives an answer as
+//! accurate as its sigmas, or an answer that says why it is not.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::answer::Finding;
@@ -16,13 +16,13 @@ use crate::simulator::{AtOnce, Bench, Random, csv};
 /// Attitudes of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scheme {
-    /// Six at odd angles, with slews under inertial carry.
+    /// Six positions at odd angles, with slews under inertial carry.
     Six,
-    /// The paper's two.
+    /// The paper's two positions.
     Two,
-    /// The first four of the six.
+    /// First four of the six positions.
     Four,
-    /// The seven of examples/self-calibration: 33 coefficients.
+    /// Seven positions of examples/self-calibration: 33 coefficients.
     Whole,
 }
 
@@ -31,9 +31,9 @@ enum Scheme {
 struct Case {
     scheme: Scheme,
     carry: Carry,
-    /// Standard deviations of the drifts over 12 deg/h and 5 deg/h/g.
+    /// Ratio of the standard deviations of the drifts to 12 deg/h and 5 deg/h/g.
     scale: f64,
-    /// True if these are stated as priors.
+    /// True if these standard deviations are stated as priors.
     priors: bool,
 }
 
@@ -61,7 +61,7 @@ impl Case {
         format!("{:?} {} {}x {priors}", self.scheme, self.carry, self.scale)
     }
 
-    /// Fewest estimates of an answer: what a prior or the exact verdicts determine.
+    /// Fewest estimates of an answer: those that a prior or the exact verdicts determine.
     fn fewest(&self) -> usize {
         match (self.scheme, self.carry) {
             (Scheme::Two, Carry::Reset) if !self.priors => 1,
@@ -69,7 +69,7 @@ impl Case {
         }
     }
 
-    /// A platform drawn at random; psi is 0.1 deg (1 sigma) in each axis.
+    /// Platform drawn at random; psi is 0.1 deg (1 sigma) in each axis.
     fn bench(&self, seed: u64) -> Bench {
         let mut random = Random::new(1_000_003 * (seed + 1) + (1e4 * self.scale) as u64);
         let mut three = |sigma: f64| -> [f64; 3] { std::array::from_fn(|_| sigma * random.normal()) };
@@ -95,7 +95,7 @@ impl Case {
         Bench { seed: seed + 77, drift, psi, carry, ..bench }
     }
 
-    /// Scheme and conditions.
+    /// Scheme and conditions of the case.
     fn stated(&self, bench: &Bench) -> (obsdeg_core::model::Scheme, Conditions) {
         let terms = if self.scheme == Scheme::Whole { "all" } else { "F,I,O,S" };
         let mut of = scheme(bench, terms);
@@ -123,19 +123,19 @@ impl Case {
     }
 }
 
-/// Widths of the box that an answer states of what the data leave open: the answer holds for truths within
-/// it. What an open unknown bends into the others grows with its square (D_OY of p1 p2 at 35 deg/h/g, 3.5
-/// times its box: 12 sigmas of errors).
+/// Widths of the box of an undetermined unknown within which the answer must hold. Beyond it, the effect of
+/// an undetermined unknown on the others grows with its square (D_OY of p1 p2 at 35 deg/h/g, 3.5 times its
+/// box: 12 sigmas of errors).
 const BOX: f64 = 2.0;
 
-/// True if the truth of an unknown that the data leave open is farther than [`BOX`] from its box.
+/// True if the truth of an undetermined unknown is farther than [`BOX`] from its box.
 fn outside(bench: &Bench, c: &Calibration) -> bool {
     let far =
         |(name, width, _): &(String, f64, String)| truth(bench, name).is_some_and(|x| x.abs() > BOX * width);
     c.assumed.held.iter().any(far)
 }
 
-/// The true value of a quantity in the unit of the answer, where the bench has one.
+/// True value of a quantity in the unit of the answer; `None` if the bench has none.
 fn truth(bench: &Bench, name: &str) -> Option<f64> {
     match name.strip_prefix("psi_") {
         Some(axis) => "xyz".find(axis).map(|axis| bench.psi[axis].to_degrees()),
@@ -143,8 +143,8 @@ fn truth(bench: &Bench, name: &str) -> Option<f64> {
     }
 }
 
-/// True values of the combinations of a scheme in the units of the answer, by their expressions: their terms,
-/// which have all digits, times the true values of unknowns.
+/// True values of the combinations of a scheme in the units of the answer, by their expressions: their terms
+/// in full precision, times the true values of unknowns.
 fn combinations(
     of: &obsdeg_core::model::Scheme,
     conditions: &Conditions,
@@ -177,19 +177,19 @@ fn nees(bench: &Bench, c: &Calibration, combinations: &[(String, f64)]) -> (f64,
 #[derive(Debug, Default)]
 struct Outcome {
     unsettled: usize,
-    /// Refused before anything was estimated.
+    /// Number of records refused before anything was estimated.
     refused: usize,
-    /// Answers that leave estimates open: records and priors do not determine them at these drifts.
+    /// Number of answers with undetermined estimates: records and priors are not sufficient at these drifts.
     open: usize,
-    /// Answers of which an unknown that the data leave open is beyond [`BOX`] of the stated box.
+    /// Number of answers with an undetermined unknown beyond [`BOX`] of the stated box.
     outside: usize,
-    /// True if an answer holds unknowns within a box: its sigmas count the whole of it.
+    /// True if an answer keeps unknowns within a box: its sigmas include the whole box.
     boxed: bool,
-    /// False alarms.
+    /// Number of false alarms.
     flagged: usize,
-    /// NEES of those that are called consistent, with their number of estimates.
+    /// NEES of the answers called consistent, with their numbers of estimates.
     nees: Vec<(f64, usize)>,
-    /// Estimates of an answer that leaves none open.
+    /// Number of estimates of an answer without undetermined ones.
     estimates: usize,
     findings: Vec<String>,
 }
@@ -231,10 +231,10 @@ fn run(case: &Case, seeds: std::ops::Range<u64>) -> Outcome {
     out
 }
 
-/// The demands on every case, by so many records: each gives an answer, none ends unsettled, false alarms are
-/// at most 1 % (one record in any case), and the sum of the NEES of answers without a finding is in its 99.9
-/// % band (not above it where an answer states a box). Estimates that are left open, and truths outside a
-/// box, are not in it: their numbers are printed. Each case is printed.
+/// Requirements on every case, by the records of `seeds`. Each record gives an answer, all answers converge,
+/// and false alarms are at most 1 % (one record in any case). The sum of the NEES of answers without a
+/// finding is in its 99.9 % band (only not above it where an answer states a box). Undetermined estimates,
+/// and truths outside a box, do not count; their numbers are printed. Each case is printed.
 fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
     let mut wrong = Vec::new();
     for case in cases().iter().filter(|c| only(c)) {
@@ -242,7 +242,7 @@ fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
         let answers = o.nees.len();
         let sum: f64 = o.nees.iter().map(|n| n.0).sum();
         let of: usize = o.nees.iter().map(|n| n.1).sum();
-        // as if every answer had all estimates
+        // scaled as if every answer had all estimates
         let per = o.estimates as f64 / of.max(1) as f64;
         let mean = sum * per;
         let largest = o.nees.iter().fold(0.0f64, |m, n| m.max(n.0));
@@ -253,12 +253,13 @@ fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
             "{}",
             case.name()
         );
-        // what the whole of a box would add is in the sigmas, however small the truth is
+        // sigmas include the effect of a whole box, however small the truth is
         let low = if o.boxed { 0.0 } else { low };
         let in_band = of == 0 || (low..=high).contains(&mean);
         let alarms = o.flagged as u64 > 1.max((seeds.end - seeds.start) / 100);
         let line = format!(
-            "{}: ANEES {mean:.2} of {} ({low:.2} to {high:.2}), largest {largest:.1}, {answers} answers, {} with some left open, {} outside the box, {} flagged, {} unsettled, {} refused {:?}",
+            "{}: ANEES {mean:.2} of {} ({low:.2} to {high:.2}), largest {largest:.1}, {answers} answers, {} \
+             with some left open, {} outside the box, {} flagged, {} unsettled, {} refused {:?}",
             case.name(),
             o.estimates,
             o.open,
@@ -281,12 +282,16 @@ fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
 fn records_of_random_platforms() {
     let quick = |c: &Case| c.scheme == Scheme::Six && c.carry == Carry::Inertial;
     right(quick, 0..3);
-    // wrong by a hundred sigmas and called consistent once
+    // once wrong by a hundred sigmas and called consistent
     right(|c| c.scheme == Scheme::Two && c.carry == Carry::Inertial && c.scale == 3.0 && c.priors, 0..3);
 }
 
-/// 200 records of every case, or as the environment says: `CASES="Two inertial" FROM=1000 RECORDS=20 cargo
-/// test -p obsdeg-calibration --test it -- --ignored --nocapture random_platforms`.
+/// 200 records of every case, or those of the environment:
+///
+/// ```text
+/// CASES="Two inertial" FROM=1000 RECORDS=20 cargo test -p obsdeg-calibration --test it -- \
+///     --ignored --nocapture random_platforms
+/// ```
 #[test]
 #[ignore = "hours"]
 fn records_of_all_random_platforms() {

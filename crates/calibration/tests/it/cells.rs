@@ -1,4 +1,4 @@
-//! Cells that cannot be: each is named by row and column, and the estimate is that of the others.
+//! Invalid cells: each is named by row and column, and the estimate is that of the other cells.
 
 use obsdeg_calibration::answer::{CellKind, Finding};
 use obsdeg_calibration::{Calibration, CalibrationError};
@@ -16,7 +16,7 @@ fn is_near(bench: &Bench, c: &Calibration, what: &str) {
     }
 }
 
-/// The first row of a position, one in its middle and one at its end.
+/// First row of a position, one in its middle and its last.
 fn places(samples: &[Sample]) -> [usize; 3] {
     let of = |label: &str| samples.iter().position(|s| s.label == label).expect("there");
     [of("p2"), of("p3") + 40, of("p5") - 30]
@@ -47,15 +47,15 @@ fn a_gross_cell_is_named_and_left_out() {
                     Finding::Cells { column: found, lines, .. } if *lines == (line, line) && found == column)
                 });
                 assert!(outlier || code, "{step_s} s, {column}, {what}: {:?} {:?}", c.outliers, c.findings);
-                // about the line of a dense bin some samples are far by chance
+                // some samples are far from the line of a dense bin by chance
                 assert!(step_s < 1.0 || c.outliers.len() < 4, "{:?}", c.outliers);
             }
         }
     }
 }
 
-/// Codes of missing values are asked about; where the file states them they are empty cells, which are
-/// counted as NaN are.
+/// Codes of missing values are reported. If the file states them, they are empty cells, which are counted
+/// like NaN.
 #[test]
 fn codes_are_asked_about() {
     let bench = bench();
@@ -78,7 +78,7 @@ fn codes_are_asked_about() {
         is_near(&bench, &stated, "stated");
         let [empty] = &stated.records[0].empty_cells[..] else { panic!("{:?}", stated.records) };
         assert_eq!((empty.column.as_str(), empty.count), ("fy [g]", 12));
-        // as if these cells were empty
+        // the same with empty cells
         let blank = csv(&own).replace(&format!(",{code},"), ",,");
         let blank = of_csv(&bench, "F,I,O,S", blank).expect("calibrated");
         assert_eq!(
@@ -95,7 +95,7 @@ fn codes_are_asked_about() {
     assert_eq!(c.findings.iter().filter(stuck).count(), 3, "{:?}", c.findings);
 }
 
-/// One cell at each of three positions with the same value: a code, though no position has it twice.
+/// One cell at each of three positions with the same value is a code, though no position has it twice.
 #[test]
 fn a_code_here_and_there_is_asked_about() {
     let bench = bench();

@@ -1,4 +1,5 @@
-//! Constraints of models: against the same models with an unknown less, and closed formulas of least squares.
+//! Constraints of models: compared with the same models with one unknown fewer, and closed formulas of least
+//! squares.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::system::SystemEstimated;
@@ -6,7 +7,7 @@ use obsdeg_calibration::{Before, SystemOptions};
 
 use crate::models::{calibrated, found, normals, options};
 
-/// Measurements of a direction at an angle of 0.7, and of a gain of 3, by `rows`.
+/// Measurements, for `rows`, of a direction at an angle of 0.7 and a gain of 3.
 fn turned(rows: std::ops::Range<i32>) -> String {
     let (angle, gain): (f64, f64) = (0.7, 3.0);
     let mut normal = normals(12);
@@ -20,14 +21,15 @@ fn turned(rows: std::ops::Range<i32>) -> String {
     text
 }
 
-/// The model of that with a direction that is written so.
+/// Model of these measurements with the direction `cos`, `sin`.
 fn direction(unknowns: &str, cos: &str, sin: &str, values: &str) -> String {
     format!(
-        "{unknowns}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"k*{cos}*cos(u) + {sin}\"\nz = \"k*{sin}*sin(u)\"\n[simulation]\nvalues = {{ k = 2.5, {values} }}\nnoise = {{ y = 0.02, z = 0.02 }}\n"
+        "{unknowns}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"k*{cos}*cos(u) + {sin}\"\n\
+         z = \"k*{sin}*sin(u)\"\n[simulation]\nvalues = {{ k = 2.5, {values} }}\nnoise = {{ y = 0.02, z = 0.02 }}\n"
     )
 }
 
-/// As two unknowns with constraints.
+/// Model with the direction as two unknowns with constraints.
 fn bound(constraints: &str, values: &str) -> String {
     direction(
         &format!("constraints = [{constraints}]\n[parameters]\nk = {{}}\nc = {{}}\ns = {{}}"),
@@ -39,7 +41,7 @@ fn bound(constraints: &str, values: &str) -> String {
 
 const UNIT: &str = "\"c^2 + s^2 = 1\"";
 
-/// As an angle.
+/// Model with the direction as an angle.
 fn free() -> String {
     direction("[parameters]\nk = {}\na = {}", "cos(a)", "sin(a)", "a = 0.6435")
 }
@@ -49,18 +51,18 @@ fn of(list: &[SystemEstimated], name: &str) -> (f64, f64, f64) {
     (u.estimate.expect(name), u.sigma.expect(name), u.sigma_rescaled.expect(name))
 }
 
-/// A direction of unit length, as two unknowns beside a constraint and as an angle: the same estimates,
-/// sigmas and degrees of freedom, from wherever it starts.
+/// A direction of unit length, as two unknowns with a constraint and as an angle, has the same estimates,
+/// sigmas and degrees of freedom, from any start.
 #[test]
 fn constraints_are_an_unknown_less() {
     let text = turned(0..40);
     for (constraints, values) in [
         (UNIT, "c = 0.8, s = 0.6"),
-        // starts at which nothing holds, or has no slope
+        // starts at which no constraint holds, or none has a slope
         (UNIT, "c = 0.1, s = 0.1"),
         (UNIT, "c = -5, s = 100"),
         (UNIT, "c = 0, s = 0"),
-        // the same twice, and once more as a quotient
+        // the same constraint twice, and once more as a quotient
         ("\"c^2 + s^2 = 1\", \"3*c^2 + 3*s^2 = 3\", \"s^2 = (1 - c)*(1 + c)\"", "c = 0.6, s = 0.6"),
     ] {
         as_an_angle(&bound(constraints, values), &text);
@@ -97,8 +99,8 @@ fn as_an_angle(bound: &str, text: &str) {
     assert!((c * c + s * s - 1.0).abs() < 1e-12, "{c} {s}");
 }
 
-/// Two weights of which the sum is known, far smaller than one and known far better than that: weighed apart
-/// and together, in closed form.
+/// Two masses with a known sum, far smaller than one and with a far smaller sigma: measured apart and
+/// together, in closed form.
 #[test]
 fn a_sum_that_is_known() {
     let mut normal = normals(3);
@@ -109,7 +111,8 @@ fn a_sum_that_is_known() {
         .collect();
     let model = |constraints: &str| {
         format!(
-            "constraints = [{constraints}]\n[parameters]\na = {{}}\nb = {{}}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\nvalues = {{ a = 1e-6, b = 1e-7 }}\nnoise = {{ y = 1e-10, z = 1e-10 }}\n"
+            "constraints = [{constraints}]\n[parameters]\na = {{}}\nb = {{}}\n[outputs]\ny = \"a\"\n\
+             z = \"b\"\n[simulation]\nvalues = {{ a = 1e-6, b = 1e-7 }}\nnoise = {{ y = 1e-10, z = 1e-10 }}\n"
         )
     };
     let c = calibrated(&model("\"a + b = 0.000003\""), &text, &options()).expect("calibrated");
@@ -121,7 +124,7 @@ fn a_sum_that_is_known() {
         "{x} {mean} {s} {expected}"
     );
     assert_eq!((c.consistent, c.degrees_of_freedom), (Some(true), 23));
-    // known altogether: nothing is left to estimate, and nothing that moves
+    // fully known: nothing is estimated, and nothing moves
     let both = model("\"a + b = 0.000003\", \"a = 2*b\"");
     let c = calibrated(&both, &text, &SystemOptions { profiles: vec!["a".into()], ..options() })
         .expect("calibrated");
@@ -130,7 +133,7 @@ fn a_sum_that_is_known() {
     assert_eq!((c.degrees_of_freedom, c.profiles[0].points.len(), c.profiles[0].flat), (24, 1, false));
 }
 
-/// What does not hold anywhere, or says nothing where it holds, is refused by name.
+/// A constraint that holds nowhere, or has no slope where it holds, is refused by name.
 #[test]
 fn constraints_that_cannot_be_met() {
     let refused = |model: &str, text: &str, message: &str| {
@@ -144,20 +147,24 @@ fn constraints_that_cannot_be_met() {
     for (constraints, message) in [
         (
             "\"c^2 + s^2 = -1\"",
-            "the constraint c^2 + s^2 = -1: no real point meets it: its left side minus its right side is positive everywhere",
+            "the constraint c^2 + s^2 = -1: no real point meets it: its left side minus its right side is \
+             positive everywhere",
         ),
         ("\"c = 0.5\", \"c = 0.6\"", "no real point was found at which it holds together with the others"),
         (
             "\"(c - s)^2 = 0\"",
-            "the constraint (c - s)^2 = 0: its left side minus its right side is never negative: where it holds, if anywhere, its gradient",
+            "the constraint (c - s)^2 = 0: its left side minus its right side is never negative: where it \
+             holds, if anywhere, its gradient",
         ),
     ] {
         refused(&rational(constraints), &text, message);
     }
-    // a start that is known, and that holds, or not
+    // a known start that satisfies the constraint, or does not
     let known = |x: f64| {
         format!(
-            "constraints = [\"x^2 + v^2 = 4\", \"x = 1\"]\n[states]\nx = {{ equation = \"v\", initial = \"known\" }}\nv = \"0\"\n[outputs]\ny = \"x\"\n[simulation]\nvalues = {{ x = {x}, v = 1 }}\nnoise = {{ y = 0.1 }}\n"
+            "constraints = [\"x^2 + v^2 = 4\", \"x = 1\"]\n[states]\n\
+             x = {{ equation = \"v\", initial = \"known\" }}\nv = \"0\"\n[outputs]\ny = \"x\"\n[simulation]\n\
+             values = {{ x = {x}, v = 1 }}\nnoise = {{ y = 0.1 }}\n"
         )
     };
     let text = "t,y\n0,1\n1,2.7\n2,4.5\n";
@@ -166,7 +173,7 @@ fn constraints_that_cannot_be_met() {
     assert!((of(&c.quantities, "v").0 - 3f64.sqrt()).abs() < 1e-9 && c.degrees_of_freedom == 3);
 }
 
-/// Parameters that two experiments share are bound once, states at the start of each once each.
+/// Parameters common to two experiments are constrained once, states at the start of each once each.
 #[test]
 fn experiments_do_not_count_twice() {
     let mut normal = normals(31);
@@ -183,7 +190,9 @@ fn experiments_do_not_count_twice() {
             );
         }
     }
-    let model = "experiments = 2\nconstraints = [\"x + v = 3\", \"p + q = 1\"]\n[states]\nx = \"-p*x\"\nv = \"-q*v\"\n[parameters]\np = {}\nq = {}\n[outputs]\ny = \"x\"\nz = \"v\"\n[simulation]\nvalues = { x = 1, v = 1, p = 0.5, q = 0.5 }\nnoise = { y = 0.01, z = 0.01 }\n";
+    let model = "experiments = 2\nconstraints = [\"x + v = 3\", \"p + q = 1\"]\n[states]\nx = \"-p*x\"\n\
+        v = \"-q*v\"\n[parameters]\np = {}\nq = {}\n[outputs]\ny = \"x\"\nz = \"v\"\n[simulation]\n\
+        values = { x = 1, v = 1, p = 0.5, q = 0.5 }\nnoise = { y = 0.01, z = 0.01 }\n";
     let c = calibrated(model, &text, &options()).expect("calibrated");
     assert_eq!(
         (c.consistent, c.degrees_of_freedom),
@@ -199,8 +208,8 @@ fn experiments_do_not_count_twice() {
     assert!((sigma("p") / sigma("q") - 1.0).abs() < 1e-9 && (sigma("x@1") / sigma("v@1") - 1.0).abs() < 1e-9);
 }
 
-/// A profile along a circle: chi-square at values of an unknown is that of the angle there, all else
-/// following; another solution beyond the end of the circle.
+/// Profile along a circle: chi-square at values of an unknown is that of the angle there, with all others
+/// fitted. Another solution lies beyond the end of the circle.
 #[test]
 fn profiles_and_other_solutions_keep_to_constraints() {
     let mut normal = normals(41);
@@ -211,7 +220,8 @@ fn profiles_and_other_solutions_keep_to_constraints() {
         (sum[0], sum[1], squares) = (sum[0] + u * u, sum[1] + u * y, squares + y * y);
         text += &format!("{i},{u},{y}\n");
     }
-    let model = "constraints = [\"c^2 + s^2 = 1\"]\n[known_inputs]\nu = \"generic\"\n[parameters]\nc = {}\ns = {}\n[outputs]\ny = \"s*u\"\n[simulation]\nvalues = { c = 0.9, s = 0.3 }\nnoise = { y = 0.2 }\n";
+    let model = "constraints = [\"c^2 + s^2 = 1\"]\n[known_inputs]\nu = \"generic\"\n[parameters]\nc = {}\n\
+        s = {}\n[outputs]\ny = \"s*u\"\n[simulation]\nvalues = { c = 0.9, s = 0.3 }\nnoise = { y = 0.2 }\n";
     let asked = SystemOptions { profiles: vec!["c".into()], ..options() };
     let c = calibrated(model, &text, &asked).expect("calibrated");
     let chi = |s: f64| (squares - 2.0 * s * sum[1] + s * s * sum[0]) / 0.04;
@@ -230,8 +240,9 @@ fn profiles_and_other_solutions_keep_to_constraints() {
     assert!((other.values[0] + cos).abs() < 1e-6 && (other.values[1] - s).abs() < 1e-6, "{other:?}");
 }
 
-/// Half of the data, then the other half with what the first said: as all at once, and as with an angle; what
-/// holds by a constraint is no news to a model without.
+/// Half of the data, then the other half with the first as prior: the result equals that of all data at once,
+/// and that with an angle. For a model without the constraint, a direction fixed by it carries no
+/// information.
 #[test]
 fn what_was_known_before_keeps_to_constraints() {
     let (first, second) = (turned(0..5), turned(5..40));
@@ -258,8 +269,8 @@ fn what_was_known_before_keeps_to_constraints() {
     assert!(e.contains("the prior calibration knows k, c, s as constraints make them"), "{e}");
 }
 
-/// Three that hang together by two constraints, known before in part: rows of constraints are not what they
-/// say of these alone.
+/// Three unknowns with two constraints, partly known before: the rows of constraints differ from the
+/// conditions on single unknowns.
 #[test]
 fn what_was_known_of_some_is_as_it_was() {
     let mut normal = normals(51);
@@ -270,8 +281,10 @@ fn what_was_known_of_some_is_as_it_was() {
         text += &format!("{i},{y}\n");
     }
     // a and b were known, with a correlation; a + b + c = 4 and c is measured
-    let model = "constraints = [\"a + b + c = 4\"]\n[parameters]\na = {}\nb = {}\nc = {}\n[outputs]\ny = \"c + 0*a + 0*b\"\n[simulation]\nnoise = { y = 0.1 }\n";
-    let plain = "[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\nnoise = { y = 0.3, z = 0.4 }\n";
+    let model = "constraints = [\"a + b + c = 4\"]\n[parameters]\na = {}\nb = {}\nc = {}\n[outputs]\n\
+        y = \"c + 0*a + 0*b\"\n[simulation]\nnoise = { y = 0.1 }\n";
+    let plain = "[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a\"\nz = \"b\"\n[simulation]\n\
+        noise = { y = 0.3, z = 0.4 }\n";
     let c = calibrated(plain, "t,y,z\n0,1.1,1.5\n1,1.2,1.4\n", &options()).expect("calibrated");
     let mut estimates = c.covariance.clone();
     estimates.covariance[0][1] = 0.03;
@@ -281,14 +294,14 @@ fn what_was_known_of_some_is_as_it_was() {
     let before = Before { priors: Vec::new(), estimates, rests_on: c.rests_on.clone(), of: c.model };
     let known = SystemOptions { prior: Some(before), ..options() };
     let c = calibrated(model, &text, &known).expect("calibrated");
-    // normal equations by a and b alone
+    // normal equations for a and b alone
     let ones = DMatrix::from_element(10, 2, -1.0);
     let w = p.try_inverse().expect("regular");
     let information = &w + ones.transpose() * &ones * 100.0;
     let y = DVector::from_iterator(10, rows.iter().map(|y| y - 4.0));
     let inverse = information.try_inverse().expect("regular");
     let x = &inverse * (w * mean + ones.transpose() * y * 100.0);
-    // what the model does not tell stays untold, whatever was known of it
+    // an unknown that the model does not determine stays undetermined, whatever the prior
     assert!(!found(&c.quantities, "a").determined);
     let (e, s, _) = of(&c.quantities, "c");
     assert!((e - 4.0 + x.sum()).abs() < 1e-6 && (s - inverse.sum().sqrt()).abs() < 1e-6, "{e} {s} {x}");

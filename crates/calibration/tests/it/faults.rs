@@ -1,5 +1,5 @@
-//! Records that are not what they say they are: each is refused by name. And what an estimate says of itself,
-//! against other ways to it.
+//! Records that contradict their headers or labels: each is refused by name. Statements of an estimate about
+//! itself, compared with other computations.
 
 use nalgebra::DMatrix;
 use obsdeg_calibration::answer::{Finding, ForceError};
@@ -27,7 +27,7 @@ fn mistaken(found: Result<Calibration, CalibrationError>) -> Mistaken {
     }
 }
 
-/// A record whose columns have these headers and are these times as large.
+/// Record whose columns have these headers and are multiplied by these factors.
 fn scaled(samples: &[Sample], units: [&str; 4], by: [f64; 4]) -> String {
     let [t, x, y, z] = units;
     let line = |s: &Sample| {
@@ -39,8 +39,8 @@ fn scaled(samples: &[Sample], units: [&str; 4], by: [f64; 4]) -> String {
         .collect()
 }
 
-/// Numbers of another unit than the header has are told from errors of scale, column by column; with the
-/// right unit the record is right.
+/// Numbers in another unit than the header's are distinguished from errors of scale, column by column; with
+/// the right unit the record is right.
 #[test]
 fn units_are_named() {
     const G: f64 = 9.80665;
@@ -74,12 +74,12 @@ fn units_are_named() {
     }
 }
 
-/// One axis of the specific force that is too long, or off its zero, is named with its figure; another
-/// gravity is not taken for it, nor two axes for one.
+/// One axis of the specific force with a scale error or a zero is named with its figure; another gravity is
+/// not mistaken for it, nor two axes for one.
 #[test]
 fn an_axis_is_named() {
     let found = |k0: [f64; 3], k1: [f64; 3], scale: f64| {
-        // drifts so small that positions stay where they are
+        // drifts so small that positions keep their attitudes
         let drift = [[0.1; 3], [0.05; 3], [0.05; 3], [0.05; 3]];
         let bench = Bench { accelerometers: [k0, k1, [0.0; 3]], scale, drift, ..bench() };
         let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
@@ -119,12 +119,12 @@ fn an_axis_is_named() {
     }
 }
 
-/// A record by a clock that is fast by a part.
+/// Record with a clock that is fast by the fraction `fast`.
 fn by_clock(bench: &Bench, fast: f64) -> Vec<Sample> {
     bench.record().into_iter().map(|s| Sample { t: s.t * (1.0 + fast), ..s }).collect()
 }
 
-/// What is said of its clock.
+/// Finding on the clock: fractions by durations and by the earth.
 fn clock_of(c: &Calibration) -> Option<(Option<f64>, Option<f64>)> {
     c.findings.iter().find_map(|f| match f {
         Finding::Clock { by_durations, by_earth, .. } => {
@@ -134,8 +134,8 @@ fn clock_of(c: &Calibration) -> Option<(Option<f64>, Option<f64>)> {
     })
 }
 
-/// A clock that is off by a part is told by when positions begin and end, and by the earth; positions that
-/// were held longer by a right clock are not taken for one.
+/// A clock error is found by the begins and ends of positions, and by the earth; positions held longer by a
+/// right clock give no finding.
 #[test]
 fn a_clock_is_named() {
     let slower = bench().drift.map(|d| d.map(|x| 0.1 * x));
@@ -145,18 +145,18 @@ fn a_clock_is_named() {
         let Some((Some(by_durations), Some(by_earth))) = clock_of(&c) else {
             panic!("{fast}: {:?}", c.findings)
         };
-        // a sample at either end of a run
+        // one sample at either end of a run
         assert!((by_durations - fast).abs() < 2.0 * 4.0 / 6000.0, "{by_durations}");
         let sigma = c.records[0].clock.by_earth.as_ref().map_or(f64::NAN, |e| e.sigma);
         assert!(
             (by_earth - fast).abs() < 3.0 * sigma + 0.1 * fast.abs() && sigma < 0.003,
             "{by_earth} {sigma}"
         );
-        // drifts are too small by that part
+        // drifts are too small by that fraction
         let d = c.quantities.iter().find(|u| u.name == "D_FY").expect("there").estimate.expect("determined");
         assert!((d / drift[0][1] * (1.0 + fast) - 1.0).abs() < 0.7 * fast.abs(), "{d}");
     }
-    // a scheme of positions that are one part in fifty shorter than they were held
+    // a scheme with positions 2 % shorter than they were held
     let mut held = bench();
     held.positions.iter_mut().for_each(|p| p.2 = 980.0);
     let c = of_csv(&held, "F,I,O,S", csv(&bench().record())).expect("calibrated");
@@ -165,7 +165,7 @@ fn a_clock_is_named() {
     let earth = clock.by_earth.as_ref().expect("there");
     assert!(clock.by_durations.is_some_and(|d| (d - 0.0204).abs() < 2e-3), "{clock:?}");
     assert!(earth.fast.abs() < 4.0 * earth.sigma && earth.sigma < 1e-3, "{earth:?}");
-    // positions that are labelled after they have settled are as long as they are
+    // positions labelled after they have settled keep their durations
     let samples = bench().record();
     let settled: Vec<Sample> = samples
         .iter()
@@ -177,14 +177,15 @@ fn a_clock_is_named() {
         .collect();
     let c = of_csv(&bench(), "F,I,O,S", csv(&settled)).expect("calibrated");
     assert!(c.consistent && c.records[0].clock.by_durations.is_none(), "{:?}", c.records[0].clock);
-    // two positions at once and the drifts of good gyros: nothing tells, and that is said
+    // two positions at once and the drifts of good gyros: nothing shows the clock, and the answer says so
     let quiet =
         Bench { psi: [1e-5; 3], drift: [[0.01; 3], [0.005; 3], [0.005; 3], [0.005; 3]], ..Bench::default() };
     let c = of_csv(&quiet, "F,I,O,S", csv(&quiet.record())).expect("calibrated");
     assert!(c.records[0].clock.by_earth.as_ref().is_none_or(|e| e.sigma > 0.05), "{:?}", c.records[0].clock);
 }
 
-/// Without labels the turns lie where the clock has them: a fast one, a slow one, a record that begins late.
+/// Without labels the turns lie where the clock has them: a fast clock, a slow one, a record that begins
+/// late.
 #[test]
 fn a_clock_shows_in_the_timeline() {
     let bench = bench();
@@ -223,8 +224,8 @@ fn a_clock_shows_in_the_timeline() {
     );
 }
 
-/// A cell, or a row, of another unit than the others is named with its line and column, however dense the
-/// rows are.
+/// A cell or a row in another unit than the others is named with its line and column, however dense the rows
+/// are.
 #[test]
 fn a_cell_of_another_unit_is_named() {
     const G: f64 = 9.80665;
@@ -272,8 +273,8 @@ fn a_cell_of_another_unit_is_named() {
     );
 }
 
-/// A record of pulses: counts of increments of velocity over the time since the row before, with a weight, by
-/// sums of a force that is sampled eight times as often.
+/// Record of pulses: counts of increments of velocity over the time since the row before, of a given weight,
+/// by sums of a force that is sampled eight times as often.
 fn pulses(bench: &Bench, weight: f64) -> (String, String) {
     const G: f64 = 9.80665;
     let fine = bench.record();
@@ -298,11 +299,11 @@ fn pulses(bench: &Bench, weight: f64) -> (String, String) {
     (counts, format!("t [s],position,fx [m/s],fy [m/s],fz [m/s]\n{mean}"))
 }
 
-/// Increments of velocity over the time between samples are mean forces in the middle; the estimate is what
-/// the bench had, and that of the forces.
+/// Increments of velocity over the time between samples are mean forces at its middle; the estimates are
+/// those of the bench, and those by the forces.
 #[test]
 fn pulses_are_mean_forces() {
-    // noise of a sum of eight is that of a sample over the root of eight
+    // a mean of eight has the noise of a sample over the root of eight
     let fine = Bench { step_s: 0.5, dropped: 0, noise_g: 1e-5 * 8f64.sqrt(), ..bench() };
     let coarse = Bench { noise_g: 1e-5, ..fine.clone() };
     let (counts, increments) = pulses(&fine, 1e-5);
@@ -332,17 +333,17 @@ fn pulses_are_mean_forces() {
         let off = d.estimate.expect("there") - coarse.drift[0][0];
         assert!(off.abs() < 3.5 * d.sigma.expect("there"), "{off}");
     }
-    // rows at whole fours of seconds are of the middle between them
+    // rows at multiples of four seconds belong to the middle between them
     let first: Vec<f64> =
         by_counts.residuals.iter().filter(|r| r.position == 0).map(|r| (r.t_s - 2.0) % 4.0).collect();
     let middle = first.iter().filter(|off| off.abs() < 1e-9).count();
     assert!(middle > 150 && first.len() - middle < 5, "{middle} of {}", first.len());
-    // a row that is lost takes its increment along: the next is not over twice the time
+    // a lost row takes its increment along: the next one covers a single interval
     let lost: String =
         increments.lines().enumerate().filter(|(i, _)| i % 50 != 20).map(|(_, l)| format!("{l}\n")).collect();
     let c = of_csv(&coarse, "F,I,O,S", lost).expect("calibrated");
     assert!(c.consistent && c.outlier_count == 0, "{:?} {:?}", c.findings, c.outliers);
-    // increments that the header has as forces, and forces that it has as increments
+    // increments with units of forces in the header, and forces with units of increments
     let e = refused(&coarse, increments.replace("[m/s]", "[m/s^2]"));
     assert!(
         e.contains("columns `fx [m/s^2]`, `fy [m/s^2]`, `fz [m/s^2]`")
@@ -379,7 +380,7 @@ fn shifted_labels_are_found() {
         assert_eq!(what, if rows > 0 { "leaves" } else { "comes to rest at" });
         assert!((from..=to).contains(&expected) && to - from < 9, "{rows}: {e}, expected {expected}");
     }
-    // one sample that is off at one end is left out where a bin has many, else it is refused
+    // one bad sample at one end is left out where a bin has many, otherwise it is refused
     let spiked = |bench: &Bench| {
         let mut own = bench.record();
         let end = own.iter().rposition(|s| s.label == "p3").expect("there");
@@ -394,7 +395,7 @@ fn shifted_labels_are_found() {
     assert!(c.consistent && c.outliers.iter().any(|o| o.lines == (end, end)), "{:?}", c.outliers);
 }
 
-/// A calibration as what is known before another.
+/// Calibration as the prior of another.
 pub(crate) fn before(c: &Calibration) -> Before<Setup> {
     Before {
         priors: c.assumed.priors.iter().map(|p| p.0.clone()).collect(),
@@ -433,15 +434,15 @@ fn no_record_is_refused() {
     }
 }
 
-/// No record counts twice: neither beside itself, nor behind a calibration that rests on it, however long
-/// ago.
+/// No record counts twice: neither beside itself, nor after a calibration that rests on it, directly or
+/// through its prior.
 #[test]
 fn a_record_counts_once() {
     let [a, b, c] = [1, 2, 3].map(|seed| csv(&Bench { seed, ..bench() }.record()));
     let bench = bench();
     let e = with(&bench, &[("a.csv", &a), ("b.csv", &a)], None).expect_err("twice").to_string();
     assert!(e.starts_with("b.csv has the same numbers as a.csv; expected records of different runs"), "{e}");
-    // with a column of numbers that nobody asked for, with comments
+    // with an additional column of numbers, and comments
     let noted: String = a.lines().enumerate().map(|(i, l)| format!("{l},{i}\n# {i}\n")).collect();
     for other in [noted.replacen(",0\n", ",volts [V]\n", 1), a.replacen("position", "position ", 1)] {
         let e = with(&bench, &[("a.csv", &a), ("b.csv", &other)], None).expect_err("twice").to_string();
@@ -456,7 +457,7 @@ fn a_record_counts_once() {
     let third = with(&bench, &[("c.csv", &c)], Some(&second)).expect("calibrated");
     let names: Vec<&str> = third.rests_on.iter().map(|b| b.record.as_str()).collect();
     assert_eq!(names, ["c.csv", "b.csv", "a.csv"]);
-    // one after the other is all at once
+    // calibrations one after the other equal one of all records at once
     let all = with(&bench, &[("a.csv", &a), ("b.csv", &b), ("c.csv", &c)], None).expect("calibrated");
     for name in ["D_FX", "D_IY", "D_SZ"] {
         let of = |c: &Calibration| {
@@ -472,7 +473,7 @@ fn a_record_counts_once() {
     assert!(e.contains("of a platform with another mounting of the sensors"), "{e}");
 }
 
-/// Names of the unknowns, in the order of the scheme, and a bench with one of them, in deg or deg/h.
+/// Bench with the unknown of index `k`, in the order of the scheme, changed by `by`, in deg or deg/h.
 fn moved(bench: &Bench, k: usize, by: f64) -> Bench {
     let mut out = bench.clone();
     match k {
@@ -482,7 +483,7 @@ fn moved(bench: &Bench, k: usize, by: f64) -> Bench {
     out
 }
 
-/// The sigma that is predicted is that of least squares on the samples of the record, with derivatives by
+/// The predicted sigma equals that of least squares on the samples of the record, with derivatives by
 /// differences of the simulator's quaternions.
 #[test]
 fn what_is_predicted() {
@@ -514,13 +515,14 @@ fn what_is_predicted() {
     }
 }
 
-/// Two positions with drifts of the paper's size: what is left open bends into sigmas, by a factor that is
-/// said. The oracle is a calibration with as many unknowns known as the records leave directions open, at the
-/// first estimates: its sigmas are smaller by that factor. The open coefficients of the bench are their first
-/// estimates, zero, so that both calibrations end with the same attitudes.
+/// Two positions with drifts of the paper's size: undetermined unknowns enter sigmas by curvature, by a
+/// stated factor. The reference is a calibration in which as many unknowns as there are undetermined
+/// directions are known, at the first estimates: its sigmas are smaller by that factor. The undetermined
+/// coefficients of the bench equal their first estimates, zero, so that both calibrations end with the same
+/// attitudes.
 #[test]
 fn what_is_held_is_said() {
-    // the first record that does not leave all open
+    // the first record that leaves some estimates determined
     let scales = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
     let of = |scale: f64| {
         let drift =
@@ -533,7 +535,7 @@ fn what_is_held_is_said() {
         stands.then_some((bench, text, c))
     };
     let (bench, text, c) = scales.into_iter().find_map(of).expect("a record that leaves less open");
-    // every combination that is determined leaves one of its unknowns free
+    // every determined combination leaves one of its unknowns free
     let mut free: Vec<&str> = Vec::new();
     for combination in c.combinations.iter().filter(|e| e.determined) {
         let part =
@@ -551,7 +553,7 @@ fn what_is_held_is_said() {
     for (u, v) in c.quantities.iter().zip(&known.quantities).filter(|(u, _)| u.determined) {
         let (s, t, factor) =
             (u.sigma.expect("there"), v.sigma.expect("there"), u.held_factor.expect("there"));
-        // attitudes of the two differ by what the box lets them
+        // the attitudes of the two differ within the box
         assert!((0.9..1.1).contains(&(s / t / factor)), "{}: {s} {t} {factor}", u.name);
         assert!((v.held_factor.expect("there") - 1.0).abs() < 1e-3, "{}: {:?}", v.name, v.held_factor);
         largest = largest.max(factor);

@@ -1,4 +1,4 @@
-//! What loggers write beside CSV with commas: the numbers are the same, so is the estimate.
+//! Formats that loggers write beside CSV with commas: the numbers and the estimates are the same.
 
 use std::sync::Arc;
 
@@ -13,14 +13,14 @@ use parquet::schema::types::Type;
 use crate::round_trip::{conditions, of_csv, scheme, six};
 use crate::simulator::{Bench, Sample, csv};
 
-/// Steps of 1e-8 g, and of 1e-6 s.
+/// Samples rounded to steps of 1e-8 g and 1e-6 s.
 fn samples(bench: &Bench) -> Vec<Sample> {
     let round = |x: f64, n: f64| (x * n).round() / n;
     let of = |s: &Sample| Sample { t: round(s.t, 1e6), f: s.f.map(|x| round(x, 1e8)), ..s.clone() };
     bench.record().iter().map(of).collect()
 }
 
-/// Times as nanoseconds since 1970, forces as decimals with eight digits.
+/// Parquet file with times as nanoseconds since 1970, and forces as decimals with eight digits.
 fn parquet(samples: &[Sample]) -> Vec<u8> {
     let field = |name: &str| {
         let kind = if name == "position" { Physical::BYTE_ARRAY } else { Physical::INT64 };
@@ -102,7 +102,7 @@ fn other_formats_are_the_same_record() {
     )
     .expect("calibrated");
     agree(&late, &c, "parquet");
-    // nanoseconds that are said to be seconds
+    // nanoseconds in a column of seconds
     let nanos: Vec<Sample> = samples.iter().map(|s| Sample { t: s.t * 1e9, ..s.clone() }).collect();
     let e = of_csv(&bench, "F,I,O,S", csv(&nanos)).expect_err("nanoseconds").to_string();
     assert!(e.contains("column `t [s]`") && e.contains("as [ns] they agree"), "{e}");

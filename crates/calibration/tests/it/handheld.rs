@@ -1,5 +1,4 @@
-//! A unit in the hand, whose record is written from its equations: are its errors found, and are the sigmas
-//! right?
+//! Record of a handheld unit, written from its equations: its errors are found, with the right sigmas.
 
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Before, SystemCalibration, SystemOptions, calibrate_system};
@@ -7,7 +6,7 @@ use obsdeg_core::system::model_file;
 use obsdeg_exact::SplitMix64;
 
 const G: f64 = 9.81744;
-/// Accelerometers: bias, scale, misalignment; gyros: bias, scale, misalignment; in the order of the files.
+/// Errors of the unit: accelerometers (bias, scale, misalignment), then gyros, in the order of the files.
 const TRUTH: [(&str, f64); 21] = [
     ("bx", 33124.0),
     ("by", 33275.0),
@@ -50,7 +49,7 @@ fn solved(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// Rests of 2 s (35 s at first) and turns of 1.5 s at rates that rise and fall, at 100 Hz; the force is
+/// Rests of 2 s (35 s at first) and turns of 1.5 s at rates that rise and fall, at 100 Hz. The force is
 /// turned by Rodrigues' formula in steps of a millisecond.
 fn record(rests: usize, seed: u64) -> String {
     let mut random = SplitMix64::new(seed);
@@ -89,7 +88,7 @@ fn record(rests: usize, seed: u64) -> String {
             text += &line;
             text.push('\n');
             t += 0.01;
-            // what is at rest in n turns backwards in the unit; the rate is held from a sample to the next
+            // a vector at rest in n turns backwards in the unit; the rate is held from a sample to the next
             let rate = w.iter().map(|x| x * x).sum::<f64>().sqrt();
             if rate > 0.0 {
                 let (u, angle) = (w.map(|x| -x / rate), rate * 0.01);
@@ -108,7 +107,7 @@ fn record(rests: usize, seed: u64) -> String {
 fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibration {
     let path = format!("{}/../../examples/handheld/{file}", env!("CARGO_MANIFEST_DIR"));
     let model = std::fs::read_to_string(path).expect("the model");
-    // turns of 1.5 s; no earth
+    // turns of 1.5 s; no earth rate
     let model =
         model.replace("noise = { turn = 0.016, rate = 1e-4 }", "noise = { turn = 6e-3, rate = 1e-6 }");
     let record = Record::csv("hand.csv", Box::new(std::io::Cursor::new(text.to_string()))).expect("a record");
@@ -116,7 +115,7 @@ fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibrat
         .expect("calibrated")
 }
 
-/// Accelerometers by the length of the force, gyros by the turns between, what is known of the first as a
+/// Accelerometers by the length of the force; gyros by the turns between rests, with the first result as a
 /// prior of the second.
 #[test]
 fn errors_of_a_unit_in_the_hand() {
@@ -139,7 +138,7 @@ fn errors_of_a_unit_in_the_hand() {
             assert!((x - truth(&u.name)).abs() < 4.0 * s, "{}: {x} +- {s}", u.name);
         }
     }
-    // NEES of the gyros' fifteen with what was known of the others: 21 unknowns
+    // NEES of the gyros' fifteen errors with the prior on the others: 21 unknowns
     let p = nalgebra::DMatrix::from_fn(21, 21, |i, j| second.covariance.covariance[i][j]);
     let e = nalgebra::DVector::from_fn(21, |i, _| {
         second.covariance.estimates[i] - truth(&second.covariance.names[i])

@@ -1,5 +1,5 @@
-//! Small models whose answer is known by other means: closed formulas of least squares, the same model
-//! without what cannot be told apart.
+//! Small models with an answer known by other means: closed formulas of least squares, or the same model
+//! without indistinguishable unknowns.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::record::Record;
@@ -24,7 +24,7 @@ pub(crate) fn calibrated(
     calibrate_system(&model_file::read(&model).expect("a model"), record, options, &|_| true)
 }
 
-/// Unit normals (Box and Muller).
+/// Unit normals (Box-Muller).
 pub(crate) fn normals(seed: u64) -> impl FnMut() -> f64 {
     let mut random = SplitMix64::new(seed);
     let mut uniform = move || ((random.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
@@ -35,9 +35,11 @@ pub(crate) fn found<'a>(list: &'a [SystemEstimated], name: &str) -> &'a SystemEs
     list.iter().find(|u| u.name == name).unwrap_or_else(|| panic!("{name}: {list:?}"))
 }
 
-const LINE: &str = "[known_inputs]\nx = \"generic\"\n[parameters]\na = {}\nb = {}\n[outputs]\ny = \"a + b*x\"\n[simulation]\nvalues = { a = 1, b = 1 }\n";
+const LINE: &str = "[known_inputs]\nx = \"generic\"\n[parameters]\na = {}\nb = {}\n[outputs]\n\
+    y = \"a + b*x\"\n[simulation]\nvalues = { a = 1, b = 1 }\n";
 
-/// A straight line with a spike: named with what the line through the others, and their scatter, say of it.
+/// A straight line with a spike: the spike is named with the distance and scatter by the line through the
+/// other points.
 #[test]
 fn a_spike_does_not_hide_in_its_own_sigma() {
     let mut normal = normals(5);
@@ -53,7 +55,7 @@ fn a_spike_does_not_hide_in_its_own_sigma() {
             .collect();
         let model = noise.map_or(LINE.to_string(), |s: f64| format!("{LINE}noise = {{ y = {s} }}\n"));
         let c = calibrated(&model, &text, &options()).expect("calibrated");
-        // the others alone
+        // the other points alone
         let others: Vec<(f64, f64)> =
             points.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, p)| *p).collect();
         let a = DMatrix::from_fn(others.len(), 2, |i, j| if j == 0 { 1.0 } else { others[i].0 });
@@ -82,7 +84,7 @@ fn a_spike_does_not_hide_in_its_own_sigma() {
     assert_eq!((c.outputs[0].outlier_gate, c.outputs[0].degrees_of_freedom.round()), (None, 1.0));
 }
 
-/// A scale and a start that are only told as a product: the product is what the start is where the scale is
+/// A scale and a start that are determined only as a product: the product equals the start for a scale of
 /// one.
 #[test]
 fn what_is_not_told_apart_has_its_product() {
@@ -92,7 +94,8 @@ fn what_is_not_told_apart_has_its_product() {
         format!("{t},{}\n", 6.0 * (-0.7 * t).exp() + 0.05 * normal())
     };
     let text: String = std::iter::once("t,y\n".to_string()).chain((0..30).map(line)).collect();
-    let model = "[states]\nx = \"-k*x\"\n[parameters]\nk = {}\ns = {}\n[outputs]\ny = \"s*x\"\n[simulation]\nvalues = { x = 2, k = 1, s = 2 }\nnoise = { y = 0.05 }\n";
+    let model = "[states]\nx = \"-k*x\"\n[parameters]\nk = {}\ns = {}\n[outputs]\ny = \"s*x\"\n[simulation]\n\
+        values = { x = 2, k = 1, s = 2 }\nnoise = { y = 0.05 }\n";
     let c = calibrated(model, &text, &options()).expect("calibrated");
     let plain = model.replace("s = {}\n", "").replace("s*x", "x").replace(", s = 2", "");
     let own = calibrated(&plain, &text, &options()).expect("calibrated");
@@ -109,14 +112,14 @@ fn what_is_not_told_apart_has_its_product() {
     let ((a, s), (b, t)) = (of(product), of(x));
     assert!((a - b).abs() < 1e-3 * t && (s / t - 1.0).abs() < 1e-3, "{a} {s} {b} {t}");
     assert!((a - 6.0).abs() < 4.0 * s);
-    // one solution by what can be told: not all starts are needed
+    // one solution by the determined combinations: not all starts are needed
     let o = &own.other_starts;
     assert_eq!(own.starts.1 + o.near + o.higher + o.unsettled + o.failed, own.starts.0, "{o:?}");
     assert!(own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16, "{:?}", own.starts);
 }
 
-/// Times and columns in another unit than the model's are converted, or refused with both; what one model
-/// knows is no news to itself.
+/// Times and columns in another unit than the model's are converted, or refused with both units. A prior
+/// calibration of the same model gives no finding.
 #[test]
 fn units_of_models() {
     let mut normal = normals(9);
@@ -126,7 +129,9 @@ fn units_of_models() {
         let line = |(t, y): &(f64, f64)| format!("{},{}\n", t * by, y * scale);
         std::iter::once(format!("t{unit},y{of}\n")).chain(rows.iter().map(line)).collect()
     };
-    let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\nk = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\nvalues = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
+    let model = "[states]\nx = { equation = \"-k*x\", unit = \"m/s^2\" }\n[parameters]\n\
+        k = { unit = \"1/s\" }\n[outputs]\ny = { expression = \"x\", unit = \"m/s^2\" }\n[simulation]\n\
+        values = { x = 2, k = 1 }\nnoise = { y = 0.01 }\n";
     let right = calibrated(model, &text("", 1.0, "", 1.0), &options()).expect("calibrated");
     let k = |c: &SystemCalibration| found(&c.quantities, "k").estimate.expect("determined");
     for (unit, by, of, scale) in [
@@ -153,22 +158,24 @@ fn units_of_models() {
     let options = SystemOptions { prior: Some(before), ..options() };
     let e = calibrated(model, &text("", 1.0, "", 1.0), &options).expect_err("known").to_string();
     assert!(e.contains("which the calibration before rests on, of the same model"), "{e}");
-    // of another model it is said, and counts
+    // a calibration of another model counts, with a finding
     let other = model.replace("-k*x", "-k*x*1");
     assert!(calibrated(&other, &text("", 1.0, "", 1.0), &options).expect("calibrated").shared);
 }
 
-const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n[outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\ncarry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
+const DOSES: &str = "[constants]\nD = { value = 100 }\n[states]\nA = \"-k*A\"\n[parameters]\nk = {}\nV = {}\n\
+    [outputs]\ny = \"A/V\"\n[[segment]]\n[[segment]]\ncarry = { A = \"A + D\" }\n[[segment]]\n\
+    carry = { A = \"A + D/2\" }\n[simulation]\nvalues = { A = 50, k = 0.2, V = 8 }\nnoise = { y = 0.05 }\n";
 
-/// Doses at times that the record says: what is left of the first is unknown, the volume follows from the
-/// jumps of the next, whose sizes are known.
+/// Doses at times stated in the record: the rest of the first dose is unknown, and the volume follows from
+/// the jumps of the next doses, whose sizes are known.
 #[test]
 fn segments_begin_with_their_first_rows() {
     let (start, k, v, jumps) = (70.0, 0.13, 12.0, [(6.0, 100.0), (11.5, 50.0)]);
     let mut normal = normals(8);
     let mut text = "t,segment,y\n".to_string();
     let mut times: Vec<f64> = (0..60).map(|i| 0.3 * f64::from(i)).collect();
-    // a row of nothing but the time of a jump
+    // a row with only the time of a jump
     times.push(11.5);
     times.sort_by(f64::total_cmp);
     times.dedup();
@@ -186,7 +193,7 @@ fn segments_begin_with_their_first_rows() {
         let (x, s) = (u.estimate.expect(name), u.sigma.expect(name));
         assert!((x - truth).abs() < 3.5 * s && s < 0.05 * truth, "{name}: {x} +- {s}");
     }
-    // without the jumps only amount over volume is told, whatever segments there could be
+    // without the jumps only amount over volume is determined, whatever segments there could be
     let early: String =
         text.lines().filter(|l| !l.contains(",2,") && !l.contains(",3,")).map(|l| format!("{l}\n")).collect();
     let c = calibrated(DOSES, &early, &options()).expect("calibrated");
@@ -227,8 +234,8 @@ fn segments_begin_with_their_first_rows() {
     }
 }
 
-/// Two patients with doses of their own times and amounts at first, and one volume: rows of one among those
-/// of the other, or behind them.
+/// Two patients with their own times of doses and initial amounts, and one volume: rows of one among those of
+/// the other, or behind them.
 #[test]
 fn experiments_have_segments_of_their_own() {
     let (k, v) = (0.13, 12.0);
@@ -263,7 +270,7 @@ fn experiments_have_segments_of_their_own() {
     sorted.sort_by_key(|l| l.0);
     let other = calibrated(&model, &text(&sorted), &options()).expect("calibrated");
     assert_eq!(c.quantities, other.quantities);
-    // an experiment goes on behind another's rows, not back
+    // an experiment continues behind another's rows, and its time does not go back
     sorted.push((1, "5,1,2,3\n".into()));
     let e = calibrated(&model, &text(&sorted), &options()).expect_err("back").to_string();
     assert!(
@@ -272,10 +279,11 @@ fn experiments_have_segments_of_their_own() {
     );
 }
 
-/// Times of another clock are the record's own business; work that would not end is refused before it begins.
+/// Times of another clock are converted; endless work is refused before it begins.
 #[test]
 fn times_of_another_clock() {
-    const DECAY: &str = "states = { x = '-k*x' }\nparameters = ['k']\noutputs = { z = 'x' }\n[simulation]\nvalues = { x = 1, k = 1 }\nstep = 0.1\nnoise = { z = 0.001 }";
+    const DECAY: &str = "states = { x = '-k*x' }\nparameters = ['k']\noutputs = { z = 'x' }\n[simulation]\n\
+        values = { x = 1, k = 1 }\nstep = 0.1\nnoise = { z = 0.001 }";
     let rows = |head: &str, time: &dyn Fn(f64) -> String| {
         let mut normal = normals(3);
         let of = |i: u32| {

@@ -1,5 +1,5 @@
-//! Further runs: the one that would meet a requirement is computed, and a run that is made so meets it; a
-//! prior counts once, however many records there are.
+//! Further runs: the computed run meets its requirement when it is made; a prior counts once, however many
+//! records there are.
 
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, Options, calibrate};
@@ -47,9 +47,9 @@ fn sigma(c: &Calibration, name: &str) -> f64 {
     own.sigma.expect("determined")
 }
 
-/// Sigmas that are required are a part of those of the record. Each run that is said to meet one is
-/// simulated, by the simulator of the tests, and calibrated with the first: sigma is the one that was said,
-/// within the part by which attitudes and the fit's factor differ, and estimates are right.
+/// Required sigmas are a fraction of those of the record. Each run that would meet one is simulated by the
+/// simulator of the tests, and calibrated with the first. Its sigma is the predicted one, but for the effects
+/// of attitudes and of the fit's factor, and the estimates are right.
 #[test]
 fn a_run_as_it_is_said_meets_the_requirement() {
     let first = bench(41);
@@ -58,7 +58,7 @@ fn a_run_as_it_is_said_meets_the_requirement() {
     let required: Vec<(&str, f64)> =
         [("D_FY", 0.6), ("D_IX", 0.8), ("D_SZ", 2.0)].map(|(n, part)| (n, part * sigma(&free, n))).to_vec();
     let c = calibrated(&first, &required, false, None);
-    // the third is met
+    // the third requirement is met
     assert_eq!(c.next_runs.iter().map(|n| n.unknown.as_str()).collect::<Vec<_>>(), ["D_FY", "D_IX"]);
     for n in &c.next_runs {
         let (attitude, dwell, then) =
@@ -82,7 +82,7 @@ fn a_run_as_it_is_said_meets_the_requirement() {
     }
 }
 
-/// A requirement far beyond any run is said to be so, with the figure of the longest.
+/// A requirement beyond any run is reported as such, with the figure of the longest run.
 #[test]
 fn what_no_run_meets_is_said() {
     let first = bench(43);
@@ -92,8 +92,8 @@ fn what_no_run_meets_is_said() {
     assert!(n.sigma_then.is_some_and(|s| s > 1e-9 && s < sigma(&c, "D_FX")), "{n:?}");
 }
 
-/// Priors that a scheme states are in the first calibration; the second, with the first as prior, does not
-/// count them again: it is the calibration of both records at once.
+/// Priors stated by a scheme are in the first calibration. The second, with the first as prior, does not
+/// count them again: it equals the calibration of both records at once.
 #[test]
 fn a_prior_counts_once() {
     let (first, second) = (bench(44), bench(45));

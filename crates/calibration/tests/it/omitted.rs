@@ -1,5 +1,5 @@
-//! Records with an error in their truth that the scheme does not estimate: is it named, and what is said
-//! without one?
+//! Records with an error in their truth that the scheme does not estimate: the error is named. Answers
+//! without such an error.
 
 use obsdeg_calibration::answer::Finding;
 use obsdeg_calibration::{Calibration, Options, calibrate, record::Record};
@@ -28,12 +28,12 @@ fn five(k0_y_ug: f64, seed: u64) -> Bench {
     }
 }
 
-/// Z1 and Z3 of the record of a bench, `C_c^n f - (0, 1, 0)`.
+/// Calibration of the record of a bench by Z1 and Z3, `C_c^n f - (0, 1, 0)`.
 fn calibrated(bench: &Bench) -> Calibration {
     required(bench, &[], &[])
 }
 
-/// The same with requirements and a bench, by names.
+/// Calibration with requirements and a bench, by names.
 fn required(bench: &Bench, requirements: &[(&str, f64)], sizes: &[(&str, f64)]) -> Calibration {
     let mut text = String::from("t [s],position,Z1 [g],Z3 [g]\n");
     for s in bench.record() {
@@ -52,9 +52,10 @@ fn required(bench: &Bench, requirements: &[(&str, f64)], sizes: &[(&str, f64)]) 
         .expect("calibrated")
 }
 
-/// No requirement counts as met where a suspected error moves the estimate by more than it allows; without
-/// one the answer says which size of each error would use it up. By the reference table 1 ug of every K0
-/// changes D_IZ by 0.02985 deg/h/g. Where a bench alone is beyond the requirement, no further run is offered.
+/// No requirement counts as met where a suspected error moves the estimate beyond it. Without a suspicion the
+/// answer states the size of each error that would use the requirement up. By the reference table 1 ug of
+/// every K0 changes D_IZ by 0.02985 deg/h/g. Where a bench alone exceeds the requirement, no further run is
+/// offered.
 #[test]
 fn requirements_count_what_is_suspected_and_say_what_is_not_stated() {
     let all = [("D", 0.1)];
@@ -69,7 +70,7 @@ fn requirements_count_what_is_suspected_and_say_what_is_not_stated() {
     let expected = (0.01 - sigma * sigma).sqrt() / 0.02985;
     assert_eq!(k0.unknown, "D_IZ");
     assert!((k0.size / expected - 1.0).abs() < 0.02, "{} {expected}", k0.size);
-    // of a bench the families that it states have no limit
+    // families that a bench states have no limit
     let c = required(&five(0.0, 3), &all, &[("K0", 0.1)]);
     assert!(c.omitted.limits.iter().all(|l| l.family != "K0") && c.omitted.limits.len() > 3);
     let c = required(&five(0.0, 3), &all, &[("K0", 20.0)]);
@@ -77,8 +78,8 @@ fn requirements_count_what_is_suspected_and_say_what_is_not_stated() {
     assert!(next.required_sigma == 0.0 && next.attitude.is_none() && !next.met, "{next:?}");
 }
 
-/// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band, D_IZ is many sigmas off, and
-/// the score test names the error and what D_IZ is with it.
+/// A zero of 15 ug of accelerometer Y: chi-square of the fit is within its band and D_IZ is many sigmas off.
+/// The score test names the error and the resulting D_IZ.
 #[test]
 fn an_accelerometer_zero_is_named() {
     let c = calibrated(&five(15.0, 3));
@@ -101,8 +102,8 @@ fn an_accelerometer_zero_is_named() {
     assert!(!c.consistent);
 }
 
-/// Members of a group explain the residuals equally and change the estimates in other ways: a range holds
-/// what the estimate is with the true one, which is not the one named first.
+/// Members of a group explain the residuals equally and change the estimates differently: a range holds the
+/// estimate with the true error, which is not the one named first.
 #[test]
 fn a_group_changes_estimates_by_a_range() {
     let (mut ranges, mut others) = (0, 0);
@@ -131,9 +132,9 @@ fn a_group_changes_estimates_by_a_range() {
     assert!(ranges > 0 && others > 0, "{ranges} {others}");
 }
 
-/// Where the platform is tilted, an error changes the estimates by what a record with it says: the total of a
-/// bench of one error against the difference of two calibrations with the same noise, under platform and
-/// inertial carry. Columns at the attitudes of the scheme gave 0.66 and 1.7 times the change there.
+/// For a tilted platform, an error changes the estimates as a record with it does: the total of a bench of
+/// one error, against the difference of two calibrations with the same noise, under platform and inertial
+/// carry. Columns at the attitudes of the scheme gave 0.66 and 1.7 times the change there.
 #[test]
 fn a_bench_counts_as_much_as_its_error_changes() {
     use crate::simulator::AtOnce;
@@ -184,8 +185,8 @@ fn a_bench_counts_as_much_as_its_error_changes() {
     assert!(seen > 12, "{seen}");
 }
 
-/// Where labels leave the beginning of the scheme open, it takes part in what explains residuals: an error of
-/// five times its visible size is named, although a later beginning would take most of it.
+/// Where labels leave the beginning of the scheme open, it may explain residuals too. An error of five times
+/// its visible size is still named, although a later beginning would explain most of it.
 #[test]
 fn an_error_is_told_from_an_open_beginning() {
     use crate::simulator::AtOnce;
@@ -215,7 +216,7 @@ fn an_error_is_told_from_an_open_beginning() {
     assert!(named == 12 && open > 2, "{named} {open}");
 }
 
-/// Without an error nothing is suspected, in these ten records.
+/// Without an error nothing is suspected in these ten records.
 #[test]
 fn nothing_is_suspected_without_an_error() {
     for seed in 0..10 {

@@ -1,4 +1,4 @@
-//! From a bench to a record to an estimate: is it what the bench had, and what its sigmas say?
+//! From a bench to a record to an estimate: the estimate equals the truth of the bench within its sigmas.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::answer::{Finding, PositionsBy};
@@ -11,7 +11,7 @@ use obsdeg_evidence::simulation::Conditions;
 
 use crate::simulator::{AtOnce, Bench, Sample, csv};
 
-/// The scheme that a bench runs.
+/// Scheme that a bench runs.
 pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
     let angles = bench
         .positions
@@ -25,7 +25,7 @@ pub(crate) fn scheme(bench: &Bench, terms: &str) -> Scheme {
     };
     scheme.latitude = Some(bench.latitude_deg.to_string().parse().expect("a latitude"));
     scheme.unknowns = terms.parse().expect("terms");
-    // torquers act on turns that are exact
+    // torquers act on exact turns
     scheme.path = (terms == "all").then_some(Path::OneAxis);
     for (p, (name, _, dwell)) in scheme.positions.iter_mut().zip(&bench.positions) {
         p.name = (*name).into();
@@ -62,7 +62,7 @@ pub(crate) fn six() -> Bench {
     Bench { positions, ..Bench::default() }
 }
 
-/// The true value of a coefficient in the unit of the answer, by its name; `None` for psi and combinations.
+/// True value of a coefficient in the unit of the answer, by its name; `None` for psi and combinations.
 pub(crate) fn truth(bench: &Bench, name: &str) -> Option<f64> {
     const ARCSEC: f64 = 648000.0 / std::f64::consts::PI;
     let (kind, axes) = name.rsplit_once('_').filter(|_| !name.contains(' '))?;
@@ -83,7 +83,7 @@ pub(crate) fn truth(bench: &Bench, name: &str) -> Option<f64> {
     })
 }
 
-/// Name, error over sigma of every coefficient.
+/// Name, and error over sigma, of every coefficient.
 pub(crate) fn errors(bench: &Bench, c: &Calibration) -> Vec<(String, f64)> {
     let known = c.quantities.iter().filter(|u| u.determined);
     let known = known.filter_map(|u| Some((u, truth(bench, &u.name)?)));
@@ -102,14 +102,15 @@ fn normalised(bench: &Bench, c: &Calibration) -> (f64, usize) {
     (e.dot(&solved), at.len())
 }
 
-/// What every right record must show.
+/// Checks common to all right records.
 fn is_right(c: &Calibration) {
-    // with wide priors on what is not determined sigmas lose some digits
+    // wide priors on undetermined unknowns cost sigmas some digits
     assert!(c.second_path.difference < 1e-9 && c.second_path.sigma_difference < 1e-8, "{:?}", c.second_path);
     assert!(c.consistent, "{:?}", c.findings);
 }
 
-/// Benches as real ones are: turns take time, outputs are quantised, samples are lost, gyros drift at random.
+/// Benches with real effects: turns take time, outputs are quantised, samples are lost, gyros drift at
+/// random.
 fn real(seed: u64) -> Bench {
     Bench {
         seed,
@@ -122,7 +123,7 @@ fn real(seed: u64) -> Bench {
     }
 }
 
-/// The mean NEES of so many records lies where it does with a probability of 99.9 %.
+/// The mean NEES of `records` records lies in its band of 99.9 %.
 fn round_trips(records: u64, bench: impl Fn(u64) -> Bench, terms: &str) {
     let (mut sum, mut count, mut inconsistent) = (0.0, 0, 0);
     let mut clocks: Vec<f64> = Vec::new();
@@ -142,7 +143,7 @@ fn round_trips(records: u64, bench: impl Fn(u64) -> Bench, terms: &str) {
     let of_clock: f64 = clocks.iter().sum::<f64>() / clocks.len().max(1) as f64;
     let clock_band = chi_square_band(1.0, clocks.len() as f64, 0.999);
     println!("{terms}: {} clocks, mean square {of_clock:.3}, band {clock_band:.3?}", clocks.len());
-    // of the paper's two positions nothing is said of the clock
+    // the paper's two positions do not determine the clock
     assert!(
         clocks.is_empty() || (clock_band.0..=clock_band.1).contains(&of_clock),
         "{of_clock}: {clock_band:?}"
@@ -163,7 +164,7 @@ fn estimates_are_what_their_sigmas_say() {
     round_trips(6, real, "F,I,O,S");
 }
 
-/// With biases, scale factors and squares of the accelerometers.
+/// Round trips with biases, scale factors and squares of the accelerometers.
 #[test]
 fn accelerometers_too() {
     let bench = |seed| Bench {
@@ -174,7 +175,7 @@ fn accelerometers_too() {
     round_trips(3, bench, "F,I,O,S,K0,K1,K2");
 }
 
-/// The seven quarter turns of examples/self-calibration, with errors of everything: 33 coefficients.
+/// Seven quarter turns of examples/self-calibration, with errors of everything: 33 coefficients.
 pub(crate) fn whole(seed: u64) -> Bench {
     let attitudes = [
         [0.0, 0.0, 90.0],
@@ -197,7 +198,7 @@ pub(crate) fn whole(seed: u64) -> Bench {
     }
 }
 
-/// Everything at once: drifts, torquers, accelerometers and mounting.
+/// Round trips with all errors at once: drifts, torquers, accelerometers and mounting.
 #[test]
 fn the_whole_platform() {
     round_trips(2, whole, "all");
@@ -228,8 +229,8 @@ fn twelve() -> Vec<(&'static str, [f64; 3], f64)> {
     six().positions.into_iter().chain(more).collect()
 }
 
-/// Two positions, nothing told of D_FZ and psi_y but together: no numbers of their own, one of the
-/// combination that is what the bench had.
+/// Two positions determine D_FZ and psi_y only together: neither has an estimate, and their combination has
+/// that of the bench.
 #[test]
 fn what_is_not_told_apart_has_no_estimate() {
     let bench = Bench { seed: 4, drift: [[1.1, 1.2, 1.3], [0.5; 3], [0.5; 3], [0.5; 3]], ..Bench::default() };
@@ -245,10 +246,10 @@ fn what_is_not_told_apart_has_no_estimate() {
     let (estimate, sigma) = (both.estimate.expect("there"), both.sigma.expect("there"));
     // under inertial carry: D_SZ + a*psi_y
     assert!(both.name.contains("D_SZ"), "{}", both.name);
-    // D_SZ 0.5 and wN psi_y 0.023 deg/h: what nothing determines is held within ten times its prior, and
-    // bends into the combination
+    // D_SZ 0.5 and wN psi_y 0.023 deg/h: the fit bounds an undetermined direction by ten times its prior,
+    // which affects the combination at second order
     assert!((estimate - 0.523).abs() < 3.0 * sigma && sigma < 0.5, "{both:?}");
-    // with other priors it is the same but for that, which sigma holds
+    // with other priors the combination changes by that effect only, within sigma
     let mut other = conditions(&bench);
     other.priors.iter_mut().for_each(|p| p.value *= 0.5);
     let record =
@@ -264,7 +265,7 @@ fn what_is_not_told_apart_has_no_estimate() {
     }
 }
 
-/// What is wrong with a record, or with what is believed of it, is found and named.
+/// Faults of a record, or of the assumptions on it, are found and named.
 #[test]
 fn faults_are_named() {
     let bench = Bench { seed: 9, ..real(9) };
@@ -272,7 +273,7 @@ fn faults_are_named() {
     let right = of_csv(&bench, "F,I,O,S", csv(&samples)).expect("calibrated");
     is_right(&right);
 
-    // spikes, in samples that are a measurement of two
+    // spikes, in samples of which two make a measurement
     let mut spiked = samples.clone();
     for (k, by) in [(100, 3e-4), (700, -2e-3)] {
         spiked[k].f[0] += by;
@@ -296,7 +297,7 @@ fn faults_are_named() {
         );
     }
 
-    // two positions exchanged: of different gravity they cannot be what the scheme says
+    // two positions exchanged: with different gravity they contradict the scheme
     let mut other = bench.clone();
     (other.positions[1].1, other.positions[3].1) = (bench.positions[3].1, bench.positions[1].1);
     let e = of_csv(&other, "F,I,O,S", csv(&samples)).expect_err("another scheme").to_string();
@@ -307,7 +308,7 @@ fn faults_are_named() {
         "{e}"
     );
 
-    // a position whose azimuth is not that of the scheme, which gravity does not show
+    // a position with another azimuth than the scheme's, which gravity does not show
     let mut other = bench.clone();
     other.positions[3].1 = [0.0, 0.0, 0.0];
     let mut turned = bench.clone();
@@ -315,13 +316,13 @@ fn faults_are_named() {
     let c = of_csv(&other, "F,I,O,S", csv(&turned.record())).expect("calibrated");
     assert!(!c.consistent);
 
-    // scale
+    // scale error
     let c = of_csv(&bench, "F,I,O,S", csv(&Bench { scale: 1.001, ..bench.clone() }.record()))
         .expect("calibrated");
     let Some(Finding::Force { length_g, .. }) = c.findings.first() else { panic!("{:?}", c.findings) };
     assert!((length_g - 1.001).abs() < 1e-4, "{length_g}");
 
-    // noise that is three times what was said, alike everywhere
+    // noise three times as large as stated, everywhere
     let c = of_csv(
         &Bench { noise_g: 1e-5, ..bench.clone() },
         "F,I,O,S",
@@ -333,7 +334,7 @@ fn faults_are_named() {
     let u = &c.quantities[3];
     assert!((u.sigma_rescaled.expect("there") / u.sigma.expect("there") - factor).abs() < 1e-9);
 
-    // a position that is missing
+    // a missing position
     let fewer: Vec<_> = samples.iter().filter(|s| s.label != "p3").cloned().collect();
     let e = of_csv(&bench, "F,I,O,S", csv(&fewer)).expect_err("no p3").to_string();
     assert!(e.contains("found `p4`, expected p3"), "{e}");
@@ -347,7 +348,7 @@ fn faults_are_named() {
     );
 }
 
-/// Short positions and small drifts, so that a window tells rest from turns.
+/// Short positions and small drifts, so that a window distinguishes rest from turns.
 fn quick(seed: u64) -> Bench {
     let mut positions = six().positions;
     positions.iter_mut().for_each(|p| p.2 = 300.0);
@@ -371,8 +372,8 @@ pub(crate) fn with_recording(
     calibrate(&scheme, &conditions(bench), vec![record], &Options::default(), &|_| true)
 }
 
-/// Without labels and late, by the intervals at rest: the estimate is that by labels but for a part of sigma;
-/// other schemes are refused.
+/// Record without labels that begins late, by its intervals at rest: the estimate equals that by labels
+/// within a fraction of sigma; other schemes are refused.
 #[test]
 fn positions_are_found() {
     let bench = quick(11);
@@ -415,7 +416,7 @@ fn positions_are_found() {
     );
 }
 
-/// Names and counts of the file, gimbals, temperature: what goes with it is named.
+/// Names and counts of the file, gimbals, temperature: a correlation with the temperature is named.
 #[test]
 fn columns_of_all_kinds() {
     let bench = quick(12);
@@ -428,7 +429,7 @@ fn columns_of_all_kinds() {
         ..Recording::default()
     };
     let angles = |label: &str| bench.positions.iter().find(|p| p.0 == label).map_or([0.0; 3], |p| p.1);
-    // warmer and colder with time, and Z with it by as much as four times the noise of a measurement
+    // temperature that rises and falls, and Z with it by up to four times the noise of a measurement
     let text = |by: f64, turned: f64| {
         let head = "Time [ms],position,X,Y,Z,alpha [deg],beta [deg],gamma [deg],T [degC]\n".to_string();
         let line = |s: &Sample| {
@@ -467,8 +468,8 @@ fn columns_of_all_kinds() {
     assert!(c.findings.iter().any(warm), "{:?}", c.findings);
 }
 
-/// Noise that nobody knows is estimated, component by component; then it is consistent, and sigmas are those
-/// of who knows it.
+/// Unknown noise is estimated, component by component; the fit is then consistent, with the sigmas of a known
+/// noise.
 #[test]
 fn noise_is_estimated() {
     let bench = Bench { noise_g: 3e-5, ..real(14) };
@@ -486,7 +487,7 @@ fn noise_is_estimated() {
     is_right(&c);
     assert!(c.assumed.noise_estimated && (c.fit.factor - 1.0).abs() < 1e-2, "{:?}", c.fit);
     for channel in &c.channels {
-        // 1200 samples, two a measurement: a standard deviation is known to 3 %
+        // 1200 samples, two per measurement: a standard deviation is known to 3 %
         assert!((channel.sigma / 3e-5 - 1.0).abs() < 0.12, "{channel:?}");
     }
     for (a, b) in knows.quantities.iter().zip(&c.quantities) {
@@ -495,10 +496,10 @@ fn noise_is_estimated() {
     }
 }
 
-/// Two positions at the drifts of the paper, where psi grows to degrees: what nothing determines is in a box
-/// about the first estimate, 0 or twice the truth. Both estimates of what is determined are right. To first
-/// order they differ by at most their part of sigma that comes from the box, times the distance of the two
-/// boxes in widths of the box (Cauchy and Schwarz); a quarter of sigma is left to what is of second order.
+/// Two positions at the drifts of the paper, where psi grows to degrees: undetermined unknowns are in a box
+/// about the first estimate, 0 or twice the truth. Both estimates of the determined unknowns are right. To
+/// first order they differ by at most the part of sigma that comes from the box, times the distance of the
+/// two boxes in widths of the box (Cauchy-Schwarz). A quarter of sigma is allowed for the second order.
 #[test]
 fn what_is_held_bends_little() {
     const OPEN: [&str; 7] = ["D_IX", "D_IZ", "D_OX", "D_OY", "D_OZ", "D_SY", "D_SZ"];
@@ -530,7 +531,7 @@ fn what_is_held_bends_little() {
     assert_eq!(compared, 8);
 }
 
-/// Two runs of one platform agree; where a coefficient has changed between them, that is said.
+/// Two runs of one platform agree; a coefficient that changed between them gives a finding.
 #[test]
 fn runs_are_held_against_each_other() {
     let first = quick(15);
@@ -560,7 +561,7 @@ fn runs_are_held_against_each_other() {
     );
 }
 
-/// An interrupt while a record is read leaves nothing; later it leaves the iteration where it is, and says
+/// An interrupt while a record is read leaves no answer; later the answer is the current iterate, and says
 /// so.
 #[test]
 fn an_interrupt_leaves_what_there_is() {
@@ -586,21 +587,21 @@ fn an_interrupt_leaves_what_there_is() {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));
         assert!((x - y).abs() < 100.0 * s, "{}: {x} {y} +- {s}", a.name);
     }
-    // what is left over time is that of white noise
+    // residuals over time are white noise
     for s in &whole.series {
         assert!(s.points.len() <= 1000 && s.count == s.points.len() && s.autocorrelation.len() == 20);
         let band = 4.0 / (s.count as f64).sqrt();
         assert!(s.autocorrelation.iter().all(|r| r.abs() < band), "{:?}", s.autocorrelation);
         for (k, (tau, found, white)) in s.allan.iter().enumerate() {
             assert!((tau / 10.0 - f64::from(1 << k)).abs() < 0.1, "{tau}");
-            // of n/m clusters
+            // for n/m clusters
             let scatter = 4.0 * (tau / 10.0 / s.count as f64).sqrt();
             assert!((found / white - 1.0).abs() < scatter + 0.1, "{tau}: {found} {white}");
         }
     }
 }
 
-/// The record of examples/bench-day.
+/// Record of examples/bench-day.
 fn bench_day() -> Bench {
     let mut positions = six().positions;
     positions.iter_mut().for_each(|p| p.2 = 600.0);
@@ -619,7 +620,7 @@ fn bench_day() -> Bench {
     }
 }
 
-/// It is what the simulator writes, and the estimate is what the bench had.
+/// The example's record is what the simulator writes, and the estimate is that of the bench.
 #[test]
 fn the_record_of_the_example() {
     let bench = bench_day();

@@ -1,37 +1,37 @@
-//! Records by other mathematics than the estimator's: the attitude is a quaternion that is turned by what the
-//! gyros let through, the force is exact, noise is white and Gauss-Markov, outputs are quantised, samples are
-//! dropped. Written from the equations of the platform; nothing of the program is used but a generator of
-//! numbers.
+//! Records by other mathematics than the estimator's: the attitude is a quaternion that turns with the drift
+//! of the gyros, the force is exact, noise is white and Gauss-Markov, outputs are quantised, samples are
+//! dropped. The simulator is written from the equations of the platform, and of the program it uses only a
+//! generator of numbers.
 
 use obsdeg_exact::SplitMix64;
 
 pub(crate) type Vector = [f64; 3];
-/// (w, x, y, z), from platform axes to n.
+/// Quaternion (w, x, y, z), from platform axes to n.
 pub(crate) type Quaternion = [f64; 4];
 
 const EARTH_RATE: f64 = 7.292115e-5;
 const DPH: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 
-/// Carry of the error of the attitude through a turn at once.
+/// Carry of the attitude error through an instantaneous turn.
 #[derive(Debug, Clone)]
 pub(crate) enum AtOnce {
-    /// It is the same in n.
+    /// The error stays the same in n.
     Inertial,
-    /// It is the same in platform axes.
+    /// The error stays the same in platform axes.
     Platform,
-    /// It is another rotation vector in platform axes (rad) at each position but the first.
+    /// The error is another rotation vector in platform axes (rad) at each position but the first.
     Reset(Vec<Vector>),
 }
 
-/// What the bench has.
+/// Properties of the bench.
 #[derive(Debug, Clone)]
 pub(crate) struct Bench {
     pub(crate) latitude_deg: f64,
-    /// Of every position: name, Euler angles in deg, dwell in s.
+    /// Positions: name, Euler angles in deg, dwell in s.
     pub(crate) positions: Vec<(&'static str, Vector, f64)>,
-    /// How fast it is turned from one to the next, in deg/s; `None`: at once.
+    /// Rate of the turns between positions, in deg/s; `None`: instantaneous.
     pub(crate) slew_deg_s: Option<f64>,
-    /// Carry of the error of the attitude through turns at once.
+    /// Carry of the attitude error through instantaneous turns.
     pub(crate) carry: AtOnce,
     /// psi at the start in platform axes, in rad.
     pub(crate) psi: Vector,
@@ -41,25 +41,25 @@ pub(crate) struct Bench {
     pub(crate) squares: [Vector; 3],
     /// K0 (g), K1, K2 (1/g) of the accelerometers.
     pub(crate) accelerometers: [Vector; 3],
-    /// What the output of each accelerometer has of the force along each platform axis besides its own, in
-    /// rad.
+    /// Misalignments of each accelerometer: sensitivity of its output to the force along each other platform
+    /// axis, in rad.
     pub(crate) mounting: [Vector; 3],
-    /// What each gyro is torqued too fast by, as a part of the rate commanded about each platform axis: scale
-    /// factors, and misalignments in rad.
+    /// Excess torquing of each gyro, relative to the rate commanded about each platform axis: scale factors,
+    /// and misalignments in rad.
     pub(crate) torquer: [Vector; 3],
     /// White noise of a sample, in g.
     pub(crate) noise_g: f64,
-    /// Steps of the output, in g; 0: none.
+    /// Quantum of the output, in g; 0: none.
     pub(crate) quantum_g: f64,
     /// Angle random walk, in deg/sqrt(h).
     pub(crate) walk_deg_sqrt_h: f64,
     /// Gauss-Markov drift of every gyro: sigma in deg/h, correlation time in s.
     pub(crate) markov: (f64, f64),
-    /// Between two samples, in s.
+    /// Time between two samples, in s.
     pub(crate) step_s: f64,
-    /// One sample in so many is not there; 0: all are.
+    /// Reciprocal of the fraction of samples that are dropped; 0: none.
     pub(crate) dropped: u64,
-    /// All outputs times this.
+    /// Factor on all outputs.
     pub(crate) scale: f64,
     pub(crate) seed: u64,
 }
@@ -89,11 +89,11 @@ impl Default for Bench {
     }
 }
 
-/// One line of a record.
+/// Row of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sample {
     pub(crate) t: f64,
-    /// Empty while the platform turns.
+    /// Label of the position; empty while the platform turns.
     pub(crate) label: &'static str,
     pub(crate) f: Vector,
 }
@@ -107,7 +107,7 @@ fn multiply(a: &Quaternion, b: &Quaternion) -> Quaternion {
     ]
 }
 
-/// The quaternion of a rotation vector.
+/// Quaternion of a rotation vector.
 fn of_vector(v: &Vector) -> Quaternion {
     let angle = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let k = if angle < 1e-12 { 0.5 } else { (angle / 2.0).sin() / angle };
@@ -118,14 +118,14 @@ fn conjugate(q: &Quaternion) -> Quaternion {
     [q[0], -q[1], -q[2], -q[3]]
 }
 
-/// A vector of platform axes in n.
+/// Vector of platform axes, turned into n.
 pub(crate) fn turned(q: &Quaternion, v: &Vector) -> Vector {
     let out = multiply(&multiply(q, &[0.0, v[0], v[1], v[2]]), &conjugate(q));
     [out[1], out[2], out[3]]
 }
 
-/// The passive turns Mx(alpha) My(beta) Mz(gamma) as one quaternion from c to n: a passive turn by an angle
-/// is an active one by its negative.
+/// Passive turns Mx(alpha) My(beta) Mz(gamma) as one quaternion from c to n: a passive turn by an angle is an
+/// active one by its negative.
 pub(crate) fn attitude(angles_deg: &Vector) -> Quaternion {
     let [a, b, c] = angles_deg.map(f64::to_radians);
     let about = |axis: usize, angle: f64| {
@@ -136,7 +136,7 @@ pub(crate) fn attitude(angles_deg: &Vector) -> Quaternion {
     multiply(&multiply(&about(0, a), &about(1, b)), &about(2, c))
 }
 
-/// The rotation vector of a quaternion, the short way.
+/// Rotation vector of a quaternion, of the shorter turn.
 fn vector(q: &Quaternion) -> Vector {
     let q = if q[0] < 0.0 { q.map(|x| -x) } else { *q };
     let s = (q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
@@ -155,7 +155,7 @@ impl Random {
         ((self.0.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// Box and Muller.
+    /// Standard normal random number (Box-Muller).
     pub(crate) fn normal(&mut self) -> f64 {
         let (u, v) = (self.uniform(), self.uniform());
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
@@ -163,7 +163,7 @@ impl Random {
 }
 
 impl Bench {
-    /// The drift in platform axes, in rad/s, where gravity is `g` there: the paper's mounting.
+    /// Drift in platform axes, in rad/s, for gravity `g` there: the paper's mounting.
     fn drift(&self, g: &Vector) -> Vector {
         let [f, i, o, s] = &self.drift;
         let linear = [
@@ -171,13 +171,13 @@ impl Bench {
             f[1] + i[1] * g[1] - s[1] * g[0] - o[1] * g[2],
             f[2] + i[2] * g[2] + s[2] * g[1] + o[2] * g[0],
         ];
-        // along I, O and S of each
+        // gravity along I, O and S of each gyro
         let along = [[g[0], g[2], g[1]], [g[1], g[2], g[0]], [g[2], g[0], g[1]]];
         let squared = |x: usize| (0..3).map(|k| self.squares[k][x] * along[x][k] * along[x][k]).sum::<f64>();
         std::array::from_fn(|x| (linear[x] + squared(x)) * DPH)
     }
 
-    /// The record.
+    /// Record of the bench.
     pub(crate) fn record(&self) -> Vec<Sample> {
         let mut random = Random(SplitMix64::new(self.seed));
         let latitude = self.latitude_deg.to_radians();
@@ -234,7 +234,7 @@ impl Bench {
         out
     }
 
-    /// Turns platform and computed platform, in short parts: the gyros hold the platform at the commanded
+    /// Turns platform and computed platform in short parts: the gyros keep the platform at the commanded
     /// rate, with their drift.
     #[allow(clippy::too_many_arguments, reason = "one step of everything that moves")]
     fn advance(
@@ -254,7 +254,7 @@ impl Bench {
         let fade = (-h / self.markov.1).exp();
         for _ in 0..parts {
             let white = [0.0; 3].map(|_: f64| walk * random.normal());
-            // the rate of the middle, by a half step
+            // rate at the middle, by a half step
             let mut middle = *q;
             let mut middle_computed = *computed;
             for half in [true, false] {
@@ -303,7 +303,7 @@ impl Bench {
     }
 }
 
-/// As CSV.
+/// Samples as CSV.
 pub(crate) fn csv(samples: &[Sample]) -> String {
     let line = |s: &Sample| format!("{},{},{},{},{}\n", s.t, s.label, s.f[0], s.f[1], s.f[2]);
     std::iter::once("t [s],position,fx [g],fy [g],fz [g]\n".to_string())

@@ -1,4 +1,4 @@
-//! Ways to spoil a record, in families: each that shows is refused or flagged with its cause, or does no
+//! Ways to spoil a record, in families: each visible one is refused or flagged with its cause, or does no
 //! harm.
 
 use obsdeg_calibration::record::Record;
@@ -9,16 +9,16 @@ use obsdeg_evidence::simulation::Conditions;
 use crate::round_trip::{conditions, errors, scheme, six};
 use crate::simulator::{Bench, Sample, csv};
 
-/// What must come of a spoiled record.
+/// Required outcome of a spoiled record.
 enum Expected {
-    /// The estimate of the right one, consistent.
+    /// Consistent estimate, equal to that of the right record.
     Right,
     /// One of these words in the error, the findings, the outliers or the gaps.
     Says(&'static [&'static str]),
 }
 use Expected::{Right, Says};
 
-/// A spoiled record: its text, its scheme and conditions where they are spoiled.
+/// Spoiled record: its text, and its scheme and conditions where they are spoiled.
 struct Case {
     family: &'static str,
     name: String,
@@ -56,7 +56,7 @@ impl Cases {
         self.text(family, name, csv(rows), expected);
     }
 
-    /// Every sample by itself.
+    /// Adds a case with `of` applied to every sample.
     fn each(
         &mut self,
         family: &'static str,
@@ -68,7 +68,7 @@ impl Cases {
         self.rows(family, name, &rows, expected);
     }
 
-    /// The same record by another scheme or other conditions.
+    /// Adds a case with the right record under another scheme or other conditions.
     fn believed(
         &mut self,
         family: &'static str,
@@ -88,7 +88,7 @@ impl Cases {
         });
     }
 
-    /// The first sample at a position.
+    /// Index of the first sample at a position.
     fn first(&self, label: &str) -> usize {
         self.samples.iter().position(|s| s.label == label).expect("there")
     }
@@ -102,7 +102,7 @@ fn time(s: &Sample, t: f64) -> Sample {
     Sample { t, ..s.clone() }
 }
 
-/// A number between -1 and 1 for each k, by a generator of its own (Weyl).
+/// Number between -1 and 1 for each k, by an independent generator (Weyl).
 fn between(k: usize, seed: f64) -> f64 {
     2.0 * ((k as f64 + 1.0) * (0.618_033_988_749_895 + seed)).fract() - 1.0
 }
@@ -434,7 +434,7 @@ fn encoding(c: &mut Cases) {
     c.text("encoding", "words", text.replacen(",p2,", ",p2,x", 1), Says(&["expected a number"]));
 }
 
-/// What an answer, or a refusal, says; and the largest error in sigma.
+/// Words of an answer, or of a refusal, and the largest error in sigma.
 fn said(bench: &Bench, case: &Case) -> (String, Option<f64>) {
     let read = || -> Result<Calibration, CalibrationError> {
         let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(case.bytes.clone())))?;
@@ -483,13 +483,13 @@ fn bench() -> Bench {
     Bench { seed: 31, slew_deg_s: Some(2.0), ..six() }
 }
 
-/// Some of each family.
+/// Some cases of each family.
 #[test]
 fn some_ways_to_spoil_a_record() {
     hold(cases().into_iter().step_by(19), &bench());
 }
 
-/// All of them.
+/// All cases of all families.
 #[test]
 #[ignore = "minutes"]
 fn all_ways_to_spoil_a_record() {

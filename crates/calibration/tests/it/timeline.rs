@@ -1,5 +1,5 @@
-//! Records whose times are not those of the scheme to the last digit: rows are lost, stamps are rounded,
-//! late, or of another clock. The timeline of the scheme stands, and the estimate is what the bench had.
+//! Records with times that differ slightly from those of the scheme: rows are lost, stamps are rounded, late,
+//! or of another clock. The timeline of the scheme is used, and the estimate is that of the bench.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::PositionsBy;
@@ -11,7 +11,7 @@ fn bench(seed: u64) -> Bench {
     Bench { seed, slew_deg_s: Some(2.0), ..six() }
 }
 
-/// A generator of its own for what is lost (Lehmer 1951).
+/// Independent generator for lost rows (Lehmer 1951).
 fn lost(seed: u64) -> impl FnMut(f64) -> bool {
     let mut state = 48_271 * (seed + 1) % 0x7fff_ffff;
     move |part| {
@@ -28,7 +28,7 @@ fn later(samples: &[Sample], by: f64) -> Vec<Sample> {
     samples.iter().map(|s| Sample { t: s.t + by, ..s.clone() }).collect()
 }
 
-/// Without the last sample of three positions.
+/// Samples without the last one of three positions.
 fn without_three(samples: &[Sample]) -> Vec<Sample> {
     let last = |k: usize| {
         ["p2", "p3", "p5"].contains(&samples[k].label)
@@ -41,7 +41,7 @@ fn calibrated(bench: &Bench, samples: &[Sample]) -> Calibration {
     of_csv(bench, "F,I,O,S", csv(samples)).expect("calibrated")
 }
 
-/// The largest error in sigma.
+/// Largest error in sigma.
 fn worst(bench: &Bench, c: &Calibration) -> (String, f64) {
     let all = errors(bench, c).into_iter();
     all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).expect("some")
@@ -83,7 +83,7 @@ fn the_timeline_of_the_scheme_stands() {
             "Unix seconds" => 1_795_478_400.0,
             _ => 0.0,
         };
-        // beyond the tolerance it is estimated
+        // beyond the tolerance the delay is estimated
         assert_eq!(sigma.is_some(), late > 0.5, "{name}");
         assert!((at - late).abs() < 4.0 * sigma.unwrap_or(1e-6), "{name}: {at} {sigma:?}");
         let gaps: Vec<_> = r.gaps.iter().filter(|g| g.to_s - g.from_s > 400.0).collect();
@@ -96,8 +96,7 @@ fn the_timeline_of_the_scheme_stands() {
     }
 }
 
-/// Where nothing says that rows are missing, a timeline that is late by less than an interval shows in the
-/// fit.
+/// Where nothing shows that rows are missing, a timeline late by less than an interval shows in the fit.
 #[test]
 fn a_beginning_shows_in_the_fit() {
     let bench = bench(8);
@@ -108,12 +107,12 @@ fn a_beginning_shows_in_the_fit() {
     let clock = &c.records[0].clock;
     let (at, sigma) = (clock.offset_s.expect("there"), clock.offset_sigma_s.expect("estimated"));
     assert!((at - 2.4).abs() < 4.0 * sigma && sigma < 0.2, "{clock:?}");
-    // a right record is taken as it is
+    // a right record is not changed
     let c = of_csv(&bench, "F,I,O,S", bare(0.0)).expect("calibrated");
     assert_eq!((c.records[0].clock.offset_s, c.records[0].clock.offset_sigma_s), (Some(0.0), None));
 }
 
-/// A stated tolerance is what decides whether stamps agree with the timeline.
+/// The stated tolerance decides whether stamps agree with the timeline.
 #[test]
 fn the_tolerance_is_stated() {
     let bench = bench(9);
@@ -125,8 +124,8 @@ fn the_tolerance_is_stated() {
     }
 }
 
-/// Drifts that tilt the platform by more than any bound on single positions: each position begins where the
-/// one before ended. Another position is still named.
+/// Drifts that tilt the platform beyond any bound on single positions: each position begins where the one
+/// before ended. A wrong position is still named.
 #[test]
 fn positions_are_known_at_any_tilt() {
     let tilted = |scale: f64| Bench {
@@ -144,7 +143,7 @@ fn positions_are_known_at_any_tilt() {
         (other.positions[1].1, other.positions[3].1) = (bench.positions[3].1, bench.positions[1].1);
         let e = of_csv(&other, "F,I,O,S", csv(&samples)).expect_err("another scheme").to_string();
         assert!(e.contains("at p2 the specific force is") && e.ends_with("it is that of p4"), "{e}");
-        // the platform that turned once more than the scheme has it
+        // the platform turned once more than in the scheme
         let mut other = bench.clone();
         other.positions[5].1 = other.positions[4].1;
         let e = of_csv(&other, "F,I,O,S", csv(&samples)).expect_err("another scheme").to_string();

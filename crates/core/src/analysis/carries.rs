@@ -12,19 +12,19 @@ use crate::findings::AnalysisError;
 use crate::model::platform::Platform;
 use crate::model::{Carry, Scheme, SchemeError, Unknowns};
 
-/// Verdicts under one carry: by name of an unknown, and of psi at positions.
-struct Named {
+/// Verdicts under one carry, with the names of their unknowns and of psi at positions.
+struct NamedVerdicts {
     names: Vec<String>,
     verdicts: Vec<Verdict>,
 }
 
-impl Named {
+impl NamedVerdicts {
     fn of(&self, name: &str) -> Option<Verdict> {
         self.names.iter().position(|own| own == name).map(|i| self.verdicts[i])
     }
 }
 
-/// Verdicts under the other carries, and reasons for those that are left out.
+/// Verdicts under the other carries, and reasons for omitted ones.
 pub(super) fn carry_reports(
     platform: &Platform,
     judged: &Verdicts,
@@ -36,7 +36,7 @@ pub(super) fn carry_reports(
     }
     let names = platform.names().to_vec();
     let verdicts = (0..names.len()).map(|c| findings.verdict(c)).collect();
-    let own = Named { names, verdicts };
+    let own = NamedVerdicts { names, verdicts };
     let (mut out, mut untold) = (Vec::new(), Vec::new());
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
         let other = match Platform::new(Scheme { carry, ..scheme.clone() }) {
@@ -55,7 +55,7 @@ pub(super) fn carry_reports(
             _ => {
                 let found = degrees(&other, findings.seed)?;
                 let verdicts = (0..other.names().len()).map(|c| Verdict::of(&found, c)).collect();
-                (Named { names: other.names().to_vec(), verdicts }, found.rank_profile)
+                (NamedVerdicts { names: other.names().to_vec(), verdicts }, found.rank_profile)
             }
         };
         let here = match carry {
@@ -71,22 +71,23 @@ pub(super) fn carry_reports(
     }
     if scheme.by_course() && scheme.positions.len() > 1 && !out.is_empty() {
         untold.push(
-            "where rotations are judged by their course, psi of reset carry is compared with the other carries at the first position alone"
+            "where rotations are judged by their course, psi of reset carry is compared with the other \
+             carries at the first position alone"
                 .into(),
         );
     }
     Ok((out, untold))
 }
 
-/// The verdicts of a scheme that is not under reset carry, with those on psi of every position, `psi_x@2`; of
-/// the first alone where rotations are judged by their course, since psi behind one is no combination of the
-/// unknowns with known numbers.
-fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> Named {
+/// Verdicts of a scheme that is not under reset carry, with verdicts on psi of every position, `psi_x@2`.
+/// Where rotations are judged by their output history only the first position is included: psi after a
+/// rotation is no combination of the unknowns with known numbers.
+fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> NamedVerdicts {
     let (scheme, names) = (platform.scheme(), platform.names());
     let sample = judged.values[0].sample(scheme, 1);
     let (f, point) = (sample.point.ring, &sample.point);
     let (blocks, stations) = (platform.blocks(point), scheme.stations());
-    let mut out = Named { names: Vec::new(), verdicts: Vec::new() };
+    let mut out = NamedVerdicts { names: Vec::new(), verdicts: Vec::new() };
     let begins = stations.iter().enumerate().filter(|(_, s)| !s.continues);
     let begins = begins.filter(|(_, s)| s.index == 0 || !scheme.by_course());
     for (i, station) in begins {

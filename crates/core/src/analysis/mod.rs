@@ -28,14 +28,14 @@ use crate::omitted::omitted_verdicts;
 use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
-use crate::solution::loci::{Found, loci};
+use crate::solution::loci::{DegenerateLoci, loci};
 use crate::solution::print::{StationLabel, stations, terms, text};
 use crate::solution::solver::{Frame, Functional, Solver, Sparse};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.analysis/1";
 
-/// What is to be computed.
+/// Contents and seed of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AnalysisOptions {
     /// Seed of all random choices.
@@ -73,7 +73,7 @@ pub fn analyze(
     let mut solver = judged.solver(options.frame, worker);
     let findings = judged.findings(&mut solver);
 
-    // derivatives of Z while the platform turns with such errors hold its rate
+    // with torquer or accelerometer errors, derivatives of Z during a turn contain its rate
     let course = scheme.by_course();
     let printed = AnalysisOptions { solutions: options.solutions && !course, ..options };
     let mut printer = Printer { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
@@ -82,7 +82,7 @@ pub fn analyze(
     let combinations: Vec<CombinationReport> =
         findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
     let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
-    // without an engine, and without a reason of their own
+    // true if no engine was available and the loci gave no reason of their own
     let untold_loci = found.is_ok();
     let found = printer.noted(found).unwrap_or_default();
     let generic = !scheme.generic_names().is_empty();
@@ -101,21 +101,21 @@ pub fn analyze(
     let omitted = omitted.filter(|o| !o.terms.is_empty());
     if scheme.slews() && !scheme.torquers_act() {
         printer.notes.push(
-            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at once, and with slews of \
-             finite duration they need not hold"
+            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning \
+             at once, and with slews of finite duration they need not hold"
                 .into(),
         );
     }
     let asked = (options.solutions && !course, untold_loci && generic);
-    let wanting = Wanting::new(&quantities, &combinations, &findings, &found, asked);
-    let wanting = Wanting {
+    let missing = MissingParts::new(&quantities, &combinations, &findings, &found, asked);
+    let missing = MissingParts {
         left_out: printer.solver.left_out(),
         formulas: options.formulas && formulas.is_none(),
-        ..wanting
+        ..missing
     };
-    let sought = (options.solutions && !course || wanting.formulas) && wanting.any();
+    let sought = (options.solutions && !course || missing.formulas) && missing.any();
     if sought {
-        let note = engine_note(built, &mut printer.solver, &wanting);
+        let note = engine_note(built, &mut printer.solver, &missing);
         printer.notes.extend(note);
     }
     let failure = printer.solver.worker().and_then(|w| w.failure().cloned());
@@ -158,7 +158,7 @@ pub fn analyze(
     })
 }
 
-/// Turns functionals into printed solutions and collects what could not be said.
+/// Turns functionals into printed solutions, and collects notes about those without one.
 struct Printer<'a> {
     solver: Solver<'a>,
     options: AnalysisOptions,
@@ -189,7 +189,7 @@ impl Printer<'_> {
         }
     }
 
-    /// The value, or a note.
+    /// Value of a result; an error becomes a note.
     fn noted<T>(&mut self, result: Result<T, impl std::error::Error>) -> Option<T> {
         result.map_err(|reason| self.notes.push(reason.to_string())).ok()
     }
@@ -264,12 +264,12 @@ fn components(platform: &Platform, support: &[usize], found: Option<&Sparse>) ->
 
 /// Parts of an answer that are missing without the symbolic engine.
 #[derive(Debug, Default)]
-struct Wanting {
+struct MissingParts {
     /// Names of observable unknowns with a solution in decimals.
     decimals: Vec<String>,
     /// Names of observable unknowns without a solution.
     unsolved: Vec<String>,
-    /// Number of combinations that are left out, since nobody gave their coefficients.
+    /// Number of combinations that are left out, since their coefficients are missing.
     left_out: usize,
     /// Number of unobservable directions without coefficients.
     directions: usize,
@@ -279,12 +279,12 @@ struct Wanting {
     formulas: bool,
 }
 
-impl Wanting {
+impl MissingParts {
     fn new(
         quantities: &[Quantity],
         combinations: &[CombinationReport],
         findings: &SchemeFindings,
-        found: &Found,
+        found: &DegenerateLoci,
         (solutions, generic): (bool, bool),
     ) -> Self {
         let quantities = quantities.iter().map(|q| (&q.name, q.degree, &q.solution));
@@ -311,7 +311,7 @@ impl Wanting {
         !self.parts().is_empty()
     }
 
-    /// A clause for each kind.
+    /// One clause for each kind of missing part.
     fn parts(&self) -> Vec<String> {
         let count =
             |n: usize, one: &str, many: &str| if n == 1 { one.to_string() } else { format!("{n} {many}") };
@@ -339,19 +339,20 @@ impl Wanting {
     }
 }
 
-/// Says what is missing since the symbolic engine gave no formulas, and why; `None` where that is not why.
-fn engine_note(built: bool, solver: &mut Solver<'_>, wanting: &Wanting) -> Option<String> {
+/// Note on the parts that are missing because the symbolic engine gave no formulas, with the reason; `None`
+/// where nothing is missing for that reason.
+fn engine_note(built: bool, solver: &mut Solver<'_>, missing: &MissingParts) -> Option<String> {
     let failure = solver.worker().and_then(|w| w.failure().cloned());
     let why = match failure {
         _ if !built => "built without the symbolic engine".into(),
         _ if solver.too_many_angles() => {
             "too many different angles for formulas in their sines and cosines".into()
         }
-        Some(WorkerError::OverLimit { .. }) if !solver.given_up() && !wanting.formulas => return None,
+        Some(WorkerError::OverLimit { .. }) if !solver.given_up() && !missing.formulas => return None,
         Some(failure) => format!("formulas were given up ({failure})"),
         None => return None,
     };
-    Some(format!("{why}, therefore: {}", wanting.parts().join("; ")))
+    Some(format!("{why}, therefore: {}", missing.parts().join("; ")))
 }
 
 fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, AnalysisError> {
@@ -360,7 +361,7 @@ fn degrees_of(scheme: &Scheme, seed: u64) -> Result<Vec<Option<usize>>, Analysis
 
 /// The same scheme with a name for every angle; `None` when some are names already.
 fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
-    // the angle of a slew is none of its sines and cosines
+    // the angle of a slew is not determined by its sine and cosine
     if !scheme.generic_names().is_empty() || scheme.unknowns == Unknowns::Drift || scheme.torquers_act() {
         return None;
     }
@@ -373,7 +374,7 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
     Some(out)
 }
 
-/// What the unknown terms of a scheme cannot but mean, whatever its verdicts are.
+/// Notes on ambiguities of the unknown terms, which hold whatever the verdicts are.
 pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     let terms = scheme.unknowns.terms();
     let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));
@@ -388,8 +389,9 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     let mut say = |holds: bool, text: &str| out.extend(holds.then(|| text.to_string()));
     say(
         have(&[Term::GM, Term::M6]) && !scheme.measured_azimuth,
-        "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation changes no output, so three directions are \
-         not observable by any scheme that has Z alone; let the accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
+        "GM and M6 together leave the platform axes undefined: turning psi, GM and M6 by one rotation \
+         changes no output, so three directions are not observable by any scheme that has Z alone; let the \
+         accelerometers (GM and M3) or the gyros (GM3 and M6) define the axes",
     );
     say(
         have(&[Term::GM3, Term::M3]),
@@ -397,32 +399,38 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
     );
     say(
         have(&[Term::F, Term::II, Term::OO, Term::SS]),
-        "the squares of the components of g along I, O and S add up to 1 g^2 at every attitude: D_F, D_II, D_OO and D_SS of a gyro are never \
-         told apart",
+        "the squares of the components of g along I, O and S add up to 1 g^2 at every attitude: D_F, D_II, \
+         D_OO and D_SS of a gyro are never told apart",
     );
     say(
         cardinal && have(&[Term::K1, Term::K3]),
-        "at attitudes where the force along every input axis is -1, 0 or 1 g its third power is itself: K1 and K3 are not told apart there",
+        "at attitudes where the force along every input axis is -1, 0 or 1 g its third power is itself: K1 \
+         and K3 are not told apart there",
     );
     say(
         cardinal && have(&[Term::Kx]),
-        "at attitudes where the force is along one input axis the product of two components is zero: Kx is not excited there",
+        "at attitudes where the force is along one input axis the product of two components is zero: Kx is \
+         not excited there",
     );
     say(
         scheme.by_course(),
-        "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers look like, so a rotating segment is \
-         judged by the course of Z, at almost any rate: a degree is a power of time, the order of the derivative at positions, and what has \
-         accumulated in psi while the platform turned counts by its power; expressions are not written out, and of combinations and \
-         directions whose coefficients hold the rate of turning the former are not listed, the latter named without numbers",
+        "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers \
+         look like, so a rotating segment is judged by the course of Z, at almost any rate: a degree is a \
+         power of time, the order of the derivative at positions, and what has accumulated in psi while \
+         the platform turned counts by its power; expressions are not written out, and of combinations and \
+         directions whose coefficients hold the rate of turning the former are not listed, the latter \
+         named without numbers",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
-        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors included: they act at positions and in rotations alone, \
-         as if nothing had been torqued in between; real slews need inertial carry and a path",
+        "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors \
+         included: they act at positions and in rotations alone, as if nothing had been torqued in \
+         between; real slews need inertial carry and a path",
     );
     say(
         scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
-        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act at positions and in rotations alone",
+        "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act \
+         at positions and in rotations alone",
     );
     out
 }

@@ -9,20 +9,21 @@ use crate::degree::staircase::Degrees;
 use crate::model::attitude::{cardinal, cardinal_names};
 use crate::model::platform::{Platform, RandomValues};
 use crate::model::{Position, Scheme, Unknowns};
-use crate::remedies::{Change, Directions, Remedies, Remedy, Resolved, Told};
+use crate::remedies::{Change, Directions, Information, Remedies, Remedy, Resolved};
 
-/// Most unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half a verdict.
+/// Largest number of unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half
+/// a verdict.
 const MOST_UNKNOWNS: usize = 120;
-/// Most values that are tried as known.
+/// Largest number of values tried as known.
 const MOST_KNOWN: usize = 64;
-/// Most pairs that the engine judges.
+/// Largest number of pairs that the engine judges.
 const MOST_PAIRS: usize = 12;
 
 /// Bases of `V_0, V_1, ...` in the two fields of a verdict.
 pub(super) type Stairs = [Vec<Echelon>; 2];
 
 /// Search for remedies of one scheme.
-struct Search<'a> {
+struct SchemeRemedySearch<'a> {
     platform: &'a Platform,
     verdicts: &'a Verdicts,
     seed: u64,
@@ -33,16 +34,16 @@ struct Search<'a> {
 }
 
 /// A scheme with one more attitude, in the first field of the verdict.
-struct Candidate {
+struct AttitudeCandidate {
     attitude: String,
     degrees: Vec<Option<usize>>,
-    /// Rows of the attitude in the unobservable directions; `None` where the two schemes have no random
-    /// values in common.
-    tells: Option<Told<Field>>,
+    /// Rows of the attitude in the unobservable directions; `None` where the two schemes share no random
+    /// values.
+    information: Option<Information<Field>>,
 }
 
-/// The remedies of a scheme that was judged. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs
-/// of each kind are tried.
+/// Remedies of a judged scheme. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs of each
+/// kind are tried.
 pub(super) fn remedies(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -59,7 +60,7 @@ pub(super) fn remedies(
     let none = Echelon::new(field, platform.names().len());
     let directions = Directions::of(field, stairs[0].last().unwrap_or(&none));
     let out = Remedies::default();
-    let mut search = Search { platform, verdicts, seed: findings.seed, open, stairs, out };
+    let mut search = SchemeRemedySearch { platform, verdicts, seed: findings.seed, open, stairs, out };
     search.known(&directions);
     let candidates = search.attitudes(&directions);
     search.carries(carries);
@@ -111,9 +112,9 @@ pub(super) fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Op
     (first == second).then_some(first)
 }
 
-/// The entries of rows of a longer scheme in the unobservable directions; `places` are the columns of this
+/// Entries of the rows of a longer scheme in the unobservable directions; `places` are the columns of this
 /// scheme's unknowns. Unknowns of the new position alone are eliminated.
-fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Told<Field> {
+fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Information<Field> {
     let own: Vec<usize> = (0..space.columns()).filter(|k| !places.contains(k)).collect();
     let field = space.field();
     let mut shared = Echelon::new(field, space.columns());
@@ -126,18 +127,19 @@ fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> T
     directions.rows(beyond.map(|(i, _)| &shared.row(i)[own.len()..]))
 }
 
-impl Search<'_> {
+impl SchemeRemedySearch<'_> {
     fn name(&self, c: usize) -> String {
         self.platform.names()[c].clone()
     }
 
-    /// Unknowns that no remedy resolves so far.
+    /// Unknowns without a remedy so far.
     fn left(&self) -> Vec<usize> {
         let left = |c: &usize| !self.out.resolves(&self.platform.names()[*c]);
         self.open.iter().copied().filter(left).collect()
     }
 
-    /// Enters what the engine found of a changed scheme, by the names of its unknowns; what it resolves.
+    /// Records the verdicts on a changed scheme, by the names of its unknowns. Returns the unknowns that the
+    /// changes resolve.
     fn enter(&mut self, changes: Vec<Change>, names: &[String], degrees: &[Option<usize>]) -> Vec<usize> {
         self.out.verdicts += 1;
         let given = |name: &str| changes.iter().any(|c| c.known() == Some(name));
@@ -159,7 +161,7 @@ impl Search<'_> {
         Change::Known { name: self.name(c) }
     }
 
-    /// One value known, wherever that resolves another unknown.
+    /// Tries each value as known, and keeps those that resolve another unknown.
     fn known(&mut self, directions: &Directions<Field>) {
         let others = |w: &usize| !directions.resolved(&directions.known(&[*w]), &self.open).is_empty();
         let mut candidates: Vec<usize> = self.open.iter().copied().filter(others).collect();
@@ -177,7 +179,7 @@ impl Search<'_> {
     }
 
     /// The platform of the scheme with more cardinal attitudes at its end; `None` where they cannot be added,
-    /// beyond a gimbal for instance.
+    /// for instance beyond a gimbal limit.
     fn with(&self, attitudes: &[&str]) -> Option<Platform> {
         Platform::new(with_attitudes(self.platform.scheme(), attitudes)?).ok()
     }
@@ -191,8 +193,8 @@ impl Search<'_> {
         attitudes.iter().enumerate().map(change).collect()
     }
 
-    /// One more cardinal attitude: of the 24 those that together resolve most, as few as possible.
-    fn attitudes(&mut self, directions: &Directions<Field>) -> Vec<Candidate> {
+    /// Tries one more cardinal attitude: keeps the fewest of the 24 that together resolve most unknowns.
+    fn attitudes(&mut self, directions: &Directions<Field>) -> Vec<AttitudeCandidate> {
         let n = self.platform.names().len();
         if self.platform.scheme().unknowns == Unknowns::Drift {
             return Vec::new();
@@ -202,7 +204,8 @@ impl Search<'_> {
             return Vec::new();
         }
         let names = cardinal_names();
-        let candidates: Vec<Candidate> = names.iter().filter_map(|a| self.candidate(a, directions)).collect();
+        let candidates: Vec<AttitudeCandidate> =
+            names.iter().filter_map(|a| self.candidate(a, directions)).collect();
         let mut left = self.open.clone();
         let mut excluded = vec![false; candidates.len()];
         loop {
@@ -219,7 +222,7 @@ impl Search<'_> {
         candidates
     }
 
-    /// Judges the scheme with more attitudes; what that resolves.
+    /// Judges the scheme with more attitudes. Returns the unknowns that they resolve.
     fn judge_attitudes(&mut self, attitudes: &[&str]) -> Vec<usize> {
         let Some(platform) = self.with(attitudes) else { return Vec::new() };
         let Ok(Degrees { degree, .. }) = degrees(&platform, self.seed) else { return Vec::new() };
@@ -227,11 +230,10 @@ impl Search<'_> {
     }
 
     /// Degrees with one more attitude, in the first field.
-    fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<Candidate> {
+    fn candidate(&self, attitude: &str, directions: &Directions<Field>) -> Option<AttitudeCandidate> {
         let platform = self.with(&[attitude])?;
         let scheme = platform.scheme();
-        // where turns between positions or rates of rotations take part, random values are drawn for each
-        // scheme
+        // with turns between positions or rates of rotations, each scheme draws its own random values
         let own = scheme.torquers_act() || scheme.by_course();
         let drawn;
         let values = match own {
@@ -245,19 +247,19 @@ impl Search<'_> {
         let names = self.platform.names();
         let place = |name: &String| platform.names().iter().position(|n| n == name);
         let places: Vec<usize> = names.iter().map(place).collect::<Option<_>>()?;
-        let tells = stairs.last().filter(|_| !own).map(|space| added(directions, space, &places));
-        Some(Candidate {
+        let information = stairs.last().filter(|_| !own).map(|space| added(directions, space, &places));
+        Some(AttitudeCandidate {
             attitude: attitude.into(),
             degrees: places.iter().map(|&k| found.degree[k]).collect(),
-            tells,
+            information,
         })
     }
 
-    /// Another carry, as it was judged already.
+    /// Tries the other carries, by the verdicts already found.
     fn carries(&mut self, carries: &[CarryReport]) {
         for report in carries {
             self.out.verdicts += 1;
-            // psi of a position under reset carry is an unknown of its own
+            // psi of a position is an unknown only under reset carry
             let resolves = report.differs.iter().filter(|d| d.here.degree.is_none() && !d.name.contains('@'));
             let resolves: Vec<Resolved> = resolves
                 .filter_map(|d| Some(Resolved { name: d.name.clone(), degree: d.there.degree? }))
@@ -271,16 +273,17 @@ impl Search<'_> {
         }
     }
 
-    /// Two changes for what no single one resolves: two attitudes, an attitude and a value, two values.
-    fn two(&mut self, directions: &Directions<Field>, candidates: Vec<Candidate>) {
-        if candidates.iter().any(|c| c.tells.is_none()) && !self.left().is_empty() {
+    /// Tries two changes for unknowns that no single one resolves: two attitudes, an attitude and a value,
+    /// two values.
+    fn two(&mut self, directions: &Directions<Field>, candidates: Vec<AttitudeCandidate>) {
+        if candidates.iter().any(|c| c.information.is_none()) && !self.left().is_empty() {
             let text = "two changes with an attitude among them: the turn to it acts as well";
             self.out.not_tried.push(text.into());
         }
-        let (names, attitudes): (Vec<String>, Vec<Told<Field>>) =
-            candidates.into_iter().filter_map(|c| Some((c.attitude, c.tells?))).unzip();
-        let values: Vec<Told<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
-        type List<'a> = &'a [Told<Field>];
+        let (names, attitudes): (Vec<String>, Vec<Information<Field>>) =
+            candidates.into_iter().filter_map(|c| Some((c.attitude, c.information?))).unzip();
+        let values: Vec<Information<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
+        type List<'a> = &'a [Information<Field>];
         let kinds: [(List<'_>, Option<List<'_>>); 3] =
             [(&attitudes, None), (&attitudes, Some(&values)), (&values, None)];
         let mut complete = true;

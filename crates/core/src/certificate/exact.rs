@@ -4,9 +4,9 @@
 //! All rows are homogeneous in the rates: give every drift coefficient the weight 1, psi 0, a row of order k
 //! the weight k. Where `wN` is not 0, rows of order at most k span what `wN psi_x, wN psi_z, eps_x, eps_z -
 //! wN psi_y, eps_y` (those of order at most k) of every position span, and in `wN psi` and the coefficients
-//! these hold no rate. So an entry of a null vector is a number times a power of `wN`, and a coefficient of a
-//! solution, at `wN = 1`, a polynomial in `wU` of degree at most 2 (of a combination: more, by the powers in
-//! it).
+//! So an entry of a null vector is a number times a power of `wN`. A coefficient of a solution, at `wN = 1`,
+//! is a polynomial in `wU` of degree at most 2; for a combination the degree grows by the powers of the
+//! rates in it.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use obsdeg_exact::radical::embeddings;
 use obsdeg_exact::{Field, RootField};
 
-use super::witness::{Found, Staircase};
+use super::witness::{Staircase, WitnessedVerdict};
 use super::{ExactNumber, ExactVector, Exactly, number};
 use crate::degree::coefficient::{Coefficient, Number, power, recover_radical};
 use crate::degree::ensemble::Verdicts;
@@ -29,7 +29,8 @@ pub(super) struct ExactWitness {
     pub coefficients: Vec<Option<Vec<ExactNumber>>>,
 }
 
-/// A combination in the field of a sample, at these rates; powers of a rate that is 0 are 0.
+/// Image of a combination in the field of a sample at given rates `(wN, wU)`; powers of a rate that is 0 are
+/// 0.
 pub(super) fn image(c: &Exactly, sample: &Sample, rates: [u64; 2]) -> Vec<(usize, u64)> {
     let f = &sample.roots.field;
     let value = |c: &Coefficient| match &c.number {
@@ -42,33 +43,33 @@ pub(super) fn image(c: &Exactly, sample: &Sample, rates: [u64; 2]) -> Vec<(usize
 }
 
 /// The fields, embeddings and rates at which everything is solved.
-struct Points<'a> {
+struct StaircasePoints<'a> {
     platform: &'a Platform,
     fields: [RootField; 2],
-    /// `stairs[field][embedding][point]`.
-    stairs: [[Vec<Solved>; 4]; 2],
-    /// The values of `wU` (of the only rate that is not 0: 1).
+    /// Staircases at the points, indexed `[field][embedding][point]`.
+    stairs: [[Vec<SolvedStaircase>; 4]; 2],
+    /// Rates `(wN, wU)` of the points. At a pole or the equator the only non-zero rate is 1.
     rates: Vec<[u64; 2]>,
     pole: bool,
-    /// The lowest power of `wU` in a combination, at most 0.
+    /// Lowest power of `wU` in a combination, at most 0.
     lowest: i32,
 }
 
-/// The staircase at one point, with the inverses of its minors.
-struct Solved {
+/// Staircase at one point, with the inverses of its minors.
+struct SolvedStaircase {
     sample: Sample,
     staircase: Staircase,
     inverses: Vec<Vec<Vec<u64>>>,
 }
 
-/// The exact numbers of a certificate; `None` where the angles or the terms do not allow it, or a number is
-/// not small.
+/// The exact numbers of a certificate; `None` where the angles or the terms do not allow it, or where a
+/// number is not small.
 pub(super) fn exact(
     platform: &Platform,
     verdicts: &Verdicts,
     staircase: &Staircase,
     combinations: &[Exactly],
-    found: &[Found],
+    found: &[WitnessedVerdict],
 ) -> Option<ExactWitness> {
     let scheme = platform.scheme();
     let mut angles = scheme.positions.iter().flat_map(|p| p.angles.iter().map(Angle::turn));
@@ -76,7 +77,7 @@ pub(super) fn exact(
     if !drifts || !angles.all(|a| a.is_multiple_of_deg(15)) {
         return None;
     }
-    let points = Points::new(platform, verdicts, staircase, combinations)?;
+    let points = StaircasePoints::new(platform, verdicts, staircase, combinations)?;
     let null_vectors =
         (0..staircase.ranks.len()).map(|k| points.null_vectors(staircase, k)).collect::<Option<_>>()?;
     let one = |c: usize| vec![(c, Coefficient::one())];
@@ -91,8 +92,8 @@ pub(super) fn exact(
     Some(ExactWitness { null_vectors, coefficients })
 }
 
-impl<'a> Points<'a> {
-    /// Solves everything at all points; `None` if the basis rows are others at one of them.
+impl<'a> StaircasePoints<'a> {
+    /// Computes the staircases at all points; `None` if the basis rows differ at one of them.
     fn new(
         platform: &'a Platform,
         verdicts: &Verdicts,
@@ -115,7 +116,7 @@ impl<'a> Points<'a> {
             let other = Staircase::new(platform, &sample);
             let same = other.basis == staircase.basis && other.ranks == staircase.ranks;
             let inverses = (0..other.ranks.len()).map(|k| other.inverse(k)).collect::<Option<_>>();
-            Some(Solved { sample, inverses: inverses?, staircase: other }).filter(|_| same)
+            Some(SolvedStaircase { sample, inverses: inverses?, staircase: other }).filter(|_| same)
         };
         let mut stairs = [0, 1].map(|_| [0; 4].map(|_| Vec::new()));
         for (field, values) in stairs.iter_mut().zip(&verdicts.values) {
@@ -127,12 +128,12 @@ impl<'a> Points<'a> {
         Some(Self { platform, fields, stairs, rates, pole, lowest })
     }
 
-    /// 0 for psi, 1 for a coefficient.
+    /// Weight of a column: 0 for psi, 1 for a coefficient.
     fn weight(&self, column: usize) -> i32 {
         i32::from(column >= self.platform.names().len() - self.platform.coefficients())
     }
 
-    /// A number times the rate that is not 0 (of two: `wN`) to a power, as a certificate writes it.
+    /// A number times powers `a`, `b` of the rates, in the form of a certificate.
     fn times_power(&self, images: &[[u64; 4]; 2], [a, b]: [i32; 2]) -> Option<ExactNumber> {
         let number_ = Number::Radical(recover_radical(&self.fields, images)?);
         let small = a.abs().max(b.abs()) <= 9;
@@ -163,7 +164,7 @@ impl<'a> Points<'a> {
         staircase.free(order).iter().enumerate().map(vector).collect()
     }
 
-    /// The coefficients of the rows of a solution.
+    /// Coefficients of the rows of a solution.
     fn coefficients(
         &self,
         staircase: &Staircase,
@@ -179,11 +180,11 @@ impl<'a> Points<'a> {
         }
         let mut out = vec![ExactNumber::new(); rows.len()];
         for (weight, part) in parts {
-            // y[field][embedding][point][row]; what is observable at the given latitude alone has no
-            // solution, and a row whose coefficient is zero at it alone (such as wN - wU at 45 deg) is none
-            // of `rows`
+            // y is indexed [field][embedding][point][row]. A functional that is observable at the given
+            // latitude alone has no solution. A row whose coefficient vanishes only there (such as wN - wU
+            // at 45 deg) is not among `rows`.
             let holds = Cell::new(true);
-            let solved = |s: &Solved, [w_n, w_u]: &[u64; 2]| {
+            let solved = |s: &SolvedStaircase, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;
                 let c = image(&part, &s.sample, [f.from_u64(*w_n), f.from_u64(*w_u)]);
                 let y = s.staircase.solution(&s.inverses[degree], &c);
@@ -207,14 +208,14 @@ impl<'a> Points<'a> {
         Some(out)
     }
 
-    /// The terms of a homogeneous coefficient of degree `power` by its values at all points.
+    /// Terms of a homogeneous coefficient of degree `power`, from its values at all points.
     fn terms(&self, power: i32, value: impl Fn(usize, usize, usize) -> u64) -> Option<ExactNumber> {
         if let [[w_n, _]] = self.rates[..] {
             let images = [0, 1].map(|i| [0, 1, 2, 3].map(|a| value(i, a, 0)));
             let rates = if w_n == 0 { [0, power] } else { [power, 0] };
             return self.times_power(&images, rates);
         }
-        // times wU^-lowest it is a polynomial in wU
+        // multiplied by wU^-lowest it is a polynomial in wU
         let polynomials = [0, 1].map(|i| {
             let f = self.fields[i].field;
             [0, 1, 2, 3].map(|a| {
@@ -235,7 +236,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// The coefficients, lowest first, of the polynomial through points with different arguments (Newton).
+/// Coefficients, lowest first, of the polynomial through points with distinct arguments (Newton).
 fn interpolate(f: &Field, points: &[(u64, u64)]) -> Vec<u64> {
     let n = points.len();
     let mut differences: Vec<u64> = points.iter().map(|p| p.1).collect();

@@ -24,12 +24,12 @@ use crate::model::scheme::MAX_COMBINATIONS;
 use crate::model::{Carry, Scheme, Term, Unknowns};
 use crate::solution::Frame;
 use crate::system::ModelError;
-use witness::{Found, Staircase};
+use witness::{Staircase, WitnessedVerdict};
 
 /// Name and version of the layout.
 pub const LAYOUT: &str = "obsdeg.certificate/1";
 
-/// Most unknowns of a certificate.
+/// Largest number of unknowns of a certificate.
 pub const MOST_UNKNOWNS: usize = 300;
 
 /// Derivative row: segment (from 1), derivative order, component of Z.
@@ -155,10 +155,10 @@ pub struct Proof {
     pub excited_by: Option<RowName>,
 }
 
-/// Why there is no certificate.
+/// Reasons for the lack of a certificate.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CertificateError {
-    /// There are no verdicts either.
+    /// The scheme cannot be analysed.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// The model cannot be judged.
@@ -175,7 +175,7 @@ pub enum CertificateError {
 }
 
 impl Certificate {
-    /// The JSON: one key per line, of lists one entry per line.
+    /// JSON text with one key per line, and one list entry per line.
     ///
     /// # Errors
     /// None for the certificate of a scheme.
@@ -184,7 +184,7 @@ impl Certificate {
     }
 }
 
-/// JSON with one key per line, of lists one entry per line.
+/// JSON text with one key per line, and one list entry per line.
 fn text(certificate: &impl Serialize) -> Result<String, serde_json::Error> {
     let value = serde_json::to_value(certificate)?;
     let line = |(key, value): (&String, &serde_json::Value)| match value.as_array() {
@@ -198,11 +198,11 @@ fn text(certificate: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(format!("{{\n{}\n}}\n", lines.join(",\n")))
 }
 
-/// A linear functional of the unknowns, exactly: columns and coefficients.
+/// Linear functional of the unknowns with exact coefficients: columns and coefficients.
 type Exactly = Vec<(usize, Coefficient)>;
 
-/// The certificate of a scheme: exact where its angles are multiples of 15 degrees, only drifts are unknown,
-/// and the numbers are small.
+/// The certificate of a scheme. It is exact if the angles are multiples of 15 degrees, only drifts are
+/// unknown, and the numbers are small; otherwise modular.
 ///
 /// # Errors
 /// [`CertificateError`].
@@ -233,7 +233,7 @@ fn not_covered(found: impl Into<String>, expected: &'static str) -> CertificateE
     CertificateError::NotCovered { found: found.into(), expected }
 }
 
-/// Refuses what the layout does not cover.
+/// Refuses schemes that the layout does not cover.
 fn check_covered(scheme: &Scheme) -> Result<(), CertificateError> {
     scheme.validate().map_err(AnalysisError::from)?;
     if let Some(name) = scheme.generic_names().first() {
@@ -248,8 +248,7 @@ fn check_covered(scheme: &Scheme) -> Result<(), CertificateError> {
     Ok(())
 }
 
-/// The combinations that are found and those that the scheme asks for, as far as their coefficients are
-/// exact.
+/// Combinations that were found or that the scheme requests, where their coefficients are exact.
 fn combinations(platform: &Platform, judged: &Judged<'_>) -> Vec<Exactly> {
     let mut solver = judged.solver(Frame::N, None);
     let found = judged.findings(&mut solver).combinations;
@@ -277,7 +276,7 @@ fn functionals(platform: &Platform, combinations: &[Exactly], sample: &Sample) -
     unknowns.chain(images).collect()
 }
 
-/// The terms of an exact coefficient.
+/// Terms of an exact coefficient.
 fn number(c: &Coefficient) -> ExactNumber {
     let Number::Radical(radical) = &c.number else { return Vec::new() };
     let [a, b] = c.rates.map(i64::from);
@@ -287,7 +286,7 @@ fn number(c: &Coefficient) -> ExactNumber {
 
 /// Verdict and witness of a functional in the form of the file.
 fn proof(
-    found: Found,
+    found: WitnessedVerdict,
     coefficients: Option<Vec<ExactNumber>>,
     staircase: &Staircase,
     names: &[String],
@@ -302,12 +301,12 @@ fn proof(
     }
 }
 
-/// The certificate in the form of the file.
+/// Assembles the certificate in the form of the file.
 fn written(
     platform: &Platform,
     staircase: &Staircase,
     combinations: &[Exactly],
-    found: Vec<Found>,
+    found: Vec<WitnessedVerdict>,
     exact: Option<exact::ExactWitness>,
 ) -> Certificate {
     let names = platform.names();

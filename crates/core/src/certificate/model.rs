@@ -7,7 +7,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::witness::{Found, Staircase};
+use super::witness::{Staircase, WitnessedVerdict};
 use super::{CertificateError, CertifiedUnknown, MOST_UNKNOWNS, RowName, not_covered, proof, text};
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::rows::DerivativeRows;
@@ -69,7 +69,7 @@ pub enum Operation {
 }
 
 impl ModelCertificate {
-    /// The JSON: one key per line, of lists one entry per line.
+    /// JSON text with one key per line, and one list entry per line.
     ///
     /// # Errors
     /// None for the certificate of a model.
@@ -95,7 +95,7 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
     let [first, second] =
         fields.map(|field| witness(model, &compiled, &judgement, field, &columns, &mut rng));
     let ((staircase, found), (other, second)) = (first?, second?);
-    let verdict = |(found, &column): (&Found, &usize)| {
+    let verdict = |(found, &column): (&WitnessedVerdict, &usize)| {
         let verdict = judgement.findings.verdict(column);
         (verdict.status, verdict.degree) == (found.status, found.degree)
     };
@@ -120,7 +120,7 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
     })
 }
 
-/// Refuses what the layout does not cover, before anything is judged.
+/// Refuses models that the layout does not cover, before any verdict.
 fn check_shape(model: &SystemModel, compiled: &Compiled) -> Result<(), CertificateError> {
     let expected = "one experiment in one segment without constraints";
     let cases = [
@@ -145,16 +145,16 @@ fn check_shape(model: &SystemModel, compiled: &Compiled) -> Result<(), Certifica
     }
 }
 
-/// Names that certificates cover.
+/// Description of the names that certificates cover.
 const NAMES: &str = "names of letters, digits and _ [ ] , . @ ' that begin with a letter or _, at most 256";
 
-/// True for a name that a checker takes: one that can not pass for an expression.
+/// True for a name that a checker accepts: it cannot be read as an expression.
 fn is_name(name: &str) -> bool {
     let first = name.chars().next().is_some_and(|c| c.is_alphabetic() || c == '_');
     first && name.chars().count() <= 256 && name.chars().all(|c| c.is_alphanumeric() || "_[],.@'".contains(c))
 }
 
-/// Refuses what the layout does not cover: starts and inputs that are not generic.
+/// Refuses starts and inputs that are not generic: the layout does not cover them.
 fn check_covered(
     model: &SystemModel,
     compiled: &Compiled,
@@ -176,7 +176,7 @@ fn check_covered(
     Ok(())
 }
 
-/// The equations, and for every unknown of them its column in the layout. An unknown input that is a
+/// Equations of the certificate, and for every unknown its column in the layout. An unknown input that is a
 /// polynomial in time is a chain of states, each the derivative of the one before.
 fn problem(model: &SystemModel, compiled: &Compiled, judgement: &Judgement) -> (CertifiedModel, Vec<usize>) {
     let unknowns = &judgement.layout.unknowns;
@@ -240,10 +240,10 @@ fn degree(model: &SystemModel, input: usize) -> Option<usize> {
     }
 }
 
-/// The program as it grows.
+/// Straight-line program under construction.
 struct Program<'a> {
     compiled: &'a Compiled,
-    /// Number of the first operation.
+    /// Index of the first operation.
     start: usize,
     slots: HashMap<usize, usize>,
     nodes: HashMap<usize, usize>,
@@ -260,7 +260,7 @@ impl<'a> Program<'a> {
         self.start + self.operations.len() - 1
     }
 
-    /// The number of the value of a node; what it is made of comes before it.
+    /// Index of the value of a node; its operands are added before it.
     fn node(&mut self, root: usize) -> usize {
         let operands = |op: &Op| match *op {
             Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => Some([a, b]),
@@ -288,7 +288,7 @@ impl<'a> Program<'a> {
                 Op::Subtract(a, b) => self.operation(Operation::Binary('-', of(a), of(b))),
                 Op::Multiply(a, b) => self.operation(Operation::Binary('*', of(a), of(b))),
                 Op::Divide(a, b) => self.operation(Operation::Binary('/', of(a), of(b))),
-                // refused before
+                // refused by `check_shape`
                 Op::Pi | Op::Primitive { .. } => 0,
             };
             self.nodes.insert(node, index);
@@ -307,7 +307,7 @@ fn fraction(mantissa: i128, decimals: i32) -> String {
     }
 }
 
-/// Rows and witness in one field, by columns of the certificate.
+/// Rows and witness in one field, in the columns of the certificate.
 fn witness(
     model: &SystemModel,
     compiled: &Compiled,
@@ -315,7 +315,7 @@ fn witness(
     field: Field,
     columns: &[usize],
     rng: &mut SplitMix64,
-) -> Result<(Staircase, Vec<Found>), CertificateError> {
+) -> Result<(Staircase, Vec<WitnessedVerdict>), CertificateError> {
     let work = Work::new(model.work_limit);
     let unsolved =
         || not_covered("no point at which it is defined, or more work than the limit", "models with rows");

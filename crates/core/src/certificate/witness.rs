@@ -1,4 +1,5 @@
-//! The witness that rows give in one field, and the rows of a scheme as they are defined, `H_c F^k S_i`.
+//! The witness that rows give in one field, and the derivative rows of a scheme by definition,
+//! `H_c F^k S_i`.
 
 use obsdeg_exact::{Echelon, Field};
 
@@ -15,26 +16,26 @@ pub(super) struct Staircase {
     rows: Vec<(RowName, Vec<u64>)>,
     /// Basis rows, each with its pivot.
     pub basis: Vec<(RowName, usize)>,
-    /// Their indices in `rows`.
+    /// Indices of the basis rows in `rows`.
     of_basis: Vec<usize>,
     /// `dim V_0, ..., dim V_K`, where `V_K = V_3`.
     pub ranks: Vec<usize>,
-    /// Per order 0 to 3: the space of all rows up to it.
+    /// Spaces of all rows up to each order 0 to 3.
     spaces: Vec<Echelon>,
 }
 
-/// Status, degree and witness of one functional by the rows.
+/// Status, degree and witness of one functional.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct WitnessedVerdict {
     pub status: Status,
     pub degree: Option<usize>,
-    /// Indices of basis rows.
+    /// Indices of the basis rows in the solution.
     pub solution: Option<Vec<usize>>,
     pub hidden_by: Option<usize>,
     pub excited_by: Option<RowName>,
 }
 
-/// All rows of orders 0 to 3, by order, segment, component.
+/// All rows of orders 0 to 3, sorted by order, segment, component.
 fn all_rows(platform: &Platform, sample: &Sample) -> Vec<(RowName, Vec<u64>)> {
     let point = &sample.point;
     let field = point.ring;
@@ -61,12 +62,13 @@ fn all_rows(platform: &Platform, sample: &Sample) -> Vec<(RowName, Vec<u64>)> {
 }
 
 impl Staircase {
-    /// The rows of `platform` at `sample`, from the lowest order up.
+    /// Staircase of the rows of `platform` at `sample`, lowest order first.
     pub(super) fn new(platform: &Platform, sample: &Sample) -> Self {
         Self::of(sample.roots.field, platform.names().len(), all_rows(platform, sample))
     }
 
-    /// Rows of some columns, listed by their order; those of the highest order add nothing.
+    /// Staircase of rows with the given number of columns, sorted by order; rows of the highest order must
+    /// add nothing.
     pub(super) fn of(field: Field, columns: usize, rows: Vec<(RowName, Vec<u64>)>) -> Self {
         let mut space = Echelon::new(field, columns);
         let (mut basis, mut of_basis, mut ranks, mut spaces) =
@@ -86,19 +88,18 @@ impl Staircase {
         Self { field, rows, basis, of_basis, ranks, spaces }
     }
 
-    /// The unknowns that are no pivots at an order, in their order.
+    /// Unknowns that are no pivots at an order, in model order.
     pub(super) fn free(&self, order: usize) -> Vec<usize> {
         let space = &self.spaces[order];
         (0..space.columns()).filter(|&c| space.pivot_row(c).is_none()).collect()
     }
 
-    /// The null vectors at an order: one per free unknown, in their order.
+    /// Null vectors at an order: one per free unknown, in model order.
     pub(super) fn null_vectors(&self, order: usize) -> Vec<Vec<u64>> {
         self.spaces[order].null_space()
     }
 
-    /// The inverse of the minor of the basis rows up to an order and their pivots; `None` where it is
-    /// singular.
+    /// Inverse of the minor of the basis rows and pivots up to an order; `None` where it is singular.
     pub(super) fn inverse(&self, order: usize) -> Option<Vec<Vec<u64>>> {
         let rank = self.ranks[order];
         let minor = |i: usize| self.basis[..rank].iter().map(move |(_, p)| self.rows[self.of_basis[i]].1[*p]);
@@ -120,7 +121,7 @@ impl Staircase {
         y
     }
 
-    /// True if `y` times the first basis rows is the functional `c`.
+    /// True if `y` times the first basis rows equals the functional `c`.
     pub(super) fn makes(&self, y: &[u64], c: &[(usize, u64)]) -> bool {
         let f = &self.field;
         let mut rest = vec![0; self.spaces[0].columns()];
@@ -136,7 +137,7 @@ impl Staircase {
     }
 
     /// Status, degree and witness of functionals, each as columns and values.
-    pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<Found> {
+    pub(super) fn found(&self, functionals: &[Vec<(usize, u64)>]) -> Vec<WitnessedVerdict> {
         let orders = 0..self.ranks.len();
         let null: Vec<_> = orders.clone().map(|k| (self.free(k), self.null_vectors(k))).collect();
         let inverses: Vec<_> = orders.map(|k| self.inverse(k).unwrap_or_default()).collect();
@@ -164,7 +165,7 @@ impl Staircase {
                     Some(k) => k.checked_sub(1).and_then(|k| hidden[k]),
                     None => hidden.last().copied().flatten(),
                 };
-                Found {
+                WitnessedVerdict {
                     status: Status::of(degree, excited.is_some()),
                     degree,
                     solution,

@@ -6,26 +6,26 @@ use obsdeg_exact::{Field, Radical, RootField};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// A number of a coefficient.
+/// Number of a coefficient: exact or decimal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Number {
     /// Exact: `a + b sqrt 2 + c sqrt 3 + d sqrt 6`.
     Radical(Radical),
     /// Exact: an expression in sines and cosines.
     Text {
-        /// In the symbols of the engine.
+        /// Text in the symbols of the engine.
         raw: String,
-        /// For people.
+        /// Text for readers.
         shown: String,
     },
-    /// Rounded.
+    /// Decimal, rounded.
     Decimal(f64),
 }
 
-/// Longest number in a formula that is still readable.
+/// Longest readable number in a formula, in characters.
 pub(crate) const READABLE: usize = 40;
 
-/// Coefficients as they are printed: if one of them is too long to be read, all become decimals.
+/// Coefficients in printed form: if one of them is too long to read, all become decimals.
 pub(crate) fn readable(coefficients: Vec<Coefficient>) -> Vec<Coefficient> {
     if coefficients.iter().any(Coefficient::is_unreadable) {
         return coefficients.iter().map(Coefficient::rounded).collect();
@@ -45,10 +45,10 @@ pub enum Form {
     Decimal,
 }
 
-/// `number * wN^a * wU^b`.
+/// Coefficient `number * wN^a * wU^b`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coefficient {
-    /// The number.
+    /// Number without the rates.
     pub number: Number,
     /// Exponents `(a, b)` of `(wN, wU)`.
     pub rates: Rates,
@@ -57,23 +57,24 @@ pub struct Coefficient {
 /// Exponents of `(wN, wU)`.
 pub(crate) type Rates = [i32; 2];
 
-/// The exponents that are tried, simplest first.
+/// Exponents that are tried, simplest first.
 fn candidate_rates() -> Vec<Rates> {
     let mut all: Vec<Rates> = (-2..=2).flat_map(|a| (-2..=2).map(move |b| [a, b])).collect();
     all.sort_by_key(|[a, b]| (a.abs() + b.abs(), -a, -b));
     all
 }
 
-/// One value of a coefficient, with the earth rate there.
+/// Value of a coefficient in a field, with the earth rate at that point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Image {
-    /// The value.
+    /// Value of the coefficient.
     pub value: u64,
-    /// `(wN, wU)`.
+    /// Earth rate `(wN, wU)`.
     pub rates: [u64; 2],
 }
 
-/// The exponents `(a, b)` with `value / (wN^a wU^b)` the same at two points of one field.
+/// Exponents `(a, b)` for which `value / (wN^a wU^b)` is equal at two points of one field; `None` if there
+/// are none.
 pub(crate) fn rates_between(f: &Field, first: Image, second: Image) -> Option<Rates> {
     if first.value == 0 && second.value == 0 {
         return Some([0, 0]);
@@ -97,8 +98,8 @@ pub(crate) fn power(f: &Field, values: [u64; 2], rates: Rates) -> Option<u64> {
     })
 }
 
-/// The number whose images are `images[sample][embedding]`: recovered in the first sample, confirmed
-/// in every embedding of the second.
+/// Number with the images `images[sample][embedding]`: recovered in the first sample, confirmed in every
+/// embedding of the second.
 pub(crate) fn recover_radical(fields: &[RootField; 2], images: &[[u64; 4]; 2]) -> Option<Radical> {
     let radical = Radical::recover(&fields[0], images[0])?;
     let exponents = obsdeg_exact::radical::embeddings(fields[1].order);
@@ -122,7 +123,7 @@ impl Coefficient {
         Self { number: Number::Radical(Radical::rational(1, 1)), rates: [0, 0] }
     }
 
-    /// The same as a decimal, if the number is a long root expression.
+    /// The coefficient with a long root expression replaced by its decimal.
     #[must_use]
     pub fn rounded(&self) -> Self {
         match &self.number {
@@ -136,7 +137,7 @@ impl Coefficient {
         matches!(self.number, Number::Radical(_)) && self.without_rates().to_string().len() > READABLE
     }
 
-    /// The number alone.
+    /// The coefficient with the powers of the rates removed.
     #[must_use]
     pub(crate) fn without_rates(&self) -> Self {
         Self { number: self.number.clone(), rates: [0, 0] }
@@ -156,7 +157,7 @@ impl Coefficient {
         Self { number, rates: self.rates }
     }
 
-    /// How exact the number is.
+    /// Form of the number: exact, symbolic or decimal.
     pub fn form(&self) -> Form {
         match self.number {
             Number::Radical(_) => Form::Exact,
@@ -170,7 +171,7 @@ impl Coefficient {
         self.factors(self.number.sign_and_factor(decimal))
     }
 
-    /// The same with all digits of decimals.
+    /// The sign and the magnitude as factors, with all digits of decimals.
     pub(crate) fn precise_sign_and_factors(&self) -> (bool, Vec<String>) {
         self.factors(self.number.sign_and_factor(|x| x.to_string()))
     }
@@ -193,7 +194,7 @@ impl Coefficient {
 }
 
 impl Number {
-    /// The sign and the magnitude (nothing for one).
+    /// The sign and the magnitude of the number; the magnitude is empty for one.
     fn sign_and_factor(&self, decimal: impl Fn(f64) -> String) -> (bool, Vec<String>) {
         match self {
             Self::Radical(r) => {
@@ -236,8 +237,8 @@ fn has_sum(text: &str) -> bool {
     false
 }
 
-/// The parts of a product and quotient outside of all brackets: `(above, below)`, brackets around a product
-/// below taken off.
+/// Factors of a product or quotient outside of all brackets: `(above, below)` the bar. Brackets around a
+/// product below the bar are removed.
 fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
     let (mut above, mut below) = (Vec::new(), Vec::new());
     let (mut depth, mut start, mut under) = (0, 0, false);
@@ -258,8 +259,8 @@ fn bars(text: &str) -> (Vec<&str>, Vec<&str>) {
     (above, below)
 }
 
-/// Factors as one text with one bar, so that no reader takes for below what is above: `wU*w@p1/(2*wN)`. A
-/// number in front keeps its own: `1/2*wU`.
+/// Factors as one text with one fraction bar, so that numerator and denominator are unambiguous:
+/// `wU*w@p1/(2*wN)`. A leading number keeps its own bar: `1/2*wU`.
 pub(crate) fn product(factors: &[String]) -> String {
     let text = factors.join("*");
     let (mut above, below) = bars(&text);
@@ -274,8 +275,8 @@ pub(crate) fn product(factors: &[String]) -> String {
     }
 }
 
-/// Six decimals, and six significant digits of what is small, without trailing zeros: terms of a solution
-/// that nearly cancel are as certain as others.
+/// Decimal text: six decimals, or six significant digits of small numbers, without trailing zeros. Nearly
+/// cancelling terms of a solution then have equal absolute accuracy.
 pub(crate) fn decimal(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
@@ -285,7 +286,7 @@ pub(crate) fn decimal(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
-/// `lhs` and the terms of a sum: joins coefficients and names, as in `D_FZ - wN*psi_y`.
+/// Text of a sum: joins coefficients and names, as in `D_FZ - wN*psi_y`.
 pub(crate) fn linear_combination<'a>(terms: impl IntoIterator<Item = (&'a Coefficient, &'a str)>) -> String {
     let mut out = String::new();
     for (coefficient, name) in terms.into_iter().filter(|(c, _)| !c.is_zero()) {
@@ -408,7 +409,7 @@ mod tests {
         // zero has no sign
         assert_eq!(of(&radical([ZERO; 4], [0, 0])), list(false, &["0"]));
         assert_eq!(of(&coefficient(0.0, [0, 0])), list(false, &["0"]));
-        // all digits where they are asked for
+        // all digits if requested
         let third = coefficient(-1.0 / 3.0, [1, 0]);
         assert_eq!(third.sign_and_factors(), list(true, &["0.333333", "wN"]));
         assert_eq!(third.precise_sign_and_factors(), list(true, &["0.3333333333333333", "wN"]));
@@ -439,7 +440,7 @@ mod tests {
     fn long_roots_become_decimals_together() {
         let long = radical([(1234, 987), (-4321, 789), (77777, 1234), (1, 98765)], [1, 0]);
         assert!(long.without_rates().to_string().len() > READABLE && long.is_unreadable());
-        // as long as may be
+        // as long as allowed
         let limit =
             radical([(-1_234_567_890_123_456_789, 9_123_456_789_012_345_678), ZERO, ZERO, ZERO], [0, 0]);
         assert!(limit.to_string().len() == READABLE && !limit.is_unreadable(), "{limit}");
@@ -465,7 +466,7 @@ mod tests {
         assert_eq!(rates_between(&f, zero, zero), Some([0, 0]));
         assert_eq!(rates_between(&f, zero, Image { value: 1, rates }), None);
         assert_eq!(rates_between(&f, Image { value: 1, rates }, zero), None);
-        // the simplest comes first, up to the second power of each
+        // the simplest comes first; exponents go up to the second power of each rate
         let all = candidate_rates();
         assert_eq!((all.len(), &all[..5]), (25, &[[0, 0], [1, 0], [0, 1], [0, -1], [-1, 0]][..]));
         let square = |n: i64, u: i64| {
@@ -505,7 +506,7 @@ mod tests {
         assert_eq!(decimal(0.123_456_789), "0.123457");
         assert_eq!(decimal(1234567.0), "1234567");
         assert_eq!(decimal(-1.5), "-1.5");
-        // terms of 1249.85 and -670.001 that nearly cancel
+        // nearly cancelling terms of 1249.85 and -670.001
         assert_eq!(decimal(1_249.850_123_4), "1249.850123");
         assert_eq!(["0", "0.001", "100000", "99999.9"], [0.0, 0.001, 1e5, 99_999.9].map(decimal)[..]);
     }

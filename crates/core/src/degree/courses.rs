@@ -1,29 +1,29 @@
-//! Degrees where the platform turns steadily and not only drifts are unknown.
+//! Degrees of schemes with steady turns in which not only drifts are unknown.
 //!
-//! Drifts alone are judged at attitudes of an arc. With errors of accelerometers or torquers that would say
-//! too much: at a steady rate w the drift integrates to `(D/w) sin(w t)` beside `K0 sin(w t)`, and to `D t`
-//! beside `GS w t`. Here psi moves while the platform turns:
+//! Drifts alone are judged at attitudes of an arc. With accelerometer or torquer errors that method would
+//! claim too much: at a steady rate w the drift integrates to `(D/w) sin(w t)` beside `K0 sin(w t)`, and to
+//! `D t` beside `GS w t`. This module lets psi move while the platform turns:
 //!
 //! `psi' = F psi + eps(w t)`, `Z^(k) = H F^k psi + sum_{j<k} H F^(k-1-j) eps^(j) + a^(k)`,
 //! `eps = C E(g, omega_c) D`, `a = C A(f) K`,
 //!
-//! with `omega_c` the earth rate and the rate of turning in c. Times are measured in a unit T: a rotation by
-//! phi at the rate c/T takes `phi T/c`. The rows `T^k Z^(k)` where it begins generate all of its samples over
-//! `K[[T]]`: they are trigonometric polynomials of degree m and powers of time, whose equation of order
-//! `2m + 4` has one as its leading coefficient. With the rows `T^k H F^k S_i` of positions they generate a
-//! module L. A functional c has degree k if `T^k c` is in L, k the smallest: at positions that is the order
-//! of the derivative, and what has accumulated while the platform turned counts by its power of time. Rates c
-//! are random: verdicts hold at almost all rates.
+//! with `omega_c` the earth rate and the rate of turning in c. Times are in a unit T: a rotation by phi at
+//! the rate c/T takes `phi T/c`. The rows `T^k Z^(k)` at its start generate all of its samples over
+//! `K[[T]]`. They are trigonometric polynomials of degree m and powers of time, and solve an equation of
+//! order `2m + 4` with leading coefficient one. With the rows `T^k H F^k S_i` of positions they generate a
+//! module L. A functional c has degree k if k is the smallest number with `T^k c` in L. At positions k is
+//! the order of the derivative; what accumulates during a turn counts by its power of time. The rates c are
+//! random: verdicts hold at almost all rates.
 //!
-//! What is determined at one rate alone (`GS + D/w` as a number) is in no `V_k` but the last, which is the
-//! span of the rows at a random T.
+//! A functional that is determined at one rate alone (`GS + D/w` as a number) is only in the last `V_k`,
+//! which is the span of the rows at a random T.
 
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::platform_rows::local_chain;
 use super::staircase::Degrees;
-use super::transition::{AtATime, LiftField, transition};
+use super::transition::{LiftField, RandomTime, transition};
 use crate::model::Carry;
 use crate::model::attitude::{Matrix3, elementary, product, transpose, unit};
 use crate::model::error_model::Columns;
@@ -32,21 +32,22 @@ use crate::model::platform::{
 };
 use crate::model::ring::Ring;
 
-/// The order of the equation that the course of Z solves: `exp(i j angle)` with |j| up to m, the turn of the
-/// earth (three, one of them the constant again), and what is constant accumulates.
+/// Order of the equation that Z(t) solves during a turn: `exp(i j angle)` with |j| up to m, the rotation of
+/// the earth (three, one of them the constant again), and the accumulation of constants.
 pub(super) const fn orders(harmonics: usize) -> usize {
     2 * harmonics + 4
 }
 
-/// What a rotation adds to the degree of a row in the random values. Cleared of the denominators `w` (m
-/// times, and that of its duration), `W^2`, `1 + W^2 e^2`, `T` and `j^2 w^2 - W^2 T^2` (j up to m, degree 4),
-/// with numerators no higher than these, and m more powers of w and T in derivatives.
+/// Degree in the random values that a rotation adds to a row. The denominators that are cleared are `w` (m
+/// times, and that of its duration), `W^2`, `1 + W^2 e^2`, `T` and `j^2 w^2 - W^2 T^2` (j up to m, degree
+/// 4). The numerators have no higher degree, and derivatives have m more powers of w and T.
 pub(super) const fn degree(harmonics: usize) -> usize {
     2 * (5 * harmonics + 9) + orders(harmonics)
 }
 
-/// And to its bits: these factors, `3m + 6` in all, have a norm of `1 + m^2` at most, derivatives are
-/// multiplied by up to `m^k`, and the angle has a denominator of its own, up to 180e9.
+/// Bits that a rotation adds to the entries of a row. The factors of [`degree`], `3m + 6` in all, have norms
+/// of at most `1 + m^2`. Derivatives multiply by up to `m^k`, and the angle has its own denominator, up to
+/// 180e9.
 pub(super) fn bits(harmonics: usize) -> f64 {
     let m = harmonics as f64;
     (3.0 * m + 6.0) * (1.0 + m * m).log2() + orders(harmonics) as f64 * m.log2() + 38.0
@@ -74,7 +75,7 @@ pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<E
     for order in 0..=last {
         let mut basis = Echelon::new(field, n);
         for row in series.constants_of_order(order) {
-            // beyond the precision of the series nothing is told from zero
+            // beyond the precision of the series nothing is distinguished from zero
             if full.contains(&row) {
                 basis.insert(&row);
             }
@@ -98,25 +99,25 @@ pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<E
     (degrees, stairs)
 }
 
-/// How psi moves in a rotation: `exp(F t)` over all of it, its integral over the time in units of T, and
-/// `(i j c - F T)^-1` for the harmonics j = -m..=m but 0.
-struct Motion<E> {
+/// Motion of psi in a rotation: `exp(F t)` over all of it, its integral over time in units of T, and
+/// `(i j c - F T)^-1` for the harmonics j = -m..=m except 0.
+struct PsiMotion<E> {
     phi: Matrix3<E>,
     integral: Matrix3<E>,
     resolvents: Vec<Option<Matrix3<E>>>,
 }
 
-/// The span of the rows at a random time.
+/// Span of the rows at a random time T.
 fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
     let (field, point) = (sample.point.ring, &sample.point);
-    // the same in all embeddings
+    // one seed for all embeddings
     let seed = sample.arcs.iter().flatten().fold(field.modulus(), |seed, arc| seed ^ arc.rate);
     let mut rng = SplitMix64::new(seed);
     let t = 1 + rng.below(field.modulus() - 1);
     let (t_squared, over_t) = (field.mul(t, t), field.inv(t));
     let motion = |arc: &SteadyTurn| {
         let time = field.mul(t, arc.duration);
-        let earth = AtATime::random(field, [point.w_n, point.w_u], time, &mut rng);
+        let earth = RandomTime::random(field, [point.w_n, point.w_u], time, &mut rng);
         let phi = earth.phi(1);
         // (s - F T)^-1 = (1 + (s F T + (F T)^2)/(s^2 + W^2 T^2))/s
         let resolvent = |s: u64| {
@@ -125,7 +126,7 @@ fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
             let both = field.mul(over_s, field.inv(square));
             earth.combine([over_s, field.mul(field.mul(s, both), t), field.mul(both, t_squared)])
         };
-        Motion {
+        PsiMotion {
             phi: phi.map(|row| [row[0], row[1], row[2]]),
             integral: phi.map(|row| [row[3], row[4], row[5]].map(|x| field.mul(x, over_t))),
             resolvents: frequencies(platform, sample, arc).into_iter().map(|s| s.map(resolvent)).collect(),
@@ -138,17 +139,22 @@ fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
     full
 }
 
-/// `i j c` for the harmonics j = -m..=m of a rotation; nothing for j = 0.
+/// Frequencies `i j c` of the harmonics j = -m..=m of a rotation; `None` for j = 0.
 fn frequencies(platform: &Platform, sample: &Sample, arc: &SteadyTurn) -> Vec<Option<u64>> {
     let (f, m) = (sample.point.ring, platform.errors().harmonics() as i64);
     let unit = f.mul(sample.roots.imaginary_unit(), arc.rate);
     (-m..=m).map(|j| (j != 0).then(|| f.mul(f.from_i64(j), unit))).collect()
 }
 
-/// How psi moves in a rotation, in powers of T.
-fn in_series(platform: &Platform, sample: &Sample, ring: &SeriesRing, arc: &SteadyTurn) -> Motion<Vec<u64>> {
+/// Motion of psi in a rotation, as power series in T.
+fn in_series(
+    platform: &Platform,
+    sample: &Sample,
+    ring: &SeriesRing,
+    arc: &SteadyTurn,
+) -> PsiMotion<Vec<u64>> {
     let (field, point) = (ring.field, &sample.point);
-    // one power more, which the integral loses
+    // one more order, which the integral loses
     let longer = SeriesRing { precision: ring.precision + 1, ..*ring };
     let phi = transition(&longer, point.w_n, point.w_u, arc.duration);
     let f = psi_dynamics(&field, point.w_n, point.w_u);
@@ -165,20 +171,20 @@ fn in_series(platform: &Platform, sample: &Sample, ring: &SeriesRing, arc: &Stea
         }
         out
     };
-    Motion {
+    PsiMotion {
         phi: std::array::from_fn(|i| std::array::from_fn(|j| phi[i][j][..ring.precision].to_vec())),
         integral: std::array::from_fn(|i| std::array::from_fn(|j| phi[i][j + 3][1..].to_vec())),
         resolvents: frequencies(platform, sample, arc).into_iter().map(|s| s.map(resolvent)).collect(),
     }
 }
 
-/// The rows that generate L, in a ring that holds the field and T.
+/// Rows that generate L, in a ring that contains the field and T.
 fn rows<R: LiftField>(
     platform: &Platform,
     sample: &Sample,
     ring: &R,
     t: &R::Element,
-    mut motion: impl FnMut(&SteadyTurn) -> Motion<R::Element>,
+    mut motion: impl FnMut(&SteadyTurn) -> PsiMotion<R::Element>,
 ) -> Vec<Vec<R::Element>> {
     let point = &sample.point;
     let carry = platform.scheme().carry;
@@ -193,7 +199,7 @@ fn rows<R: LiftField>(
     let stations = platform.scheme().stations();
     let blocks = platform.blocks(point);
     let mut out = Vec::new();
-    // psi^n as functionals of the unknowns, and psi in the axes of the platform where it was left
+    // psi^n as functionals of the unknowns, and psi in platform axes at the end of the last rotation
     let mut psi: Columns<R::Element> = Default::default();
     let mut left: Option<Columns<R::Element>> = None;
     for (i, (station, c)) in stations.iter().zip(&point.attitudes).enumerate() {
@@ -230,7 +236,7 @@ fn rows<R: LiftField>(
             left = Some(times(ring, &lift(&transpose(c)), &psi));
             continue;
         };
-        let turning = Turning::new(platform, sample, c, arc);
+        let turning = RotationErrors::new(platform, sample, c, arc);
         out.extend(turning.rows(ring, &psi, &powers));
         psi = turning.moved(ring, &psi, t, &motion(arc));
         // the end of the arc is the next station
@@ -239,7 +245,7 @@ fn rows<R: LiftField>(
     out
 }
 
-/// A functional of the local unknowns at a position, as one of the unknowns of the scheme.
+/// A functional of the local unknowns at a position, as a functional of the unknowns of the scheme.
 fn at_rest<R: LiftField>(
     ring: &R,
     psi: &Columns<R::Element>,
@@ -257,27 +263,27 @@ fn at_rest<R: LiftField>(
     (0..n).map(entry).collect()
 }
 
-/// `m v`.
+/// Product `m v`.
 fn times<R: Ring>(ring: &R, m: &Matrix3<R::Element>, v: &Columns<R::Element>) -> Columns<R::Element> {
     let entry = |r: usize, c: usize| ring.dot((0..3).map(|j| (&m[r][j], &v[j][c])));
     std::array::from_fn(|r| (0..v[0].len()).map(|c| entry(r, c)).collect())
 }
 
-/// `F` on `psi^n`.
+/// Block of `F` that acts on `psi^n`.
 fn psi_dynamics(field: &Field, w_n: u64, w_u: u64) -> Matrix3<u64> {
     let local = local_dynamics(field, &w_n, &w_u);
     std::array::from_fn(|i| std::array::from_fn(|j| local[i][j]))
 }
 
-/// Trigonometric polynomials of an angle with coefficients in a field: of `exp(i j angle)` for j in
-/// `-degree..=degree`.
+/// Ring of the trigonometric polynomials of an angle with coefficients in a field: coefficients of
+/// `exp(i j angle)` for j in `-degree..=degree`.
 struct Harmonics<'a> {
     field: &'a Field,
     degree: usize,
 }
 
 impl Harmonics<'_> {
-    /// A sum of the two first harmonics.
+    /// Sum of the two first harmonics.
     fn wave(&self, plus: u64, minus: u64) -> Vec<u64> {
         let mut out = self.zero();
         (out[self.degree + 1], out[self.degree - 1]) = (plus, minus);
@@ -306,7 +312,7 @@ impl Ring for Harmonics<'_> {
         let mut out = self.zero();
         for (i, &x) in a.iter().enumerate().filter(|(_, x)| **x != 0) {
             for (j, &y) in b.iter().enumerate().filter(|(_, y)| **y != 0) {
-                // no product of a model is of a higher degree
+                // no product of a model has a higher degree
                 let slot = &mut out[i + j - self.degree];
                 *slot = self.field.add(*slot, self.field.mul(x, y));
             }
@@ -321,20 +327,20 @@ impl Ring for Harmonics<'_> {
     }
 }
 
-/// A rotation: the errors along it as trigonometric polynomials of its angle.
-struct Turning<'a> {
+/// Errors along a rotation as trigonometric polynomials of its angle.
+struct RotationErrors<'a> {
     platform: &'a Platform,
     sample: &'a Sample,
     arc: &'a SteadyTurn,
-    /// What torquer errors make of the rate of turning, c; three rows, one column per coefficient.
+    /// Drift from torquer errors at the turning rate c, in n: three rows, one column per coefficient.
     turned: Columns<Vec<u64>>,
-    /// The rest of the drift, `eps^n`.
+    /// Rest of the drift, `eps^n`.
     drift: Columns<Vec<u64>>,
-    /// The error of the accelerometers in `Z^n`.
+    /// Error of the accelerometers in `Z^n`.
     accelerometer: Columns<Vec<u64>>,
 }
 
-impl<'a> Turning<'a> {
+impl<'a> RotationErrors<'a> {
     fn new(platform: &'a Platform, sample: &'a Sample, start: &Matrix3<u64>, arc: &'a SteadyTurn) -> Self {
         let (f, point, errors) = (&sample.point.ring, &sample.point, platform.errors());
         let ring = Harmonics { field: f, degree: errors.harmonics() };
@@ -345,7 +351,7 @@ impl<'a> Turning<'a> {
         let turn = elementary(&ring, arc.axis.index, &(cos, ring.neg(&sin)));
         let c =
             if arc.axis.geographic { product(&ring, &turn, &start) } else { product(&ring, &start, &turn) };
-        // the axis does not move, neither in n nor in c
+        // the axis is fixed in n and in c
         let about: [Vec<u64>; 3] =
             std::array::from_fn(|k| match (arc.axis.geographic, k == arc.axis.index) {
                 (true, _) => start[arc.axis.index][k].clone(),
@@ -364,7 +370,7 @@ impl<'a> Turning<'a> {
         Self { platform, sample, arc, turned, drift, accelerometer }
     }
 
-    /// `T^k Z^(k)` where the rotation begins, for all k that there are, as functionals of the unknowns.
+    /// Rows `T^k Z^(k)` at the start of the rotation for all orders k, as functionals of the unknowns.
     fn rows<R: LiftField>(
         &self,
         ring: &R,
@@ -407,8 +413,8 @@ impl<'a> Turning<'a> {
                     let a = f.dot(0, (0..3).map(|r| (local[PSI_EPS + r], errors[order][r][c])));
                     *slot = ring.add(slot, &ring.lift(a));
                     for j in 0..order {
-                        // T^(k-1-j) H F^(k-1-j) of eps^(j), of which the part of the earth and of g has one T
-                        // more
+                        // T^(k-1-j) H F^(k-1-j) of eps^(j); the part from the earth rate and g has one more
+                        // T
                         let k = order - 1 - j;
                         for (power, x) in
                             [(k, dot(&functional[k], &turned[j])), (k + 1, dot(&functional[k], &drift[j]))]
@@ -425,15 +431,15 @@ impl<'a> Turning<'a> {
         out
     }
 
-    /// `psi^n` at the end of the rotation. With `eps = sum E_j exp(i j angle)` it is `exp(F t)` of what it
-    /// was, the integral of that times `E_0`, and `R_j exp(i j angle) - exp(F t) R_j` times `E_j`,
-    /// `R_j = (i j c - F T)^-1`.
+    /// `psi^n` at the end of the rotation. With `eps = sum E_j exp(i j angle)` it is `exp(F t)` of its start
+    /// value, the integral of `exp(F t)` times `E_0`, and `R_j exp(i j angle) - exp(F t) R_j` times `E_j`,
+    /// with `R_j = (i j c - F T)^-1`.
     fn moved<R: LiftField>(
         &self,
         ring: &R,
         psi: &Columns<R::Element>,
         t: &R::Element,
-        motion: &Motion<R::Element>,
+        motion: &PsiMotion<R::Element>,
     ) -> Columns<R::Element> {
         let f = &self.sample.point.ring;
         let (m, first) = (self.platform.errors().harmonics(), psi[0].len() - self.platform.coefficients());

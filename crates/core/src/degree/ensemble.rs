@@ -1,4 +1,5 @@
-//! Two random fields in four embeddings each: what verdicts agree in and coefficients are recovered from.
+//! Two random fields in four embeddings each: verdicts must agree in both, and coefficients are recovered
+//! from all.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, PrimeError, gcd};
@@ -10,10 +11,10 @@ use super::staircase::{Degrees, climb};
 use crate::model::platform::{RandomValues, Sample};
 use crate::model::{Carry, Platform, Source, Unknowns};
 
-/// How many pairs of fields are drawn before a disagreement is an error.
+/// Number of pairs of fields drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
 
-/// Why no verdict could be reached.
+/// Reasons for the lack of a verdict.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EnsembleError {
     /// No field fits the angles.
@@ -21,25 +22,26 @@ pub enum EnsembleError {
     Prime(#[from] PrimeError),
     /// The fields kept disagreeing.
     #[error(
-        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this scheme"
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 \
+         runs: please report this scheme"
     )]
     Disagreement,
 }
 
-/// The verdicts of a scheme, agreed on by two random fields.
+/// Verdicts of a scheme on which two random fields agree.
 #[derive(Debug, Clone)]
 pub struct Verdicts {
-    /// What was agreed on.
+    /// Degrees that both fields give.
     pub degrees: Degrees,
-    /// The bases of `V_0, V_1, ...` in the first field.
+    /// Bases of `V_0, V_1, ...` in the first field.
     pub stairs: Vec<Echelon>,
-    /// The random values of the two fields.
+    /// Random values of the two fields.
     pub values: [RandomValues; 2],
     /// Bound on the probability that any of the verdicts is wrong.
     pub error_bound: f64,
 }
 
-/// Judges `platform` in two random fields, each of a stream of its own of `seed` and the scheme.
+/// Judges `platform` in two random fields, each with its own stream of `seed` and the scheme.
 ///
 /// # Errors
 /// [`EnsembleError`].
@@ -61,7 +63,7 @@ pub(crate) fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, Ensembl
     Ok(agreed(platform, seed, &|sample| (reset_degrees(platform, sample), ()))?.0)
 }
 
-/// What two random fields agree on, with what else was found in the first.
+/// Result on which two random fields agree, with further findings of the first field.
 fn agreed<T>(
     platform: &Platform,
     seed: u64,
@@ -95,17 +97,16 @@ pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>
     (degrees, stairs)
 }
 
-/// The size of the claim (see [`obsdeg_exact::certainty`]): a row is a row of `H F^k`, of degree k in the
-/// rates, times `S_i`, whose entries are products of at most six sines and cosines per factor, and of
-/// `C_c^n`. Torqued rates make it one more in the rates, and what torquer errors add in turns is of degree
-/// one in pi.
+/// Size of the claim (see [`obsdeg_exact::certainty`]). A row is a row of `H F^k`, of degree k in the rates,
+/// times `S_i`. Its entries are products of at most six sines and cosines per factor, and of `C_c^n`.
+/// Torqued rates add one degree in the rates; torquer errors of turns add one degree in pi.
 fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     let scheme = platform.scheme();
     let generic = !scheme.generic_names().is_empty();
     let orders = degrees.rank_profile.len();
     let unknowns = platform.names().len();
     let factors = scheme.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
-    // of a row: psi of its position, and the coefficients
+    // entries of a row: psi of its position, and the coefficients
     let entries = 3 + platform.coefficients();
     let torquers = usize::from(scheme.unknowns.have(Source::Rate));
     let rotations =
@@ -127,9 +128,9 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     }
 }
 
-/// What turns add to the bits of a row: a turn is `C J E(u)`, of products of at most six entries of `C_c^n`,
-/// with denominators 2^3 each and the cube of that of a root, and of an angle with a denominator of its own;
-/// every turn adds one.
+/// Bits that turns add to the entries of a row. A turn is `C J E(u)`: products of at most six entries of
+/// `C_c^n`, with denominators 2^3 each and the cube of a root's denominator, and an angle with its own
+/// denominator. Every turn adds one bit.
 fn torquer_bits(platform: &Platform) -> f64 {
     let steps: Vec<_> = platform.paths().iter().flatten().collect();
     let half_turn = 180_000_000_000u64;
@@ -168,12 +169,12 @@ mod tests {
         assert_eq!((generic.row_degree, generic.decisions), (3 + 18, 48));
     }
 
-    /// Position by position under reset carry, or all at once: the same degrees.
+    /// The degrees under reset carry, position by position, equal those of all positions at once.
     #[test]
     fn degrees_alone_are_those_of_the_staircase() {
         let angles = [["0", "0", "0"], ["90", "0", "0"], ["0", "90", "30"]];
         for carry in Carry::ALL {
-            // the drift itself is of one position
+            // the unknown `drift` belongs to one position
             for (unknowns, positions) in [(Unknowns::default(), 3), (Unknowns::Drift, 1)] {
                 let angles = angles[..positions].iter().map(|a| a.map(|x| x.parse().expect("an angle")));
                 let scheme = Scheme { carry, unknowns: unknowns.clone(), ..Scheme::of_angles(angles) };

@@ -1,4 +1,4 @@
-//! What is found of a model, whichever it is: exact and typed, without a text. Every answer is a view of it.
+//! Verdicts on any model: exact and typed, without texts. Every answer is a view of them.
 
 use super::staircase::Degrees;
 use super::status::Verdict;
@@ -8,15 +8,15 @@ use super::status::Verdict;
 pub struct Findings {
     /// Ranks, and the degree of every unknown in model order.
     pub degrees: Degrees,
-    /// For every unknown those that it cannot be told from.
+    /// Indistinguishable unknowns of every unknown.
     pub partners: Vec<Vec<usize>>,
-    /// The verdicts on the combinations that were asked for.
+    /// Verdicts on the requested combinations.
     pub asked: Vec<Verdict>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// How certain verdicts are that two prime fields agree on.
+/// Certainty of verdicts on which two prime fields agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByPrimes {
     /// The two random primes (61 bits) that agree.
@@ -26,14 +26,14 @@ pub struct ByPrimes {
 }
 
 impl ByPrimes {
-    /// The primes as text: they are beyond what a number of JSON holds exactly.
+    /// The primes as text: they exceed the integers that a JSON number holds exactly.
     pub fn primes_as_text(&self) -> [String; 2] {
         self.primes.map(|p| p.to_string())
     }
 }
 
 impl Findings {
-    /// The verdict on an unknown.
+    /// Verdict on an unknown.
     pub fn verdict(&self, unknown: usize) -> Verdict {
         Verdict::of(&self.degrees, unknown)
     }

@@ -14,17 +14,17 @@ pub struct LocalRow {
     pub component: usize,
     /// Derivative order.
     pub order: usize,
-    /// Shape 9.
+    /// Coefficients of the local unknowns (shape 9).
     pub row: [u64; LOCAL],
 }
 
-/// The rows of `H F^k` that raise the rank of one position, order by order until it stalls.
-/// `V_{k+1} = V_k + V_k F`, so only rows that were new at order k need a derivative.
+/// Rows of `H F^k` that raise the rank of one position, order by order until the rank stalls. Since
+/// `V_{k+1} = V_k + V_k F`, only the new rows of order k need a derivative.
 pub fn local_chain(field: &Field, w_n: u64, w_u: u64, observed: Observed) -> Vec<LocalRow> {
     chain_of(field, [w_n, w_u], local_output(field, observed), observed.locals())
 }
 
-/// The same for any outputs (component and row), over the first `locals` local unknowns.
+/// Local chain of any outputs (component and row), over the first `locals` local unknowns.
 pub(crate) fn chain_of(
     field: &Field,
     [w_n, w_u]: [u64; 2],
@@ -59,7 +59,7 @@ pub struct PlatformRows {
     columns: usize,
     chain: Vec<LocalRow>,
     blocks: Vec<Block<u64>>,
-    /// Whether turns leave torquer errors in psi^n; `None`: the unknowns are the local ones.
+    /// True if turns leave torquer errors in psi^n; `None` if the unknowns are the local ones.
     apart: Option<bool>,
     scratch: Vec<u64>,
 }
@@ -103,7 +103,7 @@ impl DerivativeRows for PlatformRows {
         let f = self.field;
         for block in &self.blocks {
             for local in self.chain.iter().filter(|r| r.order == order) {
-                // where there are no errors of the accelerometers, nothing of them is in a row
+                // without unknown accelerometer errors a row has no entries for them
                 let mut used = [(0, &block.rows[0][..]); LOCAL];
                 let (mut n, mut of_psi) = (0, 0);
                 for (i, (x, row)) in local.row.iter().zip(&block.rows).enumerate().filter(|(_, r)| *r.0 != 0)
@@ -112,7 +112,7 @@ impl DerivativeRows for PlatformRows {
                     n += 1;
                     of_psi += usize::from(i < 3);
                 }
-                // psi of the scheme is in psi^n alone, and coefficients are in it where torquers act
+                // psi of the scheme enters psi^n alone; coefficients enter it only where torquers act
                 let (psi, rest) = match self.apart {
                     Some(torqued) => (&used[..of_psi], &used[if torqued { 0 } else { of_psi }..n]),
                     None => (&used[..n], &used[..n]),

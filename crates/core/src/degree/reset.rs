@@ -1,6 +1,6 @@
-//! The degrees of a scheme under reset carry, position by position: psi of a position occurs in its rows
-//! alone, so it is eliminated there, and what is left concerns the coefficients. The whole staircase holds a
-//! matrix of all unknowns by all unknowns instead.
+//! Degrees of a scheme under reset carry, position by position. psi of a position occurs in its rows alone,
+//! so it is eliminated there, and the remaining rows concern the coefficients. The general staircase would
+//! need a matrix of all unknowns by all unknowns.
 
 use obsdeg_exact::Echelon;
 
@@ -8,10 +8,10 @@ use super::platform_rows::{LocalRow, local_chain};
 use super::staircase::Degrees;
 use crate::model::platform::{Block, LOCAL, Platform, Sample};
 
-/// The psi of one position.
+/// Number of psi components of one position.
 const PSI: usize = 3;
 
-/// What [`super::staircase::climb`] says of a scheme under reset carry.
+/// Degrees of a scheme under reset carry: the result of [`super::staircase::climb`], at less cost.
 pub(super) fn reset_degrees(platform: &Platform, sample: &Sample) -> Degrees {
     let field = sample.point.ring;
     let chain = local_chain(&field, sample.point.w_n, sample.point.w_u, platform.observed());
@@ -19,7 +19,7 @@ pub(super) fn reset_degrees(platform: &Platform, sample: &Sample) -> Degrees {
     let n = platform.names().len();
     let (own, first) = (PSI + platform.coefficients(), n - platform.coefficients());
     let mut degrees = Degrees { degree: vec![None; n], excited: vec![false; n], ..Degrees::default() };
-    // of one position: its psi, then the coefficients; of all: the coefficients
+    // per position: psi, then the coefficients; in common: the coefficients
     let mut locals: Vec<(usize, Echelon)> = Vec::new();
     for block in &blocks {
         if locals.last().is_none_or(|(psi, _)| *psi != block.columns[0]) {
@@ -72,7 +72,7 @@ pub(super) fn reset_degrees(platform: &Platform, sample: &Sample) -> Degrees {
     degrees
 }
 
-/// A row of the local chain at one station, on the columns of its block.
+/// Row of the local chain at one station, in the columns of its block.
 fn row(field: &obsdeg_exact::Field, local: &LocalRow, block: &Block<u64>) -> Vec<u64> {
     let entry = |k: usize| {
         let terms = (0..LOCAL).filter(|&i| local.row[i] != 0).map(|i| (local.row[i], block.rows[i][k]));
@@ -92,8 +92,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
-        /// Two ways to the same verdicts: cardinal and other attitudes, rotating segments, any terms and
-        /// latitudes.
+        /// Both computations give the same verdicts: cardinal and other attitudes, rotating segments, any
+        /// terms and latitudes.
         #[test]
         fn position_by_position_is_all_at_once(
             places in prop::collection::vec(prop::array::uniform3(-4i32..=4), 1..7),
@@ -103,7 +103,7 @@ mod tests {
             measured_azimuth in any::<bool>(),
             turning in prop::option::of(0usize..6),
         ) {
-            // a term and its lower triangle do not go together
+            // a term and its lower triangle exclude each other
             let both = |whole, triangle| terms.contains(&whole) && terms.contains(&triangle);
             prop_assume!(!both(Term::GM, Term::GM3) && !both(Term::M6, Term::M3));
             let angles = places.iter().map(|p| p.map(|k| Angle::from_degrees(k * step)));

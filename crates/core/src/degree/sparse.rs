@@ -2,13 +2,13 @@
 
 use obsdeg_exact::{RowSpace, Scalars};
 
-/// How many column orders are tried for short vectors, and up to how many columns that many.
+/// Number of column orders tried for short vectors, up to [`SMALL`] columns; beyond, two are tried.
 const ORDERS: usize = 16;
+/// Largest number of columns for which all orders are tried.
 const SMALL: usize = 120;
 
-/// The rows of a reduced basis of the span of `rows` when columns are preferred as pivots in the
-/// order `columns`. Every such row is an elementary vector: no vector of the span has a smaller
-/// support inside its own.
+/// Rows of a reduced basis of the span of `rows` when pivots are chosen in the order `columns`. Every such
+/// row is an elementary vector: no vector of the span has a smaller support inside its own.
 fn reduced<S: Scalars>(field: &S, rows: &[Vec<S::Element>], columns: &[usize]) -> Vec<Vec<S::Element>> {
     let mut basis = <S::Space as RowSpace>::new(field.clone(), columns.len());
     let mut permuted = vec![field.zero(); columns.len()];
@@ -29,24 +29,25 @@ fn reduced<S: Scalars>(field: &S, rows: &[Vec<S::Element>], columns: &[usize]) -
         .collect()
 }
 
-/// Products that [`extend_by_short_vectors`] takes at most: every order of the columns eliminates all rows.
+/// Largest number of products that [`extend_by_short_vectors`] takes: every order of the columns eliminates
+/// all rows.
 pub(crate) fn products_of_short_vectors(rows: usize, columns: usize) -> u64 {
     let orders = if columns <= SMALL { ORDERS } else { 2 };
     [rows, rows, columns, orders].iter().fold(1, |product: u64, &n| product.saturating_mul(n as u64))
 }
 
-/// The columns where a vector is not zero.
+/// Columns where a vector is not zero.
 pub(crate) fn support(vector: &[u64]) -> Vec<usize> {
     (0..vector.len()).filter(|&c| vector[c] != 0).collect()
 }
 
-/// The same in any field.
+/// Columns where a vector over any field is not zero.
 pub(crate) fn support_in<S: Scalars>(field: &S, vector: &[S::Element]) -> Vec<usize> {
     (0..vector.len()).filter(|&c| !field.is_zero(&vector[c])).collect()
 }
 
-/// Elementary vectors of the span of `rows`, shortest first, that together with what `span` already
-/// holds are independent; `span` grows by them.
+/// Elementary vectors of the span of `rows`, shortest first, that are independent of each other and of
+/// `span`. Adds them to `span`.
 pub(crate) fn extend_by_short_vectors<V: RowSpace>(
     field: &V::Field,
     rows: &[Vec<V::Element>],
@@ -101,7 +102,7 @@ mod tests {
         assert_eq!(products_of_short_vectors(usize::MAX, usize::MAX), u64::MAX);
     }
 
-    /// Short vectors that were planted are found, which takes several orders of the columns.
+    /// Planted short vectors are found; this takes several orders of the columns.
     #[test]
     fn planted_vectors_are_found() {
         use obsdeg_exact::SplitMix64;
@@ -128,7 +129,7 @@ mod tests {
             let vectors = extend_by_short_vectors(&f, &mixed, &mut Echelon::new(f, 12));
             found += vectors.iter().map(|v| support(v).len()).sum::<usize>();
         }
-        // two orders of the columns find them within 2 %, sixteen find shorter ones still
+        // two orders of the columns find them within 2 %, sixteen find still shorter ones
         assert!(found * 100 < planted * 97, "{found} of {planted}");
         assert_eq!(support(&[0, 5, 0]), [1]);
     }

@@ -4,26 +4,26 @@ use obsdeg_exact::{Echelon, RowSpace, Scalars};
 
 use super::rows::DerivativeRows;
 
-/// What the staircase says about every unknown.
+/// Ranks, degrees and excitation of all unknowns, from the staircase.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Degrees {
     /// `dim V_0, dim V_1, ...` up to the last order at which some segment still had rows.
     pub rank_profile: Vec<usize>,
-    /// Per unknown: the smallest k with `e_c` in `V_k`, or `None`.
+    /// Degree per unknown: the smallest k with `e_c` in `V_k`; `None` if it is not observable.
     pub degree: Vec<Option<usize>>,
-    /// Per unknown: whether it moves Z at all: its column is not zero in every row.
+    /// Excitation per unknown: true if it affects Z, that is, its column is not zero in every row.
     pub excited: Vec<bool>,
 }
 
 impl Degrees {
-    /// The final rank.
+    /// Final rank.
     pub fn rank(&self) -> usize {
         self.rank_profile.last().copied().unwrap_or(0)
     }
 }
 
-/// Climbs the staircase: rows of order 0, 1, 2, ... go into `basis` (cleared first) until every
-/// segment's chain has stalled or the rank is full; `on_order` sees the basis of `V_k` after each order.
+/// Climbs the staircase: rows of order 0, 1, 2, ... enter `basis` (cleared first) until the chain of every
+/// segment has stalled or the rank is full. `on_order` receives the basis of `V_k` after each order.
 pub fn climb<R: DerivativeRows>(
     rows: &mut R,
     basis: &mut <R::Field as Scalars>::Space,
@@ -49,9 +49,9 @@ pub fn climb<R: DerivativeRows>(
     degrees
 }
 
-/// For every unknown those that it cannot be told from: the others of the null vectors of minimal support
-/// that it is in. It depends on the null space alone, on no basis of it, and is mutual; an observable unknown
-/// and one that is not excited have none.
+/// Indistinguishable unknowns of every unknown: the other members of the null vectors of minimal support
+/// that contain it. They depend on the null space alone, not on a basis of it, and the relation is mutual.
+/// An observable unknown and an unknown that is not excited have none.
 pub fn partners(unknowns: usize, stairs: &[Echelon]) -> Vec<Vec<usize>> {
     stairs.last().map_or_else(|| vec![Vec::new(); unknowns], Echelon::companions)
 }
@@ -66,7 +66,7 @@ mod tests {
     fn who_goes_with_whom() {
         let f = Field::new((1 << 60) + 33);
         let mut basis = Echelon::new(f, 4);
-        // x0 + x1 is seen, and x2; nothing is of x3
+        // x0 + x1 and x2 are observable; x3 is not excited
         basis.insert(&[1, 1, 0, 0]);
         basis.insert(&[0, 0, 1, 0]);
         assert_eq!(partners(4, &[basis]), [vec![1], vec![0], vec![], vec![]]);

@@ -1,4 +1,4 @@
-//! What a degree says of an unknown, and how verdicts differ.
+//! Statuses of unknowns, by their degrees, and differences of verdicts.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// The status of what has this degree, if any, and moves Z or does not.
+    /// Status of an unknown or combination with this degree, if any, that affects Z or does not.
     pub fn of(degree: Option<usize>, excited: bool) -> Self {
         match degree {
             Some(_) => Self::Observable,

@@ -1,4 +1,4 @@
-//! How psi moves by itself: `exp(F t)`, in powers of time and at a random time.
+//! Free motion of psi: `exp(F t)`, as a power series in time and at a random time.
 
 use obsdeg_exact::series::SeriesRing;
 use obsdeg_exact::{Field, SplitMix64};
@@ -6,9 +6,9 @@ use obsdeg_exact::{Field, SplitMix64};
 use crate::model::platform::{LOCAL, local_dynamics};
 use crate::model::ring::Ring;
 
-/// Rings that hold the prime field.
+/// Rings that contain the prime field.
 pub(crate) trait LiftField: Ring {
-    /// The image of an element of the field.
+    /// Image of an element of the field.
     fn lift(&self, x: u64) -> Self::Element;
 }
 
@@ -24,7 +24,7 @@ impl LiftField for SeriesRing {
     }
 }
 
-/// The psi rows of `exp(F r T)` as series, r an element of the field: the sum of `F^k (r T)^k / k!`.
+/// psi rows of `exp(F r T)` as series, with r an element of the field: the sum of `F^k (r T)^k / k!`.
 pub(crate) fn transition(ring: &SeriesRing, w_n: u64, w_u: u64, ratio: u64) -> [[Vec<u64>; LOCAL]; 3] {
     let f = &ring.field;
     let dynamics = local_dynamics(f, &w_n, &w_u);
@@ -44,23 +44,24 @@ pub(crate) fn transition(ring: &SeriesRing, w_n: u64, w_u: u64, ratio: u64) -> [
     out
 }
 
-/// The transition matrix at a random time: `T`, `cos wT` and `sin wT` are independent but for
+/// Transition matrix at a random time. `T`, `cos wT` and `sin wT` are independent except for
 /// `cos^2 + sin^2 = 1`, so a random point of the circle stands for any dwell.
-pub(crate) struct AtATime {
+pub(crate) struct RandomTime {
     field: Field,
-    /// `T`.
+    /// Random time `T`.
     t: u64,
-    /// `cos wT` and `sin(wT)/w`.
+    /// Random values of `cos wT` and `sin(wT)/w`.
     circle: (u64, u64),
     /// The square of the earth rate W.
     pub w2: u64,
-    /// `psi' = W psi + eps`, and `W^2`.
+    /// Matrix W of `psi' = W psi + eps`.
     w: [[u64; 3]; 3],
     w_squared: [[u64; 3]; 3],
 }
 
-impl AtATime {
-    /// At the rates `(wN, wU)` and a time; of the turn of the earth in it nothing is known.
+impl RandomTime {
+    /// Transition at the rates `(wN, wU)` and the time `t`; the angle by which the earth rotates in it is
+    /// random.
     pub(crate) fn random(field: Field, [w_n, w_u]: [u64; 2], t: u64, rng: &mut SplitMix64) -> Self {
         let f = field;
         let w2 = f.dot(0, [(w_n, w_n), (w_u, w_u)]);
@@ -79,7 +80,7 @@ impl AtATime {
         Self { field, t, circle, w2, w, w_squared }
     }
 
-    /// `a + b F + c F^2` on psi.
+    /// Matrix `a + b F + c F^2` on psi, for the coefficients (a, b, c).
     pub(crate) fn combine(&self, [unit, first, second]: [u64; 3]) -> [[u64; 3]; 3] {
         let entry = |i: usize, j: usize| {
             let unit = if i == j { unit } else { 0 };
@@ -88,14 +89,14 @@ impl AtATime {
         std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }
 
-    /// `(cos, sin/w)` of the sum of two angles.
+    /// Pair `(cos, sin/w)` of the sum of two angles.
     fn turn(&self, a: (u64, u64), b: (u64, u64)) -> (u64, u64) {
         let f = &self.field;
         let cos = f.sub(f.mul(a.0, b.0), f.mul(self.w2, f.mul(a.1, b.1)));
         (cos, f.add(f.mul(a.0, b.1), f.mul(a.1, b.0)))
     }
 
-    /// The psi rows of `exp(F r T)`: `I + s W + (1-c)/w^2 W^2` and `rT I + (1-c)/w^2 W + (rT-s)/w^2 W^2`.
+    /// psi rows of `exp(F r T)`: `I + s W + (1-c)/w^2 W^2` and `rT I + (1-c)/w^2 W + (rT-s)/w^2 W^2`.
     pub(crate) fn phi(&self, ratio: u64) -> [[u64; LOCAL]; 3] {
         let f = &self.field;
         let (mut angle, mut base, mut e) = ((f.one(), 0), self.circle, ratio);

@@ -1,23 +1,23 @@
 //! Arithmetic expressions, and their values in a prime field and in floating point.
 //!
-//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are held in a
-//! list, operands before what is made of them, so that nothing walks a tree as deep as a file is long.
+//! `+ - * / ^`, brackets, decimals (exact), names, and functions of one argument. Operations are in a list,
+//! operands before the operations that use them, so that no recursion goes as deep as a file is long.
 
 use std::ops::Range;
 
 use obsdeg_exact::Field;
 
-/// Deepest nesting of brackets, signs and powers.
+/// Deepest nesting of brackets, signs and powers that is accepted.
 pub const MAX_DEPTH: usize = 200;
-/// Most characters of a name.
+/// Largest number of characters of a name.
 pub const MAX_NAME: usize = 256;
 
-/// An expression: its operations in order, the last one being the whole.
+/// An expression: its operations in order; the last one is its root.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Expression {
     /// Operations; operands are indices of earlier ones.
     pub nodes: Vec<Node>,
-    /// Byte range of each in the text.
+    /// Byte range in the text of each operation.
     pub spans: Vec<Range<usize>>,
 }
 
@@ -25,7 +25,7 @@ pub struct Expression {
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "the usual operations")]
 pub enum Node {
-    /// `mantissa / 10^decimals`.
+    /// Decimal `mantissa / 10^decimals`.
     Number {
         mantissa: i128,
         decimals: i32,
@@ -80,7 +80,7 @@ pub enum Function {
 }
 
 impl Function {
-    /// All of them, with their names.
+    /// All functions, with their names.
     pub const ALL: [(&'static str, Self); 12] = [
         ("sin", Self::Sin),
         ("cos", Self::Cos),
@@ -96,7 +96,7 @@ impl Function {
         ("sign", Self::Sign),
     ];
 
-    /// Its value in floating point; the sign of zero is zero.
+    /// Value in floating point; the sign of zero is zero.
     pub fn value(self, x: f64) -> f64 {
         match self {
             Self::Sin => x.sin(),
@@ -115,61 +115,61 @@ impl Function {
         }
     }
 
-    /// The function of a name.
+    /// The function with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
     }
 }
 
-/// Why a text is no expression, or has no value.
+/// Reasons why a text is no expression, or has no value.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExpressionError {
     /// The grammar is violated.
     #[error("expected {expected}, found {found}")]
     Syntax {
-        /// What could stand here.
+        /// Texts that could stand here.
         expected: &'static str,
-        /// What stands here.
+        /// Text that stands here.
         found: String,
-        /// Where.
+        /// Byte range of the error.
         span: Range<usize>,
     },
-    /// Brackets, signs or powers nested too deeply.
+    /// Brackets, signs or powers are nested too deeply.
     #[error("nested more than {MAX_DEPTH} deep")]
     TooDeep {
-        /// Where.
+        /// Byte range of the error.
         span: Range<usize>,
     },
-    /// Vectors and matrices that do not fit.
+    /// Vectors and matrices have shapes that do not fit.
     #[error("expected {expected}, found {found}")]
     Shape {
-        /// What would fit.
+        /// Shapes that would fit.
         expected: String,
-        /// What stands here.
+        /// Shapes that stand here.
         found: String,
-        /// Where.
+        /// Byte range of the error.
         span: Range<usize>,
     },
-    /// A name without a meaning.
+    /// A name has no meaning.
     #[error("`{name}` is not known here; {hint}")]
     UnknownName {
-        /// The name.
+        /// Name found.
         name: String,
-        /// The nearest known name, or what there is.
+        /// Nearest known name, or the known names.
         hint: String,
-        /// Where.
+        /// Byte range of the error.
         span: Range<usize>,
     },
     /// A division by zero.
     #[error("division by zero")]
     DivisionByZero {
-        /// Where.
+        /// Byte range of the error.
         span: Range<usize>,
     },
 }
 
 impl ExpressionError {
-    /// Where in the text the error is.
+    /// Byte range of the error in the text.
     pub fn span(&self) -> Range<usize> {
         match self {
             Self::Syntax { span, .. }
@@ -181,22 +181,22 @@ impl ExpressionError {
     }
 }
 
-/// Which names there are.
+/// Set of admitted names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Names {
-    /// Of the platform: `psi_x@1` and `psi_x^n` are names.
+    /// Names of the platform, such as `psi_x@1` and `psi_x^n`.
     Platform,
-    /// Letters, digits and `_`.
+    /// Names of letters, digits and `_`.
     Plain,
 }
 
-/// Where the names of an expression get their values.
+/// Values of the names in an expression.
 pub trait Environment {
-    /// The value of a name.
+    /// Value of a name; `None` if it is unknown.
     fn name(&self, name: &str) -> Option<u64>;
-    /// The cosine and sine of a named angle, or of one such as `20 deg`.
+    /// Cosine and sine of a named angle, or of one such as `20 deg`.
     fn cos_sin(&self, angle: &str) -> Option<(u64, u64)>;
-    /// The square root of an integer.
+    /// Square root of an integer; `None` if the field has none.
     fn sqrt(&self, _: i32) -> Option<u64> {
         None
     }
@@ -205,17 +205,17 @@ pub trait Environment {
 }
 
 impl Expression {
-    /// The whole.
+    /// Index of the root operation.
     pub fn root(&self) -> usize {
         self.nodes.len().saturating_sub(1)
     }
 
-    /// The byte range of the whole.
+    /// Byte range of the whole expression.
     pub fn span(&self) -> Range<usize> {
         self.spans.last().cloned().unwrap_or(0..0)
     }
 
-    /// The name that an operation is, and whether it has a minus.
+    /// Name that operation `i` is, and true if it has a minus.
     pub(crate) fn angle_at(&self, i: usize) -> Option<(&str, bool)> {
         match &self.nodes[i] {
             Node::Name(name) => Some((name, false)),
@@ -224,7 +224,7 @@ impl Expression {
         }
     }
 
-    /// The integer that an operation is, if it is a small one.
+    /// Integer that operation `i` is; `None` if it is none, or a large one.
     pub(crate) fn integer_at(&self, i: usize) -> Option<i32> {
         match self.nodes[i] {
             Node::Number { mantissa, decimals: 0 } => i32::try_from(mantissa).ok(),
@@ -234,8 +234,8 @@ impl Expression {
     }
 }
 
-/// The value of `expression` in a field; functions are the sine and cosine of named angles and square roots
-/// of integers, exponents integers.
+/// Value of `expression` in a field. Functions are the sine and cosine of named angles and square roots of
+/// integers; exponents are integers.
 ///
 /// # Errors
 /// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for
@@ -247,7 +247,7 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
         span: expression.spans[i].clone(),
     };
     let mut values: Vec<u64> = Vec::with_capacity(expression.nodes.len());
-    // what only names an angle, or is an exponent, needs no value
+    // a name of an angle and an exponent need no value
     let mut arguments = vec![false; expression.nodes.len()];
     for (i, node) in expression.nodes.iter().enumerate().rev() {
         match node {
@@ -331,15 +331,14 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
     Ok(values.last().copied().unwrap_or(0))
 }
 
-/// The image of an integer.
+/// Image of an integer.
 pub fn from_i128(f: &Field, x: i128) -> u64 {
     let p = u128::from(f.modulus());
     let image = f.from_u64((x.unsigned_abs() % p) as u64);
     if x < 0 { f.neg(image) } else { image }
 }
 
-/// The constants that every model knows unless it gives the name another meaning: `pi`, and a degree in
-/// radians.
+/// Constants of every model unless it gives the name another meaning: `pi`, and a degree in radians.
 pub fn constant(name: &str) -> Option<f64> {
     match name {
         "pi" => Some(std::f64::consts::PI),
@@ -348,8 +347,8 @@ pub fn constant(name: &str) -> Option<f64> {
     }
 }
 
-/// The value of an expression in floating point, with the names' values from `at`: NaN for a name that it
-/// does not know.
+/// Value of an expression in floating point, with the values of names from `at`: NaN for a name that it does
+/// not know.
 pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     let mut values: Vec<f64> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {
@@ -375,7 +374,7 @@ pub fn evaluate_f64(e: &Expression, at: &dyn Fn(&str) -> f64) -> f64 {
     values.last().copied().unwrap_or(f64::NAN)
 }
 
-/// The known name with the least edit distance, if it is close, or one that goes on where `name` ends:
+/// The known name with the least edit distance, if it is close, or a known name that begins with `name`:
 /// `latitude`, `latitude_deg`.
 pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
     let distance = |a: &str, b: &str| {
@@ -392,7 +391,7 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         }
         row[b.len()]
     };
-    // one letter for another is no slip
+    // one letter in place of another one-letter name is no misspelling
     let length = name.chars().count();
     let limit = (length * 2 / 5).max(1).min(length.saturating_sub(1));
     known
@@ -404,8 +403,7 @@ pub(crate) fn nearest(name: &str, known: &[String]) -> Option<String> {
         .map(|(_, _, k)| k.clone())
 }
 
-/// What could have been meant by `name`: the nearest of the known names, or which there are (the first of
-/// very many).
+/// Hint for an unknown `name`: the nearest known name, or the known names (the first ones of very many).
 pub(crate) fn among(name: &str, known: &[String]) -> String {
     match nearest(name, known) {
         Some(near) => format!("did you mean `{near}`?"),
@@ -414,7 +412,7 @@ pub(crate) fn among(name: &str, known: &[String]) -> String {
     }
 }
 
-/// True if `longer` is `name` with more behind it, as `latitude_deg` is for `Latitude`.
+/// True if `longer` begins with `name`, as `latitude_deg` does for `Latitude`.
 pub(crate) fn goes_on(name: &str, longer: &str) -> bool {
     let start = longer.get(..name.len()).filter(|_| name.len() > 2);
     start.is_some_and(|s| s.eq_ignore_ascii_case(name)) && longer[name.len()..].starts_with('_')
@@ -549,7 +547,7 @@ mod tests {
             let e = parse(&deep.repeat(1_000_000)).expect_err("too deep");
             assert!(matches!(e, ExpressionError::TooDeep { .. }), "{deep}: {e}");
         }
-        // what is long is not deep
+        // a long expression is not a deep one
         let f = Field::new((1 << 60) + 33);
         for (long, value) in [("x+", 3 * 300_001), ("x^2-y^2+y^2-x^2+", 3), ("1*", 3), ("1^2*", 3)] {
             let text = format!("{}x", long.repeat(if value > 3 { 300_000 } else { 1000 })).replace('y', "x");

@@ -1,4 +1,4 @@
-//! What a reader of TOML or JSON complains of, in the words of the file's author.
+//! Errors of TOML and JSON readers, in the words of the file's author.
 
 use std::ops::Range;
 
@@ -6,10 +6,10 @@ use schemars::{JsonSchema, schema_for};
 
 use super::expression::{goes_on, nearest};
 
-/// Longest part of a file that is repeated in a message.
+/// Longest part of a file that is repeated in a message, in characters.
 const SHOWN: usize = 40;
 
-/// What is wrong with a TOML file of the layout `T`, and where.
+/// Message and byte range of the error in a TOML file of the layout `T`.
 pub(crate) fn explain<T: JsonSchema>(text: &str, e: &toml::de::Error) -> (String, Option<Range<usize>>) {
     let span = e.span().filter(|s| text.get(s.clone()).is_some());
     let message = e.message().trim();
@@ -41,7 +41,7 @@ pub(crate) fn explain<T: JsonSchema>(text: &str, e: &toml::de::Error) -> (String
     }
 }
 
-/// A key that is known in another table of the layout.
+/// Message for a key that belongs to another table of the layout.
 fn misplaced<T: JsonSchema>(message: &str) -> Option<String> {
     let (found, rest) = quoted(message.strip_prefix("unknown field ")?)?;
     let here = names(rest);
@@ -57,7 +57,7 @@ fn misplaced<T: JsonSchema>(message: &str) -> Option<String> {
     Some(format!("unknown key `{found}` here; `{key}` belongs {places} (expected {})", here.join(", ")))
 }
 
-/// The keys of the tables of a layout and where these are, but for the table with the keys `here`.
+/// Keys of the tables of a layout, each with its place, except for the table with the keys `here`.
 fn other_tables(schema: &serde_json::Value, here: &[String]) -> Vec<(String, String)> {
     let keys = |table: &serde_json::Value| -> Vec<String> {
         table["properties"].as_object().map(|p| p.keys().cloned().collect()).unwrap_or_default()
@@ -78,7 +78,7 @@ fn other_tables(schema: &serde_json::Value, here: &[String]) -> Vec<(String, Str
         .collect()
 }
 
-/// `48,5` where one number is expected.
+/// Message for `48,5` where one number is expected.
 fn decimal_comma(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
     let number = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '_');
     let before = text[..span.start].trim_end_matches(number);
@@ -100,7 +100,7 @@ fn decimal_comma(text: &str, span: Range<usize>) -> Option<(String, Range<usize>
     })
 }
 
-/// `0 0 0` in a list.
+/// Message for `0 0 0` in a list.
 fn without_commas(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
     let list = text[..span.start].trim_end().ends_with(['[', ',']);
     let words: Vec<&str> = text[span.clone()].split_whitespace().collect();
@@ -114,7 +114,7 @@ fn without_commas(text: &str, span: Range<usize>) -> Option<(String, Range<usize
     })
 }
 
-/// A complaint of a reader about keys and kinds.
+/// Message of a reader about keys and kinds, in words.
 pub(crate) fn words(message: &str) -> String {
     unknown_key(message)
         .or_else(|| unknown_value(message))
@@ -123,7 +123,7 @@ pub(crate) fn words(message: &str) -> String {
         .unwrap_or_else(|| syntax(message))
 }
 
-/// The kind of a JSON value in words, by how its text begins.
+/// Kind of a JSON value in words, by the beginning of its text.
 pub(crate) fn json_kind(text: &str) -> &'static str {
     match text.as_bytes().first() {
         Some(b'"') => "a text",
@@ -135,12 +135,12 @@ pub(crate) fn json_kind(text: &str) -> &'static str {
     }
 }
 
-/// The name in backquotes with which a text goes on, and what follows.
+/// Name in backquotes at the start of a text, and the text after it.
 fn quoted(text: &str) -> Option<(&str, &str)> {
     text.strip_prefix('`')?.split_once('`')
 }
 
-/// The names in backquotes of a list.
+/// Names in backquotes in a list.
 fn names(list: &str) -> Vec<String> {
     list.split('`').skip(1).step_by(2).map(String::from).collect()
 }
@@ -168,7 +168,7 @@ fn missing(message: &str) -> Option<String> {
     Some(format!("the key `{name}` is missing; expected it in this table"))
 }
 
-/// `invalid type: string "5", expected f64`.
+/// Message for a value of the wrong kind: `invalid type: string "5", expected f64`.
 fn wrong_kind(message: &str) -> Option<String> {
     let rest = ["invalid type: ", "invalid value: ", "invalid length "]
         .iter()
@@ -204,7 +204,7 @@ fn shortened(text: &str) -> String {
     text.chars().take(SHOWN).collect::<String>() + "..."
 }
 
-/// What the grammar of TOML does not have.
+/// Message for a text that violates the grammar of TOML.
 fn syntax(message: &str) -> String {
     if message.starts_with("string values must be quoted") {
         return "found neither a number nor a text in quotes; expected one of them".into();
@@ -213,7 +213,7 @@ fn syntax(message: &str) -> String {
     lines.join("; ")
 }
 
-/// A bare word where a value is expected.
+/// Message for a bare word where a value is expected.
 fn unquoted(text: &str, span: Range<usize>) -> Option<(String, Range<usize>)> {
     let line = text[..span.start].rfind('\n').map_or(0, |i| i + 1);
     let before = text[line..span.start].trim_end();

@@ -10,35 +10,35 @@ use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 use super::expression::{
     Expression, ExpressionError, Function, MAX_DEPTH, MAX_NAME, Names, Node, evaluate_f64,
 };
-use super::vectors::{Made, Maker, Mismatch, Operation, Shape, Value, component, entry, list};
+use super::vectors::{Made, Mismatch, NodeBuilder, Shape, Value, VectorOperation, component, entry, list};
 
-/// Most names, numbers and operations of a vector or matrix, all entries written out.
+/// Largest number of names, numbers and operations of a vector or matrix with all entries written out.
 const MAX_WRITTEN_OUT: usize = 4_000_000;
 
-/// The shapes of names that are no scalars.
+/// Shapes of the names that are no scalars.
 pub type Shapes = HashMap<String, Shape>;
 
-/// What was read so far.
+/// State of the parser: the expression read so far.
 #[derive(Debug, Clone)]
-struct Reading<'a> {
+struct ParserState<'a> {
     expression: Expression,
     names: Names,
     shapes: &'a Shapes,
-    /// True if anything was no scalar.
+    /// True if any value was no scalar.
     vectors: bool,
 }
 
-type Input<'a> = Stateful<LocatingSlice<&'a str>, Reading<'a>>;
+type Input<'a> = Stateful<LocatingSlice<&'a str>, ParserState<'a>>;
 
-/// Where the grammar is violated, and what could stand there; or shapes that do not fit.
+/// Error of the parser: place and expected text, or shapes that do not fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Wrong {
+struct ParseFailure {
     at: usize,
     expected: &'static str,
     shape: Option<Box<ExpressionError>>,
 }
 
-impl ParserError<Input<'_>> for Wrong {
+impl ParserError<Input<'_>> for ParseFailure {
     type Inner = Self;
     fn from_input(input: &Input<'_>) -> Self {
         Self { at: input.current_token_start(), expected: "something else", shape: None }
@@ -48,15 +48,15 @@ impl ParserError<Input<'_>> for Wrong {
     }
 }
 
-type Parsed<T> = Result<T, ErrMode<Wrong>>;
+type Parsed<T> = Result<T, ErrMode<ParseFailure>>;
 
 fn wrong<T>(input: &Input<'_>, expected: &'static str) -> Parsed<T> {
-    Err(ErrMode::Cut(Wrong { at: input.current_token_start(), expected, shape: None }))
+    Err(ErrMode::Cut(ParseFailure { at: input.current_token_start(), expected, shape: None }))
 }
 
-/// Not this, perhaps something else.
+/// Failure from which the parser may try another rule.
 fn other<T>(input: &Input<'_>) -> Parsed<T> {
-    Err(ErrMode::Backtrack(Wrong::from_input(input)))
+    Err(ErrMode::Backtrack(ParseFailure::from_input(input)))
 }
 
 fn skip_blanks(input: &mut Input<'_>) {
@@ -70,7 +70,7 @@ fn peek(input: &Input<'_>) -> Option<char> {
     rest.chars().next()
 }
 
-/// The next character, if it is one of `wanted`.
+/// Next character, if it is one of `wanted`.
 fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
     skip_blanks(input);
     let found = peek(input).filter(|c| wanted.contains(*c))?;
@@ -78,7 +78,7 @@ fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
     Some(found)
 }
 
-/// An operator between two operands; `**` is `^`.
+/// Operator between two operands; `**` is read as `^`.
 fn operator(input: &mut Input<'_>) -> Option<char> {
     let found = symbol(input, "+-*/^")?;
     if found == '*' && peek(input) == Some('*') {
@@ -88,7 +88,7 @@ fn operator(input: &mut Input<'_>) -> Option<char> {
     Some(found)
 }
 
-/// Adds an operation on scalars that ends here.
+/// Adds an operation on scalars that ends at the current place.
 fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
     let end = input.previous_token_end();
     let expression = &mut input.state.expression;
@@ -97,20 +97,20 @@ fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
     Value { shape: Shape::SCALAR, entries: vec![expression.nodes.len() - 1], start }
 }
 
-/// Adds an operation that ends here and makes or takes vectors.
+/// Adds an operation that ends at the current place and makes or takes vectors.
 fn push_vector(
     input: &mut Input<'_>,
     start: usize,
-    made: impl FnOnce(&mut Maker<'_>) -> Made,
+    made: impl FnOnce(&mut NodeBuilder<'_>) -> Made,
 ) -> Parsed<Value> {
     let span = start..input.previous_token_end();
     input.state.vectors = true;
-    let mut maker = Maker { expression: &mut input.state.expression, span: span.clone() };
-    match made(&mut maker) {
+    let mut builder = NodeBuilder { expression: &mut input.state.expression, span: span.clone() };
+    match made(&mut builder) {
         Ok((shape, entries)) => Ok(Value { shape, entries, start }),
         Err(Mismatch { expected, found }) => {
             let shape = ExpressionError::Shape { expected, found, span };
-            Err(ErrMode::Cut(Wrong { at: start, expected: "", shape: Some(Box::new(shape)) }))
+            Err(ErrMode::Cut(ParseFailure { at: start, expected: "", shape: Some(Box::new(shape)) }))
         }
     }
 }
@@ -145,12 +145,14 @@ fn number(input: &mut Input<'_>) -> Parsed<Value> {
     }
 }
 
-/// What could stand before a bracket instead of a name.
+/// Functions with these names, for messages about an unknown name before a bracket.
 const fn functions(names: Names) -> &'static str {
     match names {
         Names::Platform => "a known function (sin, cos, sqrt) or an operator before `(`",
         Names::Plain => {
-            "a known function (sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, tanh, abs, sign; of vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator before `(`"
+            "a known function (sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, tanh, abs, sign; of \
+             vectors cross, dot, norm, transpose, skew, R, qmul, conj, qdot, Rx, Ry, Rz) or an operator \
+             before `(`"
         }
     }
 }
@@ -238,7 +240,7 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     }
     let name = rest[..length].to_string();
     input.next_slice(length);
-    // of models only
+    // functions of models only
     let later = [Function::Tanh, Function::Abs, Function::Sign];
     let known = |f: &Function| names == Names::Plain || !later.contains(f);
     if let Some(function) = Function::named(&name).filter(known) {
@@ -260,8 +262,8 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
         return angle(input, &arguments, start);
     }
     if peek(input) == Some('(') {
-        let Some(operation) = Operation::named(&name).filter(|_| names == Names::Plain) else {
-            return Err(ErrMode::Cut(Wrong { at: start, expected: functions(names), shape: None }));
+        let Some(operation) = VectorOperation::named(&name).filter(|_| names == Names::Plain) else {
+            return Err(ErrMode::Cut(ParseFailure { at: start, expected: functions(names), shape: None }));
         };
         symbol(input, "(");
         let arguments = values(input, ")", "an operator, `,` or `)`")?;
@@ -274,7 +276,7 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
     Ok(Value { shape, entries, start })
 }
 
-/// `atan2(y, x)`, the angle of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, off the negative
+/// Angle `atan2(y, x)` of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, valid off the negative
 /// x-axis, where it jumps.
 fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Value> {
     let [Value { shape: Shape::SCALAR, entries: y, .. }, Value { shape: Shape::SCALAR, entries: x, .. }] =
@@ -332,13 +334,13 @@ fn sum(input: &mut Input<'_>) -> Parsed<Value> {
         .parse_next(input)
 }
 
-/// The first place that is nested too deeply.
+/// First place that is nested too deeply.
 fn too_deep(text: &str) -> Option<usize> {
     let (mut brackets, mut signs, mut powers) = (0usize, 0usize, 0usize);
     let mut before = ' ';
     let mut characters = text.char_indices().filter(|(_, c)| !c.is_whitespace()).peekable();
     while let Some((at, c)) = characters.next() {
-        // ** is ^
+        // ** is read as ^
         let double = c == '*' && characters.next_if(|next| *next == (at + 1, '*')).is_some();
         let c = if double { '^' } else { c };
         match c {
@@ -348,7 +350,7 @@ fn too_deep(text: &str) -> Option<usize> {
         }
         let sign = matches!(c, '+' | '-');
         signs = if sign { signs + 1 } else { 0 };
-        // a sign behind ^ belongs to the exponent
+        // a sign after ^ belongs to the exponent
         if matches!(c, '*' | '/' | '(' | ')' | '[' | ']' | ',')
             || (sign && !matches!(before, '^' | '+' | '-'))
         {
@@ -379,7 +381,7 @@ pub fn parse_with(text: &str, names: Names) -> Result<Expression, ExpressionErro
     let none = Shapes::new();
     let (read, value) = read(text, names, &none, sum)?;
     match (value.shape, read.vectors) {
-        // operands come first: the whole is the last
+        // operands come first: the last operation is the root
         (Shape::SCALAR, false) => Ok(read.expression),
         (Shape::SCALAR, true) => Ok(component(&read.expression, value.entries[0])),
         (shape, _) => Err(ExpressionError::Shape {
@@ -395,7 +397,7 @@ pub fn parse_with(text: &str, names: Names) -> Result<Expression, ExpressionErro
 pub struct Components {
     /// Rows and columns.
     pub shape: Shape,
-    /// One for each entry, row by row.
+    /// Expressions of the entries, row by row.
     pub entries: Vec<Expression>,
 }
 
@@ -408,9 +410,9 @@ pub fn parse_components(text: &str, shapes: &Shapes) -> Result<Components, Expre
     components(read, &value, text)
 }
 
-/// Parses `a = b` as `a - b`; `norm(v) = c`, or `|v| = c`, as `dot(v, v) - c^2`, and so every root that
-/// stands alone on the left: it needs no root then. The second expression is such a `c`, which is not
-/// negative where the equation holds.
+/// Parses `a = b` as `a - b`. `norm(v) = c`, or `|v| = c`, becomes `dot(v, v) - c^2`; every root that stands
+/// alone on the left is squared in the same way, so that no root remains. The second expression is such a
+/// `c`, which is not negative where the equation holds.
 ///
 /// # Errors
 /// [`ExpressionError`] with the place in the text.
@@ -428,7 +430,7 @@ pub fn parse_equation(
                 return wrong(input, "an operator or `|`");
             }
             let of = [left];
-            left = push_vector(input, start, |make| Operation::Norm.apply(&of, make))?;
+            left = push_vector(input, start, |make| VectorOperation::Norm.apply(&of, make))?;
         }
         if symbol(input, "=").is_none() {
             return wrong(input, "an operator or `=`");
@@ -457,7 +459,7 @@ pub fn parse_equation(
     Ok((components(read, &value, text)?, other_side))
 }
 
-fn components(read: Reading<'_>, value: &Value, text: &str) -> Result<Components, ExpressionError> {
+fn components(read: ParserState<'_>, value: &Value, text: &str) -> Result<Components, ExpressionError> {
     let mut entries = Vec::with_capacity(value.entries.len());
     let mut operations = 0;
     for &root in value.entries.iter().filter(|_| read.vectors) {
@@ -481,11 +483,11 @@ fn read<'a>(
     names: Names,
     shapes: &'a Shapes,
     rule: impl FnOnce(&mut Input<'a>) -> Parsed<Value>,
-) -> Result<(Reading<'a>, Value), ExpressionError> {
+) -> Result<(ParserState<'a>, Value), ExpressionError> {
     if let Some(at) = too_deep(text) {
         return Err(ExpressionError::TooDeep { span: at..at + 1 });
     }
-    let state = Reading { expression: Expression::default(), names, shapes, vectors: false };
+    let state = ParserState { expression: Expression::default(), names, shapes, vectors: false };
     let mut input = Stateful { input: LocatingSlice::new(text), state };
     let parsed = rule(&mut input).and_then(|value| {
         skip_blanks(&mut input);
@@ -497,7 +499,7 @@ fn read<'a>(
     match parsed {
         Ok(value) => Ok((input.state, value)),
         Err(error) => {
-            let fallback = Wrong { at: text.len(), expected: "an expression", shape: None };
+            let fallback = ParseFailure { at: text.len(), expected: "an expression", shape: None };
             let wrong = error.into_inner().unwrap_or(fallback);
             if let Some(shape) = wrong.shape {
                 return Err(*shape);

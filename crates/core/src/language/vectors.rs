@@ -1,44 +1,43 @@
 //! Vectors, matrices and quaternions in expressions: every operation on them becomes operations on their
-//! components as it is read, so that what comes out are expressions of scalars.
+//! components when it is read. The result consists of scalar expressions.
 //!
-//! A vector is a column. Quaternions are vectors of four, (w, x, y, z) with Hamilton's product; `R(q)` turns
-//! as `v -> q v q*` does where
-//! |q| = 1, and is |q|^2 times that elsewhere: it is polynomial in q.
+//! A vector is a column. Quaternions are vectors of four, (w, x, y, z) with Hamilton's product. `R(q)` turns
+//! as `v -> q v q*` where `|q| = 1`; elsewhere it is `|q|^2` times a rotation, a polynomial in q.
 
 use std::fmt;
 use std::ops::Range;
 
 use super::expression::{Expression, Function, Node};
 
-/// Most entries of a vector or matrix.
+/// Largest number of entries of a vector or matrix.
 pub const MAX_ENTRIES: usize = 10_000;
-/// Most operations that an expression with vectors may become.
+/// Largest number of operations of an expression with vectors.
 const MAX_OPERATIONS: usize = 200_000;
 
-/// Rows and columns; a scalar has one of each, a vector one column.
+/// Numbers of rows and columns; a scalar has one of each, a vector has one column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Columns.
+    /// Number of columns.
     pub columns: usize,
 }
 
 impl Shape {
-    /// One number.
+    /// Shape of one number.
     pub const SCALAR: Self = Self { rows: 1, columns: 1 };
 
-    /// A column of `n`.
+    /// Shape of a column of `n` entries.
     pub const fn vector(n: usize) -> Self {
         Self { rows: n, columns: 1 }
     }
 
-    /// The number of entries.
+    /// Number of entries.
     pub const fn entries(self) -> usize {
         self.rows * self.columns
     }
 
-    /// The names of the entries of `base`, row by row: `v[1]`, `C[1,2]`; of a scalar its own.
+    /// Names of the entries of `base`, row by row: `v[1]`, `C[1,2]`; for a scalar its own name.
     pub fn names(self, base: &str) -> Vec<String> {
         let entry = |k: usize| match self {
             Self::SCALAR => base.to_string(),
@@ -59,16 +58,16 @@ impl fmt::Display for Shape {
     }
 }
 
-/// A value of an expression: the nodes of its entries, row by row.
+/// Value of an expression: the nodes of its entries, row by row.
 #[derive(Debug, Clone)]
 pub(super) struct Value {
     pub(super) shape: Shape,
     pub(super) entries: Vec<usize>,
-    /// Where its text begins.
+    /// Byte index at which its text begins.
     pub(super) start: usize,
 }
 
-/// What an operation needs, and what it was given.
+/// Shapes that an operation needs, and the shapes that it was given.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Mismatch {
     pub(crate) expected: String,
@@ -85,7 +84,7 @@ pub(super) type Made = Result<(Shape, Vec<usize>), Mismatch>;
 
 /// Functions of vectors; their names are taken only before a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Operation {
+pub(super) enum VectorOperation {
     Cross,
     Dot,
     Norm,
@@ -100,7 +99,7 @@ pub(super) enum Operation {
     AboutZ,
 }
 
-impl Operation {
+impl VectorOperation {
     pub(super) const ALL: [(&'static str, Self); 12] = [
         ("cross", Self::Cross),
         ("dot", Self::Dot),
@@ -120,7 +119,7 @@ impl Operation {
         Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, o)| *o)
     }
 
-    /// What it takes, in words and as shapes; `None` is any shape.
+    /// Arguments of the operation, in words and as shapes; `None` is any shape.
     fn takes(self) -> (&'static str, &'static [Option<Shape>]) {
         const V: Option<Shape> = Some(Shape::vector(3));
         const Q: Option<Shape> = Some(Shape::vector(4));
@@ -137,8 +136,8 @@ impl Operation {
         }
     }
 
-    /// What comes of it.
-    pub(super) fn apply(self, arguments: &[Value], make: &mut Maker<'_>) -> Made {
+    /// Result of the operation on `arguments`; adds its nodes to the expression.
+    pub(super) fn apply(self, arguments: &[Value], builder: &mut NodeBuilder<'_>) -> Made {
         let (words, shapes) = self.takes();
         let fits = arguments.len() == shapes.len()
             && arguments.iter().zip(shapes).all(|(a, s)| s.is_none_or(|s| s == a.shape));
@@ -159,11 +158,11 @@ impl Operation {
         let b = arguments.get(1).map_or(&[][..], |b| &b.entries);
         let shape = arguments[0].shape;
         Ok(match self {
-            Self::Cross => (shape, make.cross(a, b)),
-            Self::Dot => (Shape::SCALAR, vec![make.dot(a, b)]),
+            Self::Cross => (shape, builder.cross(a, b)),
+            Self::Dot => (Shape::SCALAR, vec![builder.dot(a, b)]),
             Self::Norm => {
-                let square = make.dot(a, a);
-                (Shape::SCALAR, vec![make.node(Node::Call { function: Function::Sqrt, argument: square })])
+                let square = builder.dot(a, a);
+                (Shape::SCALAR, vec![builder.node(Node::Call { function: Function::Sqrt, argument: square })])
             }
             Self::Transpose => {
                 let Shape { rows, columns } = shape;
@@ -171,38 +170,38 @@ impl Operation {
                 (Shape { rows: columns, columns: rows }, turned.collect())
             }
             Self::Skew => {
-                let zero = make.integer(0);
+                let zero = builder.integer(0);
                 let [x, y, z] = [a[0], a[1], a[2]];
-                let [mx, my, mz] = [x, y, z].map(|k| make.node(Node::Negate(k)));
+                let [mx, my, mz] = [x, y, z].map(|k| builder.node(Node::Negate(k)));
                 (Shape { rows: 3, columns: 3 }, vec![zero, mz, y, z, zero, mx, my, x, zero])
             }
-            Self::Rotation => (Shape { rows: 3, columns: 3 }, make.rotation(a)),
-            Self::Product => (shape, make.quaternion_product(a, b)),
+            Self::Rotation => (Shape { rows: 3, columns: 3 }, builder.rotation(a)),
+            Self::Product => (shape, builder.quaternion_product(a, b)),
             Self::Conjugate => {
-                let minus = a[1..].iter().map(|&k| make.node(Node::Negate(k))).collect::<Vec<_>>();
+                let minus = a[1..].iter().map(|&k| builder.node(Node::Negate(k))).collect::<Vec<_>>();
                 (shape, [&a[..1], &minus].concat())
             }
             Self::Rate => {
-                let zero = make.integer(0);
-                let product = make.quaternion_product(a, &[&[zero], b].concat());
-                let two = make.integer(2);
-                (shape, product.into_iter().map(|k| make.node(Node::Divide(k, two))).collect())
+                let zero = builder.integer(0);
+                let product = builder.quaternion_product(a, &[&[zero], b].concat());
+                let two = builder.integer(2);
+                (shape, product.into_iter().map(|k| builder.node(Node::Divide(k, two))).collect())
             }
             Self::AboutX | Self::AboutY | Self::AboutZ => {
                 let axis = self as usize - Self::AboutX as usize;
-                (Shape { rows: 3, columns: 3 }, make.turn(axis, a[0]))
+                (Shape { rows: 3, columns: 3 }, builder.turn(axis, a[0]))
             }
         })
     }
 }
 
-/// Makes the nodes of one operation, all with its place in the text.
-pub(super) struct Maker<'a> {
+/// Builder of the nodes of one operation, all with the byte range of the operation.
+pub(super) struct NodeBuilder<'a> {
     pub(super) expression: &'a mut Expression,
     pub(super) span: Range<usize>,
 }
 
-impl Maker<'_> {
+impl NodeBuilder<'_> {
     fn node(&mut self, node: Node) -> usize {
         self.expression.nodes.push(node);
         self.expression.spans.push(self.span.clone());
@@ -213,7 +212,7 @@ impl Maker<'_> {
         self.node(Node::Number { mantissa: x, decimals: 0 })
     }
 
-    /// `a b +- c d`.
+    /// Node of `a b +- c d`.
     fn two(&mut self, (a, b): (usize, usize), (c, d): (usize, usize), minus: bool) -> usize {
         let (ab, cd) = (self.node(Node::Multiply(a, b)), self.node(Node::Multiply(c, d)));
         self.node(if minus { Node::Subtract(ab, cd) } else { Node::Add(ab, cd) })
@@ -232,7 +231,7 @@ impl Maker<'_> {
         [(1, 2), (2, 0), (0, 1)].map(|(i, j)| self.two((a[i], b[j]), (a[j], b[i]), true)).to_vec()
     }
 
-    /// `(a0 b0 - a.b, a0 b + b0 a + a x b)`.
+    /// Nodes of the quaternion product `(a0 b0 - a.b, a0 b + b0 a + a x b)`.
     fn quaternion_product(&mut self, a: &[usize], b: &[usize]) -> Vec<usize> {
         let w = self.node(Node::Multiply(a[0], b[0]));
         let dot = self.dot(&a[1..], &b[1..]);
@@ -244,7 +243,7 @@ impl Maker<'_> {
         out
     }
 
-    /// `(w^2 - r.r) I + 2 r r^T + 2 w [r x]`.
+    /// Nodes of the matrix `(w^2 - r.r) I + 2 r r^T + 2 w [r x]` of a quaternion.
     fn rotation(&mut self, q: &[usize]) -> Vec<usize> {
         let (w, r) = (q[0], &q[1..]);
         let two = self.integer(2);
@@ -269,7 +268,7 @@ impl Maker<'_> {
         out
     }
 
-    /// The matrix that turns vectors by an angle about axis 0, 1 or 2, right-handed.
+    /// Nodes of the matrix that turns vectors by an angle about axis 0, 1 or 2, right-handed.
     fn turn(&mut self, axis: usize, angle: usize) -> Vec<usize> {
         let [c, s] = [Function::Cos, Function::Sin]
             .map(|function| self.node(Node::Call { function, argument: angle }));
@@ -281,12 +280,12 @@ impl Maker<'_> {
         out
     }
 
-    /// `a + b` and the like where one of them at least is no scalar.
+    /// Nodes of a binary operation (`a + b` and others) with at least one operand that is no scalar.
     pub(super) fn binary(&mut self, sign: char, a: &Value, b: &Value) -> Made {
         let both = || format!("{} {sign} {}", a.shape, b.shape);
-        let each = |make: &mut Self, node: fn(usize, usize) -> Node| {
+        let each = |builder: &mut Self, node: fn(usize, usize) -> Node| {
             let pairs: Vec<_> = a.entries.iter().copied().zip(b.entries.iter().copied()).collect();
-            pairs.into_iter().map(|(x, y)| make.node(node(x, y))).collect()
+            pairs.into_iter().map(|(x, y)| builder.node(node(x, y))).collect()
         };
         match sign {
             '+' | '-' if a.shape == b.shape => {
@@ -331,7 +330,7 @@ impl Maker<'_> {
         Ok((Shape { rows: n, columns: m }, out))
     }
 
-    /// Refuses what would become too much.
+    /// Refuses an expression that would exceed the largest number of operations.
     fn bounded(&self, more: usize) -> Result<(), Mismatch> {
         let total = self.expression.nodes.len().saturating_add(more);
         match total <= MAX_OPERATIONS {
@@ -348,10 +347,11 @@ impl Maker<'_> {
     }
 }
 
-/// What a list of these shapes is: a vector of scalars, or a matrix whose rows are vectors of one length.
+/// Shape of a list of values with these shapes: a vector of scalars, or a matrix whose rows are vectors of
+/// one length.
 ///
 /// # Errors
-/// What was expected, and what was found.
+/// Expected and given shapes.
 pub(crate) fn stacked(shapes: &[Shape]) -> Result<Shape, Mismatch> {
     let expected = "scalars, or rows of one length, in a list";
     let Some(&first) = shapes.first() else { return Err(Mismatch::new(expected, "nothing")) };
@@ -369,7 +369,7 @@ pub(crate) fn stacked(shapes: &[Shape]) -> Result<Shape, Mismatch> {
     }
 }
 
-/// `[a, b, c]`.
+/// Value of a list `[a, b, c]`.
 pub(super) fn list(parts: &[Value]) -> Made {
     let shape = stacked(&parts.iter().map(|p| p.shape).collect::<Vec<_>>())?;
     Ok((shape, parts.iter().flat_map(|p| p.entries.iter().copied()).collect()))
@@ -392,9 +392,9 @@ pub(super) fn entry(of: &Value, index: &[usize]) -> Result<usize, Mismatch> {
     }
 }
 
-/// What `root` is made of, alone.
+/// The expression of node `root` alone, with the nodes that it uses.
 pub(crate) fn component(e: &Expression, root: usize) -> Expression {
-    // operands stand before what they are operands of
+    // operands stand before the operations that use them
     let mut used = vec![false; root + 1];
     used[root] = true;
     for i in (0..=root).rev() {

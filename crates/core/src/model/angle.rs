@@ -9,10 +9,10 @@ use obsdeg_exact::Turn;
 pub(crate) const MAX_DECIMALS: usize = 9;
 /// Largest magnitude of an angle in degrees.
 pub(crate) const MAX_DEGREES: i64 = 1_000_000;
-/// Most characters of the name of an angle or a position.
+/// Largest number of characters of the name of an angle or a position.
 pub(crate) const MAX_NAME: usize = 64;
 
-/// `turn`, or `+-name + turn` for a generic angle.
+/// Angle: `turn`, or `+-name + turn` for a generic angle.
 ///
 /// ```
 /// use obsdeg_core::model::Angle;
@@ -23,25 +23,25 @@ pub(crate) const MAX_NAME: usize = 64;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Angle {
-    /// The constant part in 1e-9 degrees, as given (not reduced to a turn).
+    /// Constant part in 1e-9 degrees, as given (not reduced to a turn).
     nanodeg: i64,
-    /// The generic part and whether it enters with a minus sign.
+    /// Name of the generic part, and true if it enters with a minus sign.
     generic: Option<(String, bool)>,
 }
 
-/// Why a text is no angle.
+/// Reasons why a text is no angle.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AngleError {
-    /// Nothing where an angle should be.
+    /// The text is empty.
     #[error("an angle is missing; expected decimal degrees such as -90 or 12.5, or a name such as alpha")]
     Empty,
-    /// NaN or infinity.
+    /// The number is NaN or infinite.
     #[error("angle `{found}` is not finite; expected decimal degrees such as -90 or 12.5")]
     NotFinite {
         /// The text found.
         found: String,
     },
-    /// Neither a number nor a name.
+    /// The text is neither a number nor a name.
     #[error(
         "angle `{found}` is not a number; expected decimal degrees such as -90 or 12.5, or a name such as alpha"
     )]
@@ -49,39 +49,39 @@ pub enum AngleError {
         /// The text found.
         found: String,
     },
-    /// More decimals than are kept exactly.
+    /// The number has more decimals than are kept exactly.
     #[error(
         "angle `{found}` has {decimals} decimals; expected at most {MAX_DECIMALS} (angles are exact, not rounded)"
     )]
     TooManyDecimals {
         /// The text found.
         found: String,
-        /// Its number of decimals.
+        /// Number of decimals found.
         decimals: usize,
     },
-    /// Too large.
+    /// The number exceeds the largest magnitude of an angle.
     #[error("angle `{found}` is out of range; expected at most {MAX_DEGREES} degrees in magnitude")]
     TooLarge {
         /// The text found.
         found: String,
     },
-    /// A name that is too long for formulas and tables.
+    /// The name is too long for formulas and tables.
     #[error("the name `{beginning}...` of an angle has {found} characters; expected at most {MAX_NAME}")]
     LongName {
-        /// Its first characters.
+        /// First characters of the name.
         beginning: String,
-        /// Its length.
+        /// Number of characters of the name.
         found: usize,
     },
-    /// A name that means something else.
+    /// The name has another meaning.
     #[error("`{found}` cannot name an angle: it already stands for something in the formulas")]
     Reserved {
-        /// The name found.
+        /// Name found.
         found: String,
     },
 }
 
-/// What fits into a message.
+/// Beginning of a text, short enough for a message.
 pub(crate) fn excerpt(text: &str) -> String {
     let short: String = text.chars().take(60).collect();
     if short.len() < text.len() { short + "..." } else { short }
@@ -160,7 +160,7 @@ impl Angle {
         self.generic.as_ref().map(|(name, minus)| (name.as_str(), *minus))
     }
 
-    /// The angle in degrees; `None` when it is generic.
+    /// Angle in degrees; `None` when it is generic.
     pub fn degrees(&self) -> Option<f64> {
         self.generic.is_none().then_some(self.nanodeg as f64 / 1e9)
     }

@@ -10,12 +10,12 @@ pub type Matrix3<E> = [[E; 3]; 3];
 /// The three Euler angles `(alpha, beta, gamma)` of (19).
 pub type Euler = [Angle; 3];
 
-/// `alpha,beta,gamma` in degrees.
+/// Text `alpha,beta,gamma` of Euler angles, in degrees.
 pub fn angles_text(angles: &Euler) -> String {
     angles.each_ref().map(ToString::to_string).join(",")
 }
 
-/// `a b`.
+/// Product `a b`.
 pub fn product<R: Ring>(ring: &R, a: &Matrix3<R::Element>, b: &Matrix3<R::Element>) -> Matrix3<R::Element> {
     std::array::from_fn(|i| std::array::from_fn(|j| ring.dot((0..3).map(|k| (&a[i][k], &b[k][j])))))
 }
@@ -25,7 +25,7 @@ pub(crate) fn transpose<E: Clone>(m: &Matrix3<E>) -> Matrix3<E> {
     std::array::from_fn(|i| std::array::from_fn(|j| m[j][i].clone()))
 }
 
-/// 1.
+/// Unit matrix.
 pub(crate) fn unit<R: Ring>(ring: &R) -> Matrix3<R::Element> {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { ring.one() } else { ring.zero() }))
 }
@@ -49,17 +49,17 @@ pub(crate) fn c_n_from_euler<R: Ring>(ring: &R, cs: &[(R::Element, R::Element); 
     product(ring, &product(ring, &m[0], &m[1]), &m[2])
 }
 
-/// A turn about one axis.
+/// Turn about one axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Turned {
-    /// The axis.
+    /// Axis of the turn.
     pub axis: Axis,
-    /// By this angle, right-handed.
+    /// Angle of the turn, right-handed.
     pub angle: Angle,
 }
 
-/// `C_c^n` of Euler angles, then turned: `C exp([a x] t)` about a platform axis, `exp([b x] t) C` about a
-/// geographic one; `exp([a x] t)` is the transpose of the passive elementary matrix.
+/// `C_c^n` of Euler angles and a following turn: `C exp([a x] t)` about a platform axis, `exp([b x] t) C`
+/// about a geographic one. `exp([a x] t)` is the transpose of the passive elementary matrix.
 pub(crate) fn c_n<R: Ring>(
     ring: &R,
     euler: &Euler,
@@ -88,7 +88,7 @@ const DIRECTIONS: [(char, [i32; 3]); 6] = [
     ('W', [0, 0, -1]),
 ];
 
-/// Integers, for the cardinal attitudes.
+/// Ring of integers, for the cardinal attitudes.
 struct Integer;
 
 impl Ring for Integer {
@@ -135,9 +135,9 @@ fn euler_of(q: [usize; 3]) -> Euler {
     q.map(|i| Angle::from_degrees([0, 90, 180, -90][i]))
 }
 
-/// The Euler angles of a cardinal attitude given by three letters: where X_p, Y_p and Z_p point, each
-/// one of N, U, E, S, D, W. `NUE` is (0,0,0) and `NDW` is (180,0,0). Of the angles that give the attitude,
-/// those with the fewest rotations are taken. `None` for anything else.
+/// The Euler angles of a cardinal attitude, given by three letters for the directions of X_p, Y_p and Z_p,
+/// each one of N, U, E, S, D, W. `NUE` is (0,0,0) and `NDW` is (180,0,0). Of several sets of angles, the set
+/// with the fewest rotations is taken. `None` for any other text.
 ///
 /// ```
 /// use obsdeg_core::model::cardinal;

@@ -1,18 +1,20 @@
-//! What a scheme's verdicts depend on, as text: the input that takes part in the choice of primes.
+//! Canonical text of everything that a scheme's verdicts depend on: input for the choice of primes.
 
 use obsdeg_exact::SplitMix64;
 
 use super::scheme::Scheme;
 
 impl Scheme {
-    /// The stream of `seed` for one purpose and this scheme ([`SplitMix64::of`]). Everything takes part but
-    /// what moves no verdict: the names and descriptions, the numbers of a simulation, requirements and
+    /// Random stream of `seed` for one purpose and this scheme ([`SplitMix64::of`]). It depends on the whole
+    /// scheme except for what changes no verdict: names and descriptions, numbers of a simulation,
+    /// requirements and gimbals.
     /// gimbals.
     pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
         SplitMix64::of(seed, purpose, &self.canonical())
     }
 
-    /// The parts of the input, lists with their length: the same for the same scheme however it was written.
+    /// Canonical parts of the scheme, lists with their length: the same for the same scheme, however it was
+    /// written.
     fn canonical(&self) -> Vec<String> {
         let mut out = vec![
             "scheme".into(),
@@ -27,7 +29,7 @@ impl Scheme {
         if !self.geometry.accelerometers.is_default() {
             out.extend(self.geometry.accelerometers.inputs().map(|axis| format!("accelerometer {axis}")));
         }
-        // the way from one position to the next counts where a verdict depends on it
+        // the slew path counts where a verdict depends on it
         if let Ok(paths) = self.paths() {
             out.extend(paths.iter().flatten().map(ToString::to_string));
         }
@@ -46,7 +48,7 @@ impl Scheme {
 mod tests {
     use crate::model::scheme_file;
 
-    /// Writing a scheme otherwise changes no prime, every change of what is judged does.
+    /// A different notation of a scheme changes no prime; every change of the judged scheme does.
     #[test]
     fn what_is_judged_takes_part() {
         let first = |text: &str| {
@@ -54,7 +56,8 @@ mod tests {
             scheme.random(1, "verdicts").next_u64()
         };
         let plain = "[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";
-        let words = "name = 'A'\n[[position]]\nname = 'a'\nangles_deg = [0.0, 0, 0]\n[[position]]\nangles_deg = ['180', 0, 0]\n";
+        let words = "name = 'A'\n[[position]]\nname = 'a'\nangles_deg = [0.0, 0, \
+                     0]\n[[position]]\nangles_deg = ['180', 0, 0]\n";
         assert_eq!(first(plain), first(words));
         let mut seen = vec![first(plain)];
         for other in [
@@ -65,7 +68,8 @@ mod tests {
             "combinations = ['D_FX']",
             "combinations = ['D_FX', 'D_FY']",
             "combinations = ['2*D_FX']",
-            "geometry = { X = { I = '+x', O = '+z', S = '-y' }, Y = { I = '+y', O = '-z', S = '-x' }, Z = { I = '+z', O = '+x', S = '+y' } }",
+            "geometry = { X = { I = '+x', O = '+z', S = '-y' }, Y = { I = '+y', O = '-z', S = '-x' }, Z = \
+             { I = '+z', O = '+x', S = '+y' } }",
         ] {
             seen.push(first(&format!("{other}\n{plain}")));
         }

@@ -8,14 +8,14 @@ use super::symbols::Symbols;
 use super::{Angle, Platform};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 
-/// What the names of a combination stand for.
-pub(crate) struct Names<'a> {
+/// Names in a combination and their meanings.
+pub(crate) struct CombinationNames<'a> {
     pub(crate) unknowns: &'a [String],
     generic: Vec<String>,
     pub(crate) symbols: Symbols,
 }
 
-impl<'a> Names<'a> {
+impl<'a> CombinationNames<'a> {
     pub(crate) fn of(platform: &'a Platform) -> Self {
         let generic = platform.scheme().generic_names();
         Self { unknowns: platform.names(), generic, symbols: Symbols::of(platform) }
@@ -28,7 +28,7 @@ impl<'a> Names<'a> {
     }
 }
 
-/// `n = s^2 m` with m one of 1, 2, 3, 6: s and the place of `sqrt m` in a radical.
+/// Square root of `n = s^2 m` with m one of 1, 2, 3, 6: s and the index of `sqrt m` in a radical.
 pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
     let n = i64::from(n);
     [1, 2, 3, 6].into_iter().enumerate().find_map(|(i, m)| {
@@ -38,16 +38,16 @@ pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
     })
 }
 
-struct Unit<'a> {
-    names: &'a Names<'a>,
+struct UnknownValues<'a> {
+    names: &'a CombinationNames<'a>,
     values: &'a RandomValues,
     sample: &'a Sample,
-    /// The value of each unknown.
+    /// Value of each unknown.
     unknowns: &'a [u64],
     rates: [u64; 2],
 }
 
-impl Environment for Unit<'_> {
+impl Environment for UnknownValues<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         match name {
             "wN" => Some(self.rates[0]),
@@ -72,35 +72,35 @@ impl Environment for Unit<'_> {
     }
 }
 
-/// One point at which a combination is looked at.
-pub(crate) struct At<'a> {
+/// Point at which a combination is evaluated.
+pub(crate) struct EvaluationPoint<'a> {
     pub(crate) values: &'a RandomValues,
     pub(crate) sample: &'a Sample,
     pub(crate) rates: [u64; 2],
 }
 
-impl At<'_> {
+impl EvaluationPoint<'_> {
     fn field(&self) -> &Field {
         &self.sample.roots.field
     }
 }
 
-/// The coefficients of a linear expression at one point, or why it is not linear: then it is not the sum of
-/// its parts at random values.
+/// The coefficients of a linear expression at one point, or the reason why it is not linear. It is linear if
+/// it equals the sum of its parts at random values.
 pub(crate) fn row_of(
     expression: &Expression,
-    names: &Names<'_>,
-    point: &At<'_>,
+    names: &CombinationNames<'_>,
+    point: &EvaluationPoint<'_>,
     rng: &mut SplitMix64,
 ) -> Result<Vec<u64>, ExpressionError> {
     let (f, n) = (point.field(), names.unknowns.len());
     let at = |unknowns: &[u64]| {
-        let At { values, sample, rates } = *point;
-        evaluate(expression, f, &Unit { names, values, sample, unknowns, rates })
+        let EvaluationPoint { values, sample, rates } = *point;
+        evaluate(expression, f, &UnknownValues { names, values, sample, unknowns, rates })
     };
     let zero = vec![0; n];
     let unit = |c: usize| -> Vec<u64> { (0..n).map(|j| if j == c { f.one() } else { 0 }).collect() };
-    // what it does not name has no part in it
+    // unknowns that it does not name have coefficient zero
     let named = |c: usize| {
         expression.nodes.iter().any(|n| matches!(n, Node::Name(name) if *name == names.unknowns[c]))
     };
@@ -111,7 +111,7 @@ pub(crate) fn row_of(
     };
     let probe: Vec<u64> = (0..n).map(|_| rng.below(f.modulus())).collect();
     let there = at(&probe)?;
-    // what can be divided by there, but not where unknowns are zero, has unknowns in it
+    // an expression that can be divided by there, but not where the unknowns are zero, contains unknowns
     let divided = |e: ExpressionError| match e {
         ExpressionError::DivisionByZero { .. } => not_linear(),
         other => other,
@@ -125,8 +125,8 @@ pub(crate) fn row_of(
     if linear { Ok(row) } else { Err(not_linear()) }
 }
 
-/// Refuses a combination that is zero, whatever the unknowns and the rates are: `row` is its row at rates
-/// that were drawn.
+/// Refuses a combination that is zero for all values of the unknowns and rates; `row` is its row at random
+/// rates.
 pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), ExpressionError> {
     if row.iter().any(|x| *x != 0) {
         return Ok(());
@@ -138,8 +138,7 @@ pub(crate) fn not_zero(expression: &Expression, row: &[u64]) -> Result<(), Expre
     })
 }
 
-/// Checks that a text is a linear combination of the unknowns of `platform`, with coefficients that are
-/// known.
+/// Checks that a text is a linear combination of the unknowns of `platform`, with known coefficients.
 pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionError> {
     let parsed = parse(text)?;
     let mut rng = SplitMix64::of(1, "combination", &[text]);
@@ -147,7 +146,11 @@ pub(crate) fn check(text: &str, platform: &Platform) -> Result<(), ExpressionErr
     let Ok(values) = RandomValues::draw(platform.scheme(), &mut rng) else { return Ok(()) };
     let sample = values.sample(platform.scheme(), 1);
     let rates = [0; 2].map(|_| 1 + rng.below(sample.roots.field.modulus() - 1));
-    let row =
-        row_of(&parsed, &Names::of(platform), &At { values: &values, sample: &sample, rates }, &mut rng)?;
+    let row = row_of(
+        &parsed,
+        &CombinationNames::of(platform),
+        &EvaluationPoint { values: &values, sample: &sample, rates },
+        &mut rng,
+    )?;
     not_zero(&parsed, &row)
 }

@@ -1,4 +1,4 @@
-//! How long a position lasts.
+//! Dwell: duration of a position.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::angle::{format_decimal, parse_decimal};
 use crate::model::ranges::DWELL_S;
 
-/// The time spent at a position, an exact decimal of seconds.
+/// Dwell: duration of a position, an exact decimal of seconds.
 ///
 /// ```
 /// use obsdeg_core::model::Dwell;
@@ -19,7 +19,7 @@ pub struct Dwell {
     nanoseconds: u64,
 }
 
-/// Why a text is no dwell.
+/// Error for a text that is no dwell.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is not a dwell; expected {}, with at most nine decimals", DWELL_S)]
 pub struct DwellError {
@@ -31,8 +31,8 @@ impl Dwell {
     /// The dwell of the paper's positions, 1000 s.
     pub const PAPER: Self = Self { nanoseconds: 1_000_000_000_000 };
 
-    /// The dwell of so many seconds, to 1e-9 s. Sweeps go beyond what is admitted for a scheme: `None`
-    /// outside 1e-9 to 1e9 s.
+    /// Dwell of `seconds` in s, to 1e-9 s. Sweeps exceed the range that schemes admit: `None` only outside
+    /// 1e-9 to 1e9 s.
     pub fn from_seconds(seconds: f64) -> Option<Self> {
         let nanoseconds = (seconds * 1e9).round();
         (1.0..=1e18).contains(&nanoseconds).then_some(Self { nanoseconds: nanoseconds as u64 })

@@ -1,12 +1,12 @@
-//! How unknown coefficients enter: the drift of the gyros and the errors of the accelerometers at any
-//! attitude.
+//! Error model: drift of the gyros and errors of the accelerometers at any attitude, as linear functions of
+//! the unknown coefficients.
 
 use super::attitude::{Matrix3, unit};
 use super::geometry::SignedAxis;
 use super::ring::Ring;
 use super::terms::{ErrorTerm, Source};
 
-/// A vector with one column per coefficient.
+/// Vector with one column per coefficient.
 pub type Columns<E> = [Vec<E>; 3];
 
 /// The error terms of the unknown coefficients, in their order.
@@ -22,21 +22,21 @@ impl From<Vec<ErrorTerm>> for ErrorModel {
 }
 
 impl ErrorModel {
-    /// The terms; none when the unknowns are the drift itself.
+    /// Error terms; none if the unknowns are the drift itself.
     pub fn terms(&self) -> &[ErrorTerm] {
         &self.terms
     }
 
-    /// While the platform turns about one axis, drifts and errors of the accelerometers in n are
-    /// trigonometric polynomials of the angle of this degree: one for `C_c^n`, one for each component that a
+    /// Degree of the trigonometric polynomials of the turn angle that drifts and accelerometer errors in n
+    /// are while the platform turns about one axis: one for `C_c^n`, one for each component that a
     /// coefficient multiplies.
     pub fn harmonics(&self) -> usize {
         1 + self.terms.iter().map(|t| t.factors.len()).max().unwrap_or(0)
     }
 
     /// The rows of `eps^n = C E D` at any attitude `C`, `g = C^T (0,-1,0)`: three rows, one column per
-    /// coefficient; none when the unknowns are the drift itself. `rate` is that with which the gyros are
-    /// torqued, in c; it is asked for where a torquer error is unknown.
+    /// coefficient; none if the unknowns are the drift itself. `rate` gives the torquing rate of the gyros
+    /// in c; it is called only if a torquer error is unknown.
     pub fn drift_rows<R: Ring>(
         &self,
         ring: &R,
@@ -71,8 +71,8 @@ impl ErrorModel {
         self.rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
     }
 
-    /// One column per coefficient, in n: along the input axis, times the components of what the term is a
-    /// function of (3); zero where `of` says nothing of it.
+    /// Rows in n with one column per coefficient: along the input axis, times the components (3) of the
+    /// quantity that the term depends on; zero where `of` returns `None`.
     fn rows<'a, R: Ring>(
         &self,
         ring: &R,

@@ -1,4 +1,4 @@
-//! How gyros and accelerometers are mounted.
+//! Mounting of gyros and accelerometers.
 
 use std::fmt;
 use std::str::FromStr;
@@ -115,12 +115,12 @@ impl Default for Accelerometers {
 }
 
 impl Accelerometers {
-    /// In order X, Y, Z.
+    /// Input axes in order X, Y, Z.
     pub fn inputs(&self) -> [SignedAxis; 3] {
         [self.X, self.Y, self.Z]
     }
 
-    /// True if they are along the platform axes.
+    /// True if the input axes are the platform axes.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -138,10 +138,10 @@ impl Default for Geometry {
     }
 }
 
-/// Why a mounting is impossible.
+/// Reasons why a mounting is impossible.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GeometryError {
-    /// Not an axis.
+    /// The text is not an axis.
     #[error("`{found}` is not a platform axis; expected +x, -x, +y, -y, +z or -z")]
     Axis {
         /// The text found.
@@ -150,7 +150,7 @@ pub enum GeometryError {
     /// I, O, S of a gyro do not form a right-handed triad.
     #[error("the axes of gyro {gyro} (I={i} O={o} S={s}) are not right-handed; expected I x O = S")]
     NotRightHanded {
-        /// X, Y or Z.
+        /// Letter of the gyro: X, Y or Z.
         gyro: char,
         /// Input axis.
         i: SignedAxis,
@@ -159,18 +159,18 @@ pub enum GeometryError {
         /// Spin axis.
         s: SignedAxis,
     },
-    /// Two sensors of a kind measure along the same axis.
+    /// Two sensors of one kind measure along the same axis.
     #[error(
         "{sensors} {first} and {second} both have their input axis along {axis}; expected three different axes"
     )]
     SharedInput {
-        /// gyros or accelerometers.
+        /// Kind of the sensors: gyros or accelerometers.
         sensors: &'static str,
-        /// One of them.
+        /// Letter of the first sensor.
         first: char,
-        /// The other.
+        /// Letter of the second sensor.
         second: char,
-        /// The axis: x, y or z.
+        /// Letter of the common axis: x, y or z.
         axis: char,
     },
 }

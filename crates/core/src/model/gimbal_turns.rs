@@ -1,9 +1,10 @@
-//! Turns of the platform as its gimbals make them: whether gimbal angles stay within their limits on the way,
+//! Turns of the platform by its gimbals: whether the gimbal angles stay within their limits during the turn,
 //! not only at its ends.
 //!
-//! From gimbal angles `(a, b, g)` a turn about one axis takes the gimbals along one course. It is followed in
-//! steps of at most a degree, and of a quarter of the distance to `beta = +-90`: there alpha and gamma turn
-//! about one line, and a turn about the line across both has to wait until they have swung round.
+//! From gimbal angles `(a, b, g)` a turn about one axis moves the gimbals along one path. The path is
+//! followed in steps of at most one degree, and of a quarter of the distance to `beta = +-90`. There alpha
+//! and gamma turn about the same line, and a turn about the line perpendicular to both is possible only
+//! after they have swung round.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,13 +15,13 @@ use super::path::Path;
 use super::scheme::{Position, Scheme};
 use super::slew::{Slew, Turn};
 
-/// Largest step of a course, in degrees of the turn.
+/// Largest step along the path, in degrees of the turn.
 const STEP_DEG: f64 = 1.0;
 /// Smallest step, in degrees of the turn.
 const LEAST_DEG: f64 = 0.01;
-/// Smallest step as a part of the turn.
+/// Smallest step as a fraction of the turn.
 const LEAST_PART: f64 = 1e-5;
-/// A gimbal that turns so many times as fast as the platform cannot follow.
+/// Largest rate of a gimbal that can follow, as a multiple of the platform's rate.
 const FASTEST: f64 = 100.0;
 
 /// Gimbal limits of a scheme, with the angles and turns that exceed them.
@@ -96,7 +97,7 @@ impl Scheme {
             within: angles_text(within),
         });
         let mut turns = Vec::new();
-        // gimbal angles where the turn to the next position begins
+        // gimbal angles at the start of the turn to the next position
         let mut start = None;
         for (i, (p, angles)) in self.positions.iter().zip(&stands).enumerate() {
             let constant = angles.iter().all(|a| a.generic().is_none());
@@ -123,8 +124,8 @@ impl Scheme {
         Some(GimbalReport { limits: gimbals.to_string(), beyond: beyond.collect(), turns })
     }
 
-    /// The gimbal angles of the positions: as they are written where they lie within the limits, and
-    /// elsewhere those of the same attitude with the shortest gimbal way from the position before.
+    /// Gimbal angles of the positions. Angles within the limits are taken as written; otherwise those of the
+    /// same attitude with the shortest gimbal way from the position before.
     fn gimbal_angles(&self) -> Vec<Euler> {
         let mut out: Vec<Euler> = Vec::with_capacity(self.positions.len());
         for p in &self.positions {
@@ -136,8 +137,8 @@ impl Scheme {
         out
     }
 
-    /// The turn from one position, which ends at gimbal angles `start`, to the next, at gimbal angles
-    /// `listed` (degrees); `None` where the turn that is stated does not lead there.
+    /// The turn to the next position, at gimbal angles `listed` (degrees), from one position that ends at
+    /// gimbal angles `start`; `None` where the stated turn does not lead there.
     fn turn_to(
         &self,
         from: &Position,
@@ -158,7 +159,7 @@ impl Scheme {
             gimbals_deg: Some(std::array::from_fn(|k| clean(listed[k] - start[k]))),
         };
         if by_gimbals {
-            // it takes the angles as they are written
+            // gimbal by gimbal, the turn uses the angles as written
             let difference = |k: usize| degrees(&to.angles)[k] - degrees(&from.angles)[k];
             out.gimbals_deg = Some(std::array::from_fn(|k| clean(difference(k))));
             out.stays = self.gimbals.hold(&from.angles) && self.gimbals.hold(&to.angles);
@@ -171,7 +172,7 @@ impl Scheme {
         };
         let (stop, reached) = self.gimbals.follow(start, &slew);
         (out.turn, out.stays) = (Some(slew.turn()), stop.is_none());
-        // a gimbal without a limit has no count of whole turns
+        // whole turns of a gimbal without a limit do not count
         let off = |k: usize| match self.gimbals.limits[k] {
             Some(_) => reached[k] - listed[k],
             None => beside(reached[k] - listed[k], 0.0),
@@ -187,12 +188,12 @@ fn degrees(angles: &Euler) -> [f64; 3] {
     angles.each_ref().map(|a| a.nanodeg() as f64 / 1e9)
 }
 
-/// An angle without the rounding errors of sines.
+/// Angle in degrees without the rounding errors of sines.
 fn clean(deg: f64) -> f64 {
     (deg * 1e6).round() / 1e6 + 0.0
 }
 
-/// An angle in degrees by whole turns to where it is nearest to `near`.
+/// Angle in degrees, moved by whole turns to the value nearest to `near`.
 fn beside(deg: f64, near: f64) -> f64 {
     deg + ((near - deg) / 360.0).round() * 360.0
 }
@@ -203,15 +204,15 @@ fn from_lock(beta: f64) -> f64 {
 }
 
 impl Gimbals {
-    /// The limit of gimbal `k` that its angle is beyond, in degrees.
+    /// Limit of gimbal `k` that its angle exceeds, in degrees; `None` if it exceeds none.
     fn passed(&self, k: usize, angle: f64) -> Option<f64> {
         let [low, high] = self.limits[k]?.map(|x| x as f64 / 1e9);
         let rounding = ROUNDING as f64 / 1e9;
         if angle < low - rounding { Some(low) } else { (angle > high + rounding).then_some(high) }
     }
 
-    /// The gimbal that reaches its limit first between two sets of angles in degrees, the limit, and the part
-    /// of the step up to it.
+    /// The gimbal that reaches its limit first between two sets of angles in degrees, the limit, and the
+    /// fraction of the step up to it.
     fn first_passed(&self, at: &[f64; 3], next: &[f64; 3]) -> Option<(usize, f64, f64)> {
         let passed = (0..3).filter_map(|k| {
             let limit = self.passed(k, next[k])?;
@@ -220,12 +221,12 @@ impl Gimbals {
         passed.min_by(|a, b| a.2.total_cmp(&b.2))
     }
 
-    /// Follows a turn from gimbal angles in degrees: where it cannot go on, if anywhere, and the gimbal
-    /// angles reached.
+    /// Follows a turn from gimbal angles in degrees. Returns the obstacle that stops it, if there is one,
+    /// and the gimbal angles reached.
     fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
         let whole = slew.turn().angle_deg;
         let (mut at, mut done) = (start, 0.0);
-        // of very many turns fewer steps
+        // a turn of very many degrees takes larger steps
         let least = LEAST_DEG.max(whole * LEAST_PART);
         let most = STEP_DEG.max(least);
         while done < whole {
@@ -245,13 +246,13 @@ impl Gimbals {
         (None, at)
     }
 
-    /// The gimbal angles in degrees of an attitude that are nearest to `near`. At `beta = +-90` alpha is
-    /// kept, unless gamma alone cannot follow.
+    /// Gimbal angles in degrees of an attitude, nearest to `near`. At `beta = +-90` alpha is kept, unless
+    /// gamma alone cannot follow.
     fn beside(&self, c: &Matrix3<f64>, near: [f64; 3]) -> [f64; 3] {
         let [a, b, g] = euler_angles(c).map(f64::to_degrees);
         let placed = |angles: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| beside(angles[k], near[k])) };
         if is_locked(c) {
-            // gamma is 0 there, and a turn of alpha one of gamma, against it at beta = -90
+            // gamma is 0 there: a turn of alpha equals one of gamma, in the opposite sense at beta = -90
             let sign = b.signum();
             let kept = placed([near[0], b, sign * (near[0] - a)]);
             let other = placed([a + sign * near[2], b, near[2]]);
@@ -277,7 +278,7 @@ mod tests {
         scheme_file::read(&text).expect("a scheme").gimbal_report().expect("limits")
     }
 
-    /// The gimbal that stops a turn, the size of its limit and where the turn stops, in whole degrees.
+    /// The gimbal that stops a turn, its limit and the angle turned, the angles in whole degrees.
     fn stopped(turn: &GimbalTurn) -> (Option<&str>, i32, i32) {
         let stop = turn.stop.as_ref().expect("a stop");
         let whole =
@@ -286,7 +287,7 @@ mod tests {
         (stop.gimbal.as_deref(), whole[0].0, whole[1].0)
     }
 
-    /// Rates of alpha, beta, gamma for a rate `w` of the platform in n: the gimbals turn left-handed about
+    /// Rates of alpha, beta, gamma for a rate `w` of the platform in n. The gimbals turn left-handed about
     /// North, the middle axis and Z_p.
     fn rates([a, b, _]: [f64; 3], w: [f64; 3]) -> [f64; 3] {
         let [(sa, ca), (sb, cb)] = [a, b].map(|x| x.to_radians().sin_cos());
@@ -298,8 +299,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
 
-        /// A turn is followed to where integrating the rates of the gimbals leads (Runge and Kutta), and
-        /// stops at the limit that these pass first.
+        /// A followed turn ends where the integrated gimbal rates (Runge-Kutta) end, and it stops at the
+        /// limit that these exceed first.
         #[test]
         fn courses_are_integrals_of_gimbal_rates(
             start in prop::array::uniform3(-80.0f64..80.0),
@@ -332,12 +333,15 @@ mod tests {
                         return Err(TestCaseError::fail(format!("no stop at {at:?}")));
                     };
                     let after_deg = stop.after_deg;
-                    prop_assert_eq!((stop.gimbal.as_deref(), stop.at_deg), (Some(NAMES[k]), limits[k] as f64 * at[k].signum()));
+                    prop_assert_eq!(
+                        (stop.gimbal.as_deref(), stop.at_deg),
+                        (Some(NAMES[k]), limits[k] as f64 * at[k].signum())
+                    );
                     prop_assert!((after_deg - (step + 1) as f64 * h).abs() < 0.5, "{after_deg}");
                     return Ok(());
                 }
             }
-            // a limit that is only touched may count or not
+            // a limit that is only touched may or may not count
             prop_assume!((0..3).all(|k| (at[k].abs() - limits[k] as f64).abs() > 0.01));
             prop_assert_eq!(&stop, &None, "{:?}", at);
             prop_assert!((0..3).all(|k| (at[k] - end[k]).abs() < 1e-3), "{at:?} {end:?}");
@@ -352,7 +356,7 @@ mod tests {
         crate::model::slew::times(&about(0), &crate::model::slew::times(&about(1), &about(2)))
     }
 
-    /// By hand: half a turn about North is one of alpha; the way gimbal by gimbal goes by the twin.
+    /// By hand: half a turn about North is one of alpha; gimbal by gimbal it goes by the twin angles.
     #[test]
     fn half_a_turn_about_north() {
         let head = "gimbals = { alpha_deg = [-90, 90] }";
@@ -363,7 +367,7 @@ mod tests {
         let [turn] = &found.turns[..] else { panic!("{found:?}") };
         assert_eq!((turn.stays, turn.ends_deg, turn.gimbals_deg), (false, None, Some([0.0, 180.0, 180.0])));
         assert_eq!(stopped(turn), (Some("alpha"), 90, 90));
-        // gimbal by gimbal, but as the file has the angles
+        // gimbal by gimbal, with the angles as in the file
         let found = report(&format!("path = 'gimbals'\n{head}"), &["attitude = 'NUE'", "attitude = 'NDW'"]);
         assert_eq!((found.turns[0].by_gimbals, found.turns[0].stays), (true, false));
         let found =
@@ -371,8 +375,8 @@ mod tests {
         assert_eq!((found.turns[0].stays, found.turns[0].gimbals_deg), (true, Some([0.0, 180.0, 180.0])));
     }
 
-    /// By hand: through beta = 90 straight on beta goes beyond; across, alpha and gamma have to swing by 90
-    /// degrees first.
+    /// By hand: straight through beta = 90 beta exceeds its limit; perpendicular to it alpha and gamma have
+    /// to swing by 90 degrees first.
     #[test]
     fn through_the_lock_and_across() {
         let wide = "gimbals = { beta_deg = [-170, 170] }";
@@ -385,7 +389,8 @@ mod tests {
         let found = straight("gimbals = { beta_deg = [-90, 90] }");
         assert_eq!(found.beyond[0].within, "180,60,180");
         assert_eq!(stopped(&found.turns[0]), (Some("beta"), 90, 90));
-        // at beta = 90, alpha = 0 the middle axis is Up and Z_p is South: a turn about East is across
+        // at beta = 90, alpha = 0 the middle axis is Up and Z_p is South: a turn about East is perpendicular
+        // to both
         let across =
             report(wide, &["angles_deg = [0, 90, 0]", "angles_deg = [90, 50, 90]\nslew = { about = 'E' }"]);
         let lock = GimbalStop { gimbal: None, at_deg: 90.0, after_deg: 0.0 };
@@ -395,7 +400,7 @@ mod tests {
         );
     }
 
-    /// At beta = 90 a turn about North is one of gamma, and where gamma has stopped of alpha.
+    /// At beta = 90 a turn about North is one of gamma, and of alpha where gamma is at its limit.
     #[test]
     fn alpha_takes_over_at_the_lock() {
         let positions = [
@@ -413,11 +418,11 @@ mod tests {
                 "angles_deg = [-110, 90, 140]\nslew = { about = 'N', angle_deg = 150 }",
             ],
         );
-        // gamma takes all of it, and alpha stays
+        // gamma takes all of the turn, and alpha stays
         assert_eq!((found.turns[0].stays, found.turns[0].ends_deg), (true, Some([-100.0, 90.0, 150.0])));
     }
 
-    /// The turn behind a rotation starts where the gimbals are at its end.
+    /// The turn after a rotation starts at the gimbal angles at the end of the rotation.
     #[test]
     fn a_rotation_winds_its_gimbal() {
         let positions = [

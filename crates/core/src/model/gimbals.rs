@@ -1,11 +1,12 @@
-//! The gimbals: which turns about which axis, how far each turns, and the gimbal angles of an attitude.
+//! The gimbals: their axes, their limits, and the gimbal angles of an attitude.
 //!
-//! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first factor
-//! acts on geographic components: a change of alpha turns everything inside about North, an axis fixed to the
-//! base, so alpha is the *outer* gimbal. Its last factor acts on platform components: a change of gamma turns
-//! the platform alone, about Z_p, so gamma is the *inner* gimbal. Beta turns the *middle* gimbal about the
-//! axis `Mx(alpha) e_y`, which the outer gimbal carries along and the inner one does not move: Up where alpha
-//! = 0. The matrices are passive: a positive angle turns the platform left-handed about these axes.
+//! `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19) takes platform components to geographic ones. Its first
+//! factor acts on geographic components: a change of alpha turns everything inside about North, an axis
+//! fixed to the base, so alpha is the *outer* gimbal. Its last factor acts on platform components: a change
+//! of gamma turns the platform alone, about Z_p, so gamma is the *inner* gimbal. Beta turns the *middle*
+//! gimbal about the axis `Mx(alpha) e_y`. The outer gimbal carries this axis along and the inner one does
+//! not move it; it is Up where alpha = 0. The matrices are passive: a positive angle turns the platform
+//! left-handed about these axes.
 
 use std::fmt;
 
@@ -14,24 +15,25 @@ use super::attitude::{Euler, Matrix3, angles_text, c_n_f64};
 use super::position::Position;
 use crate::model::slew::Slew;
 
-/// A turn in 1e-9 degrees.
+/// Whole turn in 1e-9 degrees.
 const TURN: i64 = 360_000_000_000;
-/// Half a turn.
+/// Half turn in 1e-9 degrees.
 const HALF: i64 = TURN / 2;
-/// Rounding of angles taken from a matrix, in 1e-9 degrees.
+/// Rounding of angles computed from a matrix, in 1e-9 degrees.
 pub(super) const ROUNDING: i64 = 100_000;
 
 /// Limits on alpha, beta, gamma as `[low, high]` in 1e-9 degrees; `None`: the gimbal turns freely.
 ///
 /// An attitude has two sets of Euler angles, `(a, b, g)` and its twin `(a+180, 180-b, g+180)`, each up to
-/// whole turns, and at `b = +-90` infinitely many: it is reached when one of them lies within the limits.
+/// whole turns, and at `b = +-90` infinitely many. The attitude is reached if one of them lies within the
+/// limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Gimbals {
-    /// Of alpha, beta and gamma.
+    /// Limits of alpha, beta and gamma.
     pub limits: [Option<[i64; 2]>; 3],
 }
 
-/// Not a limit of a gimbal.
+/// Error for a text that is not a limit of a gimbal.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is no gimbal limit; expected alpha, beta or gamma and degrees, as in beta=-80:80")]
 pub struct GimbalError {
@@ -60,8 +62,8 @@ impl Gimbals {
         Ok(())
     }
 
-    /// True if the angles lie within the limits as they are written, whole turns counted; generic angles
-    /// count as within.
+    /// True if the angles lie within the limits as written, whole turns included. Generic angles count as
+    /// within.
     pub fn hold(&self, angles: &Euler) -> bool {
         let within = |(a, limit): (&Angle, Option<[i64; 2]>)| {
             a.generic().is_some() || limit.is_none_or(|[low, high]| (low..=high).contains(&a.nanodeg()))
@@ -69,14 +71,14 @@ impl Gimbals {
         angles.iter().zip(self.limits).all(within)
     }
 
-    /// The gimbal angles of the attitude of `angles`, within the limits, with the shortest gimbal way from
-    /// `before`: exact, of the same attitude. `None` where the gimbals do not reach the attitude; generic
-    /// angles stay as they are.
+    /// Gimbal angles of the attitude of `angles` within the limits, with the shortest gimbal way from
+    /// `before`. They are exact angles of the same attitude. `None` if the gimbals do not reach the
+    /// attitude; generic angles stay unchanged.
     ///
-    /// The gimbal way is the sum of what the three gimbals turn. Of equal ways, the one whose largest turn is
-    /// smaller, then the one with beta in -90..90 is taken. A gimbal without a limit turns the shorter way
-    /// round, and its angle lies in (-180, 180]. At `beta = +-90` alpha and gamma turn about one line: alpha
-    /// is kept, and where gamma cannot follow, changed as little as possible.
+    /// The gimbal way is the sum of the angles by which the three gimbals turn. Of equal ways, the one
+    /// with the smaller largest turn is taken, then the one with beta in -90..90. A gimbal without a limit
+    /// turns the shorter way round, and its angle lies in (-180, 180]. At `beta = +-90` alpha and gamma turn
+    /// about the same line: alpha is kept, or changed as little as possible if gamma cannot follow.
     pub fn nearest(&self, angles: &Euler, before: &Euler) -> Option<Euler> {
         if angles.iter().any(|a| a.generic().is_some()) {
             return Some(angles.clone());
@@ -100,9 +102,9 @@ impl Gimbals {
         Some(std::array::from_fn(|k| Angle::from_nanodeg(shown(k))))
     }
 
-    /// The gimbal angles of successive attitudes, each with the shortest gimbal way from the one before, the
-    /// first from (0, 0, 0). Attitudes that the gimbals do not reach stay as they are. Without limits angles
-    /// are brought into (-180, 180].
+    /// Gimbal angles of successive attitudes, each with the shortest gimbal way from the one before, the
+    /// first from (0, 0, 0). Attitudes that the gimbals do not reach stay unchanged. Without limits the
+    /// angles lie in (-180, 180].
     pub fn along(&self, attitudes: &[Euler]) -> Vec<Euler> {
         let mut out: Vec<Euler> = Vec::with_capacity(attitudes.len());
         let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));
@@ -114,7 +116,8 @@ impl Gimbals {
         out
     }
 
-    /// Every angle by whole turns at its place within the limits that is nearest to `from`.
+    /// The angles, each moved by whole turns to the value within its limits that is nearest to `from`;
+    /// `None` if one has none.
     fn placed(&self, angles: [i64; 3], from: [i64; 3]) -> Option<[i64; 3]> {
         let mut out = angles;
         for k in 0..3 {
@@ -123,11 +126,12 @@ impl Gimbals {
         Some(out)
     }
 
-    /// The angle `x` of gimbal `k` by whole turns at its place within the limits that is nearest to `near`.
+    /// Angle `x` of gimbal `k`, moved by whole turns to the value within its limits that is nearest to
+    /// `near`.
     fn place(&self, k: usize, x: i64, near: i64) -> Option<i64> {
         let at = near + wrapped(x - near);
         let Some([low, high]) = self.limits[k] else { return Some(at) };
-        // the place nearest to `near`, or the one that is first inside
+        // the value nearest to `near`, or the first one inside
         let inside = if at < low {
             low + (x - low).rem_euclid(TURN)
         } else if at > high {
@@ -138,7 +142,7 @@ impl Gimbals {
         (low..=high).contains(&inside).then_some(inside)
     }
 
-    /// The angles at `beta = +-90` within the limits: of every place of gamma the alpha nearest to that of
+    /// Angles at `beta = +-90` within the limits: for every value of gamma the alpha nearest to that of
     /// `from`.
     fn locked(&self, [a, b, g]: [i64; 3], from: [i64; 3]) -> Vec<[i64; 3]> {
         let Some(beta) = self.place(1, b, from[1]) else { return Vec::new() };
@@ -151,7 +155,7 @@ impl Gimbals {
             let gamma = from[2] + wrapped(sign * (alpha - fixed) - from[2]);
             return vec![[alpha, beta, gamma]];
         };
-        // the alphas of gamma's range, moved by whole turns over those of alpha's
+        // alphas for gamma's range, moved by whole turns over the range of alpha
         let (first, last) = if up { (gl + fixed, gh + fixed) } else { (fixed - gh, fixed - gl) };
         let turns = -(last - low).div_euclid(TURN)..=(high - first).div_euclid(TURN);
         let of = |n: i64| {
@@ -164,12 +168,12 @@ impl Gimbals {
         turns.filter_map(of).collect()
     }
 
-    /// True if nothing is limited.
+    /// True if no gimbal has a limit.
     pub fn are_free(&self) -> bool {
         self.limits.iter().all(Option::is_none)
     }
 
-    /// True if the gimbals reach an attitude; one with a generic angle is taken as reached.
+    /// True if the gimbals reach an attitude; an attitude with a generic angle counts as reached.
     pub fn reach(&self, angles: &Euler) -> bool {
         if self.are_free() || angles.iter().any(|a| a.generic().is_some()) {
             return true;
@@ -195,8 +199,8 @@ impl Gimbals {
             .any(|angles| (0..3).all(|k| within(angles[k], limit(k))))
     }
 
-    /// The name and attitude of a position, or of a point of a rotating segment (every degree of it is looked
-    /// at), that the gimbals do not reach.
+    /// Name and attitude of a position that the gimbals do not reach, or of an unreached point of a rotating
+    /// segment (tested at every degree).
     pub fn beyond(&self, position: &Position) -> Option<(String, String)> {
         let name = || position.name.clone();
         if !self.reach(&position.angles) {
@@ -207,7 +211,7 @@ impl Gimbals {
             return None;
         }
         let start = c_n_f64(&position.angles);
-        // a turn of so many degrees in so many seconds; behind a whole turn nothing is new
+        // points of the turn, one for every degree; beyond a whole turn no attitude is new
         let whole = r.angle.nanodeg() as f64 / 1e9;
         let path = Slew::about(&start, r, whole.abs());
         let arc = whole.abs().min(360.0);
@@ -221,12 +225,12 @@ impl Gimbals {
     }
 }
 
-/// An angle in 1e-9 degrees by whole turns within (-180, 180] degrees.
+/// Angle in 1e-9 degrees, moved by whole turns into (-180, 180] degrees.
 fn wrapped(x: i64) -> i64 {
     HALF - (HALF - x).rem_euclid(TURN)
 }
 
-/// Every constant angle by whole turns within (-180, 180].
+/// Angles, the constant ones moved by whole turns into (-180, 180] degrees; generic ones stay unchanged.
 fn normalised(angles: &Euler) -> Option<Euler> {
     let shown = |a: &Angle| match a.generic() {
         None => Angle::from_nanodeg(wrapped(a.nanodeg())),
@@ -261,7 +265,7 @@ pub(crate) fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
     // C = Mx My Mz: row 0 is (cb cg, cb sg, -sb), column 2 is (-sb, sa cb, ca cb)
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
     if is_locked(c) {
-        // only a -+ g is determined: gamma = 0, and the middle column of Mx My is (0, ca, -sa)
+        // only a -+ g is determined: choose gamma = 0; the middle column of Mx My is (0, ca, -sa)
         return [(-c[2][1]).atan2(c[1][1]), beta, 0.0];
     }
     [c[1][2].atan2(c[2][2]), beta, c[0][1].atan2(c[0][0])]
@@ -298,7 +302,7 @@ mod tests {
             prop_assert!(distance(&of_degrees(back), &c) < 1e-9);
         }
 
-        /// The verdict is that of trying all angles of the gimbals in steps.
+        /// The verdict equals that of a search over all gimbal angles in steps.
         #[test]
         fn reach_is_what_a_search_over_gimbal_angles_finds(
             angles in prop::array::uniform3(-12i64..=12),
@@ -316,9 +320,9 @@ mod tests {
         }
     }
 
-    /// Columns of `C_c^n` by turning a platform whose axes lie along North, Up, East and the gimbals around
-    /// it, from the inside out: the inner one turns the platform about its own Z, the middle one all of that
-    /// about its own Y, the outer one all about North.
+    /// Columns of `C_c^n` by turning a platform whose axes lie along North, Up, East, with its gimbals, from
+    /// the inside out. The inner gimbal turns the platform about its own Z, the middle one turns both about
+    /// its own Y, the outer one turns everything about North.
     fn nested([a, b, g]: [f64; 3]) -> Matrix3<f64> {
         // Rodrigues: v cos + (k x v) sin + k (k v) (1 - cos), left-handed
         let turned = |v: [f64; 3], k: [f64; 3], degrees: f64| -> [f64; 3] {
@@ -342,7 +346,7 @@ mod tests {
             let c = of_degrees(at);
             prop_assert!(distance(&c, &nested(at)) < 1e-12);
             let changed = |k: usize| of_degrees(std::array::from_fn(|i| at[i] + if i == k { by } else { 0.0 }));
-            // what a turn about an axis leaves is the axis: rows are along North, columns platform axes
+            // a turn leaves its axis unchanged: rows are along North, columns are platform axes
             prop_assert!((0..3).all(|j| (changed(0)[0][j] - c[0][j]).abs() < 1e-12));
             prop_assert!((0..3).all(|i| (changed(2)[i][2] - c[i][2]).abs() < 1e-12));
             let (s, cos) = at[0].to_radians().sin_cos();
@@ -350,8 +354,8 @@ mod tests {
             prop_assert!((0..3).all(|j| (middle(&changed(1), j) - middle(&c, j)).abs() < 1e-12));
         }
 
-        /// Of all gimbal angles within the limits that give the attitude, those with the shortest way; at
-        /// beta = +-90 first those that keep alpha.
+        /// The nearest angles have the shortest way of all gimbal angles within the limits that give the
+        /// attitude; at beta = +-90, of those that keep alpha, if there are any.
         #[test]
         fn the_nearest_angles_are_what_a_search_over_gimbal_angles_finds(
             angles in prop::array::uniform3(-24i64..=24),
@@ -363,7 +367,7 @@ mod tests {
             let gimbals = limited(limits);
             let of = |angles: [i64; 3]| angles.map(|a| Angle::from_nanodeg(a * 15 * DEG));
             let target = of_degrees(angles.map(|a| (a * 15) as f64));
-            // a free gimbal turns up to half a turn either way
+            // a free gimbal turns at most half a turn in each direction
             let range = |k: usize| match limits[k] {
                 Some([low, high]) => low / 15..=high / 15,
                 None => before[k] - 12..=before[k] + 12,
@@ -390,13 +394,17 @@ mod tests {
             prop_assert!(gimbals.hold(&found), "{found:?} {gimbals}");
             let found: [i64; 3] = std::array::from_fn(|k| found[k].nanodeg() / DEG / 15);
             prop_assert!(distance(&of_degrees(found.map(|x| (x * 15) as f64)), &target) < 1e-9);
-            let round = |k: usize| if width[k].is_some() { found[k] } else { before[k] + wrapped((found[k] - before[k]) * 15 * DEG) / DEG / 15 };
+            let round = |k: usize| if width[k].is_some() {
+                found[k]
+            } else {
+                before[k] + wrapped((found[k] - before[k]) * 15 * DEG) / DEG / 15
+            };
             prop_assert_eq!(Some(key(std::array::from_fn(round))), best);
             prop_assert!((0..3).all(|k| width[k].is_some() || (-11..=12).contains(&found[k])));
         }
 
-        /// The attitude is the same, exactly: the matrices are equal in a prime field that holds the sines of
-        /// all angles.
+        /// The nearest angles give exactly the same attitude: the matrices are equal in a prime field that
+        /// contains the sines of all angles.
         #[test]
         fn the_nearest_angles_give_the_same_attitude(
             angles in prop::array::uniform3(-400_000_000_000i64..400_000_000_000),
@@ -416,7 +424,9 @@ mod tests {
             prop_assert!(gimbals.hold(&found));
             let turns = euler.iter().chain(&found).map(Angle::turn);
             let mut rng = obsdeg_exact::SplitMix64::new(seed);
-            let roots = obsdeg_exact::RootField::random(obsdeg_exact::turn::common_order(turns), &mut rng).expect("a field");
+            let roots =
+                obsdeg_exact::RootField::random(obsdeg_exact::turn::common_order(turns), &mut rng)
+                    .expect("a field");
             let matrix = |euler: &Euler| {
                 let cs = euler.each_ref().map(|a| roots.cos_sin(roots.unit_circle(a.turn()).expect("held")));
                 crate::model::attitude::c_n_from_euler(&roots.field, &cs)
@@ -425,8 +435,8 @@ mod tests {
         }
     }
 
-    /// By hand: 135 of a gimbal that stops at 90 is its twin -45, whose way from the position before decides
-    /// where both are within.
+    /// By hand: 135 of a gimbal that stops at 90 becomes its twin -45. The way from the position before
+    /// decides where both are within the limits.
     #[test]
     fn twins_by_hand() {
         let gimbals = limited([Some([-90, 90]), None, None]);
@@ -444,7 +454,7 @@ mod tests {
         assert_eq!(near(&gimbals, "180,90,0", "30,0,0").as_deref(), Some("30,90,-150"));
         let narrow = limited([Some([-90, 90]), None, Some([-100, 100])]);
         assert_eq!(near(&narrow, "180,90,0", "30,0,0").as_deref(), Some("80,90,-100"));
-        // whole turns of a gimbal that turns further than one
+        // whole turns of a gimbal that turns by more than one
         let wide = limited([Some([-270, 270]), Some([-80, 80]), None]);
         assert_eq!(near(&wide, "-170,0,0", "150,0,0").as_deref(), Some("190,0,0"));
         assert_eq!(near(&wide, "0,90,0", "0,0,0"), None);

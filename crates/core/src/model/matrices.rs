@@ -1,5 +1,5 @@
-//! The platform's matrices in numbers: F, H and `S_i` of (8) and (9), for readers who build a filter or check
-//! by hand.
+//! Matrices of the platform in numbers: F, H and `S_i` of (8) and (9), for building or checking a filter by
+//! hand.
 
 use nalgebra::DMatrix;
 
@@ -9,15 +9,15 @@ use super::scheme::{Scheme, SchemeError};
 use super::slew::W_IE;
 
 /// The linear model of a scheme: `l' = F l`, `Z = H l` at every position, and `l = S_i x` at the start of
-/// position i, where x holds the unknowns of the scheme and l the local ones of a position: psi^n (rad), the
-/// drift eps^n (rad/s) and, where errors of the accelerometers are unknown, these (g).
+/// position i. x holds the unknowns of the scheme, l the local unknowns of a position: psi^n (rad), the
+/// drift eps^n (rad/s) and, if unknown, the accelerometer errors (g).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformMatrices {
     /// Names of the unknowns x, in the order of the columns of every `S_i`.
     pub unknowns: Vec<String>,
-    /// F of (8), of 6 by 6, or 9 by 9 where errors of the accelerometers are unknown; 1/s between angles.
+    /// F of (8), of 6 by 6, or 9 by 9 if accelerometer errors are unknown; entries between angles in 1/s.
     pub f: DMatrix<f64>,
-    /// H of (9), one row per observed component: Z1, Z3, with errors of the accelerometers Z1, Z2, Z3, then a
+    /// H of (9), one row per observed component: Z1 and Z3, or Z1, Z2, Z3 with accelerometer errors, then a
     /// measured azimuth if there is one; Z in rad (or g).
     pub h: DMatrix<f64>,
     /// `S_i` of every position, in order; psi in rad, coefficients in rad/s, rad/s/g, and in g for
@@ -37,15 +37,15 @@ pub enum MatricesError {
     /// The scheme itself can not be analysed.
     #[error(transparent)]
     Scheme(#[from] SchemeError),
-    /// An angle without a number.
+    /// An angle is generic and has no number.
     #[error("position {position}: the angle {angle} is generic; expected decimal degrees")]
     Generic {
         /// Name of the position.
         position: String,
-        /// The angle as it is written.
+        /// Angle as written.
         angle: String,
     },
-    /// A segment that rotates while Z is observed: its S changes all the time.
+    /// A segment rotates while Z is observed: its S changes all the time.
     #[error("position {position} rotates while Z is observed; expected fixed attitudes")]
     Rotates {
         /// Name of the segment.
@@ -53,8 +53,8 @@ pub enum MatricesError {
     },
 }
 
-/// F, H and `S_i` of a scheme at the rates `[wN, wU]` of the earth in rad/s, see [`earth_rates`]; the
-/// latitude of the scheme itself is not asked. Turns between positions take no time here.
+/// F, H and `S_i` of a scheme at the rates `[wN, wU]` of the earth in rad/s, see [`earth_rates`]. The
+/// latitude of the scheme is not used. Turns between positions take no time here.
 ///
 /// Source: (8), (9) of Ding, Cai, Huang, J. NUDT 39(1), 2017; `S_i` by the carry of the scheme.
 ///

@@ -1,4 +1,4 @@
-//! What can be judged: the platform of the paper, and how it is written down.
+//! The platform of the paper: schemes, their notation, and the model in any ring.
 
 pub(crate) mod angle;
 pub(crate) mod attitude;
@@ -49,7 +49,7 @@ pub use platform::{
     AZIMUTH, Block, Platform, Point, RandomValues, Sample, SteadyTurn, earth_rate_in, local_dynamics,
     local_output,
 };
-pub use pose::{Pose, Way};
+pub use pose::{Pose, SlewTurns};
 pub use position::{Carry, CarryError, Position, PositionError, Station, parse_attitude};
 pub use recording::{Recording, Still};
 pub use ring::{Float, Ring, Text};

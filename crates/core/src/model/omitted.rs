@@ -1,10 +1,10 @@
 //! Errors of a bench that are not among the unknowns of a scheme: the other terms of the error model, and
 //! errors of the site and of the stated attitudes. Each is one column beside those of the unknowns.
 //!
-//! A column says what one unit (SI) of the error adds to the truth, in n: to `psi^n` while a position lasts,
-//! to the drift `eps^n`, and to the output `Z^n`. Errors of the site are *value of the scheme minus true
-//! value*. Psi turns by the difference of the rate with which the platform is torqued (from the stated
-//! values) and the true rate:
+//! A column is the effect of one unit (SI) of the error on the truth, in n: on `psi^n` while a position
+//! lasts, on the drift `eps^n`, and on the output `Z^n`. Errors of the site are *value of the scheme minus
+//! true value*. Psi turns by the difference between the rate at which the platform is torqued (from the
+//! stated values) and the true rate:
 //!
 //! - latitude: `d omega_ie/dL = (-wU, wN, 0)`, a drift in rad/s per rad;
 //! - azimuth of the North reference: the rate of a frame turned about the vertical,
@@ -12,7 +12,8 @@
 //! - magnitude of the earth rate: `(wN, wU, 0)` per part of it;
 //! - magnitude of gravity (true minus stated): the vertical component of the specific force, `(0, 1, 0)` in
 //!   Z;
-//! - attitude of one position: `psi^n` is `C e_k` larger while the position lasts, axis k of the platform.
+//! - attitude of one position: `psi^n` increases by `C e_k` while the position lasts, for axis k of the
+//!   platform.
 
 use super::attitude::{Matrix3, product};
 use super::error_model::{Columns, ErrorModel};
@@ -23,7 +24,7 @@ use super::ring::Ring;
 use super::scheme::Scheme;
 use super::terms::{Source, Term, Unknowns};
 
-/// Most positions whose attitudes count one by one.
+/// Largest number of positions whose attitude errors are treated one by one.
 pub const MAX_ATTITUDES: usize = 64;
 
 /// Effect of an error that is not estimated.
@@ -48,16 +49,16 @@ pub enum OmittedEffect {
     },
 }
 
-/// One error that is not estimated.
+/// Error that is not estimated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OmittedTerm {
-    /// Name, such as `K0_X`, `latitude` or `attitude_x@2`.
+    /// Name of the error, such as `K0_X`, `latitude` or `attitude_x@2`.
     pub name: String,
-    /// Name of its family, such as `K0`, `latitude` or `attitude`.
+    /// Name of the family, such as `K0`, `latitude` or `attitude`.
     pub family: &'static str,
-    /// Unit of its size: ug, ppm, arcsec, ...
+    /// Unit of the error's size: ug, ppm, arcsec, ...
     pub unit: &'static str,
-    /// How it enters.
+    /// Effect of the error on the truth.
     pub effect: OmittedEffect,
 }
 
@@ -65,14 +66,14 @@ pub struct OmittedTerm {
 #[derive(Debug, Clone)]
 pub struct OmittedModel {
     terms: Vec<OmittedTerm>,
-    /// How the coefficients enter, which are the first terms.
+    /// Error model of the coefficients, which are the first terms.
     errors: ErrorModel,
-    /// Scheme whose turns torquer errors act on; `None` where they act at the earth rate alone.
+    /// Scheme with the turns on which torquer errors act; `None` if they act at the earth rate alone.
     turning: Option<Scheme>,
 }
 
-/// Terms of the error model that `unknowns` leaves out. A lower triangle among the unknowns makes the rest of
-/// its matrix the definition of the platform axes, which is no error.
+/// Terms of the error model that `unknowns` omits. If a lower triangle is among the unknowns, the rest of
+/// its matrix defines the platform axes and is no error.
 fn omitted_families(unknowns: &Unknowns) -> Vec<Term> {
     let has = |term: Term| unknowns.terms().contains(&term);
     let defined = |whole: Term, triangle: Term| has(whole) || has(triangle);
@@ -86,7 +87,7 @@ fn omitted_families(unknowns: &Unknowns) -> Vec<Term> {
 }
 
 impl OmittedModel {
-    /// What `platform` does not estimate; nothing for a scheme whose unknown is the drift itself.
+    /// Errors that `platform` does not estimate; none for a scheme whose unknown is the drift itself.
     pub fn new(platform: &Platform) -> Self {
         let scheme = platform.scheme();
         let (mut terms, mut errors) = (Vec::new(), Vec::new());
@@ -103,7 +104,7 @@ impl OmittedModel {
         Self { terms, errors: errors.into(), turning: turning_scheme(scheme) }
     }
 
-    /// The same scheme with some of the errors: those at `kept`, in ascending order.
+    /// Model with a subset of the errors: those at the indices `kept`, in ascending order.
     pub fn only(&self, kept: &[usize]) -> Self {
         let coefficients = self.errors.terms();
         let errors: Vec<_> = kept.iter().filter_map(|&j| coefficients.get(j).cloned()).collect();
@@ -111,13 +112,14 @@ impl OmittedModel {
         Self { terms, errors: errors.into(), turning: self.turning.clone() }
     }
 
-    /// The errors in order.
+    /// Errors in their fixed order.
     pub fn terms(&self) -> &[OmittedTerm] {
         &self.terms
     }
 
-    /// Scheme whose turns torquer errors act on: the given one, with a torquer error among its unknowns.
-    /// `None` where no turn is stated or psi^n is not carried, so that torquers act at the earth rate alone.
+    /// Scheme with the turns on which torquer errors act: the given one, with a torquer error among its
+    /// unknowns. `None` if no turn is stated or psi^n is not carried, so that torquers act at the earth rate
+    /// alone.
     pub fn turning(&self) -> Option<&Scheme> {
         self.turning.as_ref()
     }
@@ -135,8 +137,8 @@ impl OmittedModel {
         })
     }
 
-    /// Drift `eps^n` (3 x terms) where `C_c^n` is `c`, the rate of torquing in c is `rate`, the earth rate
-    /// `earth` (North, Up).
+    /// Drift `eps^n` (3 x terms) at the attitude `c` (`C_c^n`), with the torquing rate `rate` in c and the
+    /// earth rate `earth` (North, Up).
     pub fn drift_rows<R: Ring>(
         &self,
         ring: &R,
@@ -161,7 +163,7 @@ impl OmittedModel {
         out
     }
 
-    /// Errors in `Z^n` (3 x terms), in g, where `C_c^n` is `c`.
+    /// Errors in `Z^n` (3 x terms), in g, at the attitude `c` (`C_c^n`).
     pub fn output_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
         let mut out = self.errors.accelerometer_rows(ring, c);
         let site =
@@ -173,8 +175,8 @@ impl OmittedModel {
         out
     }
 
-    /// What the turns that lead to station `i` leave in psi^n (3 x terms), as in section 10 of the method;
-    /// `None` where no turn does.
+    /// Errors in psi^n (3 x terms) from the turns that lead to station `i`, as in section 10 of the method;
+    /// `None` if there is no turn.
     pub fn turned<R: Ring>(&self, point: &Point<R>, i: usize) -> Option<Columns<R::Element>> {
         let ring = &point.ring;
         let mut sum: Option<Columns<R::Element>> = None;
@@ -194,7 +196,7 @@ impl OmittedModel {
         sum
     }
 
-    /// `S_i` of every station with one more column per term behind those of the unknowns. `point` has the
+    /// `S_i` of every station, with one more column per error after those of the unknowns. `point` has the
     /// turns of [`Self::turning`].
     pub fn blocks<R: Ring>(&self, platform: &Platform, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
@@ -216,7 +218,7 @@ impl OmittedModel {
             let (outputs, offsets) = (self.output_rows(ring, c), self.offsets(ring, station.index, c));
             let own = block.columns.len();
             let rows: [Box<[R::Element]>; LOCAL] = std::array::from_fn(|r| {
-                // without errors of accelerometers among the unknowns there is nothing of them
+                // without unknown accelerometer errors the rows have no columns for them
                 let mut row = block.rows[r].to_vec();
                 row.resize(own, ring.zero());
                 match r {

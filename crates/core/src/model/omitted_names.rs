@@ -25,13 +25,13 @@ pub fn may_be_omitted(name: &str) -> bool {
     site || attitude(name) || (is_family(name) && !state)
 }
 
-/// What could have been meant by `name`.
+/// Hint for an unknown `name`: the nearest name of an error or family.
 pub fn omitted_meant(name: &str) -> String {
     let site = SITE_FAMILIES.iter().map(|(family, _)| family.to_string());
     let all: Vec<String> = Term::ALL.iter().map(|t| t.family().to_string()).chain(site).collect();
     let expected = "expected an error such as K0_X, a family such as K0, M or GS, or latitude, azimuth, \
                     earth_rate, gravity, attitude";
-    // letters of a term, whose errors have the name of its family
+    // letters of a term: its errors have the name of its family
     let term = Term::ALL.iter().find(|t| t.letters() == name).map(|t| t.family().to_string());
     match term.or_else(|| nearest(name, &all)) {
         Some(near) => format!("did you mean `{near}`? ({expected})"),

@@ -1,8 +1,8 @@
-//! The way from one position to the next, exactly: turns whose axes and angles have images in a prime field.
+//! Slew paths between positions, exactly: turns whose axes and angles have images in a prime field.
 //!
-//! A torquer error acts while the platform turns, so what a slew leaves in psi depends on its path: a turn by
-//! `phi` about the unit vector `u` of c adds `C_c^n(from) J E(u)` to `psi^n`,
-//! `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`, which is the integral of `exp([u x] t)`
+//! A torquer error acts while the platform turns, so its effect on psi depends on the path of the slew. A
+//! turn by `phi` about the unit vector `u` of c adds `C_c^n(from) J E(u)` to `psi^n`, with
+//! `J = sin(phi) I + (1 - cos(phi)) [u x] + (phi - sin(phi)) u u^T`. J is the integral of `exp([u x] t)`
 //! from 0 to `phi` (fast against the earth rate).
 
 use std::fmt;
@@ -32,10 +32,10 @@ pub enum Path {
 }
 
 impl Path {
-    /// All of them.
+    /// All slew paths.
     pub const ALL: [Self; 2] = [Self::OneAxis, Self::Gimbals];
 
-    /// The name in files and options.
+    /// Name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             Self::OneAxis => "one-axis",
@@ -45,8 +45,8 @@ impl Path {
 }
 
 impl Path {
-    /// The turns of the gimbals from one position to the next; `None` for generic angles, and where a
-    /// rotation has left the Euler angles.
+    /// Turns of the gimbals from one position to the next; `None` for generic angles, and if a rotation has
+    /// left the Euler angles.
     pub fn gimbals(from: &Position, to: &Position) -> Option<Vec<PathStep>> {
         if from.rotation.is_some() {
             return None;
@@ -73,10 +73,10 @@ impl FromStr for Path {
     }
 }
 
-/// Why there is no exact way to a position.
+/// Reasons for the lack of an exact path to a position.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PathError {
-    /// Not a path.
+    /// The text is not a slew path.
     #[error("`{found}` is no way to turn; expected one-axis or gimbals")]
     Name {
         /// The text found.
@@ -84,75 +84,79 @@ pub enum PathError {
     },
     /// No slew is stated, and the verdict depends on it.
     #[error(
-        "torquer errors ({terms}) are unknown under inertial carry, and nothing says how `{name}` is reached: they act while the platform turns, so a \
-         repositioning at once would give a verdict that is wrong in kind; expected path = \"one-axis\" or \"gimbals\", a slew rate, or a slew of \
-         the position"
+        "torquer errors ({terms}) are unknown under inertial carry, and nothing says how `{name}` is \
+         reached: they act while the platform turns, so a repositioning at once would give a verdict that \
+         is wrong in kind; expected path = \"one-axis\" or \"gimbals\", a slew rate, or a slew of the \
+         position"
     )]
     NotStated {
-        /// The position.
+        /// Name of the position.
         name: String,
-        /// Its index.
+        /// Index of the position.
         index: usize,
-        /// GS, GM, GM3.
+        /// Unknown torquer terms: GS, GM, GM3.
         terms: String,
     },
-    /// A turn that does not lead there.
+    /// The stated turn does not lead to the position.
     #[error("the slew to `{name}` does not lead there")]
-    NoWay {
-        /// The position.
+    NotReached {
+        /// Name of the position.
         name: String,
-        /// Its index.
+        /// Index of the position.
         index: usize,
     },
-    /// An angle or axis without an image in a field.
+    /// An angle or axis has no image in a field.
     #[error(
-        "the turn to `{name}` ({found}) has no exact form; expected a turn about X_p, Y_p, Z_p, N, U or E by decimal degrees, a turn by 15 \
-         degrees or a multiple between such attitudes, or path = \"gimbals\""
+        "the turn to `{name}` ({found}) has no exact form; expected a turn about X_p, Y_p, Z_p, N, U or E \
+         by decimal degrees, a turn by 15 degrees or a multiple between such attitudes, or path = \
+         \"gimbals\""
     )]
     NotExact {
-        /// The position.
+        /// Name of the position.
         name: String,
-        /// Its index.
+        /// Index of the position.
         index: usize,
-        /// The turn, in words.
+        /// Turn in words.
         found: String,
     },
 }
 
 impl PathError {
-    /// The key of the offender in a scheme file.
+    /// Key of the position in a scheme file.
     pub fn key(&self) -> Option<String> {
         match self {
             Self::Name { .. } => Some("path".into()),
             Self::NotStated { .. } => None,
-            Self::NoWay { index, .. } | Self::NotExact { index, .. } => Some(format!("position.{index}")),
+            Self::NotReached { index, .. } | Self::NotExact { index, .. } => {
+                Some(format!("position.{index}"))
+            }
         }
     }
 }
 
-/// One turn of a way.
+/// Turn of a slew path.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PathStep {
-    /// About one of the six axes.
+    /// Turn about one of the six axes.
     Named {
-        /// The axis.
+        /// Axis of the turn.
         axis: Axis,
-        /// Right-handed.
+        /// Angle of the turn, right-handed.
         angle: Angle,
     },
-    /// About the middle gimbal axis, on the platform at the attitude of these Euler angles:
-    /// `Mz(gamma)^T e_y`, against the hands of the passive matrices.
+    /// Turn about the middle gimbal axis, which on the platform at these Euler angles is `Mz(gamma)^T e_y`.
+    /// The sense is opposite to that of the passive matrices.
     Middle {
-        /// gamma.
+        /// Euler angle gamma.
         gamma: Angle,
-        /// By so much.
+        /// Angle of the turn.
         angle: Angle,
     },
-    /// The shortest turn to the next attitude, or about a direction of n.
+    /// Shortest turn to the next attitude, or turn about a direction of n.
     Direct {
-        /// Of n (North, Up, East), of length one.
+        /// Axis in n (North, Up, East), a unit vector.
         about: [f64; 3],
-        /// Right-handed about it, above 0.
+        /// Angle of the turn, right-handed about the axis, above 0.
         angle: Angle,
     },
 }
@@ -167,14 +171,14 @@ impl fmt::Display for PathStep {
     }
 }
 
-/// A turn at one point of a ring.
+/// Turn at one point of a ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TurnAt<E> {
-    /// The unit vector that it turns about, in c (constant while it turns).
+    /// Unit vector of the axis in c (constant during the turn).
     pub axis: [E; 3],
     /// Cosine and sine of the angle.
     pub cos_sin: (E, E),
-    /// The angle in rad.
+    /// Angle of the turn, in rad.
     pub angle: E,
 }
 
@@ -209,7 +213,7 @@ impl<E: Clone> TurnAt<E> {
     }
 }
 
-/// `[v x]`.
+/// Matrix `[v x]`.
 fn cross<R: Ring>(ring: &R, v: &[R::Element; 3]) -> Matrix3<R::Element> {
     let mut out: Matrix3<R::Element> = std::array::from_fn(|_| std::array::from_fn(|_| ring.zero()));
     for (i, x) in v.iter().enumerate() {
@@ -220,7 +224,7 @@ fn cross<R: Ring>(ring: &R, v: &[R::Element; 3]) -> Matrix3<R::Element> {
     out
 }
 
-/// The way from one position, with all that it turns, to the next.
+/// Slew path from the end of one position (after its rotation) to the next.
 ///
 /// # Errors
 /// [`StepError`].
@@ -236,8 +240,9 @@ pub(super) fn steps(from: &Position, to: &Position, path: Path) -> Result<Vec<Pa
     let turned = from.rotation.as_ref().map(|r| Turned { axis: r.axis, angle: r.angle.clone() });
     let start = c_n(&Float, &from.angles, turned.as_ref(), |a| a.turn().cos_sin_f64());
     let how = own.cloned().unwrap_or_default();
-    let Some(turn) =
-        Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0).map_err(|_| StepError::NoWay)?.map(|s| s.turn())
+    let Some(turn) = Slew::to(&start, &c_n_f64(&to.angles), &how, 1.0)
+        .map_err(|_| StepError::NotReached)?
+        .map(|s| s.turn())
     else {
         return Ok(Vec::new());
     };
@@ -248,7 +253,7 @@ pub(super) fn steps(from: &Position, to: &Position, path: Path) -> Result<Vec<Pa
         let [n, u, e] = turn.about;
         StepError::NotExact(format!("{} deg about N {n:.6}, U {u:.6}, E {e:.6}", turn.angle_deg))
     };
-    // an angle is known to a tenth of the last of nine decimals
+    // the angle is known to a tenth of the last of nine decimals
     let nanodeg = (turn.angle_deg * 1e9).round();
     if (turn.angle_deg * 1e9 - nanodeg).abs() > 0.01 || nanodeg < 1.0 {
         return Err(found());
@@ -260,21 +265,21 @@ fn generic() -> StepError {
     StepError::NotExact("between generic angles".into())
 }
 
-/// Why there are no exact steps.
+/// Reasons for the lack of exact steps.
 pub(super) enum StepError {
-    NoWay,
+    NotReached,
     NotExact(String),
 }
 
 impl PathStep {
-    /// By how much it turns, right-handed about its axis.
+    /// Angle of the turn, right-handed about its axis.
     pub fn angle(&self) -> &Angle {
         match self {
             Self::Named { angle, .. } | Self::Middle { angle, .. } | Self::Direct { angle, .. } => angle,
         }
     }
 
-    /// In floating point, from the attitude `from` (`C_c^n`).
+    /// The turn in floating point, from the attitude `from` (`C_c^n`).
     pub fn at_f64(&self, from: &Matrix3<f64>) -> TurnAt<f64> {
         let phi = (self.angle().nanodeg() as f64 / 1e9).to_radians();
         let axis = match self {
@@ -284,8 +289,8 @@ impl PathStep {
         TurnAt { axis, cos_sin: self.angle().turn().cos_sin_f64(), angle: phi }
     }
 
-    /// In a prime field where pi has the image `pi`; `None` when the axis has none, or the turn is not what
-    /// the floating-point one seemed to be: `to` is the attitude after it.
+    /// The turn in a prime field where pi has the image `pi`; `to` is the attitude after it. `None` if the
+    /// axis has no image, or if the turn contradicts its floating-point form.
     pub(super) fn at_field(
         &self,
         roots: &RootField,
@@ -304,7 +309,7 @@ impl PathStep {
         Some(TurnAt { axis, cos_sin: (c, s), angle })
     }
 
-    /// The axis in c of a turn about an axis that is named.
+    /// Axis in c of a turn about a named axis.
     fn named<R: Ring>(
         &self,
         ring: &R,
@@ -315,7 +320,7 @@ impl PathStep {
         match self {
             Self::Named { axis, .. } if axis.geographic => into_c(ring, from, &unit(axis.index)),
             Self::Named { axis, .. } => unit(axis.index),
-            // C = Mx My Mz, so a turn of My is one about Mz^T e_y of c
+            // C = Mx My Mz, so a turn of My is a turn about Mz^T e_y of c
             Self::Middle { gamma, .. } => {
                 let m = elementary(ring, 2, &cos_sin(gamma));
                 m[1].clone()
@@ -325,13 +330,13 @@ impl PathStep {
     }
 }
 
-/// `C_n^c v`.
+/// Product `C_n^c v`.
 fn into_c<R: Ring>(ring: &R, c: &Matrix3<R::Element>, v: &[R::Element; 3]) -> [R::Element; 3] {
     std::array::from_fn(|j| ring.dot((0..3).map(|i| (&c[i][j], &v[i]))))
 }
 
-/// The axis in c of the turn from one attitude to another by an angle of the given cosine and sine, which has
-/// the direction `about` in floating point; `None` when the angle is another, or the axis has no image.
+/// Axis in c of the turn between two attitudes by an angle of the given cosine and sine; `about` is its
+/// direction in floating point. `None` if the turn has another angle, or the axis has no image.
 fn direct(
     roots: &RootField,
     from: &Matrix3<u64>,
@@ -357,12 +362,12 @@ fn direct(
     (turn.rotation(&f) == r && f.dot(0, u.iter().map(|x| (*x, *x))) == f.one()).then(|| into_c(&f, from, &u))
 }
 
-/// The image of a component of a unit vector that is a square root of a ratio of small numbers.
+/// Image of a component of a unit vector that is a square root of a ratio of small numbers.
 fn recognised(roots: &RootField, x: f64) -> Option<u64> {
     Some(radical(x)?.image(roots))
 }
 
-/// The same exactly.
+/// Exact form of a component of a unit vector that is a square root of a ratio of small numbers.
 pub(crate) fn radical(x: f64) -> Option<Radical> {
     for (place, radicand) in [1.0f64, 2.0, 3.0, 6.0].into_iter().enumerate() {
         for den in 1..=6 {

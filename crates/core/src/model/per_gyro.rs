@@ -1,4 +1,4 @@
-//! A number for each of the three gyros, or one for all.
+//! Numbers per gyro: one for each of the three, or one for all.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use super::ranges::{self, RangeError};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct PerGyro(pub [f64; 3]);
 
-/// A text that is no noise of gyros.
+/// Error for a text that is no noise of gyros.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{found}` is no noise of gyros; expected a number, or three as in 0.01,0.01,0.02 (X,Y,Z), each 0 or {}",
@@ -24,22 +24,22 @@ pub struct PerGyroError {
 }
 
 impl PerGyro {
-    /// The same for all.
+    /// The same number for all gyros.
     pub fn all(x: f64) -> Self {
         Self([x; 3])
     }
 
-    /// True if there is none.
+    /// True if all numbers are zero.
     pub fn is_none(&self) -> bool {
         self.0 == [0.0; 3]
     }
 
-    /// The numbers that are not zero.
+    /// Numbers other than zero.
     pub(crate) fn amounts(self) -> impl Iterator<Item = f64> {
         self.0.into_iter().filter(|x| *x != 0.0)
     }
 
-    /// Refuses what is neither zero nor in its range.
+    /// Refuses numbers that are neither zero nor in their range.
     ///
     /// # Errors
     /// [`RangeError`] that names `what`.
@@ -64,7 +64,7 @@ impl FromStr for PerGyro {
 }
 
 impl fmt::Display for PerGyro {
-    /// `0.01`, or `0.01, 0.01, 0.02` where they differ.
+    /// Text `0.01`, or `0.01, 0.01, 0.02` if the gyros differ.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.0;
         if x == y && y == z { write!(f, "{x}") } else { write!(f, "{x}, {y}, {z}") }

@@ -16,24 +16,24 @@ use super::terms::{ErrorTerm, Unknowns};
 /// Names of the local unknowns.
 pub(crate) const LOCAL_NAMES: [&str; LOCAL] =
     ["psi_x^n", "psi_y^n", "psi_z^n", "eps_x^n", "eps_y^n", "eps_z^n", "a_x^n", "a_y^n", "a_z^n"];
-/// The number of a measured azimuth among the components that are observed: Z has 1, 2, 3.
+/// Component number of a measured azimuth; the components of Z are 1, 2, 3.
 pub const AZIMUTH: usize = 4;
 
-/// A scheme with its unknowns spelled out.
+/// A scheme with the names and units of its unknowns.
 #[derive(Debug, Clone)]
 pub struct Platform {
     scheme: Scheme,
     names: Vec<String>,
     units: Vec<&'static str>,
     errors: ErrorModel,
-    /// The turns that lead to every position, where torquer errors act on them.
+    /// Turns that lead to every position, if torquer errors act on them.
     paths: Vec<Vec<PathStep>>,
 }
 
-/// The platform at one point: cosines and sines of all angles and the earth rate, in some ring.
+/// The platform at one point: cosines and sines of all angles and the earth rate, in a ring.
 #[derive(Debug, Clone)]
 pub struct Point<R: Ring> {
-    /// The ring.
+    /// Ring of the numbers.
     pub ring: R,
     /// North component of the earth rate.
     pub w_n: R::Element,
@@ -41,22 +41,22 @@ pub struct Point<R: Ring> {
     pub w_u: R::Element,
     /// `C_c^n` of every station of the scheme.
     pub attitudes: Vec<Matrix3<R::Element>>,
-    /// The turns that lead to every station, on which torquer errors act; empty where none does.
+    /// Turns that lead to every station, on which torquer errors act; empty if none act.
     pub turns: Vec<Vec<TurnAt<R::Element>>>,
 }
 
-/// `S_i`: how the local unknowns of one position depend on the unknowns of the scheme.
+/// `S_i`: the local unknowns of one position as functions of the unknowns of the scheme.
 #[derive(Debug, Clone)]
 pub struct Block<E> {
-    /// The columns (unknowns of the scheme) that occur: psi, then the coefficients.
+    /// Columns (unknowns of the scheme) that occur: psi, then the coefficients.
     pub columns: Vec<usize>,
-    /// One row per local unknown, one entry per column listed; the last three are empty where no error of the
-    /// accelerometers is unknown.
+    /// Rows, one per local unknown, with one entry per column listed; the last three are empty if no
+    /// accelerometer error is unknown.
     pub rows: [Box<[E]>; LOCAL],
 }
 
 impl<E: Clone> Block<E> {
-    /// The entry of a functional of the local unknowns at the `k`-th column.
+    /// Entry of a functional of the local unknowns at the `k`-th column.
     pub fn entry<R: Ring<Element = E>>(&self, ring: &R, row: &[E], k: usize) -> E {
         ring.dot(row.iter().zip(&self.rows).filter_map(|(x, row)| Some((x, row.get(k)?))))
     }
@@ -111,38 +111,38 @@ impl Platform {
         }
     }
 
-    /// The scheme.
+    /// Scheme of the platform.
     pub fn scheme(&self) -> &Scheme {
         &self.scheme
     }
 
-    /// The scheme, when the rest is no longer needed.
+    /// Scheme of the platform, which is consumed.
     pub(crate) fn into_scheme(self) -> Scheme {
         self.scheme
     }
 
-    /// The names of the unknowns: psi first, then the coefficients term by term.
+    /// Names of the unknowns: psi first, then the coefficients term by term.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// The units of the unknowns.
+    /// Units of the unknowns, in their order.
     pub fn units(&self) -> &[&'static str] {
         &self.units
     }
 
-    /// What is observed.
+    /// Observed quantities.
     pub fn observed(&self) -> Observed {
         self.scheme.observed()
     }
 
-    /// The turns that lead to every position, where torquer errors act on them; empty where they do not.
+    /// Turns that lead to every position, if torquer errors act on them; empty otherwise.
     pub fn paths(&self) -> &[Vec<PathStep>] {
         &self.paths
     }
 
-    /// `S_i` of every station: of every position, and several of a rotation (section 4 of the method: the psi
-    /// block depends on the carry; section 10: torquer errors add to psi^n in every turn).
+    /// `S_i` of every station: of every position, and several of a rotation. The psi block depends on the
+    /// carry (section 4 of the method); torquer errors add to psi^n in every turn (section 10).
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
@@ -154,12 +154,12 @@ impl Platform {
         }
         let first_d = self.names.len() - self.coefficients();
         let accelerometers = self.observed().accelerometers;
-        // psi^n as a function of psi at the start of the scheme, and psi in platform axes where a rotation
-        // ended
+        // psi^n as a function of psi at the start of the scheme, and psi in platform axes at the end of a
+        // rotation
         let mut psi_block = &point.attitudes[0];
         let mut composed;
         let mut handed_on: Option<Matrix3<R::Element>> = None;
-        // what torquer errors have left in psi^n
+        // sum of torquer errors in psi^n
         let mut torqued: Option<Columns<R::Element>> = None;
         let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.coefficients()]);
         let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
@@ -216,7 +216,7 @@ impl Platform {
 }
 
 impl<R: Ring> Point<R> {
-    /// The turns to a station, each with the attitude from which it goes.
+    /// Turns to a station, each with the attitude at its start.
     #[expect(clippy::type_complexity, reason = "pairs, which would be no plainer under a name")]
     pub fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
         let (Some(turns), Some(before)) = (self.turns.get(i), i.checked_sub(1)) else { return Vec::new() };
@@ -230,7 +230,7 @@ impl<R: Ring> Point<R> {
     }
 }
 
-/// `m v`.
+/// Product `m v`.
 fn times<R: Ring>(ring: &R, m: &Matrix3<R::Element>, v: &Columns<R::Element>) -> Columns<R::Element> {
     std::array::from_fn(|r| (0..v[0].len()).map(|k| ring.dot((0..3).map(|j| (&m[r][j], &v[j][k])))).collect())
 }
@@ -246,18 +246,18 @@ pub fn earth_rate_in<R: Ring>(
 }
 
 impl Platform {
-    /// How the coefficients enter.
+    /// Error model of the coefficients.
     pub fn errors(&self) -> &ErrorModel {
         &self.errors
     }
 
-    /// How each coefficient enters, in the order of the unknowns; none when the unknowns are the drift
+    /// Error term of each coefficient, in the order of the unknowns; none if the unknowns are the drift
     /// itself.
     pub fn error_terms(&self) -> &[ErrorTerm] {
         self.errors.terms()
     }
 
-    /// The number of coefficients.
+    /// Number of coefficients.
     pub fn coefficients(&self) -> usize {
         self.errors.terms().len()
     }
@@ -276,8 +276,9 @@ pub fn local_dynamics<R: Ring>(ring: &R, w_n: &R::Element, w_u: &R::Element) -> 
     f
 }
 
-/// `H` of (9), `Z^n = (psi_z, 0, -psi_x)` and the error of the accelerometers if it is unknown: the
-/// components (1, 3, with that error 2, and [`AZIMUTH`] for a measured `psi_y^n`) with their rows.
+/// `H` of (9): `Z^n = (psi_z, 0, -psi_x)` plus the error of the accelerometers if it is unknown. Returns the
+/// components with their rows: 1 and 3, with accelerometer errors also 2, and [`AZIMUTH`] for a measured
+/// `psi_y^n`.
 pub fn local_output<R: Ring>(ring: &R, observed: Observed) -> Vec<(usize, [R::Element; LOCAL])> {
     let unit = |j: usize, value: R::Element| {
         let mut row: [R::Element; LOCAL] = std::array::from_fn(|_| ring.zero());
@@ -299,48 +300,48 @@ pub fn local_output<R: Ring>(ring: &R, observed: Observed) -> Vec<(usize, [R::El
 /// The images of a scheme in one random prime field.
 #[derive(Debug, Clone)]
 pub struct Sample {
-    /// The field and its root of unity.
+    /// Field with its root of unity.
     pub roots: RootField,
-    /// The point.
+    /// The platform in the field.
     pub point: Point<Field>,
-    /// The rotation of every position, where rotations are judged by their course; empty where none is.
+    /// Rotation of every position, if rotations are judged by their output history; empty otherwise.
     pub arcs: Vec<Option<SteadyTurn>>,
 }
 
-/// A rotation at a steady rate, in a field.
+/// Rotation at a steady rate, in a field.
 #[derive(Debug, Clone)]
 pub struct SteadyTurn {
-    /// About what.
+    /// Axis of the rotation.
     pub axis: Axis,
     /// Cosine and sine of the whole angle.
     pub cos_sin: (u64, u64),
-    /// Its rate, times the unit T of time.
+    /// Rate of the rotation, times the unit T of time.
     pub rate: u64,
-    /// Its duration, in units of T.
+    /// Duration of the rotation, in units of T.
     pub duration: u64,
 }
 
-/// Everything random that a sample needs, so that a conjugate embedding can reuse it.
+/// Random values of a sample, kept so that a conjugate embedding can reuse them.
 #[derive(Debug, Clone)]
 pub struct RandomValues {
     roots: RootField,
     rates: (u64, u64),
-    /// `exp(i angle)` of every generic angle.
+    /// Image `exp(i angle)` of every generic angle.
     generic: Vec<(String, u64)>,
-    /// The image of pi, where torquer errors act in turns.
+    /// Image of pi, if torquer errors act in turns.
     pi: Option<u64>,
-    /// The rate of the rotation of every position, where rotations are judged by their course.
+    /// Rate of the rotation of every position, if rotations are judged by their output history.
     turning: Vec<u64>,
 }
 
 impl RandomValues {
-    /// A random field that fits `scheme`, with random earth rates and generic angles.
+    /// Random values for `scheme`: a field that contains its angles, earth rates and generic angles.
     ///
     /// # Errors
     /// [`PrimeError`] never for a validated scheme.
     pub fn draw(scheme: &Scheme, rng: &mut SplitMix64) -> Result<Self, PrimeError> {
         let stations = scheme.stations();
-        // a scheme that is analysed has been validated
+        // the scheme of an analysis has been validated
         let paths = scheme.paths().unwrap_or_default();
         let turns = paths.iter().flatten().map(|step| step.angle().turn());
         let angles = stations.iter().flat_map(Station::angles).map(Angle::turn).chain(turns);
@@ -356,12 +357,12 @@ impl RandomValues {
         Ok(Self { roots, rates, generic, pi, turning })
     }
 
-    /// The field.
+    /// Field with its root of unity.
     pub fn roots(&self) -> &RootField {
         &self.roots
     }
 
-    /// Replaces the value of a generic angle by the one with `tan(angle/2) = t`; false when the name
+    /// Replaces the value of a generic angle by the one with `tan(angle/2) = t`. Returns false if the name
     /// is unknown or `t = +-i`.
     pub fn set_half_tangent(&mut self, name: &str, t: u64) -> bool {
         let f = &self.roots.field;
@@ -377,15 +378,16 @@ impl RandomValues {
         }
     }
 
-    /// Puts a generic angle at 180 degrees, where `tan(angle/2)` is infinite; false when unknown.
+    /// Sets a generic angle to 180 degrees, where `tan(angle/2)` is infinite. Returns false if the name is
+    /// unknown.
     pub(crate) fn set_half_turn(&mut self, name: &str) -> bool {
         let f = &self.roots.field;
         let minus_one = f.neg(f.one());
         self.generic.iter_mut().find(|(n, _)| n == name).map(|(_, z)| *z = minus_one).is_some()
     }
 
-    /// `(cos, sin)` of an angle in a conjugate of the field. The imaginary unit may have gone to its negative
-    /// there: then exp(i angle) at a fixed tangent is inverted.
+    /// `(cos, sin)` of an angle in a conjugate of the field. If the conjugation takes the imaginary unit to
+    /// its negative, exp(i angle) at a fixed tangent is inverted.
     pub fn angle_cos_sin(&self, roots: &RootField, angle: &Angle) -> (u64, u64) {
         let f = roots.field;
         let flip = roots.imaginary_unit() != self.roots.imaginary_unit();
@@ -413,10 +415,10 @@ impl RandomValues {
         scheme.stations().iter().map(|station| station.attitude(&roots.field, cos_sin)).collect()
     }
 
-    /// The turns to every station ([`Point::turns`]).
+    /// Turns to every station ([`Point::turns`]) in a field.
     ///
     /// # Errors
-    /// The index of the first position whose way has no image, or does not lead there.
+    /// Index of the first position whose slew path has no image, or does not lead there.
     fn turns(
         &self,
         scheme: &Scheme,
@@ -433,7 +435,7 @@ impl RandomValues {
         turns_of(&f, scheme, paths, attitudes, at, |reached, to| reached == to)
     }
 
-    /// The rotations of every position, where rotations are judged by their course.
+    /// Rotation of every position, if rotations are judged by their output history.
     fn arcs(&self, scheme: &Scheme, roots: &RootField) -> Vec<Option<SteadyTurn>> {
         let Some(pi) = self.pi else { return Vec::new() };
         let f = roots.field;
@@ -451,7 +453,7 @@ impl RandomValues {
         self.turning.iter().zip(&scheme.positions).map(arc).collect()
     }
 
-    /// The sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
+    /// Sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
     pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
         let roots = self.roots.conjugate(a);
         let f = roots.field;
@@ -466,7 +468,7 @@ impl RandomValues {
         self.sample_at(scheme, a, [w_n, w_u])
     }
 
-    /// The same at other rates `(wN, wU)` of the earth.
+    /// Sample under the embedding `g -> g^a`, at other rates `(wN, wU)` of the earth.
     pub fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> Sample {
         let roots = self.roots.conjugate(a);
         let attitudes = self.attitudes(scheme, &roots);
@@ -478,11 +480,12 @@ impl RandomValues {
     }
 }
 
-/// The turns to every station ([`Point::turns`]) in a ring: `at` gives one of a way that starts at an
-/// attitude, and ends at another where it is the only one; `arrives` says whether a way ends where it should.
+/// Turns to every station ([`Point::turns`]) in a ring. `at` gives one turn of a path from the attitude at
+/// its start; if it is the only turn, the attitude at its end is given too. `arrives` is true if a path ends
+/// at the attitude required.
 ///
 /// # Errors
-/// The index of the first position whose way `at` does not know, or that does not lead there.
+/// Index of the first position whose path `at` does not give, or does not lead there.
 fn turns_of<R: Ring>(
     ring: &R,
     scheme: &Scheme,
@@ -514,12 +517,12 @@ fn turns_of<R: Ring>(
 }
 
 impl Point<Float> {
-    /// The platform in floating point at these rates of the earth.
+    /// The platform in floating point at the given rates of the earth.
     pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64) -> Self {
         let scheme = platform.scheme();
         let cos_sin = |angle: &Angle| angle.turn().cos_sin_f64();
         let attitudes: Vec<_> = scheme.stations().iter().map(|s| s.attitude(&Float, cos_sin)).collect();
-        // where they lead was found when the platform was made
+        // the end of each path was checked when the platform was made
         let at = |step: &PathStep, from: &Matrix3<f64>, _: Option<&Matrix3<f64>>| Some(step.at_f64(from));
         let turns = turns_of(&Float, scheme, &platform.paths, &attitudes, at, |_, _| true);
         let turns = turns.unwrap_or_default();
@@ -527,7 +530,7 @@ impl Point<Float> {
     }
 }
 
-/// The image of `exp(i angle)` for an angle of the scheme whose field this is.
+/// Image of `exp(i angle)` for an angle of the scheme of this field.
 fn circle(roots: &RootField, angle: obsdeg_exact::Turn) -> u64 {
     roots.unit_circle(angle).expect("fields are drawn with the roots of unity of every angle of the scheme")
 }

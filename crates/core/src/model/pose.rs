@@ -1,39 +1,40 @@
-//! The platform as it stands in geographic axes at every position, and how it gets there.
+//! Attitudes of the platform in geographic axes at every position, and the turns that lead to them.
 
 use super::attitude::{Matrix3, c_n_f64};
 use super::path::Path;
 use super::scheme::{Position, Scheme};
 use super::slew::{Slew, Turn};
 
-/// The platform at one position.
+/// Attitude of the platform at one position, with the turns that lead to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pose {
-    /// The position's name.
+    /// Name of the position.
     pub name: String,
-    /// Its Euler angles in degrees, or their names.
+    /// Euler angles in degrees, or their names.
     pub angles: [String; 3],
-    /// Direction letters of X_p, Y_p, Z_p when all angles are multiples of 90 degrees.
+    /// Direction letters of X_p, Y_p, Z_p if all angles are multiples of 90 degrees; `None` otherwise.
     pub letters: Option<String>,
-    /// `C_c^n` at its start (3x3; column j is platform axis j in North, Up, East); `None` for generic angles.
+    /// `C_c^n` at the start (3x3; column j is platform axis j in North, Up, East); `None` for generic
+    /// angles.
     pub attitude: Option<Matrix3<f64>>,
-    /// How the platform turns while Z is observed, as in `X_p:90`.
+    /// Rotation while Z is observed, as in `X_p:90`; `None` if there is none.
     pub rotation: Option<String>,
-    /// How it is reached; `None` for the first position, between generic angles, and where no turn as the
-    /// scheme states it leads there.
-    pub way: Option<Way>,
+    /// Turns that lead to the position. `None` for the first position, between generic angles, and if the
+    /// stated turn does not lead there.
+    pub way: Option<SlewTurns>,
 }
 
-/// How a position is reached from the one before.
+/// Turns from one position to the next.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Way {
-    /// The turns in order; none where the attitude stays.
+pub struct SlewTurns {
+    /// Turns in order; none if the attitude stays the same.
     pub turns: Vec<Turn>,
-    /// True if the scheme says so. Where it does not this is the shortest turn.
+    /// True if the scheme states the turns; otherwise they are the shortest turn.
     pub stated: bool,
 }
 
 impl Scheme {
-    /// The platform at every position, in order.
+    /// Poses of the platform at every position, in order.
     pub fn poses(&self) -> Vec<Pose> {
         let mut out: Vec<Pose> = Vec::with_capacity(self.positions.len());
         for (i, p) in self.positions.iter().enumerate() {
@@ -51,8 +52,8 @@ impl Scheme {
         out
     }
 
-    /// How `to` is reached from `from`.
-    fn way(&self, from: &Position, to: &Position) -> Option<Way> {
+    /// Turns from `from` to `to`; `None` for generic angles, and if the stated turn does not lead there.
+    fn way(&self, from: &Position, to: &Position) -> Option<SlewTurns> {
         if from.angles.iter().chain(&to.angles).any(|a| a.generic().is_some()) {
             return None;
         }
@@ -62,7 +63,7 @@ impl Scheme {
         let how = to.slew.clone().unwrap_or_default();
         if how.axis.is_some() || self.path != Some(Path::Gimbals) {
             let slew = Slew::to(&end, &c_n_f64(&to.angles), &how, 1.0).ok()?;
-            return Some(Way { turns: slew.iter().map(Slew::turn).collect(), stated });
+            return Some(SlewTurns { turns: slew.iter().map(Slew::turn).collect(), stated });
         }
         let mut turns = Vec::new();
         for step in Path::gimbals(from, to)? {
@@ -71,7 +72,7 @@ impl Scheme {
             end = slew.at(slew.duration_s);
             turns.push(slew.turn());
         }
-        Some(Way { turns, stated })
+        Some(SlewTurns { turns, stated })
     }
 }
 
@@ -102,7 +103,7 @@ mod tests {
         assert!(way(&poses("[simulation]\nslew_rate_deg_s = 1", &two)[1]).0);
         let back = [two[0], "attitude = 'NED'\nslew = { about = 'N', angle_deg = -270 }"];
         assert_eq!(way(&poses("", &back)[1]), (true, vec![([-1.0, 0.0, 0.0], 270.0)]));
-        // from the end of a rotation nothing is left to turn
+        // the end of the rotation is the next attitude: no turn remains
         let turning = ["attitude = 'NUE'\nrotation = { about = 'X_p', angle_deg = 90 }", two[1]];
         let found = poses("", &turning);
         assert_eq!((way(&found[1]), found[0].rotation.as_deref()), ((false, vec![]), Some("X_p:90")));
@@ -113,8 +114,8 @@ mod tests {
         assert_eq!(poses("", &astray)[1].way, None);
     }
 
-    /// Gimbal by gimbal the turns end at the attitude: alpha about N, beta about the middle axis, gamma about
-    /// Z_p, each against the hands of the passive matrices.
+    /// Gimbal by gimbal the turns end at the attitude: alpha about N, beta about the middle axis, gamma
+    /// about Z_p, each in the sense opposite to that of the passive matrices.
     #[test]
     fn the_turns_of_gimbals_lead_there() {
         let found = poses("path = 'gimbals'", &["angles_deg = [10, 25, 40]", "angles_deg = [130, -50, 70]"]);

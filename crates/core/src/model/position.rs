@@ -1,4 +1,4 @@
-//! Positions of a scheme, the stations at which rows are taken, and what is carried between positions.
+//! Positions of a scheme, stations at which rows are taken, and the carry between positions.
 
 use std::fmt;
 use std::str::FromStr;
@@ -40,7 +40,7 @@ impl fmt::Display for Carry {
     }
 }
 
-/// Not one of the three carries.
+/// Error for a text that is not one of the three carries.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is not a carry; expected platform, inertial or reset")]
 pub struct CarryError {
@@ -55,43 +55,43 @@ impl FromStr for Carry {
     }
 }
 
-/// One position of a scheme.
+/// Position of a scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Position {
-    /// Its name in solutions, `p1`, `p2`, ... unless the scheme file names it.
+    /// Name in solutions: `p1`, `p2`, ... unless the scheme file names it.
     pub name: String,
     /// Euler angles.
     pub angles: Euler,
-    /// How long it lasts; `None` where the scheme does not say.
+    /// Duration of the position; `None` if the scheme does not state it.
     pub dwell: Option<Dwell>,
-    /// Turns at a constant rate while Z is observed; the angles are those at its start.
+    /// Rotation at a constant rate while Z is observed; the angles are those at its start.
     pub rotation: Option<Rotation>,
-    /// How it is reached from the position before, where that is not as the conditions say.
+    /// Slew from the position before, if it differs from the conditions.
     pub slew: Option<SlewTo>,
 }
 
-/// An attitude at which derivative rows are taken: a position, or a point of a rotating segment.
+/// Attitude at which derivative rows are taken: a position, or a point of a rotating segment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Station<'a> {
-    /// The position or segment.
+    /// Position or segment.
     pub position: &'a Position,
-    /// Its index.
+    /// Index of the position.
     pub index: usize,
-    /// How far the segment has turned.
+    /// Turn of the segment up to this station; `None` at its start.
     pub turned: Option<Turned>,
-    /// psi^n goes on from the station before, whatever the carry.
+    /// True if psi^n continues from the station before, whatever the carry.
     pub continues: bool,
-    /// An end of a rotation that is judged by its course: no derivative row is taken here.
+    /// True for an end of a rotation that is judged by its output history: no derivative row is taken here.
     pub course: bool,
 }
 
 impl Station<'_> {
-    /// All its angles.
+    /// All angles of the station.
     pub fn angles(&self) -> impl Iterator<Item = &Angle> {
         self.position.angles.iter().chain(self.turned.iter().map(|t| &t.angle))
     }
 
-    /// `C_c^n` there.
+    /// Attitude `C_c^n` of the station.
     pub fn attitude<R: Ring>(
         &self,
         ring: &R,
@@ -101,48 +101,49 @@ impl Station<'_> {
     }
 }
 
-/// Why a text is no attitude.
+/// Reasons why a text is no attitude.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PositionError {
-    /// Not three angles.
+    /// The text has not three parts.
     #[error(
         "position `{text}` has {found} angle(s); expected three, as in 180,0,0, or three direction letters, as in NUE"
     )]
     Count {
         /// The text found.
         text: String,
-        /// The number of parts.
+        /// Number of parts.
         found: usize,
     },
-    /// One of the three is wrong.
+    /// One of the three angles is wrong.
     #[error("position `{text}`, {which}: {error}")]
     Angle {
         /// The text found.
         text: String,
-        /// alpha, beta or gamma.
+        /// Name of the wrong angle: alpha, beta or gamma.
         which: &'static str,
-        /// What is wrong with it.
+        /// Error of the angle.
         error: AngleError,
     },
-    /// Three parts that are not separated by commas.
+    /// The three parts are not separated by commas.
     #[error("position `{text}` has no commas; expected them between the angles, as in {hint}")]
     Commas {
         /// The text found.
         text: String,
-        /// The same with commas.
+        /// Text with commas.
         hint: String,
     },
-    /// Direction letters that are small.
+    /// The direction letters are lower case.
     #[error("position `{text}` has small letters; expected directions out of N S U D E W, as in {hint}")]
     SmallLetters {
         /// The text found.
         text: String,
-        /// The same in capitals.
+        /// Text in capitals.
         hint: String,
     },
-    /// Letters, but no right-handed attitude.
+    /// The letters are no right-handed attitude.
     #[error(
-        "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, perpendicular and right-handed, as in NUE or NDW"
+        "`{found}` is not an attitude; expected the directions of X_p, Y_p, Z_p out of N S U D E W, \
+         perpendicular and right-handed, as in NUE or NDW"
     )]
     Cardinal {
         /// The text found.
@@ -182,15 +183,15 @@ pub fn parse_attitude(text: &str) -> Result<Euler, PositionError> {
 }
 
 impl Position {
-    /// Direction letters when all angles are multiples of 90 degrees.
+    /// Direction letters if all angles are multiples of 90 degrees; `None` otherwise.
     pub fn cardinal(&self) -> Option<String> {
         cardinal_name(&self.angles)
     }
 }
 
 impl Position {
-    /// Is reached the shortest way, with the rate that it says: for a scheme in which it is reached from
-    /// another attitude.
+    /// Replaces the slew by the shortest turn at the same rate, for a scheme in which the position before
+    /// has another attitude.
     pub fn take_shortest_way(&mut self) {
         let rate_deg_s = self.slew.as_ref().and_then(|s| s.rate_deg_s);
         self.slew = rate_deg_s.map(|rate| SlewTo { rate_deg_s: Some(rate), ..SlewTo::default() });

@@ -1,16 +1,16 @@
-//! Which numbers are admitted: generous physical ranges, the same for files, options and the library. Within
-//! them squares and products stay far from the ends of what a double holds.
+//! Admitted numbers: generous physical ranges, the same for files, options and the library. Within them
+//! squares and products stay far from the limits of a double.
 
 use std::fmt;
 
-/// An interval of admitted numbers, ends included.
+/// Interval of admitted numbers, ends included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// The smallest.
+    /// Smallest admitted number.
     pub low: f64,
-    /// The largest.
+    /// Largest admitted number.
     pub high: f64,
-    /// The unit of both; empty when it depends on the unknown.
+    /// Unit of both ends; empty if it depends on the unknown.
     pub unit: &'static str,
 }
 
@@ -18,14 +18,13 @@ const fn range(low: f64, high: f64, unit: &'static str) -> Range {
     Range { low, high, unit }
 }
 
-/// A sampling step.
+/// Sampling step.
 pub const STEP_S: Range = range(1e-6, 1e6, "s");
-/// The dwell of a position.
+/// Dwell of a position.
 pub const DWELL_S: Range = range(1e-3, 1e6, "s");
-/// The rate of a slew.
-/// The largest turn from one position to the next.
+/// Largest turn from one position to the next.
 pub const TURN_DEG: Range = range(1e-3, 180.0, "degrees");
-/// The rate of slews.
+/// Rate of slews.
 pub const SLEW_RATE_DEG_S: Range = range(1e-3, 1e4, "deg/s");
 /// White noise of the observation.
 pub const NOISE_G: Range = range(1e-15, 1e3, "g");
@@ -33,36 +32,36 @@ pub const NOISE_G: Range = range(1e-15, 1e3, "g");
 pub const INSTABILITY_UG: Range = range(1e-9, 1e9, "ug");
 /// Noise of a measured azimuth.
 pub const AZIMUTH_NOISE_DEG: Range = range(1e-12, 1e3, "deg");
-/// Random drift that is not zero, in deg/h or deg/sqrt(h).
+/// Random drift other than zero, in deg/h or deg/sqrt(h).
 pub const DRIFT_NOISE: Range = range(1e-12, 1e6, "");
-/// A noise of a gyro that is not zero, in deg/sqrt(h), deg/h/sqrt(h) or deg/h.
+/// Noise of a gyro other than zero, in deg/sqrt(h), deg/h/sqrt(h) or deg/h.
 pub const GYRO_NOISE: Range = range(1e-12, 1e6, "");
-/// The correlation time of a bias instability.
+/// Correlation time of a bias instability.
 pub const CORRELATION_S: Range = range(1.0, 1e9, "s");
-/// The factor on the true drifts and their priors.
+/// Factor on the true drifts and their priors.
 pub const DRIFT_SCALE: Range = range(1e-6, 1e6, "");
-/// A prior standard deviation.
+/// Prior standard deviation.
 pub const PRIOR: Range = range(1e-9, 1e9, "");
-/// A true value, or an initial estimate.
+/// True value, or initial estimate.
 pub const VALUE: Range = range(-1e6, 1e6, "");
-/// A size (one sigma) of an error that is not estimated, in the unit of the error.
+/// Size (one sigma) of an error that is not estimated, in the unit of the error.
 pub const BENCH: Range = range(0.0, 1e9, "");
-/// A random walk of a coefficient between calibrations, in the unit of the coefficient per sqrt(day).
+/// Random walk of a coefficient between calibrations, in the unit of the coefficient per sqrt(day).
 pub const AGEING: Range = range(0.0, 1e9, "");
-/// A required standard deviation.
+/// Required standard deviation.
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 
 impl Range {
-    /// True if it holds `x`; never for NaN.
+    /// True if the range contains `x`; false for NaN.
     pub fn admits(&self, x: f64) -> bool {
         (self.low..=self.high).contains(&x)
     }
 }
 
-/// The shortest text of a number, with a power of ten where it is very small or large.
-struct Short(f64);
+/// Shortest text of a number, with a power of ten for very small and large numbers.
+struct ShortNumber(f64);
 
-impl fmt::Display for Short {
+impl fmt::Display for ShortNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             x if x == 0.0 || (1e-3..1e5).contains(&x.abs()) => write!(f, "{x}"),
@@ -73,25 +72,25 @@ impl fmt::Display for Short {
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} to {}", Short(self.low), Short(self.high))?;
+        write!(f, "{} to {}", ShortNumber(self.low), ShortNumber(self.high))?;
         if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
     }
 }
 
-/// A number beyond its range.
+/// Error for a number beyond its range.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} is {found}; expected {expected}")]
 pub struct RangeError {
-    /// What has the number.
+    /// Name of the quantity.
     pub what: String,
-    /// The number found.
+    /// Number found.
     pub found: String,
-    /// The range.
+    /// Admitted range.
     pub expected: String,
 }
 
 impl Range {
-    /// Refuses a number that it does not hold.
+    /// Refuses a number that the range does not contain.
     ///
     /// # Errors
     /// [`RangeError`] that names `what`.
@@ -99,7 +98,7 @@ impl Range {
         if self.admits(x) {
             return Ok(());
         }
-        Err(RangeError { what: what.into(), found: Short(x).to_string(), expected: self.to_string() })
+        Err(RangeError { what: what.into(), found: ShortNumber(x).to_string(), expected: self.to_string() })
     }
 }
 

@@ -1,43 +1,43 @@
-//! What a file says of the records of its runs: what columns are called, their units, and how the intervals
-//! at rest are found.
+//! Reading of the records of a run, as a file states it: names and units of columns, and the detection of
+//! intervals at rest.
 
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How the records of `obsdeg calibrate` are read.
+/// Reading of the records of `obsdeg calibrate`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
-    /// What a column is called in the record, by its name here.
+    /// Names of the columns in the record, by their names here.
     pub columns: BTreeMap<String, String>,
-    /// The unit of a column, or what one count of it is, by its name here: `2.44e-5 g`.
+    /// Units of the columns, or the size of one count, by their names here: `2.44e-5 g`.
     pub units: BTreeMap<String, String>,
-    /// What outputs of a model are known to be, where they are no columns.
+    /// Known values of a model's outputs that are no columns.
     pub values: BTreeMap<String, f64>,
-    /// How the intervals at rest are found from the data.
+    /// Detection of the intervals at rest; `None` if they are not found from the data.
     pub still: Option<Still>,
-    /// By which part of the interval between rows their stamps may differ from the timeline of a scheme;
-    /// `None`: as the program has it.
+    /// Fraction of the interval between rows by which their time stamps may differ from the timeline of a
+    /// scheme; `None` for the program's default.
     pub tolerance: Option<f64>,
-    /// Values that stand for missing ones in the columns of a scheme's record, as they are written.
+    /// Codes of missing values in the columns of a scheme's record, as written.
     pub missing: Vec<f64>,
 }
 
-/// Intervals at rest are where the scatter within a window about each sample, all columns together, is within
-/// so many times that of the beginning of the record. (D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014,
-/// doi:10.1109/ICRA.2014.6907297.)
+/// Detection of intervals at rest: the variance within a window about each sample, all columns together, is
+/// at most `factor` times that of the initial rest. Source: D. Tedaldi, A. Pretto, E. Menegatti, ICRA 2014,
+/// doi:10.1109/ICRA.2014.6907297.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Still {
-    /// The known inputs of a model whose scatter decides; of a scheme the forces.
+    /// Known inputs of a model whose scatter decides; for a scheme, the forces.
     pub by: Vec<String>,
-    /// How long the record is at rest at first, in the unit of its time (s of a scheme), as are the others.
+    /// Duration of the initial rest, in the unit of the record's time (s for a scheme).
     pub initial: f64,
-    /// The window.
+    /// Width of the window about each sample, in the unit of the record's time.
     pub window: f64,
-    /// So many times the variance of the beginning.
+    /// Largest variance at rest over that of the initial rest, dimensionless.
     pub factor: f64,
-    /// Shorter intervals are none.
+    /// Shortest interval at rest, in the unit of the record's time; shorter intervals are discarded.
     pub shortest: f64,
 }
 
@@ -163,16 +163,16 @@ fn six() -> f64 {
 }
 
 impl Recording {
-    /// What an output is known to be: of an entry of a vector its own value, or that of the whole.
+    /// Known value of an output; an entry of a vector has its own value, or that of the whole vector.
     pub fn value(&self, output: &str) -> Option<f64> {
         let whole = output.split('[').next().unwrap_or(output);
         self.values.get(output).or_else(|| self.values.get(whole)).copied()
     }
 
-    /// What is wrong with it, whatever the file.
+    /// Checks numbers and texts, independently of the rest of the file.
     ///
     /// # Errors
-    /// What was found and expected.
+    /// Description of the fault and of the expected values.
     pub fn check(&self) -> Result<(), String> {
         if let Some(s) = &self.still {
             for (key, x, least) in [
@@ -202,10 +202,10 @@ impl Recording {
         bad.map_or(Ok(()), |(name, x)| Err(format!("values.{name} is {x}; expected a finite number")))
     }
 
-    /// The same for a model with these known `inputs` and `outputs`.
+    /// Checks the reading for a model with these known `inputs` and `outputs`.
     ///
     /// # Errors
-    /// As [`Self::check`].
+    /// Description of the fault, as for [`Self::check`].
     pub(crate) fn check_model(&self, inputs: &[&str], outputs: &[&str]) -> Result<(), String> {
         self.check()?;
         let none = |kind: &str, list: &[&str], name: &str| {

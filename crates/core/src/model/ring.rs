@@ -1,29 +1,29 @@
-//! The rings in which one and the same model is written out.
+//! Rings in which the same model is evaluated.
 
 use std::sync::OnceLock;
 
 use obsdeg_exact::series::SeriesRing;
 use obsdeg_exact::{Ball, Field};
 
-/// What a model needs of its numbers. The platform is written once over this trait: its images in a
-/// prime field give the verdicts, in `f64` the decimals, as text the exact formulas.
+/// Arithmetic that a model needs of its numbers. The platform is written once over this trait: its images in
+/// a prime field give the verdicts, in `f64` the decimals, as text the exact formulas.
 pub trait Ring {
-    /// An element.
+    /// Element of the ring.
     type Element: Clone;
     /// The neutral element of addition.
     fn zero(&self) -> Self::Element;
     /// The neutral element of multiplication.
     fn one(&self) -> Self::Element;
-    /// `a + b`.
+    /// Sum `a + b`.
     fn add(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
-    /// `a b`.
+    /// Product `a b`.
     fn mul(&self, a: &Self::Element, b: &Self::Element) -> Self::Element;
-    /// `-a`.
+    /// Negative `-a`.
     fn neg(&self, a: &Self::Element) -> Self::Element;
-    /// True if `a` is zero for certain.
+    /// True if `a` is certainly zero.
     fn is_zero(&self, a: &Self::Element) -> bool;
 
-    /// `sum a_i b_i`.
+    /// Sum of products `sum a_i b_i`.
     fn dot<'a>(
         &self,
         terms: impl IntoIterator<Item = (&'a Self::Element, &'a Self::Element)>,
@@ -94,7 +94,7 @@ impl Ring for SeriesRing {
     }
 }
 
-/// Floating-point numbers.
+/// Ring of floating-point numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Float;
 
@@ -126,15 +126,15 @@ impl Ring for Float {
     }
 }
 
-/// A real number of 512 bits with a bound on its error.
+/// Real number of 512 bits with a bound on its error.
 pub(crate) type Real = Ball<8>;
 
-/// Real numbers of many digits.
+/// Ring of real numbers of many digits.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ManyDigits;
 
 impl ManyDigits {
-    /// The angle of the half turn, computed once.
+    /// Angle of the half turn, computed once.
     fn pi() -> &'static Real {
         static PI: OnceLock<Real> = OnceLock::new();
         PI.get_or_init(Real::pi)
@@ -154,8 +154,8 @@ impl ManyDigits {
         })
     }
 
-    /// The nearest double, zero where only zero is possible to 1e-60; `None` where the number is not known to
-    /// all digits of a double.
+    /// The nearest double, or zero if the number cannot be distinguished from zero to 1e-60; `None` if the
+    /// number is not known to all digits of a double.
     pub(crate) fn to_f64(x: &Real) -> Option<f64> {
         let known =
             if x.is_zero() { x.radius_log2() < -200.0 } else { x.radius_log2() < x.size_log2() - 60.0 };
@@ -185,7 +185,7 @@ impl Ring for ManyDigits {
     }
 }
 
-/// The sign of a text and its magnitude as a factor: a sum is put in brackets.
+/// Sign of a text, and its magnitude as a factor: a sum is put in brackets.
 fn signed_factor(text: &str) -> (bool, String) {
     let (minus, rest) = text.strip_prefix('-').map_or((false, text), |rest| (true, rest));
     let mut depth = 0;
@@ -201,7 +201,7 @@ fn signed_factor(text: &str) -> (bool, String) {
     if sum { (false, format!("({text})")) } else { (minus, rest.to_string()) }
 }
 
-/// Expressions as text, unexpanded but for zeros and ones.
+/// Ring of expressions as text, not expanded except for zeros and ones.
 #[derive(Debug, Clone, Copy)]
 pub struct Text;
 

@@ -1,4 +1,4 @@
-//! Turning the platform: rotating segments, and the way from one position to the next.
+//! Turns of the platform: rotating segments, and slews from one position to the next.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,16 +8,16 @@ use super::angle::{Angle, parse_decimal};
 /// Smallest rotation in 1e-9 degrees.
 pub(crate) const MIN_ROTATION: i64 = 1_000_000;
 
-/// An axis to turn about.
+/// Axis of a turn: one of six.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Axis {
-    /// 0, 1, 2: X_p, Y_p, Z_p or N, U, E.
+    /// Index 0, 1, 2 of the axis: X_p, Y_p, Z_p or N, U, E.
     pub index: usize,
-    /// A geographic axis, not one of the platform.
+    /// True for a geographic axis, false for a platform axis.
     pub geographic: bool,
 }
 
-/// Not one of the six axes.
+/// Error for a text that is not one of the six axes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is not an axis to turn about; expected X_p, Y_p, Z_p (platform) or N, U, E (geographic)")]
 pub struct AxisError {
@@ -45,22 +45,22 @@ impl fmt::Display for Axis {
     }
 }
 
-/// A rotating segment: psi^n goes on through it.
+/// Rotation of a segment; psi^n continues through it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rotation {
-    /// About what.
+    /// Axis of the rotation.
     pub axis: Axis,
-    /// The whole angle, right-handed; constant and not zero.
+    /// Total angle, right-handed; constant and not zero.
     pub angle: Angle,
 }
 
-/// Why a text is no rotation.
+/// Reasons why a text is no rotation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RotationError {
-    /// Not an axis.
+    /// The text does not name an axis.
     #[error(transparent)]
     About(#[from] AxisError),
-    /// Not an angle.
+    /// The text has no admitted angle.
     #[error("`{found}` is no angle to turn by; expected decimal degrees of at least 0.001 in magnitude")]
     Angle {
         /// The text found.
@@ -78,7 +78,7 @@ impl Rotation {
     }
 }
 
-/// An angle to turn by.
+/// Angle of a rotation from its text.
 ///
 /// # Errors
 /// [`RotationError::Angle`] for anything but decimal degrees of at least 0.001 in magnitude.
@@ -93,7 +93,7 @@ impl fmt::Display for Rotation {
     }
 }
 
-/// What a slew turns about.
+/// Axis of a slew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SlewAxis {
     /// One of the six axes.
@@ -103,7 +103,7 @@ pub enum SlewAxis {
 }
 
 impl SlewAxis {
-    /// A direction in n, if it is one.
+    /// Direction in n; `None` unless it has three finite components, not all zero.
     pub fn direction(components: &[f64]) -> Option<Self> {
         let direction: [f64; 3] = components.try_into().ok()?;
         let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -118,14 +118,15 @@ impl FromStr for SlewAxis {
     }
 }
 
-/// The way to a position from the one before: a turn at a constant rate, without observation.
+/// Slew to a position from the one before: a turn at a constant rate, without observation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SlewTo {
-    /// The rate in deg/s; `None`: that of the conditions.
+    /// Rate in deg/s; `None`: rate of the conditions.
     pub rate_deg_s: Option<f64>,
-    /// About this axis; `None`: the shortest way, half turns about the axis in n (North, Up, East) whose
-    /// first component that is not zero is positive.
+    /// Axis of the slew. `None`: the shortest turn; a half turn goes about the axis in n (North, Up, East)
+    /// whose first non-zero component is positive.
     pub axis: Option<SlewAxis>,
-    /// By this angle, right-handed; `None`: the shorter way about the axis, half turns right-handed.
+    /// Angle of the slew, right-handed. `None`: the shorter turn about the axis; a half turn is
+    /// right-handed.
     pub angle: Option<Angle>,
 }

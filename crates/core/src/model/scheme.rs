@@ -1,4 +1,4 @@
-//! A torquing scheme: positions, carry, latitude, geometry and what is unknown.
+//! Torquing schemes: positions, carry, latitude, geometry and unknown terms.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fmt;
@@ -21,19 +21,19 @@ use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
 
-/// A geographic latitude, an exact decimal of degrees in -90..=90.
+/// Geographic latitude, an exact decimal of degrees in -90..=90.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Latitude {
     nanodeg: i64,
 }
 
-/// Why a text is no latitude.
+/// Reasons why a text is no latitude.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LatitudeError {
-    /// Not an exact decimal.
+    /// The text is not an exact decimal.
     #[error("latitude: {0}")]
     Decimal(AngleError),
-    /// Beyond a pole.
+    /// The latitude is beyond a pole.
     #[error("latitude {found} is out of range; expected -90 to 90 degrees")]
     OutOfRange {
         /// The text found.
@@ -52,12 +52,12 @@ impl Latitude {
         self.nanodeg as f64 / 1e9
     }
 
-    /// True if `wN = 0`.
+    /// True at a pole, where `wN = 0`.
     pub fn is_pole(self) -> bool {
         self.nanodeg.abs() == 90_000_000_000
     }
 
-    /// True if `wU = 0`.
+    /// True at the equator, where `wU = 0`.
     pub(crate) fn is_equator(self) -> bool {
         self.nanodeg == 0
     }
@@ -80,177 +80,180 @@ impl fmt::Display for Latitude {
     }
 }
 
-/// A torquing scheme and the assumptions under which it is judged.
+/// Torquing scheme, with the assumptions under which it is judged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Scheme {
-    /// What it is called; empty where nothing says.
+    /// Name of the scheme; empty if it has none.
     pub name: String,
-    /// What it is for.
+    /// Purpose of the scheme.
     pub description: String,
-    /// The positions, in order.
+    /// Positions in order of time.
     pub positions: Vec<Position>,
-    /// What is carried between positions.
+    /// Carry between positions.
     pub carry: Carry,
-    /// `None`: generic (`wN`, `wU` independent).
+    /// Latitude; `None`: generic (`wN`, `wU` independent).
     pub latitude: Option<Latitude>,
-    /// How the gyros are mounted.
+    /// Mounting of the gyros and accelerometers.
     pub geometry: Geometry,
-    /// What is unknown besides psi.
+    /// Unknowns besides psi.
     pub unknowns: Unknowns,
     /// True if `psi_y^n` is measured too.
     pub measured_azimuth: bool,
     /// Linear combinations of unknowns to be judged, as written by the user.
     pub combinations: Vec<String>,
-    /// Conditions of a simulation, as far as the scheme gives them.
+    /// Conditions of a simulation, as far as the scheme states them.
     pub simulation: Settings,
-    /// The largest sigma allowed, by unknown or family, in deg, deg/h, deg/h/g.
+    /// Largest sigma allowed, by unknown or family, in deg, deg/h, deg/h/g.
     pub requirements: BTreeMap<String, f64>,
-    /// Sizes (one sigma) of errors that are not estimated, by error or family, in ug, ppm, arcsec, deg/h/g^2.
+    /// Sizes (one sigma) of errors that are not estimated, by error or family, in ug, ppm, arcsec,
+    /// deg/h/g^2.
     pub bench: BTreeMap<String, f64>,
     /// Random walk of coefficients between calibrations, by coefficient or family, in the unit of the
     /// coefficient per sqrt(day).
     pub ageing: BTreeMap<String, f64>,
-    /// How far the gimbals turn.
+    /// Limits of the gimbals.
     pub gimbals: Gimbals,
-    /// How the platform is turned from one position to the next, where a position does not say.
+    /// Slew path between positions that state none; `None` if the scheme states no path.
     pub path: Option<Path>,
-    /// How the records of its runs are read.
+    /// Reading of the records of its runs.
     pub recording: Recording,
 }
 
-/// Most unknowns of an analysis: bases of what derivatives span are matrices of unknowns by unknowns.
+/// Largest number of unknowns of an analysis: bases of the spans of derivatives are square matrices of this
+/// size.
 pub(crate) const MAX_UNKNOWNS: usize = 1000;
 
-/// Why a scheme cannot be analysed.
+/// Reasons why a scheme cannot be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SchemeError {
-    /// No position.
+    /// The scheme has no position.
     #[error("the scheme has no position; expected at least one, as in --angles 0,0,0")]
     Empty,
-    /// More positions than the program takes.
+    /// The scheme has more positions than the program takes.
     #[error("the scheme has {found} positions; expected at most {MAX_POSITIONS}")]
     TooMany {
         /// Number of positions.
         found: usize,
     },
-    /// More unknowns than an analysis takes.
+    /// The scheme has more unknowns than an analysis takes.
     #[error(
         "{found} unknowns; expected at most {} (under reset carry every position has three of its own)",
         MAX_UNKNOWNS
     )]
     TooManyUnknowns {
-        /// Their number.
+        /// Number of unknowns.
         found: usize,
     },
-    /// Two positions of one name.
+    /// Two positions have the same name.
     #[error("two positions are named `{name}`; expected different names")]
     DuplicateName {
-        /// The name.
+        /// Name of the two positions.
         name: String,
-        /// The index of the second.
+        /// Index of the second position.
         index: usize,
     },
-    /// A name that tables and formulas cannot hold.
+    /// Tables and formulas cannot print a position's name.
     #[error("position name `{name}`; expected up to {MAX_NAME} letters, digits, `_`, `-`, `.` and blanks")]
     PositionName {
-        /// The name, or its first characters.
+        /// Name of the position, or its first characters.
         name: String,
-        /// The index of the position.
+        /// Index of the position.
         index: usize,
     },
-    /// A text that is too long for a report.
+    /// A text is too long for a report.
     #[error("{key} has {found} characters; expected at most {most}")]
     LongText {
-        /// The key in a scheme file.
+        /// Key in a scheme file.
         key: String,
-        /// Its length.
+        /// Number of characters of the text.
         found: usize,
-        /// The most.
+        /// Largest number of characters.
         most: usize,
     },
-    /// Too many combinations.
+    /// The scheme has too many combinations.
     #[error("{found} combinations; expected at most {MAX_COMBINATIONS}")]
     Combinations {
-        /// Their number.
+        /// Number of combinations.
         found: usize,
     },
-    /// A number beyond its range.
+    /// A number is beyond its range.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// A number for something that no gyro model has.
+    /// A number is given for an unknown that no gyro model has.
     #[error("`{name}`: no such unknown; {}", settings::meant(name))]
     UnknownName {
-        /// The key in a scheme file.
+        /// Key in a scheme file.
         key: String,
-        /// The name, or its first characters.
+        /// Name found, or its first characters.
         name: String,
     },
-    /// A size for something that no bench has.
+    /// A size is given for an error that no bench has.
     #[error("`{name}`: no such error; {}", omitted_names::omitted_meant(name))]
     BenchName {
-        /// The key in a scheme file.
+        /// Key in a scheme file.
         key: String,
-        /// The name, or its first characters.
+        /// Name found, or its first characters.
         name: String,
     },
-    /// The drift alone is constant at one position only.
+    /// Several positions with the unknowns `drift`: the drift is constant at one position only.
     #[error(
-        "the unknowns `drift` describe a single position; found {found} positions (use coefficients such as --terms F,I,O,S)"
+        "the unknowns `drift` describe a single position; found {found} positions (use coefficients such \
+         as --terms F,I,O,S)"
     )]
     DriftPositions {
         /// Number of positions.
         found: usize,
     },
-    /// A dwell out of range.
+    /// A dwell is out of range.
     #[error("a dwell of {found} s; expected 1e-9 to 1e9 s")]
     Dwell {
-        /// The seconds found.
+        /// Seconds found.
         found: String,
     },
-    /// A rotation that is none.
+    /// A rotation is impossible.
     #[error("the rotation of `{name}` is too small or generic; expected at least 0.001 degrees")]
     Rotation {
-        /// The segment.
+        /// Name of the segment.
         name: String,
-        /// Its index.
+        /// Index of the segment.
         index: usize,
     },
-    /// A position that the gimbals do not reach.
+    /// The gimbals do not reach a position.
     #[error("the gimbals do not reach `{name}` ({attitude}); expected {limits}")]
     Gimbals {
-        /// The position.
+        /// Name of the position.
         name: String,
-        /// Its index.
+        /// Index of the position.
         index: usize,
-        /// Its angles, and how far it has turned.
+        /// Angles of the position, and the angle of its rotation so far.
         attitude: String,
-        /// The limits.
+        /// Limits of the gimbals.
         limits: String,
     },
-    /// A slew to the first position.
+    /// The first position has a slew.
     #[error("`{name}` is the first position; expected no slew to it")]
     FirstSlew {
-        /// The position.
+        /// Name of the first position.
         name: String,
     },
-    /// An impossible mounting.
+    /// The mounting is impossible.
     #[error(transparent)]
     Geometry(#[from] super::geometry::GeometryError),
-    /// A coefficient that is there twice.
+    /// A coefficient occurs twice.
     #[error(transparent)]
     Terms(#[from] super::terms::TermError),
-    /// A way that has no exact verdict.
+    /// A slew path has no exact verdict.
     #[error(transparent)]
     Path(#[from] PathError),
 }
 
-/// A turn in 1e-9 degrees.
+/// Whole turn in 1e-9 degrees.
 const FULL_TURN: i64 = 360_000_000_000;
-/// Stations of a rotation lie at multiples of this part of it (of a turn, if it is more): at most seven of
-/// them.
+/// Stations of a rotation lie at multiples of this fraction of it (of a whole turn, if the rotation exceeds
+/// one): at most seven of them.
 const STATION_STEPS: i64 = 8;
-/// So many are different along a whole turn, which is enough for two g factors; with more the verdicts would
-/// say too little.
+/// Asserts that the distinct stations along a whole turn suffice for the g factors of every drift term (at
+/// most two). With more factors they would span too little, and verdicts would miss observable unknowns.
 const _: () = {
     let mut term = 0;
     while term < Term::ALL.len() {
@@ -263,17 +266,17 @@ const _: () = {
     }
 };
 
-/// Most positions that a scheme may have.
+/// Largest number of positions of a scheme.
 pub(crate) const MAX_POSITIONS: usize = 1000;
-/// Most combinations that a scheme may ask for, and characters of one.
+/// Largest number of combinations that a scheme may request, and of characters of one.
 pub(crate) const MAX_COMBINATIONS: usize = 100;
 const MAX_COMBINATION: usize = 1000;
-/// Most characters of the name and of the description of a scheme.
+/// Largest number of characters of the name and of the description of a scheme.
 const MAX_TITLE: usize = 200;
 const MAX_DESCRIPTION: usize = 10_000;
 
 impl SchemeError {
-    /// The key of the offender in a scheme file, as in `position.1.name`; `None` when it is the whole scheme.
+    /// Key of the offending entry in a scheme file, as in `position.1.name`; `None` for the whole scheme.
     pub fn key(&self) -> Option<String> {
         match self {
             Self::Empty | Self::Dwell { .. } | Self::TooManyUnknowns { .. } => None,
@@ -313,10 +316,10 @@ impl Scheme {
         Self { positions, ..Self::default() }
     }
 
-    /// Checks what the types do not.
+    /// Checks all conditions that the types do not ensure.
     ///
     /// # Errors
-    /// [`SchemeError`] naming the offender.
+    /// [`SchemeError`] naming the offending entry.
     pub fn validate(&self) -> Result<(), SchemeError> {
         let found = self.positions.len();
         if found == 0 {
@@ -349,7 +352,7 @@ impl Scheme {
         Ok(())
     }
 
-    /// Names and other texts.
+    /// Checks names and other texts.
     fn validate_texts(&self) -> Result<(), SchemeError> {
         let plain = |c: char| c.is_alphanumeric() || "_-. ".contains(c);
         let mut names = HashSet::new();
@@ -379,7 +382,7 @@ impl Scheme {
         Ok(())
     }
 
-    /// Numbers and the names that they are for.
+    /// Checks numbers and the names that they are for.
     fn validate_numbers(&self) -> Result<(), SchemeError> {
         let lists = self.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
         for (key, list) in lists
@@ -409,10 +412,11 @@ impl Scheme {
         Ok(())
     }
 
-    /// The scheme with every dwell times `factor`; `dwell_s` is that of positions that do not say.
+    /// The scheme with every dwell multiplied by `factor`; `dwell_s` is the dwell, in s, of positions that
+    /// state none.
     ///
     /// # Errors
-    /// [`SchemeError::Dwell`] when that is no dwell.
+    /// [`SchemeError::Dwell`] if a product is no dwell.
     pub fn with_dwells(&self, dwell_s: f64, factor: f64) -> Result<Self, SchemeError> {
         let mut other = self.clone();
         for p in &mut other.positions {
@@ -423,14 +427,14 @@ impl Scheme {
         Ok(other)
     }
 
-    /// True if it says that turning to a position takes time.
+    /// True if the scheme states that turns between positions take time.
     pub fn slews(&self) -> bool {
         let own = |p: &Position| p.slew.as_ref().is_some_and(|s| s.rate_deg_s.is_some());
         self.simulation.slew_rate_deg_s.is_some() || self.positions.iter().any(own)
     }
 
-    /// The scheme without a position; the one behind it is reached from another attitude then, the shortest
-    /// way.
+    /// The scheme without a position. The next position is then reached from another attitude, by the
+    /// shortest turn.
     pub fn without_position(&self, index: usize) -> Self {
         let mut rest = self.clone();
         rest.positions =
@@ -442,7 +446,7 @@ impl Scheme {
         rest
     }
 
-    /// Name of a further position: `p3` for the third, unless another position has it.
+    /// Name of a further position: `p3` for the third, unless another position has that name.
     pub(crate) fn free_name(&self, number: usize) -> String {
         let mut name = format!("p{number}");
         while self.positions.iter().any(|p| p.name == name) {
@@ -451,33 +455,33 @@ impl Scheme {
         name
     }
 
-    /// True if a segment rotates.
+    /// True if any segment rotates.
     pub fn rotates(&self) -> bool {
         self.positions.iter().any(|p| p.rotation.is_some())
     }
 
-    /// True if rotations are judged by the course of Z while they go on, not at attitudes of the arc: where
+    /// True if rotations are judged by the output history during the turn, not at attitudes of the arc: if
     /// not only drifts are unknown.
     pub fn by_course(&self) -> bool {
         self.rotates() && (self.unknowns.have(Source::Rate) || self.unknowns.have(Source::Force))
     }
 
-    /// What is observed.
+    /// Observed quantities.
     pub fn observed(&self) -> Observed {
         Observed { azimuth: self.measured_azimuth, accelerometers: self.unknowns.have(Source::Force) }
     }
 
-    /// How the unknown coefficients enter.
+    /// Error model of the unknown coefficients.
     pub fn error_model(&self) -> ErrorModel {
         let terms = self.unknowns.terms().iter().flat_map(|t| t.coefficients(&self.geometry));
         terms.map(|(_, effect)| effect).collect::<Vec<_>>().into()
     }
 
-    /// The attitudes at which derivative rows are taken. The rows along a rotation are trigonometric
+    /// Stations: attitudes at which derivative rows are taken. The rows along a rotation are trigonometric
     /// polynomials of its angle, of degree m = 1 + the largest number of g factors (one for `C_c^n`, one for
-    /// each component of g^c): any 2m+1 different angles of the arc span what all of it spans. The end is
-    /// added, where psi is handed on. Of a rotation that is judged by its course both ends are there, and no
-    /// row is taken at them.
+    /// each component of g^c). Any 2m+1 distinct angles of the arc span the same space as the whole arc. The
+    /// end is added, since psi continues from there. A rotation that is judged by its output history has
+    /// stations at both ends, and no row is taken at them.
     pub fn stations(&self) -> Vec<Station<'_>> {
         let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0);
         let course = self.by_course();
@@ -502,15 +506,15 @@ impl Scheme {
         out
     }
 
-    /// True if verdicts depend on how positions are reached: torquer errors act while psi^n is carried.
+    /// True if verdicts depend on the slew paths: torquer errors act while psi^n is carried.
     pub fn torquers_act(&self) -> bool {
         self.carry == Carry::Inertial && self.unknowns.have(Source::Rate) && self.positions.len() > 1
     }
 
-    /// The turns that lead to every position, where verdicts depend on them; nothing where they do not.
+    /// Turns that lead to every position, if verdicts depend on them; empty otherwise.
     ///
     /// # Errors
-    /// [`PathError`] when a way is not stated or has no exact form.
+    /// [`PathError`] if a slew path is not stated or has no exact form.
     pub fn paths(&self) -> Result<Vec<Vec<PathStep>>, PathError> {
         if !self.torquers_act() {
             return Ok(Vec::new());
@@ -526,7 +530,7 @@ impl Scheme {
                 return Err(PathError::NotStated { name, index, terms });
             };
             out.push(path::steps(from, to, path).map_err(|e| match e {
-                StepError::NoWay => PathError::NoWay { name, index },
+                StepError::NotReached => PathError::NotReached { name, index },
                 StepError::NotExact(found) => PathError::NotExact { name, index, found },
             })?);
         }
@@ -549,7 +553,7 @@ impl Scheme {
 mod tests {
     use super::*;
 
-    /// A scheme that no file was read for is checked as well.
+    /// A scheme that was not read from a file is checked as well.
     #[test]
     fn names_of_requirements_and_settings_are_known() {
         let zero = || std::array::from_fn(|_| Angle::from_degrees(0));

@@ -1,5 +1,4 @@
-//! What a scheme says of a run: steps, noise, true values, priors, requirements. All in the units of the
-//! report.
+//! Settings of a run: steps, noise, true values, priors, requirements, all in the units of the report.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -37,10 +36,10 @@ pub enum FilterKind {
 }
 
 impl FilterKind {
-    /// All of them.
+    /// All kinds of filters.
     pub const ALL: [Self; 3] = [Self::Linear, Self::Extended, Self::Iterated];
 
-    /// The name in files and options.
+    /// Name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -73,19 +72,19 @@ pub enum DriftNoise {
 }
 
 impl DriftNoise {
-    /// The number without its unit.
+    /// Number without its unit.
     pub fn amount(self) -> f64 {
         match self {
             Self::OneStep(x) | Self::RandomWalk(x) => x,
         }
     }
 
-    /// Refuses what is neither zero nor in its range.
+    /// Refuses a number that is neither zero nor in its range.
     pub fn check(self, what: &str) -> Result<(), RangeError> {
         if self.amount() == 0.0 { Ok(()) } else { ranges::DRIFT_NOISE.check(what, self.amount()) }
     }
 
-    /// The standard deviation in rad/s of the bias held over one step of `dt` seconds.
+    /// Standard deviation in rad/s of the bias that is constant over one step of `dt` seconds.
     pub fn held_rad_s(self, dt: f64) -> f64 {
         match self {
             Self::OneStep(x) => x.to_radians() / 3600.0,
@@ -93,8 +92,8 @@ impl DriftNoise {
         }
     }
 
-    /// Its density in deg/sqrt(h) (angle random walk) with steps of `dt` seconds: a bias held for one step
-    /// turns by `x dt`, and independent steps add up in squares.
+    /// Density in deg/sqrt(h) (angle random walk) with steps of `dt` seconds. A bias x that is constant over
+    /// one step turns by `x dt`; independent steps add up in squares.
     pub fn density_deg_sqrt_h(self, dt: f64) -> f64 {
         match self {
             Self::OneStep(x) => x * (dt / 3600.0).sqrt(),
@@ -103,25 +102,26 @@ impl DriftNoise {
     }
 }
 
-/// A text that is no random drift.
+/// Reasons why a text is no random drift.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DriftNoiseError {
-    /// No number with a unit.
+    /// The text has no number with a unit.
     #[error(
-        "`{found}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of one step) or \"0.001 deg/sqrt(h)\""
+        "`{found}` is no random drift; expected 0, or a number with a unit, as in \"0.01 deg/h\" (bias of \
+         one step) or \"0.001 deg/sqrt(h)\""
     )]
     Form {
-        /// What was found.
+        /// Text found.
         found: String,
     },
-    /// A number out of its range.
+    /// The number is out of its range.
     #[error("`{found}`: expected 0, or {expected} {unit}")]
     Value {
-        /// What was found.
+        /// Number found.
         found: String,
-        /// The range.
+        /// Admitted range.
         expected: String,
-        /// Of what.
+        /// Unit of the number.
         unit: String,
     },
 }
@@ -131,7 +131,7 @@ impl FromStr for DriftNoise {
     fn from_str(text: &str) -> Result<Self, DriftNoiseError> {
         let wrong = || DriftNoiseError::Form { found: text.into() };
         let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
-        // none needs no unit
+        // zero needs no unit
         if compact.contains('0') && matches!(compact.trim_matches('0'), "" | ".") {
             return Ok(Self::OneStep(0.0));
         }
@@ -182,16 +182,16 @@ pub struct Assignment {
     pub value: f64,
 }
 
-/// A text that is no assignment.
+/// Error for a text that is no assignment.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is no assignment; expected NAME=NUMBER, as in D_FX=11 or psi=0.1")]
 pub struct AssignmentError {
-    /// What was found.
+    /// Text found.
     pub found: String,
 }
 
 impl fmt::Display for Assignment {
-    /// `D_FX=11`.
+    /// Text `D_FX=11`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.name, self.value)
     }
@@ -210,51 +210,52 @@ impl FromStr for Assignment {
     }
 }
 
-/// What a scheme file says of a run; what it leaves out has defaults.
+/// Settings of a run in a scheme file; missing ones have defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Settings {
-    /// linear or exact; left out, exact with a filter that has full attitudes, and linear otherwise.
+    /// Model of the truth: linear or exact; if missing, exact with a filter that has full attitudes, linear
+    /// otherwise.
     pub truth: Option<Truth>,
-    /// linear, extended or iterated; when left out, linear where the small-angle model holds.
+    /// Filter: linear, extended or iterated; if missing, linear where the small-angle model holds.
     pub filter: Option<FilterKind>,
-    /// Largest step in s; 10 when left out.
+    /// Largest step in s; 10 if missing.
     pub step_s: Option<f64>,
-    /// Dwell of positions without dwell_s; 1000 when left out.
+    /// Dwell, in s, of positions without dwell_s; 1000 if missing.
     pub dwell_s: Option<f64>,
-    /// Rate of the rotations between positions in deg/s; instantaneous when left out.
+    /// Rate of the rotations between positions in deg/s; instantaneous if missing.
     pub slew_rate_deg_s: Option<f64>,
-    /// Noise of the observation per sample in g; 1e-5 when left out.
+    /// Noise of the observation per sample in g; 1e-5 if missing.
     pub accelerometer_noise_g: Option<f64>,
-    /// Bias instability of the accelerometers in ug; none when left out.
+    /// Bias instability of the accelerometers in ug; none if missing.
     pub accelerometer_bias_instability_ug: Option<f64>,
-    /// Its correlation time in s; 3600 when left out.
+    /// Correlation time of the accelerometer bias instability in s; 3600 if missing.
     pub accelerometer_correlation_time_s: Option<f64>,
-    /// Noise of a measured azimuth per sample in deg; 0.001 when left out.
+    /// Noise of a measured azimuth per sample in deg; 0.001 if missing.
     pub azimuth_noise_deg: Option<f64>,
-    /// "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
+    /// Random drift: "0.01 deg/h" (bias of one step) if missing, or for instance "0.001 deg/sqrt(h)".
     pub drift_noise: Option<DriftNoise>,
-    /// Angle random walk of the gyros in deg/sqrt(h), instead of drift_noise; none when left out.
+    /// Angle random walk of the gyros in deg/sqrt(h), instead of drift_noise; none if missing.
     pub angle_random_walk_deg_sqrt_h: Option<PerGyro>,
-    /// Rate random walk of the gyros in deg/h/sqrt(h); none when left out.
+    /// Rate random walk of the gyros in deg/h/sqrt(h); none if missing.
     pub rate_random_walk_dph_sqrt_h: Option<PerGyro>,
-    /// Bias instability of the gyros in deg/h; none when left out.
+    /// Bias instability of the gyros in deg/h; none if missing.
     pub bias_instability_dph: Option<PerGyro>,
-    /// Correlation time of the bias instability in s; 3600 when left out.
+    /// Correlation time of the bias instability in s; 3600 if missing.
     pub correlation_time_s: Option<f64>,
-    /// exponential (default) or rk4.
+    /// Propagation of the filter: exponential (default) or rk4.
     pub propagation: Option<Propagation>,
-    /// Factor on the true drift coefficients and their priors.
+    /// Factor on the true drift coefficients and their priors, dimensionless.
     pub drift_scale: Option<f64>,
-    /// True values by unknown or family, as in D_F = 11.
+    /// True values by unknown or family, in the unit of the unknown, as in D_F = 11.
     pub values: BTreeMap<String, f64>,
-    /// Initial estimates.
+    /// Initial estimates by unknown or family, in the unit of the unknown.
     pub estimates: BTreeMap<String, f64>,
-    /// Initial standard deviations.
+    /// Initial standard deviations by unknown or family, in the unit of the unknown.
     pub priors: BTreeMap<String, f64>,
 }
 
 impl Settings {
-    /// Every number by its key in a scheme file, with its range.
+    /// Numbers by their keys in a scheme file, each with its range.
     pub(crate) fn numbers(&self) -> Vec<(String, f64, Range)> {
         let single = [
             ("step_s", self.step_s, ranges::STEP_S),
@@ -292,7 +293,7 @@ impl Settings {
         single.chain(gyros).chain(lists).collect()
     }
 
-    /// The noises of the gyros by their keys.
+    /// Noises of the gyros by their keys.
     pub(crate) fn gyros(&self) -> [(&'static str, Option<PerGyro>); 3] {
         [
             ("angle_random_walk_deg_sqrt_h", self.angle_random_walk_deg_sqrt_h),
@@ -301,7 +302,7 @@ impl Settings {
         ]
     }
 
-    /// The lists by their keys, with the range of their numbers.
+    /// Lists by their keys, with the range of their numbers.
     pub(crate) fn lists(&self) -> [(&'static str, &BTreeMap<String, f64>, Range); 3] {
         [
             ("values", &self.values, ranges::VALUE),
@@ -332,7 +333,7 @@ pub(crate) fn may_be_unknown(name: &str) -> bool {
     is_family(name) || axis(name.strip_suffix("^n").unwrap_or(name)) || at(name)
 }
 
-/// True if a gyro model may have it, even if the scheme at hand does not.
+/// True if a gyro model may have this family, even if the scheme at hand does not.
 pub fn is_family(name: &str) -> bool {
     families().chain(coefficients()).any(|known| known == name)
 }
@@ -342,13 +343,13 @@ fn families() -> impl Iterator<Item = String> {
     ["psi", "eps", "D"].into_iter().chain(super::Term::ALL.iter().map(|t| t.family())).map(String::from)
 }
 
-/// The coefficients that an error model may have.
+/// Names of the coefficients that an error model may have.
 fn coefficients() -> impl Iterator<Item = String> {
     let geometry = super::Geometry::default();
     super::Term::ALL.iter().flat_map(move |t| t.coefficients(&geometry)).map(|(name, _)| name)
 }
 
-/// What could have been meant by `name`, of all that some scheme has.
+/// Hint for an unknown `name`: the nearest name among the unknowns and families of any scheme.
 pub(crate) fn meant(name: &str) -> String {
     let axes = |stem: &str, letters: [char; 3]| letters.map(|l| format!("{stem}{l}"));
     let angles = ["psi_", "eps_"].into_iter().flat_map(|stem| axes(stem, ['x', 'y', 'z']));
@@ -360,8 +361,8 @@ pub(crate) fn meant(name: &str) -> String {
     }
 }
 
-/// What could have been meant by `name` among the `names` of unknowns and their families: the nearest, or all
-/// there is (the first of very many).
+/// Hint for an unknown `name` among the `names` of unknowns and their families: the nearest name, or all
+/// names (the first ones of very many).
 pub fn known(names: &[String], name: &str) -> String {
     let mut families: Vec<String> = families().collect();
     families.dedup();
@@ -399,7 +400,7 @@ mod tests {
         for wrong in ["", ".", "00.1", "0 h", "0.01", "-1 deg/h", "nan deg/h", "1 rad/s", "deg/h"] {
             assert!(wrong.parse::<DriftNoise>().is_err(), "{wrong}");
         }
-        // a random walk of N deg/sqrt(h) turns by N after an hour, whatever the step
+        // a random walk of N deg/sqrt(h) turns by N deg after an hour, whatever the step
         let walk = |dt: f64| DriftNoise::RandomWalk(0.3).held_rad_s(dt) * dt * (3600.0 / dt).sqrt();
         assert!((walk(10.0).to_degrees() - 0.3).abs() < 1e-12 && (walk(1.0) - walk(10.0)).abs() < 1e-15);
     }

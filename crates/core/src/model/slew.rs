@@ -1,4 +1,4 @@
-//! The computed attitude over time: constant at a position, turning about an eigenaxis during a slew.
+//! Computed attitude over time: constant at a position, turning about a fixed axis during a slew.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::attitude::Matrix3;
 use super::ring::Float;
 use super::rotation::{Axis, Rotation, SlewAxis, SlewTo};
 
-/// The earth rate in rad/s.
+/// Earth rate in rad/s.
 pub const W_IE: f64 = 7.292115e-5;
 
 /// Turn of the platform about a fixed axis.
@@ -26,19 +26,19 @@ impl Turn {
     }
 }
 
-/// `a b` in floating point.
+/// Product `a b` in floating point.
 #[inline]
 pub fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
     crate::model::attitude::product(&Float, a, b)
 }
 
-/// `a b`.
+/// Product `a b` of a matrix and a vector.
 #[inline]
 pub fn apply(a: &Matrix3<f64>, b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|j| a[i][j] * b[j]).sum())
 }
 
-/// The transpose.
+/// Transpose of a matrix.
 #[inline]
 pub fn transpose(a: &Matrix3<f64>) -> Matrix3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
@@ -59,20 +59,20 @@ pub fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j)) + s * k[i][j] + c * k2[i][j]))
 }
 
-/// `[v x]`.
+/// Matrix `[v x]`.
 #[inline]
 pub fn cross(v: &[f64; 3]) -> Matrix3<f64> {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
-/// Turns that differ by less are one, in rad: rounding leaves 1e-15, angles of nine decimals are 1.7e-11
-/// apart.
+/// Tolerance in rad below which two turns are the same: rounding is about 1e-15, and angles of nine decimals
+/// differ by at least 1.7e-11.
 const SAME: f64 = 1e-12;
-/// A component of an axis that counts for the sense of a half turn.
+/// Smallest component of an axis that decides the sense of a half turn.
 const COMPONENT: f64 = 1e-6;
 
-/// The rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. Of the two vectors of a
-/// half turn the one whose first component that is not zero is positive.
+/// Rotation vector of a rotation matrix: `rotation(v) = r`, of length at most pi. For a half turn, the
+/// vector whose first non-zero component is positive.
 pub fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     let sine = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]].map(|x| x / 2.0);
     let length = norm(&sine);
@@ -81,7 +81,7 @@ pub fn rotation_vector(r: &Matrix3<f64>) -> [f64; 3] {
     if cosine > -0.5 {
         return if length > 1e-7 { sine.map(|x| x * angle / length) } else { sine };
     }
-    // towards half a turn the sine loses its direction; r + r^T = 2 cos + 2 (1 - cos) a a^T keeps it
+    // near half a turn the sine loses its direction; r + r^T = 2 cos + 2 (1 - cos) a a^T keeps it
     let largest = (0..3).fold(0, |b, i| if r[i][i] > r[b][b] { i } else { b });
     let scale = 2.0 * (1.0 - cosine);
     let column = std::array::from_fn(|i| {
@@ -101,7 +101,7 @@ fn norm(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// True if a rotation by so many rad leads as well the other way round.
+/// True if a rotation by `angle` rad is a half turn: the opposite rotation has the same end.
 fn is_half_turn(angle: f64) -> bool {
     (angle.abs() - std::f64::consts::PI).abs() <= SAME
 }
@@ -112,47 +112,47 @@ fn axis_in_c(from: &Matrix3<f64>, axis: Axis) -> [f64; 3] {
     if axis.geographic { apply(&transpose(from), &unit) } else { unit }
 }
 
-/// A turn does not lead to the position.
+/// Error for a turn that does not lead to the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NoWay;
+pub struct TurnMismatch;
 
-/// A turn from one attitude to another about a fixed axis at a constant rate.
+/// Turn from one attitude to another about a fixed axis at a constant rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slew {
     /// `C_c^n` at the start.
     pub from: Matrix3<f64>,
-    /// The rate `omega_nc` in the axes of c, rad/s (constant).
+    /// Rate `omega_nc` in the axes of c, in rad/s (constant).
     pub rate: [f64; 3],
-    /// How long it takes, in s.
+    /// Duration of the turn, in s.
     pub duration_s: f64,
 }
 
 impl Slew {
-    /// A rotating segment from `from` that takes `duration_s`.
+    /// Rotation of a segment from `from`, of duration `duration_s`.
     pub fn about(from: &Matrix3<f64>, rotation: &Rotation, duration_s: f64) -> Self {
         let rate = (rotation.angle.nanodeg() as f64 / 1e9).to_radians() / duration_s;
         Self { from: *from, rate: axis_in_c(from, rotation.axis).map(|x| x * rate), duration_s }
     }
 
-    /// A turn by a rotation vector (rad) in the axes of c, at `rate_rad_s`.
+    /// Turn by a rotation vector (rad) in the axes of c, at `rate_rad_s`.
     pub fn by(from: &Matrix3<f64>, vector: &[f64; 3], rate_rad_s: f64) -> Self {
         let duration_s = norm(vector) / rate_rad_s;
         Self { from: *from, rate: vector.map(|x| x / duration_s), duration_s }
     }
 
-    /// The way to `to` as `slew` describes it, at `rate_rad_s`; `None` when there is nothing to turn. Without
-    /// an axis it is the shortest way; of two shortest ways, half turns, the one about the axis in n (North,
-    /// Up, East) whose first component that is not zero is positive. So `from -> from P`, `to -> to P`, a
-    /// turn of the platform axes, leaves the turn in n as it is.
+    /// Turn to the attitude `to` as `slew` describes it, at `rate_rad_s`; `None` if the attitude stays the
+    /// same. Without an axis it is the shortest turn. A half turn goes about the axis in n (North, Up, East)
+    /// whose first non-zero component is positive. So a turn of the platform axes, `from -> from P`,
+    /// `to -> to P`, leaves the turn in n unchanged.
     ///
     /// # Errors
-    /// [`NoWay`] when a turn about its axis, or by its angle, does not lead there.
+    /// [`TurnMismatch`] if a turn about the axis, or by the angle, does not lead there.
     pub fn to(
         from: &Matrix3<f64>,
         to: &Matrix3<f64>,
         slew: &SlewTo,
         rate_rad_s: f64,
-    ) -> Result<Option<Self>, NoWay> {
+    ) -> Result<Option<Self>, TurnMismatch> {
         let shortest = apply(&transpose(from), &rotation_vector(&times(to, &transpose(from))));
         let length = norm(&shortest);
         let axis = match &slew.axis {
@@ -161,37 +161,38 @@ impl Slew {
             None if length < SAME => return Ok(None),
             None => shortest.map(|x| x / length),
         };
-        // about a given axis the shorter way, a half turn right-handed; by a given angle whatever it is
+        // about a given axis take the shorter turn, a half turn right-handed; a given angle is taken as it
+        // is
         let along: f64 = shortest.iter().zip(&axis).map(|(x, a)| x * a).sum();
         let along = if is_half_turn(length) { along.abs() } else { along };
         let angle = slew.angle.as_ref().map_or(along, |a| (a.nanodeg() as f64 / 1e9).to_radians());
         let reached = times(from, &rotation(&axis.map(|x| x * angle)));
         let missed = (0..9).map(|k| (reached[k / 3][k % 3] - to[k / 3][k % 3]).abs()).fold(0.0, f64::max);
         if missed > 1e-6 {
-            return Err(NoWay);
+            return Err(TurnMismatch);
         }
         let duration_s = angle.abs() / rate_rad_s;
         let rate = axis.map(|x| x * angle / duration_s);
         Ok((angle.abs() > SAME).then_some(Self { from: *from, rate, duration_s }))
     }
 
-    /// How it turns, seen from n.
+    /// The turn in n.
     pub fn turn(&self) -> Turn {
         let rate = norm(&self.rate);
-        // what rounding leaves of a component that is zero
+        // removes the rounding of components that are zero
         let clean = |x: f64| (x / rate * 1e12).round() / 1e12 + 0.0;
         let angle_deg = (rate * self.duration_s).to_degrees();
         let angle_deg = (angle_deg * 1e10).round() / 1e10;
         Turn { about: apply(&self.from, &self.rate).map(clean), angle_deg }
     }
 
-    /// The same two attitudes by the other way round, if both are half a turn.
+    /// The opposite turn between the same two attitudes; `None` unless it is a half turn.
     pub fn reversed(&self) -> Option<Self> {
         let half = is_half_turn(norm(&self.rate) * self.duration_s);
         half.then(|| Self { rate: self.rate.map(|x| -x), ..self.clone() })
     }
 
-    /// How far it turns in `t` seconds, with the earth rate, in rad.
+    /// Angle of the turn after `t` seconds, with the earth rate, in rad.
     pub fn turned(&self, t: f64) -> f64 {
         (norm(&self.rate) + W_IE) * t
     }
@@ -230,7 +231,7 @@ mod tests {
     }
 
     /// Half turns in n are the same for every turn of the platform axes, and go about the axis that the rule
-    /// says.
+    /// states.
     #[test]
     fn half_turns_are_chosen_in_n() {
         let names = crate::model::attitude::cardinal_names();
@@ -254,7 +255,7 @@ mod tests {
                 for p in &all {
                     assert_eq!(slew(p).map(|s| s.turn()), plain);
                 }
-                // the other way leads there too, in the same time
+                // the opposite turn leads there too, in the same time
                 if let Some(slew) = slew(&all[0]) {
                     let back = slew.reversed();
                     assert_eq!(back.is_some(), slew.turn().angle_deg == 180.0);
@@ -264,13 +265,13 @@ mod tests {
                 }
             }
         }
-        // about three axes and six diagonals
+        // half turns about three axes and six diagonals
         assert_eq!(half_turns, 24 * 9);
     }
 
     proptest! {
-        /// Short of half a turn, by as little as the last of nine decimals, the shorter way is taken; at it,
-        /// the rule.
+        /// Slightly short of half a turn (by the last of nine decimals) the shorter turn is taken; at half a
+        /// turn the rule decides.
         #[test]
         fn close_to_half_a_turn(v in prop::array::uniform3(-1f64..1.0), short in 1e-11f64..1e-3) {
             prop_assume!(norm(&v) > 0.1 && v[0].abs() > 1e-3);
@@ -291,9 +292,9 @@ mod tests {
         let slew = Slew::to(&from, &to, &eigenaxis, 0.02).expect("a way").expect("a turn");
         assert!(distance(&slew.at(slew.duration_s), &to) < 1e-12);
         assert_eq!(Slew::to(&from, &from, &eigenaxis, 0.02), Ok(None));
-        // about another axis there is no way
+        // about another axis no turn leads there
         let about = SlewTo { axis: "X_p".parse().ok(), ..SlewTo::default() };
-        assert_eq!(Slew::to(&from, &to, &about, 0.02), Err(NoWay));
+        assert_eq!(Slew::to(&from, &to, &about, 0.02), Err(TurnMismatch));
     }
 
     #[test]
@@ -313,10 +314,10 @@ mod tests {
         assert_eq!(degrees(&about(None)), 70.0);
         assert_eq!(degrees(&about(Some(-290))), -290.0);
         assert_eq!(degrees(&about(Some(430))), 430.0);
-        assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(NoWay));
+        assert_eq!(Slew::to(&unit, &to, &about(Some(71)), 0.01), Err(TurnMismatch));
     }
 
-    /// About a direction in n, by a signed angle or right-handed.
+    /// Turns about a direction in n, by a signed angle or right-handed.
     #[test]
     fn half_turns_about_skew_axes() {
         let unit = rotation(&[0.3, -0.2, 1.0]);

@@ -1,4 +1,4 @@
-//! The symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
+//! Symbols of exact formulas: sines and cosines of angles, square roots of 2 and 3.
 
 use std::sync::OnceLock;
 
@@ -8,41 +8,41 @@ use crate::model::platform::{Platform, Point, RandomValues, Sample};
 use crate::model::ring::{ManyDigits, Real, Ring, Text};
 use crate::model::scheme::Station;
 
-/// An angle whose sine and cosine stay symbols.
+/// Angle whose sine and cosine remain symbols.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Base {
+enum BaseAngle {
     /// A generic angle.
     Name(String),
     /// A constant angle between 0 and 45 degrees, in 1e-9 degrees.
     Constant(i64),
 }
 
-/// The symbols that the formulas of a scheme need.
+/// Symbols in the formulas of a scheme.
 #[derive(Debug, Clone, Default)]
 pub struct Symbols {
-    bases: Vec<Base>,
+    bases: Vec<BaseAngle>,
     radicals: bool,
     /// Indices of the positions that rotate.
     turning: Vec<usize>,
-    /// Cosine and sine of every constant angle in many digits, computed when the first is asked for.
+    /// Cosine and sine of every constant angle in many digits, computed at the first request.
     digits: OnceLock<Vec<Option<(Real, Real)>>>,
 }
 
 impl Symbols {
-    /// The symbols of `platform`: one base per generic name, and one per constant angle that is no
-    /// multiple of 15 degrees, up to sign, complement and supplement.
+    /// The symbols of `platform`: one base per generic name, and one per constant angle that is no multiple
+    /// of 15 degrees. Angles that agree up to sign, complement or supplement share a base.
     pub fn of(platform: &Platform) -> Self {
-        // combinations that are asked for may have roots of their own
+        // requested combinations may contain square roots
         let radicals = platform.scheme().combinations.iter().any(|c| c.contains('('));
         let positions = platform.scheme().positions.iter().enumerate();
         let turning = positions.filter(|(_, p)| p.rotation.is_some()).map(|(i, _)| i).collect();
         let mut out = Self { turning, radicals, ..Self::default() };
         for angle in platform.scheme().stations().iter().flat_map(Station::angles) {
             if let Some((name, _)) = angle.generic() {
-                out.add(Base::Name(name.into()));
+                out.add(BaseAngle::Name(name.into()));
             }
             if !angle.turn().is_multiple_of_deg(15) {
-                out.add(Base::Constant(octant(angle).0));
+                out.add(BaseAngle::Constant(octant(angle).0));
             } else if !angle.turn().is_multiple_of_deg(90) {
                 out.radicals = true;
             }
@@ -50,24 +50,24 @@ impl Symbols {
         out
     }
 
-    fn add(&mut self, base: Base) {
+    fn add(&mut self, base: BaseAngle) {
         if !self.bases.contains(&base) {
             self.bases.push(base);
         }
     }
 
-    /// How many angles have symbols.
+    /// Number of angles with symbols.
     pub fn angles(&self) -> usize {
         self.bases.len()
     }
 
-    /// Independent symbols, for the worker: the rates of the earth and of the platform.
+    /// Independent symbols for the worker: the rates of the earth and of the platform.
     pub fn independent(&self) -> Vec<String> {
         let turning = self.turning.iter().map(|&i| Self::rate_of_turning(i));
         ["wN", "wU"].map(String::from).into_iter().chain(turning).collect()
     }
 
-    /// The rate at which the position of this index turns, for the worker.
+    /// Symbol of the turning rate at the position of this index, for the worker.
     pub(crate) fn rate_of_turning(position: usize) -> String {
         format!("w_{position}")
     }
@@ -83,15 +83,15 @@ impl Symbols {
         (0..self.bases.len()).map(|i| self.suffix(i)).collect()
     }
 
-    /// Names and numbers share no suffix: names start with a letter.
+    /// Suffix of a symbol: a name or a number, which differ, since names start with a letter.
     fn suffix(&self, i: usize) -> String {
         match &self.bases[i] {
-            Base::Name(name) => name.clone(),
-            Base::Constant(_) => format!("{i}"),
+            BaseAngle::Name(name) => name.clone(),
+            BaseAngle::Constant(_) => format!("{i}"),
         }
     }
 
-    /// The platform as text, with rates 1 (or 0): coefficients are homogeneous in them.
+    /// The platform as text, with rates 1 (or 0): coefficients are homogeneous in the rates.
     pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> Point<Text> {
         let attitudes =
             platform.scheme().stations().iter().map(|s| s.attitude(&Text, |a| self.cos_sin(a))).collect();
@@ -102,8 +102,9 @@ impl Symbols {
     pub fn has(&self, angle: &Angle) -> bool {
         let base = octant(angle).0;
         let name = angle.generic().map(|(name, _)| name);
-        angle.turn().is_multiple_of_deg(15) && name.is_none_or(|n| self.bases.contains(&Base::Name(n.into())))
-            || name.is_none() && self.bases.contains(&Base::Constant(base))
+        angle.turn().is_multiple_of_deg(15)
+            && name.is_none_or(|n| self.bases.contains(&BaseAngle::Name(n.into())))
+            || name.is_none() && self.bases.contains(&BaseAngle::Constant(base))
     }
 
     /// The cosine and sine of an angle as text.
@@ -131,7 +132,7 @@ impl Symbols {
             15_000_000_000 => ("(r_2*r_3+r_2)/4".into(), "(r_2*r_3-r_2)/4".into()),
             30_000_000_000 => ("r_3/2".into(), "1/2".into()),
             45_000_000_000 => ("r_2/2".into(), "r_2/2".into()),
-            _ => match self.bases.iter().position(|b| *b == Base::Constant(base)) {
+            _ => match self.bases.iter().position(|b| *b == BaseAngle::Constant(base)) {
                 Some(i) => (format!("c_{}", self.suffix(i)), format!("s_{}", self.suffix(i))),
                 None => ("0".into(), "0".into()),
             },
@@ -145,7 +146,7 @@ impl Symbols {
         }
     }
 
-    /// Replaces the symbols by what they stand for: `sin(alpha)`, `cos(25 deg)`, `sqrt(2)`.
+    /// Text with the symbols replaced by their readable forms: `sin(alpha)`, `cos(25 deg)`, `sqrt(2)`.
     pub fn display(&self, text: &str) -> String {
         let mut out = String::new();
         let mut rest = text;
@@ -174,13 +175,13 @@ impl Symbols {
         };
         let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
         Some(match &self.bases[i] {
-            Base::Name(name) => format!("{function}({name})"),
-            Base::Constant(nanodeg) => format!("{function}({} deg)", format_decimal(*nanodeg)),
+            BaseAngle::Name(name) => format!("{function}({name})"),
+            BaseAngle::Constant(nanodeg) => format!("{function}({} deg)", format_decimal(*nanodeg)),
         })
     }
 
-    /// The value of a text in square roots and constant angles, right in all its digits whatever cancels;
-    /// `None` when it has another symbol, or when 512 bits do not tell it.
+    /// Value of a text in square roots and constant angles, correct in all digits even if terms cancel;
+    /// `None` if it contains another symbol, or if 512 bits do not suffice.
     pub(crate) fn float(&self, text: &str) -> Option<f64> {
         let at = |name: &str| -> Option<Real> {
             let (kind, suffix) = name.split_at_checked(2)?;
@@ -188,9 +189,9 @@ impl Symbols {
                 return Real::from_i64(suffix.parse().ok()?).sqrt();
             }
             let i = (0..self.bases.len()).find(|&i| self.suffix(i) == suffix)?;
-            let digits = |base: &Base| match base {
-                Base::Constant(nanodeg) => ManyDigits::cos_sin(*nanodeg),
-                Base::Name(_) => None,
+            let digits = |base: &BaseAngle| match base {
+                BaseAngle::Constant(nanodeg) => ManyDigits::cos_sin(*nanodeg),
+                BaseAngle::Name(_) => None,
             };
             let all = self.digits.get_or_init(|| self.bases.iter().map(digits).collect());
             let (c, s) = all[i].as_ref()?;
@@ -199,15 +200,15 @@ impl Symbols {
         ManyDigits::to_f64(&real(&parse(text).ok()?, &at)?)
     }
 
-    /// The value of a text in the symbols at a sample; `None` for what has none.
+    /// Value of a text in the symbols at a sample; `None` if it has none.
     pub fn value(&self, text: &str, values: &RandomValues, sample: &Sample) -> Option<u64> {
         let env = SymbolValues { symbols: self, values, sample };
         evaluate(&parse(text).ok()?, &sample.roots.field, &env).ok()
     }
 }
 
-/// The value of a rational expression; `None` for a name that `at` does not know, for a function, and for
-/// what is divided by zero.
+/// Value of a rational expression; `None` for a name that `at` does not know, for a function, and for a
+/// division by zero.
 fn real(e: &Expression, at: &dyn Fn(&str) -> Option<Real>) -> Option<Real> {
     let power = |x: &Real, k: i32| {
         let product = (0..k.unsigned_abs()).fold(Real::from_i64(1), |product, _| product.mul(x));
@@ -262,8 +263,8 @@ impl Environment for SymbolValues<'_> {
         let (kind, suffix) = name.split_at_checked(2)?;
         let i = (0..self.symbols.bases.len()).find(|&i| self.symbols.suffix(i) == suffix)?;
         let (c, s) = match &self.symbols.bases[i] {
-            Base::Constant(nanodeg) => angle(*nanodeg),
-            Base::Name(name) => self.values.generic_cos_sin(name, self.sample)?,
+            BaseAngle::Constant(nanodeg) => angle(*nanodeg),
+            BaseAngle::Name(name) => self.values.generic_cos_sin(name, self.sample)?,
         };
         match kind {
             "c_" => Some(c),
@@ -287,7 +288,7 @@ mod tests {
     use crate::model::scheme::{Scheme, parse_attitude};
     use obsdeg_exact::SplitMix64;
 
-    /// What cancels costs no digits: `(1 - cos x) / sin x = tan(x / 2)`, whose series is summed here.
+    /// Cancellation costs no digits: `(1 - cos x) / sin x = tan(x / 2)`, whose series is summed here.
     #[test]
     fn texts_have_all_their_digits() {
         for nanodeg in [1, 1000, 1_000_000, 100_000_000] {
@@ -308,7 +309,7 @@ mod tests {
         assert_eq!(symbols.float("wN"), None);
     }
 
-    /// The text of every cosine and sine has the value that the sample has.
+    /// The text of every cosine and sine has the value of the sample.
     #[test]
     fn texts_have_the_values_of_the_sample() {
         let attitudes = [

@@ -1,4 +1,4 @@
-//! The error terms of gyros, torquers and accelerometers, and which of them are unknown.
+//! Error terms of gyros, torquers and accelerometers, and the selection of unknown terms.
 
 use std::fmt;
 use std::str::FromStr;
@@ -47,44 +47,43 @@ pub enum Term {
     Kx,
 }
 
-/// What an error term is a function of.
+/// Quantity that an error term depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// Components of `g^c`, in g: it is a drift.
+    /// Components of `g^c`, in g; the term is a drift.
     Gravity,
-    /// The rate with which the gyro is torqued: it is a drift.
+    /// Rate at which the gyro is torqued; the term is a drift.
     Rate,
-    /// Components of the specific force `f = -g^c`, in g: it is an error of Z.
+    /// Components of the specific force `f = -g^c`, in g; the term is an error of Z.
     Force,
 }
 
-/// How one unknown coefficient enters: along the input axis of its sensor, times components of what it is a
-/// function of.
+/// Effect of one unknown coefficient: along the input axis of its sensor, times components of the source.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ErrorTerm {
-    /// The input axis of the gyro or accelerometer.
+    /// Input axis of the gyro or accelerometer.
     pub input: SignedAxis,
-    /// The components that the coefficient multiplies; none for a constant.
+    /// Axes of the components that the coefficient multiplies; none for a constant.
     pub factors: Vec<SignedAxis>,
-    /// Of what.
+    /// Quantity whose components these are.
     pub source: Source,
 }
 
 impl ErrorTerm {
-    /// A constant drift along the input axis of a gyro.
+    /// Constant drift along the input axis of a gyro.
     pub fn bias(input: SignedAxis) -> Self {
         Self { input, factors: Vec::new(), source: Source::Gravity }
     }
 }
 
-/// Which coefficients of a triad a term has.
+/// Coefficients of a term in a triad of sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
-    /// One of each sensor.
+enum TriadShape {
+    /// One coefficient per sensor.
     Each,
-    /// One of each sensor and other sensor.
+    /// One coefficient per sensor and other sensor.
     Others,
-    /// One of each sensor and sensor before it.
+    /// One coefficient per sensor and sensor before it.
     Before,
 }
 
@@ -113,7 +112,7 @@ impl Term {
         Self::Kx,
     ];
 
-    /// How it is written in a list of terms.
+    /// Letters of the term in a list of terms.
     pub const fn letters(self) -> &'static str {
         match self {
             Self::F => "F",
@@ -139,7 +138,7 @@ impl Term {
         }
     }
 
-    /// What it is a function of.
+    /// Quantity that the term depends on.
     pub const fn source(self) -> Source {
         match self {
             Self::GS | Self::GM | Self::GM3 => Source::Rate,
@@ -148,7 +147,7 @@ impl Term {
         }
     }
 
-    /// The first part of the names of its coefficients: what they are called together.
+    /// Family: first part of the names of the coefficients, and their common name.
     pub const fn family(self) -> &'static str {
         match self {
             Self::F => "D_F",
@@ -167,7 +166,7 @@ impl Term {
         }
     }
 
-    /// What it is, in words.
+    /// Description of the term in words.
     pub const fn words(self) -> &'static str {
         match self {
             Self::F => "drift that does not depend on g",
@@ -195,15 +194,15 @@ impl Term {
         }
     }
 
-    const fn shape(self) -> Shape {
+    const fn shape(self) -> TriadShape {
         match self {
-            Self::GM | Self::M6 | Self::Kx => Shape::Others,
-            Self::GM3 | Self::M3 => Shape::Before,
-            _ => Shape::Each,
+            Self::GM | Self::M6 | Self::Kx => TriadShape::Others,
+            Self::GM3 | Self::M3 => TriadShape::Before,
+            _ => TriadShape::Each,
         }
     }
 
-    /// The number of components that a coefficient multiplies.
+    /// Number of components that a coefficient multiplies.
     pub const fn order(self) -> usize {
         match self {
             Self::F | Self::K0 => 0,
@@ -221,7 +220,7 @@ impl Term {
         }
     }
 
-    /// The unit of its coefficients.
+    /// Unit of the coefficients.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::F => "deg/h",
@@ -235,7 +234,7 @@ impl Term {
         }
     }
 
-    /// Its coefficients, sensor by sensor: names and how they enter.
+    /// Coefficients of the term, sensor by sensor: names and effects.
     pub(crate) fn coefficients(self, geometry: &Geometry) -> Vec<(String, ErrorTerm)> {
         let inputs = match self.source() {
             Source::Force => geometry.accelerometers.inputs(),
@@ -244,9 +243,9 @@ impl Term {
         let mut out = Vec::new();
         for (i, input) in inputs.into_iter().enumerate() {
             let others: Vec<Option<usize>> = match self.shape() {
-                Shape::Each => vec![None],
-                Shape::Others => (0..3).filter(|&j| j != i).map(Some).collect(),
-                Shape::Before => (0..i).map(Some).collect(),
+                TriadShape::Each => vec![None],
+                TriadShape::Others => (0..3).filter(|&j| j != i).map(Some).collect(),
+                TriadShape::Before => (0..i).map(Some).collect(),
             };
             for other in others {
                 let factors = match (self, other) {
@@ -266,7 +265,7 @@ impl Term {
         out
     }
 
-    /// The axes of a gyro whose components of g a drift multiplies.
+    /// Axes of a gyro whose components of g the drift is multiplied by.
     fn gravity(self, gyro: &GyroAxes) -> Vec<SignedAxis> {
         let letters = if self == Self::F { "" } else { self.letters() };
         let axis = |letter| match letter {
@@ -292,10 +291,10 @@ pub enum DefinedBy {
 }
 
 impl DefinedBy {
-    /// All of them.
+    /// All frames.
     pub const ALL: [Self; 3] = [Self::Accelerometers, Self::Gyros, Self::Body];
 
-    /// The name in files and options.
+    /// Name in files and options.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Accelerometers => "accelerometers",
@@ -304,7 +303,7 @@ impl DefinedBy {
         }
     }
 
-    /// The misalignments of gyros and accelerometers.
+    /// Terms of the misalignments of gyros and accelerometers.
     pub const fn misalignments(self) -> [Term; 2] {
         match self {
             Self::Accelerometers => [Term::GM, Term::M3],
@@ -314,7 +313,7 @@ impl DefinedBy {
     }
 }
 
-/// Not one of the frames.
+/// Error for a text that is not one of the frames.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{found}` is not a frame; expected accelerometers, gyros or body")]
 pub struct FrameError {
@@ -330,59 +329,62 @@ impl FromStr for DefinedBy {
     }
 }
 
-/// Why a list of terms is not usable.
+/// Reasons why a list of terms is not usable.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TermError {
-    /// Not a term.
+    /// A text is not a term.
     #[error(
-        "`{found}` is not a term; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, GS, GM, GM3 (gyros), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or gyros, accelerometers, all, or `drift` alone"
+        "`{found}` is not a term; expected some of F, I, O, S, II, OO, SS, IO, IS, OS, GS, GM, GM3 \
+         (gyros), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or gyros, accelerometers, all, or `drift` \
+         alone"
     )]
     Unknown {
         /// The text found.
         found: String,
     },
-    /// The same term twice.
+    /// A term occurs twice.
     #[error("term {found} is listed twice; expected every term once")]
     Duplicate {
-        /// The term.
+        /// Letters of the term.
         found: &'static str,
     },
-    /// A term and its lower triangle.
+    /// A term and its lower triangle both occur.
     #[error("terms {whole} and {triangle}: the second is part of the first; expected one of them")]
     Both {
-        /// The six.
+        /// Letters of the term with six coefficients.
         whole: &'static str,
-        /// The three of them.
+        /// Letters of its lower triangle.
         triangle: &'static str,
     },
-    /// Misalignments that do not go with the frame.
+    /// A misalignment does not fit the frame.
     #[error("frame {frame} makes {expected} the unknown misalignments; found {found} among the terms")]
     Frame {
-        /// The frame.
+        /// Name of the frame.
         frame: &'static str,
-        /// Its misalignments.
+        /// Misalignments of the frame.
         expected: String,
-        /// The term.
+        /// Letters of the misalignment found.
         found: &'static str,
     },
-    /// A frame, and nothing that it is for.
+    /// A frame is given, but no term depends on it.
     #[error(
-        "frame {frame}, but no misalignment is among the terms; expected a family (gyros, accelerometers, all) or one of {expected}"
+        "frame {frame}, but no misalignment is among the terms; expected a family (gyros, accelerometers, \
+         all) or one of {expected}"
     )]
     NoMisalignment {
-        /// The frame.
+        /// Name of the frame.
         frame: &'static str,
-        /// Its misalignments.
+        /// Misalignments of the frame.
         expected: String,
     },
 }
 
-/// What is unknown besides psi.
+/// Unknowns besides psi.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unknowns {
-    /// The coefficients of these terms, for the three gyros and accelerometers.
+    /// Coefficients of these terms, for the three gyros and accelerometers.
     Coefficients(Vec<Term>),
-    /// The total drift `eps^n` of a single position, with `psi` in n: (8), (9).
+    /// Total drift `eps^n` of a single position, with `psi` in n: (8), (9).
     Drift,
 }
 
@@ -394,7 +396,7 @@ impl Default for Unknowns {
 
 impl Unknowns {
     /// A comma-separated list of terms such as `F,I,O,S` and families (`gyros`, `accelerometers`, `all`), or
-    /// `drift`; `frame` says which misalignments there are.
+    /// `drift`. The `frame` decides the misalignments of families.
     ///
     /// # Errors
     /// [`TermError`].
@@ -427,7 +429,8 @@ impl Unknowns {
             let own = frame.misalignments();
             let expected = own.map(Term::letters).join(" and ");
             let frame = frame.name();
-            let mut found = terms.iter().filter(|t| t.shape() != Shape::Each && **t != Term::Kx).peekable();
+            let mut found =
+                terms.iter().filter(|t| t.shape() != TriadShape::Each && **t != Term::Kx).peekable();
             if found.peek().is_none() {
                 return Err(TermError::NoMisalignment { frame, expected });
             }
@@ -441,7 +444,7 @@ impl Unknowns {
         Ok(unknowns)
     }
 
-    /// Checks that no coefficient is there twice.
+    /// Checks that no coefficient occurs twice.
     ///
     /// # Errors
     /// [`TermError::Both`].
@@ -455,7 +458,7 @@ impl Unknowns {
         Ok(())
     }
 
-    /// The terms; none for the drift itself.
+    /// Terms; none if the unknown is the drift itself.
     pub fn terms(&self) -> &[Term] {
         match self {
             Self::Coefficients(terms) => terms,
@@ -463,7 +466,7 @@ impl Unknowns {
         }
     }
 
-    /// True if a term of this source is among them.
+    /// True if the unknowns have a term with this source.
     pub fn have(&self, source: Source) -> bool {
         self.terms().iter().any(|t| t.source() == source)
     }
@@ -523,7 +526,7 @@ mod tests {
         assert!("sideways".parse::<DefinedBy>().is_err());
     }
 
-    /// The counts of the model, every name once.
+    /// Every term has the number of coefficients of the model, and every name occurs once.
     #[test]
     fn coefficients_of_every_term() {
         let geometry = Geometry::default();

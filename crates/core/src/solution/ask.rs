@@ -1,11 +1,11 @@
-//! What the solver asks of the symbolic worker.
+//! Requests of the solver to the symbolic worker.
 
 use obsdeg_exact::Radical;
 use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protocol::CheckTerm};
 
 use super::local::ZTerm;
-use super::problem::{Outputs, Problem};
-use super::solve::{Contribution, Key, Used};
+use super::problem::{LinearSystem, SystemOutputs};
+use super::solve::{Contribution, Key, UsedRow};
 use super::solver::{Functional, Solver};
 use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
@@ -23,12 +23,12 @@ impl Solver<'_> {
         }
     }
 
-    pub(super) fn ask_for_outputs(&mut self, problem: &Problem) -> Option<Vec<String>> {
+    pub(super) fn ask_for_outputs(&mut self, problem: &LinearSystem) -> Option<Vec<String>> {
         let request = self.request(problem.to_text(&self.text_or_none()?, &[]), None);
         Some(self.ask(&request)?.0)
     }
 
-    /// Asks for a formula; after one that was too much work no other is attempted.
+    /// Requests a formula; after one that exceeded the limit of work no other is requested.
     fn ask(&mut self, request: &Request) -> Option<(Vec<String>, bool)> {
         let answer = self.worker.as_deref_mut()?.ask(request);
         if matches!(answer, Err(WorkerError::OverLimit { .. })) {
@@ -41,13 +41,13 @@ impl Solver<'_> {
         (!self.text.is_empty()).then(|| self.text.clone())
     }
 
-    /// The numbers of the printed terms as text, solved and verified by the worker; `None` when there
-    /// is none, or the job failed.
+    /// Numbers of the printed terms as text, solved and verified by the worker; `None` if there are none, or
+    /// if the job failed.
     pub(super) fn ask_for_solution(
         &mut self,
         functional: &Functional,
-        problem: &Problem,
-        used: &[Used],
+        problem: &LinearSystem,
+        used: &[UsedRow],
         plan: &[(Key, Vec<Contribution>)],
     ) -> Option<Vec<String>> {
         let text = self.text_or_none()?;
@@ -73,13 +73,13 @@ impl Solver<'_> {
                 row
             })
             .collect();
-        debug_assert!(problem.outputs == Outputs::Unknowns);
+        debug_assert!(problem.outputs == SystemOutputs::Unknowns);
         let check = self.check(used, target);
         let request = self.request(system, Some(check));
         self.ask(&request).filter(|(_, verified)| *verified).map(|(texts, _)| texts)
     }
 
-    fn check(&self, used: &[Used], target: Vec<(String, String)>) -> Check {
+    fn check(&self, used: &[UsedRow], target: Vec<(String, String)>) -> Check {
         let zeros = self.tables.zeros;
         let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
         let observed = self.platform.observed();

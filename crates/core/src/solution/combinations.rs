@@ -1,4 +1,4 @@
-//! From the staircase to named combinations and null vectors.
+//! Named combinations and null vectors, from the staircase.
 
 use obsdeg_exact::{Echelon, Radical};
 
@@ -8,35 +8,35 @@ use crate::degree::sparse::{extend_by_short_vectors, support};
 use crate::model::Platform;
 use crate::model::platform::LOCAL_NAMES;
 use crate::solution::print::{StationLabel, stations};
-use crate::solution::problem::Problem;
+use crate::solution::problem::LinearSystem;
 use crate::solution::solver::{Functional, Solver, Sparse};
 use crate::solution::support::short_support;
 
-/// A named observable combination.
+/// Named observable combination.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Combination {
-    /// What it is, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`.
+    /// Name, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`.
     pub name: String,
-    /// Its coefficients in the first field of the verdicts (up to a factor).
+    /// Coefficients in the first field of the verdicts, up to a factor.
     pub vector: Vec<u64>,
-    /// Its coefficients, that of the leading unknown first, if they could be computed.
+    /// Exact coefficients, that of the leading unknown first; `None` if they could not be computed.
     pub functional: Option<Functional>,
-    /// The smallest k with the combination in `V_k`.
+    /// Observable degree: the smallest k with the combination in `V_k`.
     pub degree: usize,
 }
 
-/// A null vector: a direction in which the unknowns change without any change of Z.
+/// Null vector: a direction in which the unknowns change without any change of Z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NullVector {
-    /// Its components in the first field of the verdicts (up to a factor).
+    /// Components in the first field of the verdicts, up to a factor.
     pub vector: Vec<u64>,
-    /// The columns that occur.
+    /// Columns with non-zero components.
     pub support: Vec<usize>,
-    /// Its components, if they could be computed.
+    /// Exact components; `None` if they could not be computed.
     pub components: Option<Sparse>,
 }
 
-/// `D_FZ - wN*psi_y`, if nothing in it is longer than [`READABLE`] or a decimal.
+/// Text such as `D_FZ - wN*psi_y`; `None` if a number in it is longer than [`READABLE`] or a decimal.
 fn readable_sum(platform: &Platform, terms: &Sparse) -> Option<String> {
     let readable =
         |c: &Coefficient| c.form() != Form::Decimal && c.without_rates().to_string().len() <= READABLE;
@@ -47,7 +47,7 @@ fn readable_sum(platform: &Platform, terms: &Sparse) -> Option<String> {
         .then(|| linear_combination(terms.iter().map(|(c, k)| (k, names[*c].as_str()))))
 }
 
-/// A row of the tables by the names of a position: `eps_z^n@p2 - wN*psi_y^n@p2`.
+/// Row of the tables in the local unknowns of a position: `eps_z^n@p2 - wN*psi_y^n@p2`.
 fn local_name(solver: &Solver<'_>, labels: &[StationLabel], row: usize) -> String {
     let tables = &solver.tables;
     let at = &labels[tables.station(row)].label;
@@ -59,16 +59,16 @@ fn local_name(solver: &Solver<'_>, labels: &[StationLabel], row: usize) -> Strin
     linear_combination(terms.iter().map(|(c, name)| (c, name.as_str())))
 }
 
-/// The leading column of a support: the first constant (a coefficient, not psi), else the first.
+/// Leading column of a support: the first coefficient (no psi), or else the first column.
 fn lead(platform: &Platform, support: &[usize]) -> usize {
     let constant = |c: &&usize| !platform.names()[**c].starts_with("psi");
     support.iter().find(constant).copied().unwrap_or(support[0])
 }
 
-/// A basis of the staircase beyond single unknowns: for every degree k, combinations that together with the
-/// unknowns of degree up to k and the combinations before span `V_k`. Sparse combinations of unknowns with
-/// coefficients that a person can read come first; what these leave is spanned by `psi^n` and `eps^n` at
-/// single positions.
+/// Basis of the staircase beyond single unknowns: for every degree k, combinations that span `V_k` together
+/// with the unknowns of degree up to k and the combinations before. Sparse combinations of unknowns with
+/// readable coefficients come first; combinations of `psi^n` and `eps^n` at single positions complete the
+/// basis.
 pub(crate) fn combinations(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -114,7 +114,7 @@ pub(crate) fn combinations(
     };
     let mut out: Vec<Combination> = chosen.into_iter().filter_map(sum).collect();
     let labels = stations(platform.scheme());
-    // what else is determined while it turns holds rates of turning, and has no name
+    // other combinations that are determined during a turn contain turning rates, and have no name
     let positions = if platform.scheme().by_course() { &[][..] } else { &verdicts.stairs[..] };
     for (k, basis) in positions.iter().enumerate() {
         let mut span = singles(k);
@@ -137,7 +137,7 @@ pub(crate) fn combinations(
     out
 }
 
-/// The coefficients of a combination found as `vector`, scaled to one at the first of `support`.
+/// Exact coefficients of a combination found as `vector`, scaled to one at the first of `support`.
 fn combination_coefficients(
     platform: &Platform,
     solver: &mut Solver<'_>,
@@ -149,11 +149,11 @@ fn combination_coefficients(
     let field = first.sample.roots.field;
     let allowed = solver.tables.rows_up_to(degree);
     let used = short_support(field, &first.rows, &allowed, vector, |_| 1)?;
-    let problem = Problem::combination(&used, platform.names().len(), support, support[0]);
+    let problem = LinearSystem::combination(&used, platform.names().len(), support, support[0]);
     solver.functional_of(support, &problem)
 }
 
-/// A sparse basis of the null space, without the unknowns that are not excited.
+/// Sparse basis of the null space, without the unknowns that are not excited.
 pub(crate) fn null_space(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -186,7 +186,7 @@ pub(crate) fn null_components(solver: &mut Solver<'_>, support: &[usize], order:
     let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
     let used: Vec<usize> =
         solver.tables.rows_up_to(order).into_iter().filter(|&j| basis.insert(&restricted(j))).collect();
-    let (values, _) = solver.coefficients(&Problem::null_vector(&used, support, lead))?;
+    let (values, _) = solver.coefficients(&LinearSystem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())
 }

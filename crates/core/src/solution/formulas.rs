@@ -1,4 +1,4 @@
-//! Z and its derivatives at each position, printed as formulas: (9), (10), (12), and the drift there.
+//! Formulas of Z and its derivatives at each position, and of the drift: (9), (10), (12).
 
 use obsdeg_symbolic::{Job, Request, WorkerError};
 use schemars::JsonSchema;
@@ -23,25 +23,25 @@ pub struct Formula {
     pub right: String,
 }
 
-/// Why there are no formulas.
+/// Reasons for the lack of formulas.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum FormulasError {
-    /// Torquer errors have no symbols.
+    /// Torquer errors are unknown: their turns have no symbols.
     #[error("no formulas of Z: those with torquer errors (GS, GM, GM3) are not written out")]
     Torquers,
-    /// What turning adds to derivatives of Z of accelerometers is not among them.
+    /// The platform turns with accelerometers among the unknowns: that case has no formulas.
     #[error("no formulas of Z: those with accelerometer errors of a platform that turns are not written out")]
     Turning,
-    /// Nobody derives them.
+    /// There is no symbolic engine.
     #[error("formulas of Z need the symbolic engine")]
     NoEngine,
-    /// It gave up.
+    /// The symbolic engine failed.
     #[error("no formulas of Z: {0}")]
     Engine(WorkerError),
 }
 
-/// The formulas of Z, Z', Z'' in n, which every position shares, then `psi^n` and `eps^n` of every position
-/// in the unknowns; where the platform turns `eps^n'` too.
+/// Formulas of Z, Z', Z'' in n, which all positions share, then of `psi^n` and `eps^n` of every position in
+/// the unknowns, and of `eps^n'` where the platform turns.
 ///
 /// # Errors
 /// [`FormulasError`].
@@ -58,7 +58,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
     let rotates = platform.scheme().rotates();
     let mut dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), observed, |i| {
-        // `psi_x^n` is a power to the engine
+        // the engine would read `psi_x^n` as a power
         let derivative = || LOCAL_NAMES[i - locals + 3].replace("^n", "_d");
         if i < locals { LOCAL_NAMES[i].replace("^n", "_n") } else { derivative() }
     });
@@ -119,7 +119,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     Ok(out)
 }
 
-/// Terms with their signs, as a sum.
+/// Sum of terms with their signs.
 fn sum(terms: impl Iterator<Item = String>) -> String {
     let mut out = String::new();
     for term in terms.filter(|t| !Text.is_zero(t)) {

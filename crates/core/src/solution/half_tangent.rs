@@ -1,18 +1,18 @@
-//! Where a polynomial in the tangent of half an angle vanishes, in degrees.
+//! Zeros, in degrees, of polynomials in the tangent of half an angle.
 
 use crate::language::{Expression, Node};
 
-/// The largest degree that is solved.
+/// Largest degree that is solved.
 const DEGREE: usize = 200;
-/// Intervals looked at before the rest counts as not resolved.
+/// Number of intervals examined before the rest counts as not resolved.
 const INTERVALS: usize = 1_000;
-/// Where one half of a turn is cut from the other, in t: no tangent of anybody's angle, so that no root lies
-/// at an end.
+/// Boundary in t between the two halves of a turn. It is the half tangent of no angle in use, so that no
+/// root lies at an end.
 const CUT: f64 = 1.037_128_492_311_7;
-/// A root is known to this, in rad.
+/// Accuracy of a root, in rad.
 const WIDTH: f64 = 1e-8;
 
-/// A number and a bound on the error of its rounding.
+/// Number with a bound on its rounding error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rounded {
     value: f64,
@@ -20,7 +20,7 @@ pub(super) struct Rounded {
 }
 
 impl Rounded {
-    /// The sign, if it is certain.
+    /// True for a positive number, false for a negative one; `None` if the sign is not certain.
     fn sign(self) -> Option<bool> {
         (self.value.abs() > self.error).then_some(self.value > 0.0)
     }
@@ -32,20 +32,20 @@ impl Rounded {
     }
 }
 
-/// The angles at which a polynomial vanishes.
+/// Angles at which a polynomial vanishes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Roots {
-    /// In degrees from 0 to 360, rising.
+    /// Angles in degrees from 0 to 360, ascending.
     pub(super) deg: Vec<f64>,
-    /// True if these are certainly all; otherwise rounding, the degree, or roots very close together left
-    /// some undecided.
+    /// True if these are certainly all angles. Otherwise rounding, the degree, or roots very close together
+    /// left some undecided.
     pub(super) all: bool,
 }
 
-/// The coefficients of a polynomial in one name, lowest first, with the values of the others from `at`;
-/// `None` for what is no polynomial.
+/// Coefficients of a polynomial in one name, lowest first, with the values of the others from `at`; `None`
+/// if the expression is no polynomial.
 pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64) -> Option<Vec<Rounded>> {
-    // each with the sum of the magnitudes that it is made of
+    // each coefficient with the sum of the magnitudes of its terms
     let mut values: Vec<Vec<(f64, f64)>> = Vec::with_capacity(e.nodes.len());
     let mut whole = true;
     let times = |a: &[(f64, f64)], b: &[(f64, f64)]| {
@@ -68,7 +68,7 @@ pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64)
             .collect()
     };
     let number = |x: f64| vec![(x, x.abs())];
-    // multiplications of sums in each other, as a bound
+    // bound on the number of nested multiplications of sums
     let mut depth = 0.0;
     for node in &e.nodes {
         let value = match node {
@@ -113,12 +113,12 @@ pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64)
     last.iter().all(|x| x.1.is_finite()).then(|| rounded.collect())
 }
 
-/// The angles in 0..360 degrees at which `sum c_k tan(angle/2)^k` vanishes, but for 180, where the tangent is
+/// Angles in 0..360 degrees at which `sum c_k tan(angle/2)^k` vanishes, except for 180, where the tangent is
 /// infinite; `None` for the zero polynomial.
 ///
-/// On `0..CUT` in t and in 1/t, both signs, the polynomial is written in Bernstein's basis: by Descartes'
-/// rule it has no root where all coefficients have one sign, and one where they change it once; other
-/// intervals are halved by de Casteljau's construction. A coefficient that its rounding exceeds has no sign.
+/// On `0..CUT` in t and in 1/t, both signs, the polynomial is written in Bernstein's basis. By Descartes'
+/// rule it has no root if all coefficients have the same sign, and one if they change it once. Other
+/// intervals are halved by de Casteljau's construction. A coefficient below its rounding error has no sign.
 pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
     let zero = |c: &Rounded| c.value == 0.0 && c.error == 0.0;
     let used = coefficients.iter().rposition(|c| !zero(c))?;
@@ -137,7 +137,7 @@ pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
     };
     let reversed: Vec<Rounded> = c.iter().rev().copied().collect();
     if out.all {
-        // angles of t and of 1/t
+        // angles of roots in t and in 1/t
         for (polynomial, sign, end, from_half_turn) in [
             (c, 1.0, CUT, false),
             (&reversed, 1.0, 1.0 / CUT, true),
@@ -150,7 +150,7 @@ pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
                 let angle = 2.0 * t.atan().to_degrees();
                 let angle = if from_half_turn { 180.0 - angle } else { angle };
                 let angle = if sign < 0.0 { 360.0 - angle } else { angle };
-                // what is a whole number up to rounding is one
+                // a whole number up to rounding is taken as whole
                 if (angle - angle.round()).abs() < 1e-10 { angle.round() } else { angle }
             };
             out.deg.extend(roots.into_iter().map(in_turn));
@@ -160,7 +160,7 @@ pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
     Some(out)
 }
 
-/// The roots between 0 and `end`, and whether these are certainly all.
+/// Roots between 0 and `end`, and true if these are certainly all.
 fn positive_roots(c: &[Rounded], end: f64) -> (Vec<f64>, bool) {
     let (mut roots, mut all) = (Vec::new(), true);
     let mut intervals = vec![(0.0, end, bernstein(c, end))];
@@ -187,7 +187,8 @@ fn positive_roots(c: &[Rounded], end: f64) -> (Vec<f64>, bool) {
     (roots, all)
 }
 
-/// `sum c_k t^k` on `0..end` in Bernstein's basis: `b_j = sum_i C(j, i) / C(d, i) c_i end^i`.
+/// Coefficients of `sum c_k t^k` on `0..end` in Bernstein's basis:
+/// `b_j = sum_i C(j, i) / C(d, i) c_i end^i`.
 fn bernstein(c: &[Rounded], end: f64) -> Vec<Rounded> {
     let d = c.len() - 1;
     let unit = f64::EPSILON * (4 * d + 8) as f64;
@@ -204,10 +205,10 @@ fn bernstein(c: &[Rounded], end: f64) -> Vec<Rounded> {
         .collect()
 }
 
-/// How often the sign changes; `None` if that is not certain.
+/// Number of changes of sign; `None` if it is not certain.
 fn changes(b: &[Rounded]) -> Option<usize> {
     let signs: Vec<Option<bool>> = b.iter().map(|x| x.sign()).collect();
-    // one that is not known does not count between two that differ
+    // an unknown sign between two different signs does not count
     let idle = |j: usize| {
         j > 0
             && j + 1 < b.len()
@@ -220,7 +221,7 @@ fn changes(b: &[Rounded]) -> Option<usize> {
     Some(known.windows(2).filter(|w| w[0] != w[1]).count())
 }
 
-/// The same polynomial on both halves of an interval.
+/// The polynomial on each half of an interval.
 fn halves(mut b: Vec<Rounded>) -> (Vec<Rounded>, Vec<Rounded>) {
     let mut left = Vec::with_capacity(b.len());
     for n in (0..b.len()).rev() {
@@ -232,7 +233,7 @@ fn halves(mut b: Vec<Rounded>) -> (Vec<Rounded>, Vec<Rounded>) {
     (left, b)
 }
 
-/// The one root in an interval; `None` if rounding hides where it is.
+/// The only root in an interval; `None` if rounding hides its place.
 fn refine(mut low: f64, mut high: f64, mut b: Vec<Rounded>) -> Option<f64> {
     loop {
         let middle = (low + high) / 2.0;
@@ -261,7 +262,7 @@ mod tests {
         roots_deg(&c).expect("not zero")
     }
 
-    /// All roots are found where `expected` says.
+    /// Asserts that the roots are those in `expected`.
     fn are(text: &str, expected: &[f64]) {
         let found = roots(text);
         assert!(found.all && found.deg.len() == expected.len(), "{text}: {found:?}");
@@ -288,7 +289,7 @@ mod tests {
         // near 180 degrees, and close together
         are("(t_a-1000000)*(t_a+1000000)", &[deg(1e6), deg(-1e6)]);
         are("(t_a-1)*(1000*t_a-1001)*(t_a+2)", &[90.0, deg(1.001), deg(-2.0)]);
-        // nearly a root is none
+        // a near-zero minimum is no root
         are("(1000*t_a-1001)^2+1", &[]);
         let many: String = (0..8).map(|k| format!("*({k}-5*t_a)")).collect();
         are(&many[1..], &(0..8).map(|k| deg(f64::from(k) / 5.0)).collect::<Vec<_>>());
@@ -305,7 +306,7 @@ mod tests {
         assert_eq!(coefficients(&parse("t_a^200*t_a-1").expect("parses"), "t_a", &|_| 0.0), None);
     }
 
-    /// Against signs on a fine grid, for polynomials whose roots are far apart.
+    /// Finds as many roots as signs change on a fine grid, for polynomials with well-separated roots.
     #[test]
     fn as_many_as_signs_change() {
         let mut seed = 7u64;

@@ -1,45 +1,45 @@
-//! What one position gives: (13)-(17), the observables of a single position solved from Z in n.
+//! Observables of a single position, solved from Z in n: (13)-(17).
 
 use crate::degree::coefficient::Rates;
 use crate::model::Platform;
 use crate::model::platform::{AZIMUTH, Block, LOCAL, Observed, Point};
 use crate::model::ring::Ring;
 
-/// `sign * wN^a wU^b * Z_component^(order)`, Z in n.
+/// Term `sign * wN^a wU^b * Z_component^(order)`, Z in n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ZTerm {
     /// Component of Z: 1, 2, 3 in n-axes, or the azimuth.
     pub component: usize,
     /// Derivative order.
     pub order: usize,
-    /// +1 or -1.
+    /// Sign of the term, +1 or -1.
     pub sign: i64,
     /// Exponents of `(wN, wU)`.
     pub rates: Rates,
 }
 
-/// An observable of one position: a functional of the local unknowns and its solution in Z.
+/// Observable of one position: a functional of the local unknowns and its solution in Z.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct LocalObservable {
-    /// The derivative order that it needs.
+    /// Derivative order that the observable needs.
     pub order: usize,
-    /// `(local unknown, sign, exponents of (wN, wU))`.
+    /// Terms `(local unknown, sign, exponents of (wN, wU))` of the functional.
     pub row: Vec<(usize, i64, Rates)>,
-    /// The solution.
+    /// Solution in Z.
     pub solution: Vec<ZTerm>,
 }
 
-/// Whether the components of the earth rate are zero at the latitude of a scheme.
+/// Components of the earth rate that are zero at the latitude of a scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RateZeros {
-    /// `wN = 0`: a pole.
+    /// True if `wN = 0`: a pole.
     pub w_n: bool,
-    /// `wU = 0`: the equator.
+    /// True if `wU = 0`: the equator.
     pub w_u: bool,
 }
 
 impl RateZeros {
-    /// Of the latitude of `platform`.
+    /// Zeros of the rates at the latitude of `platform`.
     pub(crate) fn of(platform: &Platform) -> Self {
         let latitude = platform.scheme().latitude;
         Self { w_n: latitude.is_some_and(|l| l.is_pole()), w_u: latitude.is_some_and(|l| l.is_equator()) }
@@ -100,9 +100,9 @@ pub(crate) fn local_observables(zeros: RateZeros, observed: Observed) -> Vec<Loc
     without_zeros(out, zeros)
 }
 
-/// The same where Z has an error of the accelerometers, a: `psi_z + a_x`, `a_y`, `psi_x - a_z`;
-/// `eps_x - wU psi_z`, then `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z` away from the poles; with a
-/// measured azimuth `psi_y`, and the last two in Z' and Za'.
+/// Observables of a position with an accelerometer error a in Z: `psi_z + a_x`, `a_y`, `psi_x - a_z`;
+/// `eps_x - wU psi_z`; then away from the poles `eps_z - wN psi_y + wU psi_x` and `eps_y + wN psi_z`. With a
+/// measured azimuth: `psi_y`, and the last two in Z' and Za'.
 fn with_accelerometers(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObservable> {
     const UNIT: Rates = [0, 0];
     let observable = |order, row: &[(usize, i64, Rates)], solution: &[ZTerm]| LocalObservable {
@@ -133,7 +133,7 @@ fn with_accelerometers(zeros: RateZeros, measured_azimuth: bool) -> Vec<LocalObs
     without_zeros(out, zeros)
 }
 
-/// The observables without what is zero at the latitude.
+/// Observables without the terms that are zero at the latitude.
 fn without_zeros(mut out: Vec<LocalObservable>, zeros: RateZeros) -> Vec<LocalObservable> {
     let vanishes = |r: &Rates| (zeros.w_n && r[0] > 0) || (zeros.w_u && r[1] > 0);
     for o in &mut out {
@@ -143,7 +143,7 @@ fn without_zeros(mut out: Vec<LocalObservable>, zeros: RateZeros) -> Vec<LocalOb
     out
 }
 
-/// The rows of `observables` at every position of `platform`, at `point`.
+/// Rows of `observables` at every position of `platform`, at `point`.
 pub(crate) fn rows_at<R: Ring>(
     platform: &Platform,
     point: &Point<R>,
@@ -176,8 +176,8 @@ mod tests {
     use crate::model::platform::{local_dynamics, local_output};
     use obsdeg_exact::{Echelon, Field, SplitMix64};
 
-    /// (13)-(17) against the recursion: substituting the derivatives of Z gives the functional, and at
-    /// every order the observables span what the recursion spans.
+    /// (13)-(17) agree with the recursion: substituting the derivatives of Z gives the functional, and at
+    /// every order the observables span the same space as the recursion.
     #[test]
     fn observables_of_one_position_follow_from_the_recursion() {
         let f = Field::new((1 << 60) + 33);

@@ -36,48 +36,48 @@ pub struct Locus {
     pub changes: Vec<Difference>,
 }
 
-/// What was found.
+/// Degenerate loci of a scheme, and the reason why some may be missing.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Found {
-    /// The loci; `None` without generic angles or worker.
+pub(crate) struct DegenerateLoci {
+    /// Degenerate loci; `None` without generic angles or worker.
     pub loci: Option<Vec<Locus>>,
-    /// Why some may be missing.
+    /// Reason why some may be missing; `None` if none is.
     pub incomplete: Option<String>,
 }
 
-/// Where a generic angle is put.
+/// Condition on the generic angles.
 #[derive(Debug, Clone)]
 enum Condition {
-    /// `tan(name/2)` is infinite: 180 degrees.
+    /// Half turn: the angle is 180 degrees, where `tan(name/2)` is infinite.
     HalfTurn(String),
-    /// A polynomial in half tangents vanishes.
+    /// Factor: a polynomial in half tangents vanishes.
     Factor(String),
 }
 
-/// Longest condition that is printed as it is.
+/// Longest condition that is printed in full, in characters.
 const LONGEST: usize = 120;
-/// How many values of the other angles are tried for an example.
+/// Number of values of the other angles tried for an example.
 const EXAMPLES: usize = 48;
 
-/// Random points tried per factor: a polynomial has a root in a random field with probability near
+/// Number of random points tried per factor. A polynomial has a root in a random field with probability near
 /// 1 - 1/e.
 const TRIES: usize = 40;
 
-/// Why degenerate loci were not computed.
+/// Reasons why degenerate loci were not computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum LociError {
-    /// Their sines and cosines are no numbers of the factors.
+    /// Another angle or offset is no multiple of 90 degrees: the factors have no numbers for its sine.
     #[error("degenerate loci are computed when all other angles and offsets are multiples of 90 deg")]
     OtherAngles,
-    /// Minors that hold rates of turning are not factored.
+    /// Minors with turning rates are not factored.
     #[error("degenerate angles of a scheme whose rotations are judged by the course of Z are not computed")]
     Course,
     /// The engine's answer could not be read.
     #[error("factor `{text}`: {error}")]
     Factor {
-        /// As it came.
+        /// Text of the answer.
         text: String,
-        /// What is wrong.
+        /// Error in the text.
         error: ExpressionError,
     },
     /// No field fits the angles.
@@ -85,11 +85,11 @@ pub(crate) enum LociError {
     Prime(#[from] PrimeError),
 }
 
-/// The degenerate loci of a scheme with generic angles.
+/// Degenerate loci of a scheme with generic angles.
 ///
-/// Wherever a rank of `V_k`, or of `V_k` without the column of an unknown outside `V_k`, drops, every
-/// maximal minor vanishes. So the factors of one minor each are candidates, and a candidate counts
-/// when the verdict at a random point of it differs.
+/// If the rank of `V_k`, or of `V_k` without the column of an unknown outside `V_k`, drops, every maximal
+/// minor vanishes. So the factors of one minor each are candidates. A candidate counts if the verdict at a
+/// random point of it differs.
 ///
 /// # Errors
 /// [`LociError`].
@@ -98,10 +98,10 @@ pub(crate) fn loci(
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
     seed: u64,
-) -> Result<Found, LociError> {
+) -> Result<DegenerateLoci, LociError> {
     let names = platform.scheme().generic_names();
     if names.is_empty() {
-        return Ok(Found::default());
+        return Ok(DegenerateLoci::default());
     }
     if platform.scheme().by_course() {
         return Err(LociError::Course);
@@ -111,7 +111,7 @@ pub(crate) fn loci(
         return Err(LociError::OtherAngles);
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
-    let Some(worker) = solver.worker() else { return Ok(Found::default()) };
+    let Some(worker) = solver.worker() else { return Ok(DegenerateLoci::default()) };
     let mut conditions: Vec<Condition> = names.iter().cloned().map(Condition::HalfTurn).collect();
     let mut seen: Vec<String> = Vec::new();
     let mut incomplete = None;
@@ -129,13 +129,13 @@ pub(crate) fn loci(
         }
     }
     let mut rng = platform.scheme().random(seed, "degenerate angles");
-    let mut found: Vec<(Place, Locus)> = Vec::new();
+    let mut found: Vec<(LocusPoints, Locus)> = Vec::new();
     let mut undecided = 0;
     for condition in conditions {
-        let place = match Place::of(&condition, &names) {
-            Where::Nowhere => continue,
-            Where::At(place) => Some(place),
-            Where::Unknown => None,
+        let place = match LocusPoints::of(&condition, &names) {
+            RealPoints::Nowhere => continue,
+            RealPoints::At(place) => Some(place),
+            RealPoints::Unknown => None,
         };
         let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else {
             undecided += 1;
@@ -160,8 +160,8 @@ pub(crate) fn loci(
             continue;
         };
         let rank_profile = there.rank_profile;
-        // values of one angle that do the same are one condition
-        let same = |l: &&mut (Place, Locus)| {
+        // values of one angle with the same effect are one condition
+        let same = |l: &&mut (LocusPoints, Locus)| {
             let same_angle = l.0.angle.is_some() && l.0.angle == place.angle && l.0.words == place.words;
             same_angle && l.1.rank_profile == rank_profile && l.1.changes == changes
         };
@@ -179,7 +179,7 @@ pub(crate) fn loci(
             }
         }
     }
-    let finished = |(mut place, locus): (Place, Locus)| {
+    let finished = |(mut place, locus): (LocusPoints, Locus)| {
         let angle = place.angle.clone();
         place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
         Locus {
@@ -197,10 +197,10 @@ pub(crate) fn loci(
         );
         incomplete = Some(incomplete.map_or(few.clone(), |e| format!("{e}; {few}")));
     }
-    Ok(Found { loci: Some(found.into_iter().map(finished).collect()), incomplete })
+    Ok(DegenerateLoci { loci: Some(found.into_iter().map(finished).collect()), incomplete })
 }
 
-/// One request per candidate matrix, over `t_name = tan(name/2)`.
+/// Requests, one per candidate matrix, over `t_name = tan(name/2)`.
 fn candidate_requests(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -213,7 +213,7 @@ fn candidate_requests(
     let n = platform.names().len();
     let symbols: Vec<String> = names.iter().map(|name| format!("t_{name}")).collect();
     let mut out: Vec<Request> = Vec::new();
-    // where all entries of one column vanish, its unknown is no longer excited
+    // if all entries of one column vanish, its unknown is no longer excited
     for c in 0..n {
         let column: Vec<Vec<String>> =
             text.iter().filter(|row| row[c] != "0").map(|row| vec![row[c].clone()]).collect();
@@ -265,7 +265,7 @@ fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
     }
 }
 
-/// The degrees at a random point of the condition, agreed on by two fields; `None` when none was found.
+/// Degrees at a random point of the condition on which two fields agree; `None` if no point was found.
 fn degrees_on(
     platform: &Platform,
     condition: &Condition,
@@ -317,7 +317,7 @@ impl Environment for Tangents<'_> {
     }
 }
 
-/// Puts the generic angles at a random point where the polynomial vanishes; false when this field has
+/// Sets the generic angles to a random point where the polynomial vanishes. Returns false if this field has
 /// none for the values drawn.
 fn place(values: &mut RandomValues, e: &Expression, names: &[String], rng: &mut SplitMix64) -> bool {
     let f: Field = values.roots().field;
@@ -337,7 +337,7 @@ fn place(values: &mut RandomValues, e: &Expression, names: &[String], rng: &mut 
     names.iter().zip(&tangents).all(|(n, &t)| values.set_half_tangent(n, t))
 }
 
-/// An upper bound on the degree of a polynomial in one name.
+/// Upper bound on the degree of a polynomial in one name.
 fn degree_in(e: &Expression, name: &str) -> usize {
     let mut degrees: Vec<usize> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {
@@ -353,42 +353,42 @@ fn degree_in(e: &Expression, name: &str) -> usize {
     degrees.last().copied().unwrap_or(0)
 }
 
-/// Where a condition lies.
+/// Real points of a condition.
 #[derive(Debug, Clone, PartialEq)]
-struct Place {
-    /// The one angle that it is on.
+struct LocusPoints {
+    /// Name of the angle, if the condition is on a single one.
     angle: Option<String>,
-    /// Values of this angle, all of them if there are no words, or examples.
+    /// Values of the angles: all of them if there are no words, examples otherwise.
     points_deg: Vec<BTreeMap<String, f64>>,
-    /// The condition in words, unless its values say it.
+    /// Condition in words; `None` if the values state it.
     words: Option<String>,
 }
 
-/// What is known about the real points of a condition.
+/// Knowledge about the real points of a condition.
 #[derive(Debug, Clone, PartialEq)]
-enum Where {
-    /// It has none, or only such as need two conditions at once.
+enum RealPoints {
+    /// The condition has no real point, or only points that satisfy two conditions at once.
     Nowhere,
-    At(Place),
-    /// None was found, which does not say that there is none.
+    At(LocusPoints),
+    /// No real point was found, but there may be one.
     Unknown,
 }
 
-/// A whole number as such, others with four decimals.
+/// Degrees as text: whole numbers without decimals, others with four.
 fn degrees(x: f64) -> String {
     if x == x.round() { format!("{x:.0}") } else { format!("{x:.4}") }
 }
 
-impl Place {
-    fn of(condition: &Condition, names: &[String]) -> Where {
+impl LocusPoints {
+    fn of(condition: &Condition, names: &[String]) -> RealPoints {
         let text = match condition {
             Condition::HalfTurn(name) => {
                 let points_deg = vec![BTreeMap::from([(name.clone(), 180.0)])];
-                return Where::At(Self { angle: Some(name.clone()), points_deg, words: None });
+                return RealPoints::At(Self { angle: Some(name.clone()), points_deg, words: None });
             }
             Condition::Factor(text) => text,
         };
-        let Ok(e) = parse(text) else { return Where::Unknown };
+        let Ok(e) = parse(text) else { return RealPoints::Unknown };
         let in_it: Vec<&String> = names.iter().filter(|n| degree_in(&e, &format!("t_{n}")) > 0).collect();
         let roots = |name: &str, others: &dyn Fn(&str) -> f64| -> Roots {
             let found = coefficients(&e, &format!("t_{name}"), others).and_then(|c| roots_deg(&c));
@@ -397,23 +397,23 @@ impl Place {
         if let [name] = in_it[..] {
             let Roots { deg, all } = roots(name, &|_| f64::NAN);
             if deg.is_empty() {
-                return if all { Where::Nowhere } else { Where::Unknown };
+                return if all { RealPoints::Nowhere } else { RealPoints::Unknown };
             }
             let points_deg = deg.into_iter().map(|x| BTreeMap::from([(name.clone(), x)])).collect();
             let words = (!all).then(|| in_words(&e, text, &in_it));
-            return Where::At(Self { angle: Some(name.clone()), points_deg, words });
+            return RealPoints::At(Self { angle: Some(name.clone()), points_deg, words });
         }
         // a factor that is never negative vanishes on no surface
         if never_negative(&e) {
-            return Where::Nowhere;
+            return RealPoints::Nowhere;
         }
-        // examples: the others at some values, solved for each angle in turn
+        // examples: solve for each angle in turn, with some values of the others
         for i in 0..EXAMPLES {
             let value = |n: &str| {
                 let place = in_it.iter().position(|m| m.as_str() == n).unwrap_or(0);
                 ((70 + 330 * place + i * (53 + 44 * place)) % 360) as f64
             };
-            // values at which something else may happen
+            // multiples of 45 degrees may be degenerate for other reasons
             if in_it.iter().any(|n| value(n) % 45.0 == 0.0) {
                 continue;
             }
@@ -426,14 +426,14 @@ impl Place {
                 let points_deg: Vec<BTreeMap<String, f64>> = points.collect();
                 if !points_deg.is_empty() {
                     let words = Some(in_words(&e, text, &in_it));
-                    return Where::At(Self { angle: None, points_deg, words });
+                    return RealPoints::At(Self { angle: None, points_deg, words });
                 }
             }
         }
-        Where::Unknown
+        RealPoints::Unknown
     }
 
-    /// `alpha = 0, 180 deg`, or the words with an example.
+    /// Condition `alpha = 0, 180 deg`, or in words with an example.
     fn condition(&self) -> String {
         let list = |name: &str| {
             let values: Vec<String> = self.points_deg.iter().map(|p| degrees(p[name])).collect();
@@ -452,7 +452,7 @@ impl Place {
     }
 }
 
-/// True if a polynomial is a sum of products of squares, as far as its text shows.
+/// True if the text shows that a polynomial is a sum of products of squares.
 fn never_negative(e: &Expression) -> bool {
     let mut out: Vec<bool> = Vec::with_capacity(e.nodes.len());
     for node in &e.nodes {
@@ -466,7 +466,7 @@ fn never_negative(e: &Expression) -> bool {
     out.last().copied().unwrap_or(false)
 }
 
-/// A polynomial in half tangents that vanishes: a relation of two angles where it is one.
+/// Condition that a polynomial in half tangents vanishes, in words: a relation of two angles if it is one.
 fn in_words(e: &Expression, text: &str, in_it: &[&String]) -> String {
     let name = |text: &str| -> Option<String> {
         let name = text.strip_prefix("t_")?;
@@ -515,9 +515,9 @@ mod tests {
     #[test]
     fn conditions_in_words() {
         let names = ["a".to_string(), "b".into()];
-        let place = |t: &str| Place::of(&Condition::Factor(t.into()), &names);
+        let place = |t: &str| LocusPoints::of(&Condition::Factor(t.into()), &names);
         let factor = |t: &str| match place(t) {
-            Where::At(p) => Some(p.condition()),
+            RealPoints::At(p) => Some(p.condition()),
             _ => None,
         };
         let says = |t: &str, words: &str| assert_eq!(factor(t).as_deref(), Some(words));
@@ -533,17 +533,17 @@ mod tests {
             "-1+2*t_a*t_b+t_a^2",
             "-1+2*tan(a/2)*tan(b/2)+tan(a/2)^2 = 0, for instance at a = 70, b = 40 deg",
         );
-        // what nobody could read is described
+        // an unreadably long condition is described
         let long: String = (0..40).map(|k| format!("+{}*t_a^{}*t_b^3", k + 2, k % 7)).collect();
         let words = factor(&format!("-1{long}")).expect("it has points");
         let described =
             "a polynomial of 41 terms in tan(a/2), tan(b/2), of degree 6, 3, vanishes, for instance at a = ";
         assert!(words.len() < 160 && words.starts_with(described), "{words}");
-        // no real point; points that need two conditions; not all of them known
+        // no real point; points that satisfy two conditions; not all points known
         for t in ["1+t_a^2", "1+t_a^2*t_b^2", "t_a^2+2*t_b^2", "3+t_a^2*(1+t_b^2)"] {
-            assert_eq!(place(t), Where::Nowhere, "{t}");
+            assert_eq!(place(t), RealPoints::Nowhere, "{t}");
         }
-        assert_eq!(place("3-2*t_a+t_a^2-2*t_b+t_b^2"), Where::Unknown);
+        assert_eq!(place("3-2*t_a+t_a^2-2*t_b+t_b^2"), RealPoints::Unknown);
         let hidden = factor("(t_a-1)*(t_b-t_b+3*t_a-1)^2*(t_a^200-1)*t_a");
         assert_eq!(hidden, None, "beyond the limit");
         says("(t_a-1)*(3*t_a-1)^2", "(tan(a/2)-1)*(3*tan(a/2)-1)^2 = 0, for instance at a = 90 deg");

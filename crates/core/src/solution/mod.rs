@@ -1,4 +1,4 @@
-//! How an observable quantity is solved from the derivatives of Z.
+//! Solutions of observable quantities in derivatives of Z.
 
 pub(crate) mod ask;
 pub(crate) mod combinations;

@@ -1,6 +1,6 @@
-//! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies,
-//! and however strongly a reader thinks it does, the formula means the same: a quotient before one stands in
-//! brackets, unless it is a number.
+//! Solutions as text: common factors in front, terms of equal coefficient in brackets. A blank multiplies.
+//! The formula is unambiguous whatever precedence a reader gives to the blank: a quotient before it stands
+//! in brackets, unless it is a number.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,14 +28,15 @@ pub struct StationLabel {
     pub rate: Option<String>,
 }
 
-/// A name as a formula writes it: in quotation marks unless it is letters, digits and `_` behind a letter.
+/// Name in a formula: in quotation marks unless it consists of letters, digits and `_` and begins with a
+/// letter.
 pub(crate) fn quoted(name: &str) -> String {
     let plain =
         name.starts_with(char::is_alphabetic) && name.chars().all(|c| c.is_alphanumeric() || c == '_');
     if plain { name.into() } else { format!("{name:?}") }
 }
 
-/// The stations of a scheme: its positions, and the attitudes of its rotations.
+/// Stations of a scheme: its positions, and the attitudes of its rotations.
 pub(crate) fn stations(scheme: &Scheme) -> Vec<StationLabel> {
     let stations = scheme.stations();
     let label = |s: &crate::model::scheme::Station<'_>| {
@@ -52,30 +53,29 @@ pub(crate) fn stations(scheme: &Scheme) -> Vec<StationLabel> {
     stations.iter().map(label).collect()
 }
 
-/// A sum with its common factor taken out:
-/// `factor [ sign coefficient (sign Z ...) ... ]`.
+/// Sum with its common factor in front: `factor [ sign coefficient (sign Z ...) ... ]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grouped {
-    /// The factor in front, positive, without rates; `None` for one.
+    /// Common factor, positive, without rates; `None` for one.
     pub factor: Option<Coefficient>,
     /// Groups of terms with equal coefficients.
     pub groups: Vec<Group>,
 }
 
-/// `sign coefficient * w^turns * (sum of signed Z)`.
+/// Group `sign coefficient * w^turns * (sum of signed Z)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// True for minus.
+    /// True for a minus sign.
     pub negative: bool,
-    /// The magnitude.
+    /// Magnitude of the coefficient.
     pub coefficient: Coefficient,
-    /// The power of the rate of turning; that of all terms is the same.
+    /// Power of the turning rate, common to all terms.
     pub turns: usize,
-    /// Terms, each with true for minus inside the group.
+    /// Terms, each with true for a minus sign inside the group.
     pub terms: Vec<(bool, Term)>,
 }
 
-/// Collects the terms of a solution.
+/// Groups the terms of a solution.
 pub fn group(solved: &Solved, stations: &[StationLabel]) -> Grouped {
     let magnitude = |c: &Coefficient| -> (bool, Coefficient) {
         let negative = c.sign_and_factors().0;
@@ -118,7 +118,7 @@ pub fn group(solved: &Solved, stations: &[StationLabel]) -> Grouped {
 }
 
 impl Group {
-    /// Its factors, without a leading one: `1/2`, `wU/wN`, `w@p1^2`.
+    /// Factors of the group, without a leading one: `1/2`, `wU/wN`, `w@p1^2`.
     pub fn factors(&self, stations: &[StationLabel]) -> Vec<String> {
         let (_, mut factors) = self.coefficient.sign_and_factors();
         let rate = stations[self.terms[0].1.station].rate.as_deref();
@@ -127,12 +127,12 @@ impl Group {
     }
 }
 
-/// `w@p1`, `w@p1^2`.
+/// Power of a turning rate: `w@p1`, `w@p1^2`.
 fn rate_power(rate: &str, turns: usize) -> String {
     if turns == 1 { rate.into() } else { format!("{rate}^{turns}") }
 }
 
-/// The observation of a term, as in `Z1''`.
+/// Observation of a term, as in `Z1''`.
 fn observed(term: &Term, frame: Frame) -> String {
     let base = match (frame, term.azimuth) {
         (_, true) => "Za".to_string(),
@@ -142,7 +142,7 @@ fn observed(term: &Term, frame: Frame) -> String {
     format!("{base}{}", "'".repeat(term.order))
 }
 
-/// The name of a derivative of Z, as in `Z1''@p2`.
+/// Name of a derivative of Z, as in `Z1''@p2`.
 pub(crate) fn z_name(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
     format!("{}@{}", observed(term, frame), stations[term.station].label)
 }
@@ -158,7 +158,7 @@ pub struct SolutionTerm {
     pub station: String,
 }
 
-/// The terms of a solution one by one.
+/// Terms of a solution, one by one.
 pub(crate) fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<SolutionTerm> {
     let term = |t: &Term| {
         let (negative, mut factors) = t.coefficient.precise_sign_and_factors();
@@ -174,10 +174,10 @@ pub(crate) fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) ->
     solved.terms.iter().map(term).collect()
 }
 
-/// Factors as one, to be followed by a blank and what they multiply: `wU`, `1/2*wU`, `(wU/wN)`.
+/// Product of factors that is followed by a blank and another factor: `wU`, `1/2*wU`, `(wU/wN)`.
 fn before_a_blank(factors: &[String]) -> String {
     let text = product(factors);
-    // quotients outside of all brackets, but for the number in front
+    // quotients outside of all brackets, except for the leading number
     let digits = |t: &str| t.find(|c: char| !c.is_ascii_digit()).unwrap_or(t.len());
     let rest = &text[digits(&text)..];
     let below = rest.strip_prefix('/').map_or(0, digits);
@@ -191,7 +191,7 @@ fn before_a_blank(factors: &[String]) -> String {
     if quotient { format!("({text})") } else { text }
 }
 
-/// A solution in one line, as in `1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]`.
+/// Solution in one line, as in `1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]`.
 pub(crate) fn text(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> String {
     let grouped = group(solved, stations);
     let mut out = String::new();
@@ -263,12 +263,12 @@ mod tests {
         let attitude = crate::model::scheme::parse_attitude("0,0,0").expect("an attitude");
         let names = stations(&Scheme::of_angles([attitude.clone(), attitude]));
         assert_eq!(text(&solved, Frame::N, &names), "1/2 [ wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2 ]");
-        // the sign of a single term stands before its number, not between the two
+        // the sign of a single term stands before its number, not after it
         let single = Solved { terms: vec![term(0, 3, 1, -1, [0, 1])], ..solved };
         assert_eq!(text(&single, Frame::N, &names), "-1/2*wU Z3'@p1");
     }
 
-    /// No name of a station reads as a sum, a product or another name.
+    /// No label of a station reads as a sum, a product or another name.
     #[test]
     fn labels() {
         let attitude = crate::model::scheme::parse_attitude("0,0,0").expect("an attitude");

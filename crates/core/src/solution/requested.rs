@@ -1,4 +1,4 @@
-//! Combinations that a scheme asks for, judged, with their exact coefficients.
+//! Requested combinations of a scheme, judged, with their exact coefficients.
 
 use std::ops::Range;
 
@@ -11,35 +11,35 @@ use crate::degree::ensemble::Verdicts;
 use crate::degree::status::{Status, Verdict};
 use crate::language::{Expression, ExpressionError, Function, Node, parse};
 use crate::model::Platform;
-use crate::model::combination::{At, Names, not_zero, row_of, square_root};
+use crate::model::combination::{CombinationNames, EvaluationPoint, not_zero, row_of, square_root};
 use crate::model::ring::{Ring, Text};
 
-/// A combination that is asked for is no linear combination of the unknowns.
+/// Error for a requested combination that is no linear combination of the unknowns.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("combination `{text}`: {reason}")]
 pub struct CombinationError {
-    /// As written.
+    /// Combination as written.
     pub text: String,
-    /// What is wrong.
+    /// Reason for the error.
     pub reason: String,
-    /// Where in the text.
+    /// Byte range of the error in the text.
     pub span: Range<usize>,
 }
 
-/// A combination that was asked for.
+/// Requested combination.
 pub(crate) struct Requested {
-    /// As written.
+    /// Combination as written.
     pub text: String,
-    /// Its coefficients in the first field of the verdicts.
+    /// Coefficients in the first field of the verdicts.
     pub row: Vec<u64>,
-    /// Its exact coefficients.
+    /// Exact coefficients.
     pub terms: Sparse,
-    /// What the staircase says.
+    /// Verdict by the staircase.
     pub verdict: Verdict,
 }
 
-/// Reads and judges the combinations that a scheme asks for; the seed chooses the points at which they are
-/// looked at.
+/// Reads and judges the requested combinations of a scheme; the seed chooses the points at which they are
+/// evaluated.
 pub(crate) fn requested_combinations(
     platform: &Platform,
     verdicts: &Verdicts,
@@ -47,7 +47,7 @@ pub(crate) fn requested_combinations(
 ) -> Result<Vec<Requested>, CombinationError> {
     let scheme = platform.scheme();
     let mut rng = scheme.random(seed, "combinations asked for");
-    let names = Names::of(platform);
+    let names = CombinationNames::of(platform);
     scheme
         .combinations
         .iter()
@@ -61,7 +61,8 @@ pub(crate) fn requested_combinations(
             let values = &verdicts.values[0];
             let sample = &values.sample(scheme, 1);
             let rates = [sample.point.w_n, sample.point.w_u];
-            let row = row_of(&parsed, &names, &At { values, sample, rates }, &mut rng).map_err(wrap)?;
+            let row = row_of(&parsed, &names, &EvaluationPoint { values, sample, rates }, &mut rng)
+                .map_err(wrap)?;
             let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
             let moved = (0..row.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
             let status = Status::of(degree, moved);
@@ -71,11 +72,11 @@ pub(crate) fn requested_combinations(
         .collect()
 }
 
-/// The exact coefficients of a linear expression: numbers times powers of the rates.
+/// Exact coefficients of a linear expression: numbers times powers of the rates.
 fn terms_of(
     parsed: &Expression,
     platform: &Platform,
-    names: &Names<'_>,
+    names: &CombinationNames<'_>,
     verdicts: &Verdicts,
     rng: &mut SplitMix64,
 ) -> Result<Sparse, ExpressionError> {
@@ -85,9 +86,9 @@ fn terms_of(
     let f = sample.roots.field;
     let mut rates = || [1 + rng.below(f.modulus() - 1), 1 + rng.below(f.modulus() - 1)];
     let [one, other] = [rates(), rates()];
-    let first = row_of(parsed, names, &At { values, sample, rates: one }, rng)?;
+    let first = row_of(parsed, names, &EvaluationPoint { values, sample, rates: one }, rng)?;
     not_zero(parsed, &first)?;
-    let second = row_of(parsed, names, &At { values, sample, rates: other }, rng)?;
+    let second = row_of(parsed, names, &EvaluationPoint { values, sample, rates: other }, rng)?;
     let unsupported = || ExpressionError::Syntax {
         expected: "coefficients that are numbers times powers of wN and wU, such as 2*wN, wU/wN or sqrt(2)/2",
         found: "a sum of such powers, or a power beyond 2".into(),
@@ -115,9 +116,9 @@ fn terms_of(
         .collect()
 }
 
-/// The coefficient of an unknown as text in the symbols of the formulas, at rates one: the expression where
-/// this unknown is one and the others are zero. It has been evaluated before, so nothing in it fails.
-fn text_of(expression: &Expression, names: &Names<'_>, unknown: &str) -> String {
+/// Coefficient of an unknown as text in the symbols of the formulas, at rates one: the expression where this
+/// unknown is one and the others are zero. It has been evaluated before, so nothing in it fails.
+fn text_of(expression: &Expression, names: &CombinationNames<'_>, unknown: &str) -> String {
     let mut values: Vec<String> = Vec::with_capacity(expression.nodes.len());
     let integer = |i: usize| expression.integer_at(i);
     for node in &expression.nodes {
@@ -157,7 +158,7 @@ fn text_of(expression: &Expression, names: &Names<'_>, unknown: &str) -> String 
 fn quotient(a: &str, b: &str) -> String {
     match (a, b) {
         ("0", _) | (_, "1") => a.into(),
-        // times one: sums stand in brackets
+        // one as a factor is omitted; sums stand in brackets
         _ => {
             let above = Text.mul(&a.to_string(), &Text.one());
             let plain = b.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');

@@ -1,4 +1,4 @@
-//! A functional as a short sum of derivatives of Z: its terms, and the check of them.
+//! Functionals as short sums of derivatives of Z: their terms, and the check of them.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use obsdeg_exact::SplitMix64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::problem::{Motion, Problem};
+use super::problem::{LinearSystem, TurningCorrection};
 use super::solver::{Frame, Functional, MAX_SYMBOLIC_ANGLES, PRINTABLE, Solver, float_point, tidy};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
@@ -18,7 +18,8 @@ use crate::model::ring::Ring;
 
 /// Values of `(wN, wU)` and of every rate of turning at which decimals are checked.
 const OTHER_RATES: (f64, f64, f64) = (0.8, 0.5, 1.3);
-/// How far the sum of terms with decimals may be from its target, relative to the sum of their magnitudes.
+/// Largest difference between the sum of terms with decimals and its target, relative to the sum of their
+/// magnitudes.
 const RESIDUAL: f64 = 1e-9;
 
 /// Source of the coefficients of a solution.
@@ -46,60 +47,60 @@ pub enum Verification {
     Numeric,
 }
 
-/// An observable quantity as a sum of derivatives of Z.
+/// Observable quantity as a sum of derivatives of Z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
-    /// The terms, by power of the rate of turning, order, component and station.
+    /// Terms, sorted by power of the turning rate, order, component and station.
     pub terms: Vec<Term>,
-    /// Where its coefficients come from.
+    /// Source of the coefficients.
     pub found_by: FoundBy,
-    /// How it was checked.
+    /// Check that the solution passed.
     pub verification: Verification,
 }
 
 impl Solved {
-    /// The least exact form among the coefficients.
+    /// Least exact form among the coefficients.
     pub fn form(&self) -> Form {
         self.terms.iter().map(|t| t.coefficient.form()).max().unwrap_or(Form::Exact)
     }
 }
 
-/// Why no solution is printed.
+/// Reasons why no solution is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unsolved {
-    /// A broken promise: the degree says that they do.
+    /// The rows do not span the functional, although the degree says that they do: an internal error.
     #[error("the rows of its order do not span it")]
     NotSpanned,
     /// A coefficient could not be recovered.
     #[error("its coefficients have no short exact form")]
     NoForm,
-    /// What a rotation adds could not be taken off.
+    /// The contribution of a rotation could not be eliminated.
     #[error("the motion of the platform is not in the span of its stations")]
     Motion,
-    /// A broken promise: the engine solves another system.
+    /// The engine solved another system: an internal error.
     #[error("its coefficients do not solve the system in the prime fields: please report this scheme")]
     Disagreement,
-    /// Nobody reads it, and generic angles have no decimals.
+    /// A coefficient is too long to read, and generic angles have no decimals.
     #[error("its longest coefficient has {characters} characters")]
     TooLong {
-        /// How long it is.
+        /// Number of characters of the longest coefficient.
         characters: usize,
     },
-    /// Nobody writes the formulas.
+    /// There is no symbolic engine.
     #[error("formulas in generic angles need the symbolic engine")]
     NoEngine,
-    /// More sines and cosines than formulas are sought in.
+    /// There are more sines and cosines than the limit for formulas.
     #[error("formulas in more than {MAX_SYMBOLIC_ANGLES} different angles are not attempted")]
     TooManyAngles,
-    /// The engine was refused, or gave up.
+    /// The engine was refused, or failed.
     #[error("no formula of it came from the symbolic engine")]
     NoFormula,
-    /// A broken promise: found, and wrong.
+    /// A solution was found, but its check failed: an internal error.
     #[error("it did not survive its substitution: please report this scheme")]
     Refuted,
 }
 
-/// Place of a term in a solution, in the order of printing.
+/// Place of a term in a solution; the order is the order of printing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
     pub(super) turns: usize,
@@ -110,21 +111,21 @@ pub(super) struct Key {
     pub(super) station: usize,
 }
 
-/// What enters a term: an unknown of the problem, times a factor, times an entry of a derivative of `C_c^n`
-/// by the angle of the turn.
+/// Contribution to a term: an unknown of the system, times a factor, times an entry of a derivative of
+/// `C_c^n` by the angle of the turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contribution {
     pub(super) unknown: usize,
     pub(super) factor: i64,
-    /// The component of Z in n.
+    /// Component of Z in n.
     in_n: usize,
-    /// The order of the derivative of `C_c^n`.
+    /// Order of the derivative of `C_c^n`.
     derivative: usize,
 }
 
-/// An unknown of the problem: a row of the tables, with the rates that its amount is multiplied with.
+/// Unknown of the system: a row of the tables, with the rates that multiply its amount.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Used {
+pub(super) struct UsedRow {
     pub(super) row: usize,
     pub(super) rates: Rates,
     pub(super) turns: usize,
@@ -132,14 +133,15 @@ pub(super) struct Used {
 
 impl Solver<'_> {
     /// True if the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
-    /// replaced by its row, at rest or turning, in all tables; terms with decimals in floating point.
+    /// replaced by its row, at rest or turning, in all tables; terms with decimals are summed in floating
+    /// point.
     fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
             return self.holds_in_floats(terms, functional).unwrap_or(false);
         }
         self.all_tables().zip(targets).all(|((field, table), target)| {
             let f = table.sample.roots.field;
-            // a rate of turning of its own for every position
+            // every position has its own turning rate
             let turning = |i: usize| f.from_u64(SplitMix64::new(f.modulus() ^ i as u64).next_u64());
             let coefficient = |t: &Term| {
                 let image = self.image(&t.coefficient, field, table)?;
@@ -151,7 +153,8 @@ impl Solver<'_> {
         })
     }
 
-    /// The same at rates of its own in floating point; `None` without numbers.
+    /// True if the terms sum up to the functional in floating point at other rates; `None` for generic
+    /// angles.
     fn holds_in_floats(&self, terms: &[Term], functional: &Functional) -> Option<bool> {
         let (w_n, w_u, turning) = OTHER_RATES;
         let point = float_point(self.platform, &self.tables, (w_n, w_u));
@@ -169,8 +172,8 @@ impl Solver<'_> {
         Some(rest.iter().all(|x| x.abs() <= RESIDUAL * size))
     }
 
-    /// A functional that is observable with the given degree, as a short sum of derivatives of Z.
-    /// `Err` says why there is none to print.
+    /// A functional of the given observable degree as a short sum of derivatives of Z. `Err` is the reason
+    /// why there is none to print.
     pub(crate) fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, Unsolved> {
         let scatter = |values: &Vec<u64>| {
             let mut row = vec![0; self.platform.names().len()];
@@ -183,31 +186,31 @@ impl Solver<'_> {
         let first = self.tables.first();
         let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
         let allowed = self.tables.rows_up_to(degree);
-        // what is a row is solved by it
+        // a functional that is a row is solved by this row
         let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
             Some(&j) => vec![j],
             None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
                 .ok_or(Unsolved::NotSpanned)?,
         };
         let columns = self.platform.names().len();
-        let solve = |problem: &Problem| -> Option<Vec<(Rates, Vec<u64>)>> {
+        let solve = |problem: &LinearSystem| -> Option<Vec<(Rates, Vec<u64>)>> {
             let tables = self.all_tables().zip(&targets);
             let y =
                 tables.map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target));
             self.split_rates(&y.collect::<Option<Vec<_>>>()?)
         };
-        let mut problem = Problem::solution(&support, columns, &[]);
+        let mut problem = LinearSystem::solution(&support, columns, &[]);
         let mut split = solve(&problem).ok_or(Unsolved::NoForm)?;
         let motions = self.motions(&support, &split).ok_or(Unsolved::Motion)?;
         if !motions.is_empty() {
-            problem = Problem::solution(&support, columns, &motions);
+            problem = LinearSystem::solution(&support, columns, &motions);
             split = solve(&problem).ok_or(Unsolved::NoForm)?;
         }
         let rows = support.iter().map(|&row| (row, [0, 0], 0));
         // the motion enters (16) with w/wN
         let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
-        let used: Vec<Used> = (rows.chain(moved).zip(&split))
-            .map(|((row, by, turns), (r, _))| Used { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
+        let used: Vec<UsedRow> = (rows.chain(moved).zip(&split))
+            .map(|((row, by, turns), (r, _))| UsedRow { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
             .collect();
         let plan = self.plan(&used);
         // numbers of the printed terms in every field
@@ -223,7 +226,7 @@ impl Solver<'_> {
         let exact: Option<Vec<Number>> =
             (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
         let symbolic = match exact {
-            // nothing is left to ask for
+            // nothing remains to be requested
             Some(_) => None,
             None => self.ask_for_solution(functional, &problem, &used, &plan),
         };
@@ -277,10 +280,10 @@ impl Solver<'_> {
         Ok(Solved { terms, found_by, verification })
     }
 
-    /// What the turning of the platform adds to a solution by the rows `support`: one motion per rotation and
-    /// rates of the amounts, in rows of the rotation itself up to order one. `None` when these do not span
-    /// it, which they always do.
-    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<Motion>> {
+    /// Motions of a solution by the rows `support` while the platform turns: one per rotation and rates of
+    /// the amounts, in rows of the rotation itself up to order one. `None` if these rows do not span it,
+    /// which does not happen.
+    fn motions(&self, support: &[usize], split: &[(Rates, Vec<u64>)]) -> Option<Vec<TurningCorrection>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;
         let mut groups: BTreeMap<(usize, Rates), Vec<usize>> = BTreeMap::new();
@@ -310,13 +313,13 @@ impl Solver<'_> {
             let mut own = self.tables.rows_up_to(1);
             own.retain(|&row| self.stations[self.tables.station(row)].0 == position);
             let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-            out.push(Motion { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
+            out.push(TurningCorrection { rows: short_support(f, &first.rows, &own, &target, cost)?, of });
         }
         Some(out)
     }
 
-    /// The printed terms of a solution that uses the rows `used`.
-    fn plan(&self, used: &[Used]) -> Vec<(Key, Vec<Contribution>)> {
+    /// Printed terms of a solution that uses the rows `used`.
+    fn plan(&self, used: &[UsedRow]) -> Vec<(Key, Vec<Contribution>)> {
         let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
         for (j, u) in used.iter().enumerate() {
             let station = self.tables.station(u.row);
@@ -324,7 +327,7 @@ impl Solver<'_> {
             for z in &self.tables.observables[u.row % self.tables.observables.len()].solution {
                 let azimuth = z.component == AZIMUTH;
                 let in_platform = self.frame == Frame::Platform && !azimuth;
-                // Z^n = C_c^n Z^c, and C_c^n changes where the platform turns
+                // Z^n = C_c^n Z^c, and C_c^n changes while the platform turns
                 for derivative in 0..=if in_platform && turns { z.order } else { 0 } {
                     for component in if in_platform { 1..=3 } else { z.component..=z.component } {
                         let key = Key {
@@ -348,7 +351,7 @@ impl Solver<'_> {
         plan.into_iter().collect()
     }
 
-    /// `sum factor * x_j * (axis factor)` for every printed term.
+    /// Numbers `sum factor * x_j * (axis factor)` of all printed terms.
     fn term_numbers<R: Ring>(
         &self,
         point: &Point<R>,
@@ -365,7 +368,7 @@ impl Solver<'_> {
             .collect()
     }
 
-    /// What the amount of a row is multiplied with in a printed term.
+    /// Factor of the amount of a row in a printed term.
     pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &Key, c: &Contribution) -> R::Element {
         let ring = &point.ring;
         let axis = match (self.frame, self.stations[key.station].1) {
@@ -385,7 +388,7 @@ impl Solver<'_> {
     fn decimals(
         &self,
         functional: &Functional,
-        problem: &Problem,
+        problem: &LinearSystem,
         plan: &[(Key, Vec<Contribution>)],
     ) -> Option<Vec<Number>> {
         let (point, rows) = self.floats.as_ref()?;
@@ -405,8 +408,8 @@ mod tests {
     use crate::model::platform::Platform;
     use crate::model::scheme::{Scheme, parse_attitude};
 
-    /// In both frames the printed solutions of a scheme survive their substitution, and a wrong sign, a
-    /// wrong position or a wrong order does not.
+    /// In both frames the printed solutions of a scheme pass their substitution; with a wrong sign, position
+    /// or order they fail.
     #[test]
     fn substitution_tells_right_from_wrong() {
         for (frame, measured_azimuth) in

@@ -1,5 +1,5 @@
-//! Coefficients and solutions: recovered from the fields, solved and verified by the symbolic worker,
-//! or as decimals.
+//! Coefficients and solutions: recovered from the fields, or solved and verified by the symbolic worker, or
+//! as decimals.
 
 use std::cell::OnceCell;
 
@@ -8,7 +8,7 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::problem::Problem;
+use super::problem::LinearSystem;
 use super::turning::motion_rows;
 use crate::degree::coefficient::{
     Coefficient, Image, Number, READABLE, Rates, power, rates_between, recover_radical,
@@ -23,9 +23,9 @@ use crate::model::terms::Source;
 use crate::solution::local::rows_at;
 use crate::solution::tables::{Table, Tables};
 
-/// Most angles with symbols of their own for which formulas are attempted.
+/// Largest number of angles with symbols of their own for which formulas are attempted.
 pub(super) const MAX_SYMBOLIC_ANGLES: usize = 4;
-/// Longest number that is printed when there are no decimals to fall back to.
+/// Longest number, in characters, that is printed if there are no decimals.
 pub(super) const PRINTABLE: usize = 1000;
 /// Values of `(wN, wU)` for decimals; coefficients are homogeneous in them.
 const FLOAT_RATES: (f64, f64) = (1.0, 1.0);
@@ -44,20 +44,20 @@ pub enum Frame {
 /// Columns and their coefficients.
 pub type Sparse = Vec<(usize, Coefficient)>;
 
-/// A linear functional of the unknowns.
+/// Linear functional of the unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Functional {
     /// Columns and coefficients, as printed.
     pub terms: Sparse,
-    /// The exact images of the coefficients, one vector per table in the order of the tables.
+    /// Exact images of the coefficients, one vector per table in the order of the tables.
     pub(super) images: Vec<Vec<u64>>,
 }
 
-/// Everything that coefficients are computed from.
+/// Solver of coefficients: tables, symbols and worker.
 pub struct Solver<'a> {
     pub(super) platform: &'a Platform,
     pub(super) verdicts: &'a Verdicts,
-    /// The tables in the fields.
+    /// Tables in the fields.
     pub(crate) tables: Tables,
     pub(super) symbols: Symbols,
     pub(super) text: Vec<Vec<String>>,
@@ -66,14 +66,14 @@ pub struct Solver<'a> {
     many_digits: OnceCell<Option<Vec<Vec<Real>>>>,
     pub(super) worker: Option<&'a mut Worker>,
     pub(super) frame: Frame,
-    /// Per station: its position, and the axis if it turns there.
+    /// Position of every station, and its axis if the platform turns there.
     pub(super) stations: Vec<(usize, Option<Axis>)>,
     /// Number of combinations that were left out.
     pub(super) left_out: usize,
 }
 
 impl<'a> Solver<'a> {
-    /// A solver for `platform`; without a worker nothing symbolic is started.
+    /// Solver for `platform`; without a worker it starts nothing symbolic.
     pub(crate) fn new(
         platform: &'a Platform,
         verdicts: &'a Verdicts,
@@ -85,7 +85,7 @@ impl<'a> Solver<'a> {
         let symbols = Symbols::of(platform);
         let rate = |zero: bool| if zero { "0" } else { "1" };
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
-        // turns of torquer errors hold pi, and their drift sums of rates: neither is among the symbols
+        // turns of torquer errors contain pi, and their drift sums of rates: neither is among the symbols
         let torquers = platform.scheme().unknowns.have(Source::Rate);
         let others = torquers || platform.scheme().by_course();
         let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !others;
@@ -120,18 +120,18 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// True if formulas in sines and cosines are out of question: too many different angles.
+    /// True if there are too many different angles for formulas in sines and cosines.
     pub(crate) fn too_many_angles(&self) -> bool {
         self.symbols.angles() > MAX_SYMBOLIC_ANGLES
     }
 
-    /// True if a formula was too much work, so that no other was attempted.
+    /// True if a formula exceeded the limit of work, so that no other was attempted.
     pub(crate) fn given_up(&self) -> bool {
         self.worker.is_some() && self.text.is_empty() && !self.too_many_angles()
     }
 
-    /// Number of sparse combinations that are not listed, because their coefficients were not found, or in
-    /// decimals alone.
+    /// Number of sparse combinations that are not listed, because their coefficients were not found, or only
+    /// as decimals.
     pub(crate) fn left_out(&self) -> usize {
         self.left_out
     }
@@ -146,7 +146,7 @@ impl<'a> Solver<'a> {
         self.worker.as_deref_mut()
     }
 
-    /// The image of a coefficient; `None` for a decimal.
+    /// Image of a coefficient; `None` for a decimal.
     pub(super) fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
         let k = &table.sample.roots;
         let number = match &c.number {
@@ -159,7 +159,7 @@ impl<'a> Solver<'a> {
         Some(k.field.mul(number, power(&k.field, table.rates(), c.rates)?))
     }
 
-    /// The functional with the given exact coefficients; `None` when one of them is a decimal.
+    /// Functional with the given exact coefficients; `None` if one of them is a decimal.
     pub(crate) fn functional(&self, terms: Sparse) -> Option<Functional> {
         let images = |(field, table): (usize, &Table)| {
             terms.iter().map(|(_, c)| self.image(c, field, table)).collect::<Option<Vec<u64>>>()
@@ -168,18 +168,18 @@ impl<'a> Solver<'a> {
         Some(Functional { terms, images })
     }
 
-    /// The functional on `support` whose coefficients are the outputs of `problem`.
-    pub(crate) fn functional_of(&mut self, support: &[usize], problem: &Problem) -> Option<Functional> {
+    /// Functional on `support` whose coefficients are the outputs of `problem`.
+    pub(crate) fn functional_of(&mut self, support: &[usize], problem: &LinearSystem) -> Option<Functional> {
         let (coefficients, images) = self.coefficients(problem)?;
         Some(Functional { terms: support.iter().copied().zip(coefficients).collect(), images })
     }
 
-    /// The functional that is a row of a local observable.
+    /// Functional of a row of a local observable.
     pub(crate) fn functional_of_row(&self, row: usize) -> Option<Functional> {
         let first = self.tables.first();
         let names = self.platform.names();
         let mut columns: Vec<usize> = (0..names.len()).filter(|&c| first.rows[row][c] != 0).collect();
-        // a coefficient leads
+        // a coefficient comes first, before psi
         columns.sort_by_key(|&c| names[c].starts_with("psi"));
         let images: Vec<Vec<u64>> =
             self.all_tables().map(|(_, t)| columns.iter().map(|&c| t.rows[row][c]).collect()).collect();
@@ -201,7 +201,7 @@ impl<'a> Solver<'a> {
         Some(Functional { terms: terms.collect::<Option<_>>()?, images })
     }
 
-    /// The value of a coefficient without rates; `None` for one in generic angles.
+    /// Value of a coefficient without rates; `None` for one in generic angles.
     pub fn number(&self, c: &Coefficient) -> Option<f64> {
         match &c.number {
             Number::Radical(r) => Some(r.to_f64()),
@@ -210,18 +210,18 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// The tables of both fields, embedding by embedding, with the index of the field.
+    /// Tables of both fields, embedding by embedding, with the index of the field.
     pub(super) fn tables_at_the_rates(&self) -> impl Iterator<Item = (usize, &Table)> {
         self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)))
     }
 
-    /// The same, then the table at other rates.
+    /// Tables of both fields with the index of the field, then the table at other rates.
     pub(super) fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
         self.tables_at_the_rates().chain([(0, &self.tables.other_rates)])
     }
 
-    /// The exponents of the rates and the images of the numbers of some values, given as vectors in the order
-    /// of `all_tables`, as the images are.
+    /// Exponents of the rates, and images of the numbers of some values. Values and images are vectors in
+    /// the order of `all_tables`.
     pub(super) fn split_rates(&self, values: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
         let first = self.tables.first();
         let f = first.sample.roots.field;
@@ -245,8 +245,8 @@ impl<'a> Solver<'a> {
         recover_radical(&self.tables.fields(), &[*first, *second])
     }
 
-    /// True if the text solves the system in the prime fields too: it must have the images of the
-    /// solution there (in the order of `all_tables`, other rates apart).
+    /// True if the text solves the system in the prime fields too: it has the images of the solution there
+    /// (in the order of `all_tables`, without the table at other rates).
     pub(super) fn agrees(&self, text: &str, numbers: &[u64]) -> bool {
         self.tables_at_the_rates()
             .zip(numbers)
@@ -257,10 +257,12 @@ impl<'a> Solver<'a> {
         Number::Text { shown: self.symbols.display(&raw), raw }
     }
 
-    /// The outputs of a problem without targets, as coefficients and as their images in all tables:
-    /// roots where possible, then readable formulas in sines and cosines, then decimals. `None` when
-    /// nothing of these is at hand.
-    pub(crate) fn coefficients(&mut self, problem: &Problem) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
+    /// Outputs of a system without targets, as coefficients and as their images in all tables: roots if
+    /// possible, or readable formulas in sines and cosines, or decimals. `None` if all fail.
+    pub(crate) fn coefficients(
+        &mut self,
+        problem: &LinearSystem,
+    ) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
         let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
         let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
         let split = self.split_rates(&values)?;
@@ -270,7 +272,7 @@ impl<'a> Solver<'a> {
         Some((coefficients.collect(), values))
     }
 
-    fn output_numbers(&mut self, problem: &Problem, split: &[(Rates, Vec<u64>)]) -> Option<Vec<Number>> {
+    fn output_numbers(&mut self, problem: &LinearSystem, split: &[(Rates, Vec<u64>)]) -> Option<Vec<Number>> {
         let exact: Option<Vec<Number>> =
             split.iter().map(|(_, numbers)| self.recover(numbers).map(Number::Radical)).collect();
         if exact.is_some() {
@@ -293,8 +295,8 @@ impl<'a> Solver<'a> {
         Some(problem.solve_in_floats(rows, &[])?.into_iter().map(|x| Number::Decimal(tidy(x))).collect())
     }
 
-    /// The observable rows at the rates of decimals in many digits; `None` for generic angles, and for
-    /// torquer errors, whose turns have none.
+    /// Observable rows in many digits at the rates for decimals; `None` for generic angles, and for torquer
+    /// errors, whose turns have none.
     fn many_digits(&self) -> Option<&Vec<Vec<Real>>> {
         let rows = self.many_digits.get_or_init(|| {
             let scheme = self.platform.scheme();
@@ -325,7 +327,7 @@ pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64
     Point::in_floats(platform, w_n, w_u)
 }
 
-/// Zero for what rounding left over.
+/// The number, or zero if it is rounding.
 pub(super) fn tidy(x: f64) -> f64 {
     if x.abs() < 1e-12 { 0.0 } else { x }
 }

@@ -1,4 +1,4 @@
-//! Printed terms with the derivatives of Z put in: what they add up to, as a functional of the unknowns.
+//! Substitution of the derivatives of Z in printed terms: their sum as a functional of the unknowns.
 
 use super::solver::Frame;
 use super::term::Term;
@@ -9,7 +9,7 @@ use crate::model::platform::{AZIMUTH, Block, LOCAL, PSI_EPS, Point, local_dynami
 use crate::model::ring::Ring;
 use crate::model::scheme::Station;
 
-/// The local unknowns and `eps^n'`.
+/// Number of local unknowns with `eps^n'`.
 const MOVING: usize = LOCAL + 3;
 
 /// The platform at one point, ready for substitution.
@@ -19,7 +19,7 @@ pub(super) struct Substitution<'a, R: Ring> {
     frame: Frame,
     stations: Vec<Station<'a>>,
     blocks: Vec<Block<R::Element>>,
-    /// `H`, by component, and `F` with `eps' = eps^n'`.
+    /// `H` by component, and `F` with `eps' = eps^n'`.
     output: Vec<(usize, [R::Element; MOVING])>,
     dynamics: [[R::Element; MOVING]; MOVING],
 }
@@ -49,8 +49,8 @@ impl<'a, R: Ring> Substitution<'a, R> {
         }
     }
 
-    /// The sum of the terms as a functional of the unknowns; `coefficients` hold the rates of the earth and
-    /// of turning, and `turning` is the rate at which a position turns.
+    /// Sum of the terms as a functional of the unknowns. `coefficients` include the rates of the earth and
+    /// of turning; `turning` is the turning rate at a position.
     pub(super) fn sum(
         &self,
         terms: &[Term],
@@ -80,7 +80,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
         out
     }
 
-    /// The derivative of Z that a term names, as a functional of the local unknowns and `eps^n'`.
+    /// Derivative of Z that a term names, as a functional of the local unknowns and `eps^n'`.
     fn derivative(&self, term: &Term, rate: &R::Element) -> [R::Element; MOVING] {
         let ring = &self.point.ring;
         // Z^n^(k) as measured
@@ -94,8 +94,8 @@ impl<'a, R: Ring> Substitution<'a, R> {
         if self.frame == Frame::N || term.azimuth {
             return in_n(if term.azimuth { AZIMUTH } else { term.component }, term.order);
         }
-        // Z^c = C_n^c Z^n, and C_n^c changes where the platform turns: sum of binomials times (w^j d^j C_n^c)
-        // Z^n^(k-j)
+        // Z^c = C_n^c Z^n, and C_n^c changes while the platform turns: sum of binomials times (w^j d^j
+        // C_n^c) Z^n^(k-j)
         let c = &self.point.attitudes[term.station];
         let turned = self.stations[term.station].turned.as_ref();
         let mut out: [R::Element; MOVING] = std::array::from_fn(|_| ring.zero());
@@ -119,7 +119,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
     }
 }
 
-/// `n over k`.
+/// Binomial coefficient `n over k`.
 pub(super) fn binomial(n: usize, k: usize) -> usize {
     (0..k).fold(1, |b, i| b * (n - i) / (i + 1))
 }

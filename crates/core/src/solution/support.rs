@@ -1,14 +1,14 @@
-//! Which observable rows a short solution uses.
+//! Choice of the observable rows of a short solution.
 
 use obsdeg_exact::echelon::{express, nonzero_columns};
 use obsdeg_exact::{Echelon, Field};
 
-/// How many orders of the rows are tried.
+/// Number of orders of the rows that are tried.
 const ORDERS: usize = 12;
 
-/// A set of independent rows (indices into `rows`, ascending) out of `allowed` whose combination gives
-/// `target` with no coefficient zero: of the sets that different row orders lead to, the cheapest by
-/// the sum of `cost`. `None` when `target` is not in the span.
+/// Independent rows (indices into `rows`, ascending) out of `allowed` whose combination gives `target` with
+/// no coefficient zero. Of the sets that different row orders give, the cheapest by the sum of `cost` is
+/// taken. `None` if `target` is not in the span.
 pub(crate) fn short_support(
     field: Field,
     rows: &[Vec<u64>],
@@ -17,7 +17,7 @@ pub(crate) fn short_support(
     cost: impl Fn(usize) -> usize,
 ) -> Option<Vec<usize>> {
     let mut best: Option<(usize, usize, Vec<usize>)> = None;
-    // rows that share a column with the target come first, and none is taken once it is in the span
+    // rows that share a column with the target come first; no row is taken once the target is in the span
     let wanted: Vec<usize> = (0..target.len()).filter(|&c| target[c] != 0).collect();
     let (near, far): (Vec<usize>, Vec<usize>) =
         allowed.iter().partition(|&&j| wanted.iter().any(|&c| rows[j][c] != 0));
@@ -45,8 +45,9 @@ pub(crate) fn short_support(
     best.map(|(_, _, used)| used)
 }
 
-/// The first independent rows of an order up to that with which `target` is in their span. Most targets are
-/// in the span of a few rows out of many columns, so the columns grow with the rows that are looked at.
+/// First independent rows, in the given order, up to the one with which `target` is in their span. Most
+/// targets are in the span of a few rows out of many columns, so the columns grow with the rows that are
+/// examined.
 fn spanning(field: Field, rows: &[Vec<u64>], order: &[usize], target: &[u64]) -> Vec<usize> {
     let mut looked_at = 16.min(order.len());
     loop {

@@ -1,4 +1,4 @@
-//! The rows that solutions are made of: the local observables of every position, in two fields, four
+//! Rows from which solutions are made: the local observables of every position, in two fields, four
 //! embeddings each.
 
 use obsdeg_exact::RootField;
@@ -10,39 +10,39 @@ use crate::degree::ensemble::{Verdicts, staircase};
 use crate::model::Platform;
 use crate::model::platform::{RandomValues, Sample};
 
-/// The rows of the local observables of every position, in one field and embedding.
+/// Rows of the local observables of every position, in one field and embedding.
 #[derive(Debug, Clone)]
 pub(crate) struct Table {
     /// Field and embedding.
     pub sample: Sample,
-    /// One row per station and local observable, station by station; then, if the scheme rotates, one per
-    /// station of [`motion_rows`]. Where rotations are judged by their course, the bases of `V_0, V_1, ...`
-    /// instead.
+    /// Rows, one per station and local observable, station by station; then, if the scheme rotates, one per
+    /// station of [`motion_rows`]. If rotations are judged by their output history, the bases of
+    /// `V_0, V_1, ...` instead.
     pub rows: Vec<Vec<u64>>,
 }
 
 impl Table {
-    /// The values of `(wN, wU)`.
+    /// Rates `(wN, wU)` of the table.
     pub(crate) fn rates(&self) -> [u64; 2] {
         [self.sample.point.w_n, self.sample.point.w_u]
     }
 }
 
-/// The observable rows of a scheme in two fields, four embeddings each, with random rates: a formula in
-/// `wN` and `wU` that holds there holds at every latitude with the same zeros.
+/// Observable rows of a scheme in two fields, four embeddings each, with random rates. A formula in `wN` and
+/// `wU` that holds there holds at every latitude with the same zeros.
 #[derive(Debug, Clone)]
 pub(crate) struct Tables {
-    /// The observables of one position.
+    /// Observables of one position.
     pub observables: Vec<LocalObservable>,
-    /// How many rows there are but those of [`motion_rows`].
+    /// Number of rows without those of [`motion_rows`].
     pub observable_rows: usize,
-    /// The orders of the rows where these are bases of `V_0, V_1, ...`; empty elsewhere.
+    /// Orders of the rows, if these are bases of `V_0, V_1, ...`; empty otherwise.
     stairs: Vec<usize>,
-    /// Zeros of the rates.
+    /// Components of the earth rate that are zero.
     pub zeros: RateZeros,
-    /// `tables[field][embedding]`.
+    /// Tables `[field][embedding]`.
     pub tables: [[Table; 4]; 2],
-    /// The first field and embedding at other rates.
+    /// Table of the first field and embedding at other rates.
     pub other_rates: Table,
 }
 
@@ -103,7 +103,7 @@ impl Tables {
         row / self.observables.len()
     }
 
-    /// The row of [`motion_rows`] of a station.
+    /// Row of [`motion_rows`] of a station.
     pub(crate) fn motion_row(&self, station: usize) -> usize {
         self.observable_rows + station
     }
@@ -113,7 +113,7 @@ impl Tables {
         (0..self.observable_rows).filter(|&j| self.order(j) <= degree).collect()
     }
 
-    /// The first field and embedding.
+    /// Table of the first field and embedding.
     pub(crate) fn first(&self) -> &Table {
         &self.tables[0][0]
     }

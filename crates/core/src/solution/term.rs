@@ -1,21 +1,21 @@
-//! One term of a solution: a coefficient and the derivative of Z that it multiplies.
+//! Terms of a solution: a coefficient and the derivative of Z that it multiplies.
 
 use crate::degree::coefficient::Coefficient;
 
-/// `coefficient * w^turns * Z_component^(order) @ station`, w being the rate at which the platform turns
-/// there.
+/// Term `coefficient * w^turns * Z_component^(order) @ station`, with the turning rate w of the platform at
+/// the station.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// Index of the station.
     pub station: usize,
-    /// 1, 2, 3: component in n or platform axis; of a measured azimuth its number.
+    /// Component 1, 2, 3 in n or platform axes, or the number of a measured azimuth.
     pub component: usize,
     /// True if this is the measured azimuth.
     pub azimuth: bool,
-    /// Derivative order; at a rotation, of the platform that turns.
+    /// Derivative order; during a rotation, the derivative on the turning platform.
     pub order: usize,
-    /// The power of the rate of turning.
+    /// Power of the turning rate.
     pub turns: usize,
-    /// The coefficient, without it.
+    /// Coefficient without the turning rate.
     pub coefficient: Coefficient,
 }

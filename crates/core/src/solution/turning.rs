@@ -1,9 +1,9 @@
-//! What a turning platform adds to derivatives of Z: those of `C_c^n` and of `eps^n` by the angle of the
-//! turn.
+//! Contributions of a turning platform to derivatives of Z: derivatives of `C_c^n` and of `eps^n` by the
+//! angle of the turn.
 //!
-//! While the platform turns at the rate w, `eps^n` changes with its attitude, so that `Z''` holds
-//! `w d eps^n/d angle` beside what it holds at rest; and `Z` in platform axes is `C_n^c Z^n` with a `C_n^c`
-//! that changes as well.
+//! While the platform turns at the rate w, `eps^n` changes with its attitude, so `Z''` contains
+//! `w d eps^n/d angle` in addition to its value at rest. `Z` in platform axes is `C_n^c Z^n`, and `C_n^c`
+//! changes as well.
 
 use crate::model::Platform;
 use crate::model::attitude::{Matrix3, product};
@@ -11,7 +11,7 @@ use crate::model::platform::Point;
 use crate::model::ring::Ring;
 use crate::model::rotation::Axis;
 
-/// `a + b d` with `d^2 = 0`: a value and its derivative.
+/// Ring of dual numbers `a + b d` with `d^2 = 0`: a value and its derivative.
 #[derive(Debug, Clone, Copy)]
 struct Dual<'a, R>(&'a R);
 
@@ -54,8 +54,8 @@ pub(crate) fn attitude_derivative<R: Ring>(
     })
 }
 
-/// `d eps^n/d angle`: three rows, one column per coefficient. Where the platform turns no torquer error is
-/// unknown.
+/// Derivative `d eps^n/d angle`: three rows, one column per coefficient. No torquer error is unknown where
+/// the platform turns.
 pub(crate) fn drift_derivative<R: Ring>(
     platform: &Platform,
     ring: &R,
@@ -70,8 +70,8 @@ pub(crate) fn drift_derivative<R: Ring>(
     rows.map(|row| row.into_iter().map(|[_, slope]| slope).collect())
 }
 
-/// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform
-/// stands. `Z1''` is the only second derivative that solutions use (16).
+/// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform is at
+/// rest. `Z1''` is the only second derivative that solutions use (16).
 pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
     if !platform.scheme().rotates() || platform.scheme().by_course() {
         return Vec::new();
@@ -99,7 +99,7 @@ mod tests {
     use crate::model::ring::Float;
     use crate::model::scheme::parse_attitude;
 
-    /// Against differences of attitudes and drifts.
+    /// Derivatives agree with differences of attitudes and drifts.
     #[test]
     fn derivatives_are_limits_of_differences() {
         let angles = parse_attitude("20,-35,70").expect("an attitude");

@@ -1,9 +1,9 @@
 //! Addition theorems: functions of sums and multiples of arguments, written by functions of the parts.
 //!
-//! `exp(2x + y)` is `exp(x)^2 exp(y)`, `cos(a - b)` is `cos a cos b + sin a sin b`, and a quarter turn more
-//! exchanges sine and cosine. What is left are functions of arguments without such relations, whose values
-//! may then be independent (`independent`). Arguments are compared as polynomials with rational coefficients
-//! in slots, and in nodes that are none, so nothing rests on a random point.
+//! `exp(2x + y)` is `exp(x)^2 exp(y)`, `cos(a - b)` is `cos a cos b + sin a sin b`, and a quarter turn
+//! exchanges sine and cosine. The remaining functions have arguments without such relations, so their values
+//! may be independent (`independent`). Arguments are compared as polynomials with rational coefficients in
+//! slots and in nodes that are no polynomials, so nothing depends on a random point.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -12,7 +12,7 @@ use super::functions::{gcd, plus, times};
 use super::model::Compiled;
 use crate::language::Function;
 
-/// Most terms of an argument.
+/// Largest number of terms of an argument.
 const TERMS: usize = 24;
 /// Highest power of a function of a part.
 const POWER: i64 = 12;
@@ -24,30 +24,31 @@ type Monomial = Vec<(usize, u32)>;
 /// A polynomial with rational coefficients; no coefficient is zero.
 type Polynomial = BTreeMap<Monomial, Ratio>;
 
-/// An argument by those that are kept.
+/// An argument as a combination of kept arguments.
 #[derive(Debug, Clone)]
 struct Parts {
-    /// Numbers of kept arguments (their index, the multiple).
+    /// Kept arguments with their multiples: `(index, multiple)`.
     of: Vec<(usize, i64)>,
-    /// Quarter turns more.
+    /// Number of quarter turns that are added.
     quarters: i64,
 }
 
-/// The arguments of one family of functions.
+/// Arguments of one family of functions.
 #[derive(Debug, Default)]
-struct Family {
-    /// What is kept: the node of an argument, its quarter turns, and what it is divided by.
+struct ArgumentFamily {
+    /// Kept arguments: node, number of quarter turns, and divisor.
     kept: Vec<(usize, i64, i64)>,
-    /// By the node of an argument.
+    /// Combination of kept arguments by the node of an argument.
     parts: HashMap<usize, Parts>,
 }
 
-/// The same system with every function of a sum or a multiple of other arguments written by functions of
-/// these; `None` where there is none, or where multiples are large.
+/// The system with every function of a sum or a multiple of other arguments written by functions of these;
+/// `None` if there is none, or if multiples are large.
 pub(super) fn written_apart(compiled: &Compiled) -> Option<Compiled> {
     let families = [false, true].map(|real| family(&compiled.dag, real));
     let [circular, real] = &families;
-    let plain = |f: &Family| f.parts.len() == f.kept.len() && f.kept.iter().all(|k| k.1 == 0 && k.2 == 1);
+    let plain =
+        |f: &ArgumentFamily| f.parts.len() == f.kept.len() && f.kept.iter().all(|k| k.1 == 0 && k.2 == 1);
     if plain(circular) && plain(real) {
         return None;
     }
@@ -75,17 +76,16 @@ pub(super) fn written_apart(compiled: &Compiled) -> Option<Compiled> {
     Some(compiled.with(dag, &nodes))
 }
 
-/// True if there is an addition theorem.
+/// True if the function has an addition theorem.
 fn is_function_of_sums(function: Function) -> bool {
     use Function::{Cos, Exp, Sin, Tan, Tanh};
     matches!(function, Sin | Cos | Tan | Exp | Tanh)
 }
 
-/// The arguments of exp and tanh, or of sin, cos and tan: which are kept, and how the others are made of
-/// them.
-fn family(dag: &Dag, real: bool) -> Family {
-    let mut out = Family::default();
-    // kept arguments, reduced: the leading monomial, the polynomial, and what it is of the kept ones
+/// Arguments of exp and tanh, or of sin, cos and tan: the kept ones, and the others as combinations of them.
+fn family(dag: &Dag, real: bool) -> ArgumentFamily {
+    let mut out = ArgumentFamily::default();
+    // kept arguments, reduced: leading monomial, polynomial, and its combination of the kept arguments
     let mut reduced: Vec<(Monomial, Polynomial, Vec<Ratio>)> = Vec::new();
     let mut found: Vec<(usize, i64, Vec<Ratio>)> = Vec::new();
     let mut polynomials = HashMap::new();
@@ -97,7 +97,7 @@ fn family(dag: &Dag, real: bool) -> Family {
             continue;
         }
         let Some(mut rest) = polynomial(dag, of, &mut polynomials) else { continue };
-        // numbers beside the rest are quarter turns of angles, or it is left as it is
+        // constants in an argument must be quarter turns of angles; otherwise the argument stays unchanged
         let pi = dag.ops.iter().position(|op| *op == Op::Pi);
         let turn = pi.and_then(|pi| rest.remove(&vec![(pi, 1)])).unwrap_or((0, 1));
         let Some(quarters) = quarter(turn).filter(|q| *q == 0 || !real) else { continue };
@@ -107,7 +107,7 @@ fn family(dag: &Dag, real: bool) -> Family {
         let made = reduce(&mut rest, &reduced);
         let Some(mut made) = made else { continue };
         if let Some((leading, &(p, q))) = rest.first_key_value() {
-            // independent of the others: it is kept
+            // independent of the other arguments: kept
             let (leading, inverse) = (leading.clone(), if p < 0 { (-q, -p) } else { (q, p) });
             made.resize(out.kept.len(), (0, 1));
             let minus = |x: &Ratio| times((-x.0, x.1), inverse);
@@ -136,8 +136,8 @@ fn family(dag: &Dag, real: bool) -> Family {
     out
 }
 
-/// Takes reduced polynomials off `rest` as far as their leading monomials are there; what was taken, by kept
-/// arguments. `None` beyond small numbers.
+/// Subtracts multiples of reduced polynomials from `rest` as long as it contains their leading monomials.
+/// Returns the multiples, by kept arguments; `None` beyond small numbers.
 fn reduce(rest: &mut Polynomial, reduced: &[(Monomial, Polynomial, Vec<Ratio>)]) -> Option<Vec<Ratio>> {
     let mut made = vec![(0, 1); reduced.len()];
     for (leading, polynomial, row) in reduced {
@@ -161,7 +161,7 @@ fn add(sum: &mut Polynomial, monomial: Monomial, c: Ratio) -> Option<()> {
     Some(())
 }
 
-/// A node as a polynomial; `None` if it is a large one.
+/// A node as a polynomial; `None` if it is too large.
 fn polynomial(dag: &Dag, node: usize, known: &mut HashMap<usize, Option<Polynomial>>) -> Option<Polynomial> {
     if let Some(found) = known.get(&node) {
         return found.clone();
@@ -219,13 +219,13 @@ fn product(left: &Polynomial, right: &Polynomial) -> Option<Polynomial> {
     Some(out)
 }
 
-impl Family {
-    /// A function by those of the kept arguments; `None` where a power is large.
+impl ArgumentFamily {
+    /// Node of a function written by functions of the kept arguments; `None` if a power is large.
     fn write(&self, dag: &mut Dag, nodes: &[usize], function: Function, parts: &Parts) -> Option<usize> {
         if let ([(k, 1)], 0) = (&parts.of[..], parts.quarters)
             && let (node, 0, 1) = self.kept[*k]
         {
-            // the kept one itself, or what equals it
+            // the kept argument itself, or an equal one
             return Some(dag.function(function, nodes[node]));
         }
         if parts.of.iter().any(|(_, n)| n.abs() > POWER) {
@@ -267,7 +267,7 @@ impl Family {
         })
     }
 
-    /// The node of a kept argument, without its quarter turns, divided.
+    /// Node of a kept argument, without its quarter turns, divided by its divisor.
     fn argument(&self, dag: &mut Dag, nodes: &[usize], k: usize) -> usize {
         let (node, quarters, by) = self.kept[k];
         let mut out = nodes[node];
@@ -282,7 +282,7 @@ impl Family {
     }
 }
 
-/// `(cos, sin)` of a sum of two angles.
+/// Cosine and sine of a sum of two angles.
 fn turned(dag: &mut Dag, a: (usize, usize), b: (usize, usize)) -> (usize, usize) {
     let products = [(a.0, b.0), (a.1, b.1), (a.1, b.0), (a.0, b.1)].map(|(x, y)| dag.product(x, y));
     (dag.difference(products[0], products[1]), dag.sum(products[2], products[3]))
@@ -297,7 +297,7 @@ mod tests {
     use crate::system::work::{Work, WorkLimit};
     use obsdeg_exact::{Reals, SplitMix64};
 
-    /// Rewritten graphs have the values they had, in 256 bits at a random point, and no two functions of
+    /// Rewritten graphs keep their values, in 256 bits at a random point, and contain no two functions of
     /// related arguments.
     #[test]
     fn values_stay_what_they_are() {
@@ -334,7 +334,12 @@ mod tests {
             };
             let off = value(&before).sub(&value(&after));
             assert!(off.is_zero() && off.radius_log2() < -200.0, "{output}: {off:?}");
-            let is_left = |i: &usize| matches!(after.dag.ops[*i], Op::Primitive { function, .. } if function != Function::Log);
+            let is_left = |i: &usize| {
+                matches!(
+                    after.dag.ops[*i],
+                    Op::Primitive { function, .. } if function != Function::Log
+                )
+            };
             let below = super::super::constraints::below(&after.dag, after.outputs(0)[0]);
             assert_eq!(below.iter().filter(|i| is_left(i)).count(), functions, "{output}");
             assert!(written_apart(&after).is_none(), "{output}");

@@ -1,12 +1,12 @@
-//! Derivative rows without a lane per unknown in every node: the differentials of `h, L_f h, L_f^2 h, ...`
-//! along the trajectory, carried backwards through the graph.
+//! Derivative rows without a dual component per unknown in every node: the differentials of
+//! `h, L_f h, L_f^2 h, ...` along the trajectory, propagated backwards through the graph.
 //!
-//! With `d(L_f^k h) = sum_s w_s dx_s` over states and unknown constants, `w_s` series in time, the next one
-//! is `w_s' + sum_r w_r d(f_r)/dx_s`: a derivative, and one sweep through the graph against its direction
-//! (Hermann, Krener 1977, doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order
-//! k is the value at the start, k! times that of the Taylor coefficient. For orders below K series of length
-//! K - k are enough. So n unknowns and n orders take n^2 numbers in memory instead of n^3, and n^2 products
-//! of series, n^3 log n operations where these are transformed.
+//! Let `d(L_f^k h) = sum_s w_s dx_s` over states and unknown constants, with `w_s` series in time. The next
+//! `w_s` is `w_s' + sum_r w_r d(f_r)/dx_s`: a derivative, and one backward sweep through the graph (Hermann,
+//! Krener 1977, doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order k is the
+//! value at the start, which is k! times the Taylor coefficient. For orders below K, series of length K - k
+//! suffice. So n unknowns and n orders take n^2 numbers in memory instead of n^3, and n^2 products of
+//! series, or n^3 log n operations if these are transformed.
 
 use std::cell::RefCell;
 
@@ -17,15 +17,15 @@ use super::taylor::{Initial, Signal, Taylor};
 use super::values::Values;
 use super::work::Sweeps;
 
-/// A series in time.
+/// Power series in time, as its coefficients.
 type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 
-/// Length of the first series: most runs end within as many orders.
+/// Length of the first series: most runs need no more orders.
 const SHORT: usize = 16;
-/// Factor by which series that turn out too short are lengthened. All their orders are computed again.
+/// Factor by which series that are too short are lengthened. All their orders are computed again.
 const LONGER: usize = 4;
 
-/// The rows of one run.
+/// Rows of one run, computed backwards.
 #[derive(Debug, Clone)]
 pub(super) struct Adjoint<'a, S: Values> {
     dag: &'a Dag,
@@ -34,22 +34,22 @@ pub(super) struct Adjoint<'a, S: Values> {
     signals: Vec<Signal<S::Element>>,
     initial: Vec<Option<Initial<S::Element>>>,
     outputs: Vec<usize>,
-    /// The values of all nodes, of this many orders; 0 before the first row.
+    /// Number of orders of the values of all nodes; 0 before the first row.
     length: usize,
-    /// With fewer orders no unknown stays unseen: series are seldom longer.
+    /// Length that suffices for most runs: it gives every unknown a row.
     enough: usize,
     values: Taylor<'a, S>,
-    /// Of a quotient: one over the divisor, and minus the quotient over the divisor.
+    /// Factors of every quotient: one over the divisor, and minus the quotient over the divisor.
     quotients: Vec<Option<[Series<S>; 2]>>,
     plan: RefCell<S::Plan>,
-    /// The order of what is held.
+    /// Order of the differentials in `held`.
     order: usize,
-    /// Per output and slot the factor of its differential.
+    /// Factors of the differentials, by output and slot.
     held: Vec<Vec<Option<Series<S>>>>,
 }
 
 impl<'a, S: Values> Adjoint<'a, S> {
-    /// The rows of a run, from order 0, and its values; `None` where inputs are unknown.
+    /// Prepares the rows of a run, from order 0, and its values; `None` if inputs are unknown.
     pub(super) fn new(
         dag: &'a Dag,
         f: S,
@@ -83,7 +83,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         })
     }
 
-    /// The length of the series with which the rows of an order are computed.
+    /// Length of the series for the rows of an order.
     fn length_for(&self, order: usize) -> usize {
         if order < self.length {
             return self.length;
@@ -92,7 +92,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         if order < longer { longer } else { order + 1 + order / 2 }
     }
 
-    /// Series that the rows of an order will take, from what is held now.
+    /// Series that the rows of an order will take, starting from the current differentials.
     pub(super) fn sweeps(&self, order: usize) -> Sweeps {
         let length = self.length_for(order);
         let held = self.values.length;
@@ -108,7 +108,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         }
     }
 
-    /// Values up to the length, and what is held at order 0.
+    /// Computes the values up to the length, and the differentials of order 0.
     fn begin(&mut self) {
         while self.values.length < self.length {
             self.values.advance();
@@ -119,7 +119,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
             Op::Divide(_, b) if self.values.takes_part(i) && !self.values.is_known(i) => {
                 let below = inverse(f, self.values.series(b), n);
                 let ratio: Series<S> = self.values.series(i).iter().map(|x| f.neg(x)).collect();
-                // nothing has this key
+                // a key that no other factor has
                 let other = self.products(&ratio, &[(usize::MAX - i, &below)], n);
                 Some([below, other.into_iter().next()?])
             }
@@ -135,7 +135,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         self.held = self.outputs.iter().map(start).collect();
     }
 
-    /// The next order.
+    /// Advances the differentials by one order.
     fn step(&mut self) {
         let (f, n) = (&self.f, self.length - self.order - 1);
         let next = |held: &Vec<Option<Series<S>>>| {
@@ -158,7 +158,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         self.order += 1;
     }
 
-    /// The values of the run, up to an order.
+    /// Values of the run, up to an order.
     pub(super) fn values_to(&mut self, order: usize) -> &Taylor<'a, S> {
         while self.values.length <= order {
             self.values.advance();
@@ -166,7 +166,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         &self.values
     }
 
-    /// The rows of an order, not below those that were asked for before, one for each output.
+    /// Rows of an order, one for each output. Orders must not decrease from call to call.
     pub(super) fn rows(&mut self, order: usize) -> Vec<Series<S>> {
         if order >= self.length {
             self.length = self.length_for(order);
@@ -195,7 +195,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         self.held.iter().map(row).collect()
     }
 
-    /// From factors of differentials of nodes to those of slots, the first `n` orders.
+    /// Factors of the differentials of slots, from those of nodes, for the first `n` orders.
     fn sweep(&self, seeds: Vec<(usize, Series<S>)>, n: usize) -> Vec<Option<Series<S>>> {
         let f = &self.f;
         let mut left: Vec<Option<Series<S>>> = vec![None; self.dag.ops.len()];
@@ -258,8 +258,8 @@ impl<'a, S: Values> Adjoint<'a, S> {
         }
     }
 
-    /// The first `n` coefficients of the products of a series with others, each with a key of its own; what
-    /// is constant is a series of one.
+    /// First `n` coefficients of the products of a series with others, each with its own key; a constant is
+    /// a series of length one.
     fn products(&self, w: &[S::Element], factors: &[(usize, &[S::Element])], n: usize) -> Vec<Series<S>> {
         let f = &self.f;
         if factors.iter().all(|(_, b)| b.len() > 1) {
@@ -273,9 +273,9 @@ impl<'a, S: Values> Adjoint<'a, S> {
     }
 }
 
-/// The first `n` coefficients of one over a series.
+/// First `n` coefficients of one over a series.
 fn inverse<S: Values>(f: &S, b: &[S::Element], n: usize) -> Series<S> {
-    // no divisor is zero, or there were no series
+    // no divisor is zero: otherwise the series would not exist
     let first = f.inverse(&b[0]).unwrap_or(f.zero());
     let mut out = vec![first];
     if b.len() == 1 {
@@ -293,15 +293,17 @@ mod tests {
     use obsdeg_exact::{Field, Scalars, SplitMix64};
 
     use crate::system::model_file;
-    use crate::system::rows::{Layout, Maker, random_field};
+    use crate::system::rows::{Layout, PointBuilder, random_field};
     use crate::system::work::Work;
 
-    /// Against duals in every node, to orders beyond the first length.
+    /// The rows agree with duals in every node, to orders beyond the first length.
     #[test]
     fn the_same_as_forwards() {
         for text in [
-            "[states]\nx='-a*x*z + u'\nz='x/(z + b)'\nw='w'\n[outputs]\ny='x*z'\nv='w + t'\n[known_inputs]\nu='generic'\n",
-            "[states]\nx={equation='a*sin(z)', initial='2*b'}\nz='exp(x) - u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
+            "[states]\nx='-a*x*z + u'\nz='x/(z + b)'\nw='w'\n[outputs]\ny='x*z'\nv='w + \
+             t'\n[known_inputs]\nu='generic'\n",
+            "[states]\nx={equation='a*sin(z)', initial='2*b'}\nz='exp(x) - \
+             u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
             "[states]\nx='a/b'\nz='log(x + z)*tanh(a)'\n[outputs]\ny='z'\n",
         ] {
             let model =
@@ -311,8 +313,9 @@ mod tests {
             let mut rng = SplitMix64::new(5);
             let field: Field = random_field(&mut rng);
             let work = Work::new(model.work_limit);
-            let maker = Maker { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
-            let (mut forward, mut adjoint) = maker.both(&mut rng);
+            let builder =
+                PointBuilder { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
+            let (mut forward, mut adjoint) = builder.both(&mut rng);
             let mut factorial = field.one();
             for order in 0..12 {
                 factorial = Scalars::mul(&field, &factorial, &field.integer((order as i64).max(1)));

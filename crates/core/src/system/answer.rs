@@ -23,7 +23,7 @@ use crate::why::Why;
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
 
-/// Default of [`SystemOptions::relation_limit`]: relations are sought only where they are asked for.
+/// Default of [`SystemOptions::relation_limit`]: relations are sought on request only.
 pub const RELATION_LIMIT: u64 = 0;
 
 /// Name and version of the JSON layout.
@@ -177,12 +177,12 @@ pub enum Identifiability {
 }
 
 impl SystemQuantity {
-    /// With the identifiability that its verdict and its number of solutions state.
+    /// The quantity with the identifiability that follows from its verdict and its number of solutions.
     fn with_identifiability(self) -> Self {
         Self { identifiability: self.identifiability(), ..self }
     }
 
-    /// The identifiability that the verdict and the number of solutions state.
+    /// Identifiability that follows from the verdict and the number of solutions.
     fn identifiability(&self) -> Identifiability {
         match (self.status, &self.number_of_solutions) {
             (
@@ -195,7 +195,7 @@ impl SystemQuantity {
         }
     }
 
-    /// The identifiability in words, with the number of solutions: `locally identifiable (2 solutions)`.
+    /// Identifiability in words, with the number of solutions: `locally identifiable (2 solutions)`.
     pub fn identifiability_words(&self) -> String {
         match (self.identifiability, &self.number_of_solutions) {
             (Identifiability::GloballyIdentifiable, _) => "globally identifiable".into(),
@@ -252,7 +252,7 @@ pub struct SymmetryReport {
 }
 
 impl Judgement {
-    /// Of a model judged in prime fields: the bound on the probability that a verdict is wrong.
+    /// Bound on the probability that a verdict is wrong; `None` for a model judged in real numbers.
     pub fn error_bound(&self) -> Option<f64> {
         match self.certainty {
             SystemCertainty::Primes(primes) => Some(primes.error_bound),
@@ -260,7 +260,7 @@ impl Judgement {
         }
     }
 
-    /// Of a model judged in real numbers: how clear its ranks were.
+    /// Margin of the rank decisions in real numbers; `None` for a model judged in prime fields.
     pub fn digits(&self) -> Option<DigitsReport> {
         match self.certainty {
             SystemCertainty::Primes(_) => None,
@@ -280,21 +280,22 @@ impl From<ByDigits> for DigitsReport {
     }
 }
 
-/// What is to be computed.
+/// Options of the analysis of a system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SystemOptions {
     /// Seed of all random choices.
     pub seed: u64,
     /// True if solving expressions and the number of solutions are wanted.
     pub solutions: bool,
-    /// How much work counting solutions may take: millions of products of two coefficients, at each of two
+    /// Limit of the work of counting solutions, in millions of products of two coefficients, at each of two
     /// points.
     pub count_limit: u64,
-    /// Limit of the work of relations among derivatives of the outputs, where counting leaves a number
-    /// undecided: millions of products of two coefficients, at each of two points; 0: none are sought.
+    /// Limit of the work of relations among derivatives of the outputs, which are sought if counting leaves
+    /// a number undecided. In millions of products of two coefficients, at each of two points; 0: none are
+    /// sought.
     pub relation_limit: u64,
-    /// The highest order of derivatives to look at; left out: n for each experiment where chains end by
-    /// themselves, else 2n+4, and at least 60 without arbitrary inputs.
+    /// Highest order of derivatives. `None`: n for each experiment if chains end by themselves, else 2n+4,
+    /// and at least 60 without arbitrary inputs.
     pub order: Option<usize>,
 }
 
@@ -370,8 +371,8 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     Ok(out)
 }
 
-/// The output that a state is, or the derivative of such a state that it is, if it is nothing else: `y`,
-/// `y'`, `y''`.
+/// Name of the output that equals a state, or of the output derivative that equals it: `y`, `y'`, `y''`;
+/// `None` if no output does.
 fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Option<String> {
     if model.experiments > 1 || !model.segments.is_empty() || !matches!(unknown.role, Role::State(_)) {
         return None;
@@ -398,7 +399,7 @@ fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
     }
 }
 
-/// The answer for a model that was judged.
+/// Answer for a judged model.
 fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> SystemAnalysis {
     let findings = &judged.findings;
     let name = |c: usize| name_of(model, judged, c);
@@ -408,7 +409,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             Role::State(i) => ("state", &model.states[i].named),
             Role::Parameter(i) => ("parameter", &model.parameters[i]),
             Role::UnknownInput(i) => ("input", &model.unknown_inputs[i].0),
-            // no unknowns
+            // these roles are no unknowns
             Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
         };
         let Verdict { status, degree } = judged.verdict_on(c);
@@ -478,7 +479,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
     }
 }
 
-/// The name of an unknown; known constants are counted on behind the unknowns.
+/// Name of an unknown; known constants are numbered after the unknowns.
 fn name_of(model: &SystemModel, judged: &Judgement, c: usize) -> String {
     match judged.layout.unknowns.get(c) {
         Some(u) => u.name.clone(),
@@ -490,13 +491,13 @@ fn named(list: &[Vec<usize>], name: &dyn Fn(usize) -> String) -> Vec<Vec<String>
     list.iter().map(|columns| columns.iter().map(|&c| name(c)).collect()).collect()
 }
 
-/// `c`, or a name like it that the model does not use.
+/// `c`, or a similar name that the model does not use.
 fn free_name(judged: &Judgement) -> String {
     let taken = |name: &str| judged.layout.unknowns.iter().any(|u| u.name == name);
     ["c", "s", "k", "factor"].into_iter().find(|n| !taken(n)).unwrap_or("factor_").into()
 }
 
-/// The symmetries of a judged model in words: scalings and translations, then polynomial directions.
+/// Symmetries of a judged model in words: scalings and translations, then polynomial directions.
 pub fn symmetry_reports(
     model: &SystemModel,
     judged: &Judgement,
@@ -519,7 +520,7 @@ pub fn symmetry_reports(
     plain.chain(polynomial).collect()
 }
 
-/// `move x, y, theta along -y, x, 1`.
+/// Text such as `move x, y, theta along -y, x, 1`.
 fn along(d: &PolynomialDirection, name: &dyn Fn(usize) -> String) -> String {
     let term = |(factors, (p, q)): &PolynomialTerm, first: bool| {
         let sign = match (*p < 0, first) {
@@ -556,10 +557,10 @@ fn along(d: &PolynomialDirection, name: &dyn Fn(usize) -> String) -> String {
     format!("move {} along {}", names.join(", "), speeds.join(", "))
 }
 
-/// A symmetry as what it does to the unknowns, for every `c` where scalings are at work for every positive
-/// one: the flow of `x_i' = c_i x_i + d_i` after the time `log c`, or after `c` where nothing is scaled.
-/// `multiply a, b by c; divide d by c^2`, `add c to x; subtract 2 c from y`, `multiply a by c; replace x by
-/// c*x + 1 - c; add log(c) to y`.
+/// A symmetry as its effect on the unknowns, for every `c` (every positive one if it has a scaling). It is
+/// the flow of `x_i' = c_i x_i + d_i` after the time `log c`, or after `c` without a scaling. Examples:
+/// `multiply a, b by c; divide d by c^2`, `add c to x; subtract 2 c from y`,
+/// `multiply a by c; replace x by c*x + 1 - c; add log(c) to y`.
 fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
     let fraction = |(p, q): (i64, i64)| if q == 1 { p.to_string() } else { format!("{p}/{q}") };
     let power = |(p, q): (i64, i64)| match (p, q) {
@@ -571,7 +572,7 @@ fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
     let amount = |(p, q): (i64, i64)| {
         if (p, q) == (1, 1) { step.clone() } else { format!("{} {step}", fraction((p, q))) }
     };
-    // unknowns that are treated alike stand together
+    // unknowns with the same change stand together
     let mut groups: Vec<(String, Vec<String>, String)> = Vec::new();
     let mut put =
         |verb: &str, name: String, rest: String| match groups.iter_mut().find(|g| g.0 == verb && g.2 == rest)

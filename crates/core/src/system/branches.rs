@@ -1,4 +1,4 @@
-//! Branches of functions: those that a model has, and the sides of them on which it was judged.
+//! Branches of the functions of a model, and the sides of them on which it was judged.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ pub struct BranchSide {
     pub given: bool,
 }
 
-/// True if the values that a slot takes are not all given.
+/// True if not all values of a slot are given.
 fn varies(compiled: &Compiled, slot: usize) -> bool {
     match compiled.roles[slot] {
         Role::Constant(c) => (0..compiled.experiments.len()).any(|e| compiled.constants(e)[c].is_none()),
@@ -32,8 +32,8 @@ fn varies(compiled: &Compiled, slot: usize) -> bool {
     }
 }
 
-/// True if the value of a node at the start of the first segment is given: it depends on states with given
-/// starts and on given constants alone.
+/// True if the value of a node at the start of the first segment is given: it depends only on states with
+/// given starts and on given constants.
 fn is_given(compiled: &Compiled, node: usize) -> bool {
     slots_of(&compiled.dag, node).into_iter().all(|s| match compiled.roles[s] {
         Role::State(i) => compiled.starts[i].is_some_and(|start| !open(compiled, start)),
@@ -41,18 +41,18 @@ fn is_given(compiled: &Compiled, node: usize) -> bool {
     })
 }
 
-/// True if a node depends on something that is not given.
+/// True if a node depends on a value that is not given.
 fn open(compiled: &Compiled, node: usize) -> bool {
     slots_of(&compiled.dag, node).into_iter().any(|s| varies(compiled, s))
 }
 
-/// Functions with branches that are taken of what is not given: unknowns, inputs, generic constants or the
-/// time.
+/// Functions with branches whose argument is not given: it depends on unknowns, inputs, generic constants or
+/// the time.
 pub(super) fn branches(compiled: &Compiled) -> Vec<String> {
     let branched = [Function::Abs, Function::Sign, Function::Sqrt, Function::Asin, Function::Acos];
     let taken = |f: Function| {
         compiled.dag.ops.iter().any(|op| {
-            // a sign is the derivative of a size
+            // sign is the derivative of abs
             matches!(*op, Op::Primitive { function, of, .. } if function == f
                 && !(f == Function::Sign && compiled.dag.has(Function::Abs, of))
                 && open(compiled, of))
@@ -72,11 +72,11 @@ pub(super) fn sided(compiled: &Compiled) -> Vec<usize> {
     all.into_iter().filter(|&node| open(compiled, node)).collect()
 }
 
-/// True where an argument is positive at the start of a run, false where it is negative; `None` where it
-/// takes no part. By argument, then by run: experiment by experiment, segment by segment.
+/// Signs of arguments, by argument and then by run (experiment by experiment, segment by segment): true if
+/// positive at the start of the run, false if negative; `None` if the argument takes no part in it.
 pub(crate) type Signs = Vec<Vec<Option<bool>>>;
 
-/// The sides of the branches at two points, in words.
+/// Sides of the branches at two points, in words.
 pub(super) fn sides(model: &SystemModel, compiled: &Compiled, points: &[Signs; 2]) -> Vec<BranchSide> {
     let names = model.slot_names();
     let segments = compiled.segments.len().max(1);

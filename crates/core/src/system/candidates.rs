@@ -7,10 +7,10 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{Candidate, Named, Place, PlacedExpression, SystemModel};
-use super::reader::{Entry, Reader, base};
+use super::reader::{Entry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, parse_components};
 
-/// Words that stand for candidates, with what they stand for.
+/// Words for groups of candidates, with their meanings.
 pub const CANDIDATE_WORDS: [(&str, &str); 5] = [
     ("states", "every state"),
     ("outputs", "every output of the model"),
@@ -21,10 +21,10 @@ pub const CANDIDATE_WORDS: [(&str, &str); 5] = [
 
 impl SystemModel {
     /// Candidates from a list such as `states` or `x1, x2, x1 + x3`: words of [`CANDIDATE_WORDS`], names and
-    /// expressions, separated by commas. What is named twice counts once.
+    /// expressions, separated by commas. Repeated ones count once.
     ///
     /// # Errors
-    /// [`ModelError`] of an expression that cannot be read, and of a word that stands for nothing here.
+    /// [`ModelError`] for an expression that cannot be read, and for a word without a meaning in this model.
     pub fn candidates_of(&self, list: &str) -> Result<Vec<Candidate>, ModelError> {
         let mut out: Vec<Candidate> = Vec::new();
         for item in items(list) {
@@ -58,8 +58,8 @@ impl SystemModel {
         }
     }
 
-    /// Refuses a candidate of the file with the name of a state, a parameter, an unknown input or an output
-    /// that is something else.
+    /// Refuses a candidate of the file that has the name of a state, a parameter, an unknown input or an
+    /// output but is another quantity.
     pub(super) fn check_candidates(&self) -> Result<(), ModelError> {
         let states = self.states.iter().map(|s| &s.named.name);
         let own = states.chain(self.parameters.iter().map(|p| &p.name));
@@ -78,7 +78,7 @@ impl SystemModel {
         Ok(())
     }
 
-    /// A candidate that is an expression, or a state, input or parameter by its name.
+    /// Candidate from an expression, or from the name of a state, input or parameter.
     fn candidate(&self, text: &str) -> Result<Candidate, ModelError> {
         let own = (self.states.iter().map(|s| &s.named))
             .chain(&self.parameters)
@@ -119,8 +119,8 @@ impl SystemModel {
         out
     }
 
-    /// The model with candidates as its outputs, beside its own where these stay, and the outputs of each
-    /// candidate; without the combinations that it asks for.
+    /// The model with candidates as its outputs, beside its own outputs if `own`, and the outputs of each
+    /// candidate; without requested combinations.
     pub fn measuring(&self, candidates: &[Candidate], own: bool) -> (Self, Vec<Range<usize>>) {
         let mut out = Self { combinations: Vec::new(), candidates: Vec::new(), ..self.clone() };
         if !own {
@@ -139,9 +139,9 @@ impl SystemModel {
     }
 }
 
-impl Reader<'_> {
-    /// An entry of the table `candidates`: an expression, or a table with expression, cost, unit,
-    /// description.
+impl ModelReader<'_> {
+    /// Candidate of an entry of the table `candidates`: an expression, or a table with expression, cost,
+    /// unit, description.
     pub(super) fn file_candidate(&self, (key, value): Entry<'_>) -> Result<Candidate, ModelError> {
         let (name, span) = (base(key), value.span());
         let what = format!("the candidate {name}");
@@ -163,7 +163,7 @@ impl Reader<'_> {
         Ok(Candidate { named: self.named(name, table), parts: found.parts, cost })
     }
 
-    /// All of them, in the order of the file.
+    /// All candidates of the file, in its order.
     pub(super) fn file_candidates(
         &self,
         entries: &[(&String, &Spanned<Value>)],
@@ -175,12 +175,14 @@ impl Reader<'_> {
 /// Checks a cost.
 ///
 /// # Errors
-/// What was expected.
+/// Description of the admitted costs.
 pub fn check_cost(cost: f64) -> Result<(), String> {
     let steps = cost * 1e6;
     match (1.0..=1e12).contains(&steps) && (steps - steps.round()).abs() < 1e-3 {
         true => Ok(()),
-        false => Err("expected a cost above 0 and up to 1000000, with at most 6 decimals".into()),
+        false => {
+            Err(format!("found {cost}; expected a cost above 0 and up to 1000000, with at most 6 decimals"))
+        }
     }
 }
 
@@ -192,7 +194,7 @@ fn one(named: Named, part: PlacedExpression) -> Candidate {
     Candidate { named, parts: vec![part], cost: 1.0 }
 }
 
-/// What has this name, as it is.
+/// Candidate that is the quantity of this name.
 fn named(of: &Named) -> Candidate {
     let expression = Expression {
         nodes: vec![Node::Name(of.name.clone())],
@@ -202,7 +204,7 @@ fn named(of: &Named) -> Candidate {
     one(of.clone(), PlacedExpression { text: of.name.clone(), expression, place })
 }
 
-/// The parts of a list between commas that stand in no brackets.
+/// Parts of a list, separated by commas outside of brackets.
 fn items(list: &str) -> Vec<&str> {
     let (mut depth, mut start, mut out) = (0i32, 0, Vec::new());
     for (i, c) in list.char_indices() {
@@ -225,8 +227,9 @@ mod tests {
     use super::*;
     use crate::system::model_file::read;
 
-    const TEXT: &str = "name = 'm'\nparameters = ['k']\n[states]\nx = '-k*x + w'\n'p[2]' = '[p[2], x]'\n\
-                        [unknown_inputs]\nw = 'constant'\n[outputs]\ny = 'x'\n[candidates]\nbeat = { expression = 'x*k', cost = 2.5, unit = 'V' }\nplace = 'p'\n";
+    const TEXT: &str = "name = 'm'\nparameters = ['k']\n[states]\nx = '-k*x + w'\n'p[2]' = '[p[2], \
+                        x]'\n[unknown_inputs]\nw = 'constant'\n[outputs]\ny = 'x'\n[candidates]\nbeat = { \
+                        expression = 'x*k', cost = 2.5, unit = 'V' }\nplace = 'p'\n";
 
     fn names(list: &str) -> Vec<String> {
         let model = read(TEXT).expect("a model");

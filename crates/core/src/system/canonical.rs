@@ -1,18 +1,19 @@
-//! What a model's verdicts depend on, as text: the input that takes part in the choice of primes.
+//! Canonical text of everything that a model's verdicts depend on: input for the choice of primes.
 
 use obsdeg_exact::SplitMix64;
 
 use super::model::{Constant, KnownInput, PlacedExpression, StartTime, StateStart, SystemModel};
 
 impl SystemModel {
-    /// The stream of `seed` for one purpose and this model ([`SplitMix64::of`]). Everything takes part but
-    /// what moves no verdict: the name of the model, units, descriptions, the numbers of a simulation.
+    /// Random stream of `seed` for one purpose and this model ([`SplitMix64::of`]). It depends on the whole
+    /// model except for what changes no verdict: the name of the model, units, descriptions, numbers of a
+    /// simulation.
     pub fn random(&self, seed: u64, purpose: &str) -> SplitMix64 {
         SplitMix64::of(seed, purpose, &self.canonical())
     }
 
-    /// The parts of the input, lists with their length: the same for the same model whichever file it came
-    /// from.
+    /// Canonical parts of the model, lists with their length: the same for the same model, whatever file it
+    /// came from.
     fn canonical(&self) -> Vec<String> {
         let mut out: Vec<String> = vec!["model".into()];
         let text = |f: &PlacedExpression| f.text.trim().to_string();

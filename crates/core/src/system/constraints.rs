@@ -1,9 +1,9 @@
-//! Random points at which the constraints of a model hold, in a prime field (in real numbers: `newton`).
+//! Random points of a prime field at which the constraints of a model hold (for real numbers see `newton`).
 //!
-//! Constraints are solved block by block. A block is all that hold no value left to choose but those of one
-//! of them; all of its constraints but one must be linear in the values that are solved for. So they leave a
-//! line, and on it the last one is a polynomial in one unknown, of which a root in the field is drawn: as for
-//! `|q| = 1`, or the six conditions of a rotation matrix.
+//! Constraints are solved block by block. A block contains all constraints without free values other than
+//! those of one of them. All of its constraints but one must be linear in the values that are solved for. So
+//! they leave a line, on which the last constraint is a polynomial in one unknown. A root of it in the field
+//! is drawn: this solves `|q| = 1`, or the six conditions of a rotation matrix.
 
 use std::collections::BTreeSet;
 
@@ -14,18 +14,18 @@ use obsdeg_exact::polynomial::{interpolate, root};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::dag::{Dag, Op};
-use super::values::NotHeld;
+use super::values::ConstraintFailure;
 use super::work::{PER_NODE, Step, Work};
 
-/// Draws of a block: half of all quadratic equations have a root in a field.
+/// Number of draws of a block: half of all quadratic equations have a root in a field.
 const TRIES: usize = 60;
-/// Draws of a block that leaves no value to choose: only which of its roots is drawn differs.
+/// Number of draws of a block without free values: only the choice of its roots differs.
 const TRIES_OF_POINTS: usize = 4;
 /// Highest degree of a constraint on a line.
 const MAX_DEGREE: usize = 400;
-/// Operations of a root of a polynomial and of its interpolation, for the square of its degree: powers modulo
-/// the polynomial up to the prime, 61 squares of it and as many products by halves, each with its remainder,
-/// and a division of two numbers for every pair of points.
+/// Operations of a root of a polynomial and of its interpolation, divided by the square of its degree. The
+/// powers modulo the polynomial up to the prime take 61 squares and as many products by halves, each with
+/// its remainder; the interpolation takes a division of two numbers for every pair of points.
 const PER_SQUARE: u64 = 512;
 
 /// A constraint that is a product, and the factor that was taken for it.
@@ -48,7 +48,7 @@ pub(crate) fn slots_of(dag: &Dag, node: usize) -> BTreeSet<usize> {
     ops.filter_map(|op| if let Op::Slot(s) = op { Some(s) } else { None }).collect()
 }
 
-/// The nodes that a node is made of, and itself, in order.
+/// The nodes that a node depends on, and itself, in order.
 pub(crate) fn below(dag: &Dag, node: usize) -> BTreeSet<usize> {
     let (mut out, mut left) = (BTreeSet::new(), vec![node]);
     while let Some(i) = left.pop() {
@@ -65,7 +65,7 @@ pub(crate) fn below(dag: &Dag, node: usize) -> BTreeSet<usize> {
     out
 }
 
-/// A rational constraint of the graph.
+/// Rational constraint of the graph.
 struct Constraint<'a> {
     dag: &'a Dag,
     f: &'a Field,
@@ -74,12 +74,12 @@ struct Constraint<'a> {
 }
 
 impl Constraint<'_> {
-    /// Operations of its value.
+    /// Number of operations of the constraint's value.
     fn operations(&self) -> u64 {
         self.node as u64 + PER_NODE * self.nodes.len() as u64
     }
 
-    /// Numerator and denominator at values of the slots.
+    /// Numerator and denominator at given values of the slots.
     fn at(&self, values: &[u64]) -> (u64, u64) {
         let f = self.f;
         let mut out: Vec<(u64, u64)> = vec![(0, 0); self.node + 1];
@@ -129,8 +129,8 @@ impl Constraint<'_> {
         out[self.node]
     }
 
-    /// The coefficients of the numerator in some slots, then what is without them; `None` where it is not
-    /// linear, as a random second difference shows.
+    /// Coefficients of the numerator in some slots, then the constant term; `None` if it is not linear in
+    /// them, which a random second difference shows.
     fn linear(&self, slots: &[usize], values: &[u64], rng: &mut SplitMix64) -> Option<Vec<u64>> {
         let f = self.f;
         if self.degree(slots).1 > 0 {
@@ -157,11 +157,11 @@ impl Constraint<'_> {
     }
 }
 
-/// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are zero:
-/// a random solution.
+/// Changes the values of `free` slots to a random solution: the nodes `constraints` (rational, of slots
+/// alone) become zero.
 ///
 /// # Errors
-/// [`NotHeld`]: the constraint that could not be solved, or that the work is beyond its limit.
+/// [`ConstraintFailure`]: the constraint that could not be solved, or an exceeded limit of work.
 pub(crate) fn hold(
     dag: &Dag,
     constraints: &[usize],
@@ -170,7 +170,7 @@ pub(crate) fn hold(
     f: &Field,
     rng: &mut SplitMix64,
     work: &Work,
-) -> Result<(), NotHeld> {
+) -> Result<(), ConstraintFailure> {
     let mut all: Vec<Constraint<'_>> = Vec::new();
     for &node in constraints {
         let nodes = below(dag, node);
@@ -179,7 +179,7 @@ pub(crate) fn hold(
         work.take(Step::Constraints, 2 * PER_NODE * nodes.len() as u64, bytes)?;
         all.push(Constraint { dag, f, node, nodes });
     }
-    // entries that mirror each other are one node
+    // mirrored entries are one node
     let first = |c: &usize| constraints[..*c].iter().all(|node| *node != constraints[*c]);
     let mut open: Vec<(usize, BTreeSet<usize>)> = (all.iter().enumerate().filter(|(c, _)| first(c)))
         .map(|(c, g)| (c, slots_of(dag, g.node).into_iter().filter(|&s| free[s]).collect()))
@@ -191,7 +191,7 @@ pub(crate) fn hold(
         let block: Vec<usize> =
             (open.iter()).filter(|(_, s)| s.iter().all(|s| slots.contains(s))).map(|(c, _)| *c).collect();
         let block_of: Vec<&Constraint<'_>> = block.iter().map(|&c| &all[c]).collect();
-        // where nothing is left to choose they hold or not
+        // constraints without free values hold or do not hold
         let operations = block_of.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
         let holds = |values: &[u64]| {
             work.take(Step::Constraints, operations, 0).is_ok()
@@ -205,9 +205,9 @@ pub(crate) fn hold(
             }
         };
         if !found {
-            // what was refused once is refused in every try
+            // a refusal holds for every later try
             work.take(Step::Constraints, 0, 0)?;
-            return Err(NotHeld::Constraint(block[0]));
+            return Err(ConstraintFailure::Constraint(block[0]));
         }
         open.retain(|(c, _)| !block.contains(c));
         for (_, left) in &mut open {
@@ -217,7 +217,7 @@ pub(crate) fn hold(
     Ok(())
 }
 
-/// One attempt at a block: new values for `slots`, as many of them solved for as there are constraints.
+/// One attempt at a block: new values for `slots`, of which as many are solved for as there are constraints.
 fn solve(
     block: &[&Constraint<'_>],
     slots: &[usize],
@@ -228,13 +228,13 @@ fn solve(
 ) -> Option<()> {
     let m = block.len();
     let take = |operations: u64| work.take(Step::Constraints, operations, 0).ok();
-    // along every slot, and at the points that show whether a constraint is linear
+    // along every slot, and at the points that test whether a constraint is linear
     let operations = block.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
     take(operations.saturating_mul(m as u64 + 8).saturating_add((m as u64).saturating_pow(3)))?;
     for &s in slots {
         values[s] = rng.below(f.modulus());
     }
-    // any m of the slots
+    // choose any m of the slots
     let mut chosen = slots.to_vec();
     for i in 0..chosen.len().min(m) {
         let j = i + rng.below((chosen.len() - i) as u64) as usize;
@@ -246,7 +246,7 @@ fn solve(
     for (k, g) in block.iter().enumerate() {
         let row = if m > 1 { g.linear(chosen, values, rng) } else { None };
         match row {
-            // one is always left for the end
+            // one constraint always remains for the end
             Some(row) if k + 1 < m || bent.is_some() => {
                 line.insert(&row);
             }
@@ -258,7 +258,7 @@ fn solve(
     let [first, second] = <[Vec<u64>; 2]>::try_from(line.null_space()).ok()?;
     let (a, b) = (first[m], second[m]);
     let weight = rng.below(f.modulus());
-    // a point of the line has 1 as its last entry, its direction 0
+    // a point of the line has 1 as its last entry, a direction has 0
     let height = f.add(a, f.mul(weight, b));
     if height == 0 {
         return None;

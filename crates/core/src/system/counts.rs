@@ -1,13 +1,12 @@
-//! The number of solutions of every unknown, by stages: equations in the unknowns, relations among
-//! derivatives of the outputs, and maps between solutions where derivatives of a higher order might leave
-//! fewer.
+//! Number of solutions of every unknown, by stages: equations in the unknowns, relations among derivatives
+//! of the outputs, and maps between solutions if derivatives of a higher order might leave fewer solutions.
 
 use obsdeg_exact::groebner::Work;
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::{Dag, Op};
-use super::fibre::{Counted, Fibre, at_point};
-use super::global::{self, Found, Known};
+use super::fibre::{CountingPoint, Fibre, at_point};
+use super::global::{self, ModelRelations, RelationConsequences};
 use super::judge::Judgement;
 use super::maps::second_solution;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
@@ -17,39 +16,39 @@ use super::twins::{Twin, images, twins};
 use super::undecided::{NotCounted, UNKNOWNS};
 use super::work;
 
-/// Orders beyond the last at which rank grows: of 0 to 6 the one with which most of the reference models are
-/// decided.
+/// Number of orders beyond the last one at which rank grows. Of 0 to 6, this one decides most of the
+/// reference models.
 const BEYOND: usize = 3;
-/// Runs from the same start with other values of generic inputs, where one run does not decide.
+/// Number of runs from the same start with other values of generic inputs, if one run does not decide.
 const OTHERS: usize = 2;
 
-/// The number of values of an unknown, or why it is not decided.
+/// Number of values of an unknown, or the reason why it is not decided.
 pub(super) type Count = Result<usize, NotCounted>;
 
 /// Limits of work, in products of two coefficients at each of two points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
-    /// Of counting solutions of the equations in the unknowns.
+    /// Limit for counting solutions of the equations in the unknowns.
     pub(super) count: u64,
-    /// Of relations among derivatives of the outputs, and of counting once more, where the first leaves
-    /// something undecided; zero: nothing more is done.
+    /// Limit for relations among derivatives of the outputs, and for a second count if the first leaves
+    /// numbers undecided; zero: neither is done.
     pub(super) relations: u64,
 }
 
 /// Numbers of solutions, and maps between them.
 pub(super) struct Solutions {
-    /// The number of values that every unknown takes, in the order of the layout, as two random points in the
-    /// two fields agree. What is not observable has no number.
+    /// Number of values of every unknown, in the order of the layout, on which two random points in the two
+    /// fields agree; `None` for unknowns that are not observable.
     pub(super) counts: Vec<Option<Count>>,
-    /// The number of values that every function takes, likewise.
+    /// Number of values of every function, on which both fields agree.
     pub(super) of_functions: Vec<Count>,
-    /// The order of the derivatives of the outputs with which they were counted.
+    /// Order of the derivatives of the outputs with which solutions were counted.
     pub(super) order: usize,
-    /// Maps that take every solution to another, in words, where there are several.
+    /// Maps that take every solution to another, in words, if there are several solutions.
     pub(super) maps: Vec<String>,
 }
 
-/// Model, fields and order that solutions are counted with.
+/// Model, fields and order for counting solutions.
 struct Counting<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
@@ -61,12 +60,12 @@ struct Counting<'a> {
     functions: &'a [Terms],
 }
 
-/// Equations that are tried.
+/// Stage of counting: the equations that it uses.
 #[derive(Clone, Copy)]
 struct Stage {
     others: usize,
     limit: u64,
-    /// True if functions and all unknowns are counted, not only those that are observable.
+    /// True if functions and all unknowns are counted, not only observable unknowns.
     whole: bool,
 }
 
@@ -77,20 +76,20 @@ impl Stage {
 }
 
 impl Counting<'_> {
-    /// The random numbers of the point in a field: always the same ones.
+    /// Random stream of the point in a field: the same at every call.
     fn random(&self, i: usize) -> SplitMix64 {
         self.model.random(self.seed, &format!("solutions, field {i}"))
     }
 
-    /// The solutions in a field, with what is known beforehand.
-    fn fibre(&self, i: usize, stage: Stage, known: &Known) -> Result<Fibre, NotCounted> {
+    /// Solutions in a field, given known consequences of relations.
+    fn fibre(&self, i: usize, stage: Stage, known: &RelationConsequences) -> Result<Fibre, NotCounted> {
         let Self { model, compiled, judged, order, .. } = *self;
         if judged.findings.degrees.degree.len() > UNKNOWNS {
             return Err(NotCounted::TooLarge);
         }
         let mut work = Work::new(stage.limit);
         let functions = stage.whole.then_some(self.functions);
-        let at = Counted { f: self.fields[i], order, others: stage.others, known, functions };
+        let at = CountingPoint { f: self.fields[i], order, others: stage.others, known, functions };
         let found = at_point(model, compiled, judged, at, &mut self.random(i), &mut work);
         let used_up = work.used_up;
         let why = |e: NotCounted| match e {
@@ -105,7 +104,7 @@ impl Counting<'_> {
         Ok(fibre)
     }
 
-    /// The numbers in a field.
+    /// Numbers of solutions in a field.
     fn counts(&self, i: usize, fibre: &Result<Fibre, NotCounted>) -> Vec<Count> {
         let roots = |p: &Result<Vec<u64>, NotCounted>| {
             p.as_ref().map(|p| polynomial::distinct_roots(&self.fields[i], p)).map_err(|e| *e)
@@ -116,7 +115,7 @@ impl Counting<'_> {
         }
     }
 
-    /// A number that both fields agree on.
+    /// Number on which both fields agree.
     fn agreed_number(&self, both: (Count, Count)) -> Count {
         match both {
             (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
@@ -126,13 +125,13 @@ impl Counting<'_> {
         }
     }
 
-    /// Numbers that both fields agree on.
+    /// Numbers of the unknowns on which both fields agree.
     fn agreed(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
         let both = self.counts(0, &fibres[0]).into_iter().zip(self.counts(1, &fibres[1]));
         both.map(|both| self.agreed_number(both)).collect()
     }
 
-    /// The same of the functions.
+    /// Numbers of the functions on which both fields agree.
     fn agreed_functions(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
         let [first, second] = fibres;
         let of = |i: usize| -> Count {
@@ -144,8 +143,8 @@ impl Counting<'_> {
         (0..self.functions.len()).map(of).collect()
     }
 
-    /// Both fields; the second only where the first says something.
-    fn both(&self, stage: Stage, known: [&Known; 2]) -> [Result<Fibre, NotCounted>; 2] {
+    /// Solutions in both fields; in the second only if the first decides a number.
+    fn both(&self, stage: Stage, known: [&RelationConsequences; 2]) -> [Result<Fibre, NotCounted>; 2] {
         let first = self.fibre(0, stage, known[0]);
         let second = match &first {
             Ok(fibre) if fibre.polynomials.iter().any(Result::is_ok) => self.fibre(1, stage, known[1]),
@@ -154,8 +153,8 @@ impl Counting<'_> {
         [first, second]
     }
 
-    /// True if the derivatives up to the order hold all that the outputs say: see `fibre`; of a system that
-    /// is linear in its states by Cayley and Hamilton, whatever its start.
+    /// True if the derivatives up to the order contain all information of the outputs (see `fibre`); for a
+    /// system that is linear in its states by Cayley-Hamilton, whatever its start.
     fn is_proven(&self) -> bool {
         let Self { compiled, judged, order, .. } = *self;
         // a relation between derivatives that holds on one component of the constraints need not hold on
@@ -165,8 +164,8 @@ impl Counting<'_> {
         alone && (judged.layout.closed || linear)
     }
 
-    /// Maps between solutions, where there are several. Where derivatives of a higher order might leave fewer
-    /// than were counted, as many as the maps prove are the number.
+    /// Maps between solutions, if there are several. If derivatives of a higher order might leave fewer
+    /// solutions than were counted, only the number that the maps prove is kept.
     fn confirmed(&self, counts: &mut [Count]) -> Vec<Twin> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
         let (layout, degrees) = (&judged.layout, &judged.findings.degrees);
@@ -193,11 +192,11 @@ impl Counting<'_> {
         found
     }
 
-    /// Consequences of relations in both fields, where there are any.
-    fn by_relations(&self, limit: u64) -> Option<[Known; 2]> {
+    /// Consequences of relations in both fields, if there are any.
+    fn by_relations(&self, limit: u64) -> Option<[RelationConsequences; 2]> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
-        let mut found = Found::default();
-        let mut known = |i: usize| -> Option<Known> {
+        let mut found = ModelRelations::default();
+        let mut known = |i: usize| -> Option<RelationConsequences> {
             let verdict = work::Work::new(model.work_limit);
             let mut own = self.random(i);
             let point =
@@ -207,15 +206,20 @@ impl Counting<'_> {
             let system = (model, compiled, judged);
             let known =
                 global::known(system, fields[i], &values, &mut found, &mut rng, &mut Work::new(limit));
-            (known != Known::default()).then_some(known)
+            (known != RelationConsequences::default()).then_some(known)
         };
         Some([known(0)?, known(1)?])
     }
 
-    /// Runs with other inputs that may be added.
+    /// Number of additional runs with other inputs.
     fn others(&self) -> usize {
         let Self { model, compiled, judged, .. } = *self;
-        let generic = |role: &Role| matches!(*role, Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic));
+        let generic = |role: &Role| {
+            matches!(
+                *role,
+                Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic)
+            )
+        };
         let alone = judged.layout.closed
             && compiled.segments.len() <= 1
             && compiled.constraints.is_empty()
@@ -226,9 +230,9 @@ impl Counting<'_> {
 }
 
 impl Counting<'_> {
-    /// The numbers as far as the limits allow.
+    /// Numbers of solutions, stage by stage, as far as the limits allow.
     fn by_stages(&self, limits: Limits) -> Vec<Count> {
-        let nothing = Known::default();
+        let nothing = RelationConsequences::default();
         let mut counts = self.agreed(&self.both(Stage::new(0, limits.count), [&nothing; 2]));
         let others = self.others();
         if self.is_open(&counts) && others > 0 {
@@ -257,8 +261,8 @@ impl Counting<'_> {
         counts.iter().zip(degrees).any(|(c, d)| !decided(c) && d.is_some())
     }
 
-    /// Counts once more, and takes over what was not decided before.
-    fn again(&self, counts: &mut [Count], stage: Stage, known: [&Known; 2]) {
+    /// Counts again, and fills in numbers that were not decided before.
+    fn again(&self, counts: &mut [Count], stage: Stage, known: [&RelationConsequences; 2]) {
         let mut new = self.agreed(&self.both(stage, known));
         let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
         unique.for_each(|&lane| new[lane] = Ok(1));
@@ -269,17 +273,17 @@ impl Counting<'_> {
         }
     }
 
-    /// Results of counting with all unknowns: a map between two solutions where `maps` has none, and the
+    /// Results of counting with all unknowns: a map between two solutions if `maps` has none, and the
     /// numbers of values of the functions.
     fn of_all(&self, counts: &[Count], mut maps: Vec<String>, limit: u64) -> (Vec<String>, Vec<Count>) {
         let degrees = &self.judged.findings.degrees.degree;
         let two = counts.iter().zip(degrees).any(|(c, d)| d.is_some() && *c == Ok(2));
         let pairs = maps.is_empty() && two;
         let mut found = [Err(NotCounted::OverLimit), Err(NotCounted::OverLimit)];
-        // where less is not decided all is not
+        // if the smaller count is not decided, the count with all unknowns is not either
         if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
             let stage = Stage { whole: true, ..Stage::new(0, limit) };
-            found = self.both(stage, [&Known::default(); 2]);
+            found = self.both(stage, [&RelationConsequences::default(); 2]);
         }
         let name = |lane: usize| self.judged.layout.unknowns[lane].name.clone();
         if pairs && let [Ok(first), Ok(second)] = &found {
@@ -289,7 +293,7 @@ impl Counting<'_> {
     }
 }
 
-/// The number of values that every unknown takes.
+/// Numbers of values that the unknowns and functions take.
 pub(super) fn values_taken(
     model: &SystemModel,
     compiled: &Compiled,
@@ -332,16 +336,16 @@ fn role_name(model: &SystemModel, role: Role) -> String {
     }
 }
 
-/// The counts of functions; what is made of unknowns with one value has one.
+/// Counts of functions; a function of unknowns with one value each has one value.
 fn with_single(functions: &[Terms], counted: Vec<Count>, unknowns: &[Option<Count>]) -> Vec<Count> {
     let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| unknowns[p.0] == Some(Ok(1)));
     functions.iter().zip(counted).map(|(terms, count)| if single(terms) { Ok(1) } else { count }).collect()
 }
 
-/// Of a model that is linear in its states (constants beside them), without inputs other than polynomials in
-/// time, with one segment: the order of the last derivative that can distinguish two of its points. Both side
-/// by side are a linear system of twice its states with the inputs' derivatives and a constant: by Cayley and
-/// Hamilton their outputs agree if that many derivatives do.
+/// Order of the last derivative that can distinguish two points of a model that is linear in its states (and
+/// constants beside them), with one segment and no inputs other than polynomials in time. Two copies of the
+/// model side by side are a linear system of twice its states with the inputs' derivatives and a constant.
+/// By Cayley-Hamilton their outputs agree if that many derivatives do.
 fn linear_order(model: &SystemModel, compiled: &Compiled) -> Option<usize> {
     if compiled.segments.len() > 1 || compiled.uses_time() || !model.unknown_inputs.is_empty() {
         return None;
@@ -365,7 +369,7 @@ fn linear_order(model: &SystemModel, compiled: &Compiled) -> Option<usize> {
     Some(2 * model.states.len() + signals - 1)
 }
 
-/// By node: its degree in states and known inputs together; `None` where it is no polynomial in them.
+/// Degree of each node in states and known inputs together; `None` if it is no polynomial in them.
 fn degrees_in_states(dag: &Dag, roles: &[Role]) -> Vec<Option<usize>> {
     let mut out: Vec<Option<usize>> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {

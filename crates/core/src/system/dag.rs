@@ -1,80 +1,80 @@
-//! Expressions as a graph of operations that are shared and never expanded.
+//! Expressions as a graph of shared operations that are never expanded.
 //!
-//! A function holds its derivative as well: `dF = weight d(of)`, the weight being a node like any other.
+//! A function also stores its derivative: `dF = weight d(of)`, where the weight is a node like any other.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::language::{Expression, Function, Node};
 
-/// An operation; operands are indices of nodes.
+/// Operation; operands are indices of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Op {
-    /// `mantissa / 10^decimals`.
+    /// Decimal `mantissa / 10^decimals`.
     Number {
-        /// All digits.
+        /// All digits as an integer.
         mantissa: i128,
-        /// How many of them are behind the point.
+        /// Number of digits after the decimal point.
         decimals: i32,
     },
-    /// A state, parameter, input or constant.
+    /// Slot of a state, parameter, input or constant.
     Slot(usize),
-    /// `a + b`.
+    /// Sum `a + b`.
     Add(usize, usize),
-    /// `a - b`.
+    /// Difference `a - b`.
     Subtract(usize, usize),
-    /// `a b`.
+    /// Product `a b`.
     Multiply(usize, usize),
-    /// `a / b`.
+    /// Quotient `a / b`.
     Divide(usize, usize),
-    /// The half turn in radians.
+    /// Number pi.
     Pi,
-    /// A function F with `dF = weight d(of)`; the weight may come later and depend on F.
+    /// Function F with `dF = weight d(of)`; the weight may come later and depend on F.
     Primitive {
-        /// Which function.
+        /// Kind of the function.
         function: Function,
-        /// Its argument.
+        /// Argument of the function.
         of: usize,
-        /// Its derivative by the argument.
+        /// Derivative of the function by its argument.
         weight: usize,
     },
 }
 
-/// Why an expression cannot be held.
+/// Reasons why an expression has no place in the graph.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DagError {
-    /// A name without a meaning.
+    /// A name has no meaning.
     #[error("`{0}` is not known here")]
     UnknownName(String),
-    /// Something too large.
+    /// A number or power is too large.
     #[error("{0}")]
     TooLarge(&'static str),
-    /// Something that is never defined.
+    /// An expression is never defined.
     #[error("{0}")]
     Undefined(&'static str),
 }
 
-/// The graph.
+/// Graph of operations.
 #[derive(Debug, Clone, Default)]
 pub struct Dag {
-    /// Operations; operands come first, but for weights.
+    /// Operations; operands come first, except for weights.
     pub ops: Vec<Op>,
     index: HashMap<Op, usize>,
-    /// Functions by kind and argument.
+    /// Nodes of the functions, by kind and argument.
     pub(super) functions: HashMap<(Function, usize), usize>,
-    /// Values of slots that are rational and never change, by slot: what an exponent may be made of.
+    /// Values of slots that are rational and never change, by slot: exponents may be made of these.
     pub(super) definite: HashMap<usize, (i64, i64)>,
-    /// Logarithms that stand for a power whose exponent is no whole number and no half of one: nobody wrote
-    /// them.
+    /// Logarithms that come from a power whose exponent is neither an integer nor half of one: the model
+    /// does not contain them as text.
     pub(super) powers: HashSet<usize>,
 }
 
 impl Dag {
-    /// True if there is no function in it, so that a prime field knows every value.
+    /// True if the graph has no function, so that every value exists in a prime field.
     pub fn is_rational(&self) -> bool {
         !self.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi))
     }
 
-    /// True if a function of a node is there.
+    /// True if the graph has this function of the node.
     pub(super) fn has(&self, function: Function, of: usize) -> bool {
         self.functions.contains_key(&(function, of))
     }
@@ -88,18 +88,21 @@ impl Dag {
         self.ops.len() - 1
     }
 
-    /// A slot.
+    /// Node of a slot.
     pub fn slot(&mut self, slot: usize) -> usize {
         self.add(Op::Slot(slot))
     }
 
-    /// An integer.
+    /// Node of an integer.
     pub fn integer(&mut self, x: i64) -> usize {
         self.add(Op::Number { mantissa: x.into(), decimals: 0 })
     }
 
     pub(super) fn is(&self, node: usize, x: i64) -> bool {
-        matches!(self.ops[node], Op::Number { mantissa, decimals } if mantissa == i128::from(x) && (x == 0 || decimals == 0))
+        matches!(
+            self.ops[node],
+            Op::Number { mantissa, decimals } if mantissa == i128::from(x) && (x == 0 || decimals == 0)
+        )
     }
 
     pub(super) fn sum(&mut self, a: usize, b: usize) -> usize {
@@ -137,7 +140,7 @@ impl Dag {
         self.product(minus, a)
     }
 
-    /// The node of an expression; `names` gives the nodes of names.
+    /// Node of an expression; `names` gives the nodes of names.
     ///
     /// # Errors
     /// [`DagError`] with the index of the operation in the expression.

@@ -1,9 +1,9 @@
-//! The unknowns of a rational system, one after the other, by elimination over a prime field.
+//! Unknowns of a rational system, one after the other, by elimination over a prime field.
 //!
-//! States are eliminated first: an equation that is linear in one gives it by all others, and its derivative
-//! is the next equation. Then parameters and signals are left, at any time; these equations and their
-//! derivatives are linear in the products of parameters that occur, and elimination over rational functions
-//! of the signals shows which parameters stand alone.
+//! States are eliminated first. An equation that is linear in a state gives the state by all other
+//! variables; its derivative is the next equation. The remaining equations contain parameters and signals
+//! and hold at any time. They and their derivatives are linear in the products of parameters that occur.
+//! Elimination over rational functions of the signals finds the parameters that are determined alone.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,13 +13,13 @@ use obsdeg_exact::fraction::Fraction;
 use obsdeg_exact::groebner::OverLimit;
 use obsdeg_exact::multivariate::{Monomial, Polynomial};
 
-/// Most terms of an equation that is used.
+/// Largest number of terms of an equation that is used.
 const TERMS: usize = 150;
-/// Most products of parameters in an equation that is solved.
+/// Largest number of products of parameters in an equation that is solved.
 const PRODUCTS: usize = 12;
-/// Most terms of an expression that replaces a state.
+/// Largest number of terms of an expression that replaces a state.
 const SUBSTITUTED: usize = 60;
-/// Most terms that a product may have before like terms are added.
+/// Largest number of terms of a product before like terms are added.
 const PRODUCT: usize = 4000;
 
 /// A system `x' = f`, `y = h` in numbered variables: states, parameters, and signals with their derivatives.
@@ -42,34 +42,35 @@ pub(super) struct System {
     pub(super) degrees: Vec<Option<usize>>,
     /// Orders beyond its degree to which an expression may go.
     pub(super) beyond: usize,
-    /// Parameters that a symmetry may give any value: no observable unknown depends on them.
+    /// Parameters to which a symmetry may give any value: no observable unknown depends on them.
     pub(super) free: Vec<usize>,
 }
 
-/// An equation `polynomial = 0`, at any time or at the start only.
-struct Equation {
+/// Equation `polynomial = 0`, at any time or at the start only.
+struct PolynomialEquation {
     zero: Polynomial,
     at_any_time: bool,
 }
 
-/// How little an elimination is liked: division by a parameter, by a signal, its order, its terms.
+/// Cost of an elimination, compared in this order: division by a parameter, division by a signal, order,
+/// number of terms.
 type Cost = (bool, bool, usize, usize);
 
-/// An equation as linear in products of parameters: their coefficients.
+/// Equation that is linear in products of parameters: their coefficients.
 type Row = BTreeMap<Monomial, Fraction>;
 
-/// A derivative of an output or of a known input.
-struct Signal {
-    /// Its order; 0 of known inputs, which need no derivative of an output.
+/// Derivative of an output or of a known input.
+struct SignalDerivative {
+    /// Order of the derivative; 0 for known inputs, which need no derivative of an output.
     order: usize,
-    /// Variable of the next derivative, if it has one.
+    /// Variable of the next derivative; `None` if it has none.
     next: Option<u32>,
     /// True if derivatives without a variable vanish.
     ends: bool,
 }
 
-/// What a symbol's derivative is: nothing, an expression, or one without a name.
-enum Rate {
+/// Derivative of a variable: zero, an expression, or a derivative without a variable.
+enum TimeDerivative {
     Zero,
     Is(Fraction),
     Nameless,
@@ -78,19 +79,19 @@ enum Rate {
 struct Elimination<'a> {
     s: &'a mut Algebra,
     system: &'a System,
-    /// `f`, without the states that are gone.
+    /// Rates `f`, without the eliminated states.
     rates: Vec<Fraction>,
-    /// Every state that is gone, in terms of those left.
+    /// Expressions of the eliminated states, in the remaining variables.
     solved: Vec<Option<Fraction>>,
-    /// Every parameter that was found.
+    /// Expressions of the parameters that were found.
     found: Vec<Option<Fraction>>,
-    /// State of every variable that is one.
+    /// Index of the state, by variable.
     states: BTreeMap<u32, usize>,
-    /// Of every output and known input and their derivatives.
-    signals: BTreeMap<u32, Signal>,
+    /// Outputs and known inputs with their derivatives, by variable.
+    signals: BTreeMap<u32, SignalDerivative>,
 }
 
-/// Expressions of the states, then of the parameters, and whether all were sought within the limit of work.
+/// Expressions of the states, then of the parameters, and true if all were sought within the limit of work.
 pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fraction>>, bool) {
     let mut work = Elimination {
         s,
@@ -116,14 +117,14 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
 }
 
 /// Outputs and known inputs with their derivatives, by variable.
-fn signals(system: &System) -> BTreeMap<u32, Signal> {
+fn signals(system: &System) -> BTreeMap<u32, SignalDerivative> {
     let outputs = system.outputs.iter().map(|(_, chain)| (chain, false, true));
     let inputs = system.inputs.iter().map(|(chain, ends)| (chain, *ends, false));
     let mut out = BTreeMap::new();
     for (chain, ends, counts) in outputs.chain(inputs) {
         for (k, &v) in chain.iter().enumerate() {
             let order = if counts { k } else { 0 };
-            out.entry(v).or_insert(Signal { order, next: chain.get(k + 1).copied(), ends });
+            out.entry(v).or_insert(SignalDerivative { order, next: chain.get(k + 1).copied(), ends });
         }
     }
     out
@@ -136,7 +137,7 @@ impl Elimination<'_> {
             let Some(&y) = chain.first() else { continue };
             let y = self.s.whole(Polynomial::variable(&self.s.f, y));
             let minus = self.s.minus(h);
-            equations.push(Equation { zero: self.s.sum(&y, &minus)?.numerator, at_any_time: true });
+            equations.push(PolynomialEquation { zero: self.s.sum(&y, &minus)?.numerator, at_any_time: true });
         }
         let mut relations = self.eliminate_states(equations)?;
         for &(state, value) in &system.starts {
@@ -145,7 +146,7 @@ impl Elimination<'_> {
                 let minus = self.s.minus(x);
                 let zero = self.s.sum(&value, &minus)?.numerator;
                 if !self.holds_state(&zero) {
-                    relations.push(Equation { zero, at_any_time: false });
+                    relations.push(PolynomialEquation { zero, at_any_time: false });
                 }
             }
         }
@@ -156,32 +157,32 @@ impl Elimination<'_> {
         p.variables().iter().any(|v| self.states.contains_key(v))
     }
 
-    /// What time makes of a variable.
-    fn rate(&self, v: u32) -> Rate {
+    /// Derivative of a variable by time.
+    fn rate(&self, v: u32) -> TimeDerivative {
         if let Some(&i) = self.states.get(&v) {
-            return Rate::Is(self.rates[i].clone());
+            return TimeDerivative::Is(self.rates[i].clone());
         }
         if let Some(signal) = self.signals.get(&v) {
             return match signal.next {
-                Some(next) => Rate::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
-                None if signal.ends => Rate::Zero,
-                None => Rate::Nameless,
+                Some(next) => TimeDerivative::Is(self.s.whole(Polynomial::variable(&self.s.f, next))),
+                None if signal.ends => TimeDerivative::Zero,
+                None => TimeDerivative::Nameless,
             };
         }
         match self.system.time == Some(v) {
-            true => Rate::Is(self.s.whole(Polynomial::constant(self.s.f.one()))),
-            false => Rate::Zero,
+            true => TimeDerivative::Is(self.s.whole(Polynomial::constant(self.s.f.one()))),
+            false => TimeDerivative::Zero,
         }
     }
 
-    /// `d/dt` along the motion; `None` when it needs a derivative without a name.
+    /// Derivative `d/dt` along the motion; `None` if it needs a derivative without a variable.
     fn derivative(&mut self, p: &Polynomial) -> Result<Option<Fraction>, OverLimit> {
         let mut sum = self.s.whole(Polynomial::default());
         for v in p.variables() {
             let rate = match self.rate(v) {
-                Rate::Zero => continue,
-                Rate::Nameless => return Ok(None),
-                Rate::Is(rate) => rate,
+                TimeDerivative::Zero => continue,
+                TimeDerivative::Nameless => return Ok(None),
+                TimeDerivative::Is(rate) => rate,
             };
             let slope = self.s.whole(p.derivative(&self.s.f, v));
             let part = self.s.times(&slope, &rate)?;
@@ -195,11 +196,15 @@ impl Elimination<'_> {
         p.variables().iter().filter_map(|v| self.signals.get(v)).map(|s| s.order).max().unwrap_or(0)
     }
 
-    /// The equation that is linear in a state at the least cost: its number, the state, and what that is.
-    fn best(&mut self, equations: &[Equation]) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
+    /// Equation that is linear in a state at the least cost: its index, the state, and the state's
+    /// expression.
+    fn best(
+        &mut self,
+        equations: &[PolynomialEquation],
+    ) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
         let mut best: Option<(Cost, usize, usize, [Polynomial; 2])> = None;
-        // slope and rest together have its terms
-        let short = |e: &(usize, &Equation)| e.1.zero.len() <= SUBSTITUTED;
+        // slope and rest together have as many terms as the equation
+        let short = |e: &(usize, &PolynomialEquation)| e.1.zero.len() <= SUBSTITUTED;
         for (e, equation) in equations.iter().enumerate().filter(short) {
             let occurring: BTreeSet<usize> =
                 equation.zero.variables().iter().filter_map(|v| self.states.get(v)).copied().collect();
@@ -222,12 +227,16 @@ impl Elimination<'_> {
         Ok(Some((e, i, x)))
     }
 
-    /// Eliminates states by equations that are linear in them; the equations left that hold none.
-    fn eliminate_states(&mut self, mut equations: Vec<Equation>) -> Result<Vec<Equation>, OverLimit> {
+    /// Eliminates states by equations that are linear in them. Returns the remaining equations, which
+    /// contain no state.
+    fn eliminate_states(
+        &mut self,
+        mut equations: Vec<PolynomialEquation>,
+    ) -> Result<Vec<PolynomialEquation>, OverLimit> {
         while let Some((e, i, x)) = self.best(&equations)? {
             let v = self.system.states[i];
             equations.swap_remove(e);
-            // the equation without what divides all of it; its derivative, before anything is put in
+            // the equation without its common factor; its derivative, before anything is substituted
             let mut own = self.s.product(&Polynomial::variable(&self.s.f, v), &x.denominator)?;
             own.add_scaled(&self.s.f, &x.numerator, self.s.f.neg(self.s.f.one()));
             let next = self.derivative(&own)?;
@@ -239,7 +248,7 @@ impl Elimination<'_> {
                     self.solved[k] = Some(put(self.s, own)?);
                 }
             }
-            equations.extend(next.map(|d| Equation { zero: d.numerator, at_any_time: true }));
+            equations.extend(next.map(|d| PolynomialEquation { zero: d.numerator, at_any_time: true }));
             for equation in &mut equations {
                 if equation.zero.terms_with(v) > 0 {
                     let zero = self.s.put_into(&equation.zero, v, &x)?.numerator;
@@ -253,7 +262,7 @@ impl Elimination<'_> {
         Ok(equations)
     }
 
-    /// A polynomial without the factors that it shares with what is not zero.
+    /// A polynomial without the factors that it shares with a non-zero one.
     fn without(&mut self, p: Polynomial, factors: &Polynomial) -> Result<Polynomial, OverLimit> {
         let mut rest = p;
         while !rest.is_empty() {
@@ -266,14 +275,14 @@ impl Elimination<'_> {
         Ok(rest)
     }
 
-    /// Finds the parameters that stand alone in the relations, at the lowest order. Beyond its degree a
+    /// Finds parameters that are determined alone by the relations, at the lowest order. Beyond its degree a
     /// parameter counts as known at first, since others may be solved by it, and then as open.
-    fn parameters(&mut self, relations: Vec<Equation>) -> Result<(), OverLimit> {
+    fn parameters(&mut self, relations: Vec<PolynomialEquation>) -> Result<(), OverLimit> {
         let system = self.system;
         let (degrees, beyond) = (&system.degrees[system.states.len()..], system.beyond);
         let highest = degrees.iter().flatten().copied().max().unwrap_or(0) + beyond;
-        // by order; a relation is differentiated when its turn comes
-        let mut waiting: Vec<(usize, Equation)> =
+        // sorted by order; a relation is differentiated when its turn comes
+        let mut waiting: Vec<(usize, PolynomialEquation)> =
             relations.into_iter().map(|r| (self.order(&r.zero), r)).collect();
         let mut pool: Vec<Polynomial> = Vec::new();
         for order in 0..=highest {
@@ -286,7 +295,7 @@ impl Elimination<'_> {
                 if equation.at_any_time
                     && let Some(next) = self.derivative(&equation.zero)?.filter(|d| !d.is_zero())
                 {
-                    let next = Equation { zero: next.numerator, at_any_time: true };
+                    let next = PolynomialEquation { zero: next.numerator, at_any_time: true };
                     waiting.push((self.order(&next.zero).max(order + 1), next));
                 }
                 pool.push(equation.zero);
@@ -316,8 +325,8 @@ impl Elimination<'_> {
         Ok(())
     }
 
-    /// The expression with what is not observable, but found once a free parameter is given, replaced: the
-    /// free one goes with it.
+    /// The expression with unobservable parameters replaced, if they are determined by a free parameter: the
+    /// free parameter cancels.
     fn without_unobservable(&mut self, value: &Fraction) -> Result<Fraction, OverLimit> {
         let n = self.system.states.len();
         let mut out = value.clone();
@@ -329,8 +338,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// Reduces the equations as linear ones in the products of the open parameters; parameters that stand
-    /// alone.
+    /// Reduces the equations as linear ones in the products of the open parameters. Returns the parameters
+    /// that are determined alone.
     fn standing_alone(
         &mut self,
         pool: &[Polynomial],
@@ -346,7 +355,7 @@ impl Elimination<'_> {
         let mut done: Vec<(Monomial, Row)> = Vec::new();
         loop {
             rows.retain(|r| !r.is_empty());
-            // products go first, so that what is left is linear; of these the simplest pivot
+            // eliminate products first, so that the rest is linear; of these choose the simplest pivot
             if rows.iter().any(|r| r.len() > PRODUCTS) {
                 return Ok(Vec::new());
             }
@@ -394,8 +403,8 @@ impl Elimination<'_> {
         Ok(out)
     }
 
-    /// True if an expression holds no unknown of a higher degree than its own, and no derivative of an order
-    /// too far beyond that.
+    /// True if an expression contains no unknown of a higher degree than its own, and no derivative of an
+    /// order too far beyond its degree.
     fn is_solution(&self, unknown: usize, e: &Fraction) -> bool {
         let Some(degree) = self.system.degrees[unknown] else { return false };
         let variables = self.system.states.iter().chain(&self.system.parameters);
@@ -405,7 +414,7 @@ impl Elimination<'_> {
     }
 }
 
-/// `[a, b]` with `p = a v + b`, where `v` occurs to the first power.
+/// Coefficients `[a, b]` of `p = a v + b`; `None` unless `v` occurs to the first power.
 fn linear(p: &Polynomial, v: u32) -> Option<[Polynomial; 2]> {
     if p.degree_in(v) != 1 {
         return None;
@@ -415,7 +424,7 @@ fn linear(p: &Polynomial, v: u32) -> Option<[Polynomial; 2]> {
     Some([slope, parts.remove(&0).unwrap_or_default()])
 }
 
-/// A polynomial by the products of some variables in it.
+/// Coefficients of a polynomial by the products of some variables in it.
 fn by_products(f: &obsdeg_exact::Field, p: &Polynomial, variables: &[u32]) -> BTreeMap<Monomial, Polynomial> {
     let mut out: BTreeMap<Monomial, Polynomial> = BTreeMap::new();
     for (m, c) in p.terms() {

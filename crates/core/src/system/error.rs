@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Most characters of the place of a fault that are shown: a name may be as long as a file.
+/// Largest number of characters of the place of a fault that is shown: a name may be as long as a file.
 const LONGEST_PLACE: usize = 320;
 
 fn shortened(place: &str) -> String {

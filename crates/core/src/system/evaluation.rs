@@ -5,11 +5,11 @@ use obsdeg_exact::{Ball, Field, Reals, Scalars, SplitMix64, Transform};
 use super::constraints::hold;
 use super::dag::Dag;
 use super::newton::hold_by_newton;
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::Work;
 use crate::language::{Function, from_i128};
 
-/// An element as if at random, of a kind of function and its argument.
+/// Pseudo-random element for a kind of function and its argument.
 fn any(f: &Field, kind: u64, x: u64) -> u64 {
     let mut rng = SplitMix64::new(SplitMix64::new(f.modulus() ^ kind).next_u64() ^ x);
     1 + rng.below(f.modulus() - 1)
@@ -42,14 +42,14 @@ impl Values for Field {
         Field::mul(self, from_i128(self, mantissa), factor)
     }
 
-    /// It is transcendental: any element serves, always the same one.
+    /// Image of pi. Pi is transcendental, so any element serves, always the same one.
     fn pi(&self) -> u64 {
         any(self, 0, 0)
     }
 
-    /// Nothing in a prime field knows the value of a function. Where values are independent of each other
-    /// (`independent`) any element serves, the same one for the same argument; those of one argument belong
-    /// together.
+    /// Image of a function's value. A prime field does not determine it. If values are independent of each
+    /// other (`independent`) any element serves, the same one for the same argument; functions of one
+    /// argument are related.
     fn function(&self, function: Function, x: &u64) -> Option<u64> {
         let (f, one) = (self, Field::one(self));
         let exponential = || any(f, 1, *x);
@@ -96,12 +96,13 @@ impl Values for Field {
         free: &[bool],
         rng: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld> {
+    ) -> Result<(), ConstraintFailure> {
         hold(dag, constraints, values, free, self, rng, work)
     }
 }
 
-/// Attempts at points of positive numbers near one, where most models are at home; later ones look further.
+/// Number of attempts at points of positive numbers near one, where most models are defined; later attempts
+/// use larger numbers.
 const NEAR: usize = 8;
 
 impl<const N: usize> Values for Reals<N> {
@@ -142,7 +143,7 @@ impl<const N: usize> Values for Reals<N> {
 
     fn function(&self, function: Function, x: &Ball<N>) -> Option<Ball<N>> {
         let one = Ball::from_i64(1);
-        // the other side of the right triangle with this one and the hypotenuse 1
+        // the other side of the right triangle with this side and the hypotenuse 1
         let side = || one.sub(&x.mul(x)).sqrt();
         match function {
             Function::Sin => Some(x.sin_cos()?.0),
@@ -153,7 +154,7 @@ impl<const N: usize> Values for Reals<N> {
             }
             Function::Asin => Ball::atan2(x, &side()?),
             Function::Acos => {
-                // on the cut of the angle, but defined
+                // on the branch cut of the angle, but defined
                 if x.add(&one).is_exactly_zero() { Some(self.pi()) } else { Ball::atan2(&side()?, x) }
             }
             Function::Atan => Ball::atan2(x, &one),
@@ -176,8 +177,8 @@ impl<const N: usize> Values for Reals<N> {
         (!x.is_zero()).then(|| x.is_positive())
     }
 
-    /// A rational number of 60 bits: of the first attempts in (1/4, 5/4); then of either sign, the larger the
-    /// later.
+    /// Random rational number of 60 bits: in the first attempts from (1/4, 5/4); then of either sign, and
+    /// larger with each attempt.
     fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Ball<N> {
         let digits = Ball::from_i64((rng.next_u64() >> 4) as i64).shifted(-60);
         let size = digits.add(&Ball::from_i64(1).shifted(-2));
@@ -208,7 +209,7 @@ impl<const N: usize> Values for Reals<N> {
         free: &[bool],
         _: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld> {
+    ) -> Result<(), ConstraintFailure> {
         hold_by_newton(dag, constraints, values, free, work)
     }
 }

@@ -1,5 +1,5 @@
-//! Constraints that are products: one of their factors is zero, and verdicts are those where the same one
-//! always is.
+//! Constraints that are products: one of their factors is zero. Verdicts are those where the same factor is
+//! always zero.
 
 use std::collections::HashMap;
 
@@ -13,35 +13,36 @@ use super::rows::Layout;
 use super::work::Spent;
 use crate::language::{Expression, Node, component, evaluate_f64};
 
-/// Choices of one factor in each product that are tried at most.
+/// Largest number of choices of one factor in each product that are tried.
 const CHOICES: usize = 64;
-/// Operations of the search for points of all of them.
+/// Limit of operations of the search for points of all choices.
 const OPERATIONS: u64 = 200_000_000;
-/// Size, relative to the largest of a product, up to which a factor is zero at the given values.
+/// Size, relative to the largest factor of the product, below which a factor is zero at the given values.
 const ZERO: f64 = 1e-9;
 /// Size below which a factor is zero at a point of 77 digits.
 const ROUNDING: f64 = 1e-30;
 
-/// A factor of a constraint.
+/// Factor of a constraint.
 struct Factor {
     text: String,
     expression: Expression,
 }
 
-/// A constraint that is a product.
+/// Constraint that is a product.
 struct Product {
     constraint: usize,
     factors: Vec<Factor>,
-    /// The factor that is zero at the values of the file.
+    /// Index of the factor that is zero at the values of the file.
     given: Option<usize>,
 }
 
 impl SystemModel {
-    /// The same with one factor in the place of each constraint that is a product. Of the choices whose
-    /// factors have a real point together with all other constraints, at which the model is defined: factors
-    /// that are zero at the values of the file before all others, then those at whose point no other factor
-    /// is zero, then factors that are no unknown alone (by x = 0 a model loses more than by y = z), then the
-    /// first as written. Unchanged where there is no product, or no such point was found.
+    /// The model with one factor in place of each constraint that is a product. Candidates are choices whose
+    /// factors have a real point together with all other constraints, at which the model is defined. The
+    /// preferred choice has factors that are zero at the values of the file; then those at whose point no
+    /// other factor is zero; then factors that are no unknown alone (x = 0 removes more from a model than y
+    /// = z); then the first as written. The model is unchanged if there is no product, or if no such point
+    /// was found.
     pub(super) fn by_one_factor(self) -> Self {
         let all = self.constraints.iter().enumerate();
         let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
@@ -82,7 +83,7 @@ impl SystemModel {
         (factors.len() > 1).then_some(Product { constraint, factors, given })
     }
 
-    /// Puts a factor in the place of its product.
+    /// Replaces a product by one of its factors.
     fn take(&mut self, of: &Product, taken: usize) {
         let own = &mut self.constraints[of.constraint];
         own.expression = of.factors[taken].expression.clone();
@@ -96,7 +97,7 @@ impl SystemModel {
     }
 
     /// Number of factors that are zero at a real point at which the constraints hold and the model is
-    /// defined; `None` where none was found.
+    /// defined; `None` if none was found.
     fn zero_at_point(&self, factors: &[&Factor], spent: &mut Spent) -> Option<usize> {
         let mut model = self.clone();
         model.work_limit = model.work_limit.within(OPERATIONS - spent.operations);
@@ -113,8 +114,8 @@ impl SystemModel {
         Some(factors.iter().filter(is_zero).count())
     }
 
-    /// The only factor that is zero at the values under `[simulation.values]`, where these are complete, in
-    /// all experiments; `None` of a product whose factors are zero in different experiments.
+    /// The only factor that is zero at the values under `[simulation.values]`, if these are complete, in all
+    /// experiments; `None` for a product whose factors are zero in different experiments.
     fn zero_at_given(&self, factors: &[Factor]) -> Option<Option<usize>> {
         let zero = |experiment: usize| {
             let value = |name: &str| self.simulation.value(name, experiment).unwrap_or(f64::NAN);
@@ -129,7 +130,7 @@ impl SystemModel {
     }
 }
 
-/// The different factors of a constraint, those without a name in them left out; none where it is no product.
+/// Distinct factors of a constraint, without factors that contain no name; empty if it is no product.
 fn factors(own: &PlacedExpression) -> Vec<Factor> {
     let e = &own.expression;
     let (mut found, mut open) = (Vec::new(), Vec::new());
@@ -145,7 +146,7 @@ fn factors(own: &PlacedExpression) -> Vec<Factor> {
             Node::Multiply(a, b) => open.extend([b, a]),
             Node::Negate(a) => open.push(a),
             Node::Divide(a, b) if matches!(e.nodes[b], Node::Number { .. }) => open.push(a),
-            // it holds everywhere, or where the denominator is not zero
+            // it holds everywhere, or wherever the denominator is not zero
             Node::Number { mantissa: 0, .. } | Node::Divide(..) => return Vec::new(),
             Node::Power(a, b) if matches!(e.nodes[b], Node::Number { mantissa: 1.., decimals: ..=0 }) => {
                 open.push(a)
@@ -165,7 +166,7 @@ fn factors(own: &PlacedExpression) -> Vec<Factor> {
     out
 }
 
-/// A factor as written.
+/// Text of a factor as written.
 fn text(own: &PlacedExpression, factor: &Expression) -> Option<String> {
     let span = factor.spans.iter().cloned().reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))?;
     Some(own.text.get(span)?.trim().to_string())

@@ -1,21 +1,21 @@
-//! How many solutions there are for an unknown: the values it takes among all points with the same outputs.
+//! Number of solutions for an unknown: the values it takes among all points with the same outputs.
 //!
-//! At a random point of a prime field the Taylor coefficients of the outputs are numbers. That they are these
-//! numbers is a system of polynomial equations in the unknowns and the coefficients of the states; an unknown
-//! that a symmetry moves keeps its value (nothing observable depends on it). A Groebner basis says how many
-//! values each observable unknown has over the algebraic closure: the degree of its minimal polynomial in the
-//! quotient ring.
+//! At a random point of a prime field the Taylor coefficients of the outputs are numbers. These values are a
+//! system of polynomial equations in the unknowns and the coefficients of the states. An unknown that a
+//! symmetry changes keeps its value, since nothing observable depends on it. A Groebner basis gives the
+//! number of values of each observable unknown over the algebraic closure: the degree of its minimal
+//! polynomial in the quotient ring.
 //!
-//! Which order is enough: let `L_k` be the field that the derivatives up to order k generate. If rank grows
-//! last at order h, `y^(h+1)` is algebraic over `L_h`; differentiating its minimal polynomial gives `y^(h+2)`
-//! in `L_(h+1)`, and so on: `L_(h+1)` holds all derivatives (the argument of Hong, Ovchinnikov, Pogudin, Yap
-//! 2020, doi:10.1002/cpa.21921). It needs a derivation of the unknowns, hence one segment, a generic start
-//! and no arbitrary input; elsewhere one solution is one, and more may become fewer. Orders beyond h+1 change
-//! nothing but make the equations easier to solve.
+//! Sufficient order: let `L_k` be the field that the derivatives up to order k generate. If rank grows last
+//! at order h, `y^(h+1)` is algebraic over `L_h`. Differentiating its minimal polynomial gives `y^(h+2)` in
+//! `L_(h+1)`, and so on: `L_(h+1)` contains all derivatives (the argument of Hong, Ovchinnikov, Pogudin, Yap
+//! 2020, doi:10.1002/cpa.21921). The argument needs a derivation of the unknowns, hence one segment, a
+//! generic start and no arbitrary input. In other cases one solution remains one, and several may become
+//! fewer. Orders beyond h+1 only make the equations easier to solve.
 //!
-//! Where inputs are generic, runs from the same start with other inputs add equations of low order: almost
+//! If inputs are generic, runs from the same start with other inputs add equations of low order. Almost
 //! every input distinguishes every pair of points that any input distinguishes (Sussmann 1979, "Single-input
-//! observability of continuous-time systems", Math. Systems Theory 12, 371), so that no solution is lost.
+//! observability of continuous-time systems", Math. Systems Theory 12, 371), so no solution is lost.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
-use super::global::Known;
+use super::global::RelationConsequences;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{Quotients, Terms};
@@ -32,37 +32,37 @@ use super::rows::{Layout, SystemRows, Unknown};
 use super::undecided::{LONGEST, NotCounted};
 use super::work;
 
-/// Higher powers are not formed: a basis has none above 255.
+/// Limit of the powers that are formed: a basis has none above 255.
 const POWER: u64 = 1 << 16;
-/// The least weight of a state; parameters have weight one.
+/// Least weight of a state; parameters have weight one.
 const STATE: u32 = 2;
 
-/// The equations at a point.
+/// Equations at a point.
 struct Equations<'a> {
     f: Field,
     compiled: &'a Compiled,
     layout: &'a Layout,
     rows: SystemRows<'a, Field>,
     work: &'a mut Work,
-    /// The value of every variable at the point.
+    /// Value of every variable at the point.
     values: Vec<u64>,
-    /// The weight of every variable.
+    /// Weight of every variable.
     weights: Vec<u32>,
-    /// The weight of every state.
+    /// Weight of every state.
     state_weights: Vec<u32>,
-    /// What each unknown is.
+    /// Every unknown as a polynomial in the variables.
     lanes: Vec<Polynomial>,
-    /// What is zero.
+    /// Polynomials that are zero.
     zero: Vec<Polynomial>,
-    runs: Vec<Run>,
+    runs: Vec<SegmentSeries>,
 }
 
-/// A segment of an experiment.
-struct Run {
+/// Segment of an experiment.
+struct SegmentSeries {
     experiment: usize,
-    /// The states at its start.
+    /// States at its start.
     initial: Vec<Polynomial>,
-    /// `nodes[node][k]`, of the nodes that are needed.
+    /// Coefficients `nodes[node][k]` of the nodes that are needed.
     nodes: Vec<Vec<Polynomial>>,
 }
 
@@ -87,7 +87,7 @@ impl Equations<'_> {
         if sum.len() > LONGEST { Err(NotCounted::TooLong) } else { Ok(()) }
     }
 
-    /// Coefficient `k` of the nodes that are `needed`, in a run that has those before.
+    /// Computes coefficient `k` of the `needed` nodes in run `r`, from the coefficients before.
     fn extend(&mut self, r: usize, needed: &[bool], k: usize) -> Result<(), NotCounted> {
         self.work.take(needed.len() as u64)?;
         for (i, &needed) in needed.iter().enumerate() {
@@ -141,7 +141,7 @@ impl Equations<'_> {
                     return Ok(rest.scaled(&f, inverse));
                 }
                 if k == 0 {
-                    // nothing is divided by zero at a solution
+                    // no divisor is zero at a solution
                     let z = self.variable(inverse, STATE);
                     let mut zero = Polynomial::constant(minus);
                     self.add_product(&mut zero, &z, &below)?;
@@ -157,7 +157,7 @@ impl Equations<'_> {
         }
     }
 
-    /// Coefficient `k` of what is not known and no operation.
+    /// Coefficient `k` of a slot that is neither known nor an operation.
     fn signal(&mut self, r: usize, role: Role, k: usize) -> Polynomial {
         let f = self.f;
         let Role::State(s) = role else {
@@ -183,7 +183,7 @@ impl Equations<'_> {
         x
     }
 
-    /// What a node is at the start of a run, from the states there.
+    /// Value of a node at the start of a run, in terms of the states there.
     fn start(&mut self, r: usize, node: usize) -> Result<Polynomial, NotCounted> {
         let needed = reached(self.compiled, &[node], |_| None);
         self.extend(r, &needed, 0)?;
@@ -201,7 +201,7 @@ impl Equations<'_> {
         Ok(())
     }
 
-    /// Takes variables out that an affine equation gives, the latest first.
+    /// Eliminates variables that an affine equation gives, the latest first.
     fn solve(&mut self) -> Result<(), NotCounted> {
         let f = self.f;
         while let Some(e) = self.zero.iter().position(|p| p.degree() <= 1) {
@@ -224,7 +224,7 @@ impl Equations<'_> {
     }
 }
 
-/// The nodes that some nodes are made of; `follow` leads on from a state.
+/// Nodes that some nodes depend on; `follow` gives the next node of a state.
 pub(super) fn reached(
     compiled: &Compiled,
     from: &[usize],
@@ -250,8 +250,8 @@ pub(super) fn reached(
     out
 }
 
-/// How many derivatives of the outputs it takes until a state is in them at all, plus [`STATE`]: coefficients
-/// of a state weigh as much as the products that they are solved from.
+/// Weight of every state: the lowest order of an output derivative that contains it, plus [`STATE`].
+/// Coefficients of a state weigh as much as the products from which they are solved.
 fn state_weights(compiled: &Compiled) -> Vec<u32> {
     let mut weights = vec![0; compiled.rates(0).len()];
     let experiments = 0..compiled.experiments.len();
@@ -272,16 +272,16 @@ fn state_weights(compiled: &Compiled) -> Vec<u32> {
             break;
         }
     }
-    // what constraints alone hold has a weight too: without one its powers have no end
+    // states that only constraints contain have a weight too: otherwise their powers would be unlimited
     weights.into_iter().map(|weight| weight.max(STATE)).collect()
 }
 
-/// The equations at a random point, with derivatives of the outputs up to `order`.
+/// Equations at a random point, with derivatives of the outputs up to `order`.
 fn equations<'a>(
     model: &SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    Counted { f, order, others, known, .. }: Counted<'_>,
+    CountingPoint { f, order, others, known, .. }: CountingPoint<'_>,
     (rng, verdict): (&mut SplitMix64, &'a work::Work),
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
@@ -291,7 +291,7 @@ fn equations<'a>(
     let segments = compiled.segments.len().max(1);
     let experiments = model.experiments.max(1);
     for e in 0..experiments {
-        // the values of unknown inputs are coefficients
+        // values of unknown inputs are Taylor coefficients
         let highest = layout.unknowns.iter().map(|u| u.derivative).max().unwrap_or(0);
         rows.coefficient(e * segments, 0, highest);
     }
@@ -335,7 +335,11 @@ fn equations<'a>(
         }
         for segment in 0..segments {
             let r = out.runs.len();
-            out.runs.push(Run { experiment, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
+            out.runs.push(SegmentSeries {
+                experiment,
+                initial,
+                nodes: vec![Vec::new(); compiled.dag.ops.len()],
+            });
             let given = compiled.starts.iter().enumerate().filter_map(|(s, node)| Some((s, (*node)?)));
             let given: Vec<(usize, usize)> = given.filter(|_| segment == 0).collect();
             let jumps = compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
@@ -352,7 +356,11 @@ fn equations<'a>(
     }
     for _ in 0..others {
         let initial = out.runs[0].initial.clone();
-        out.runs.push(Run { experiment: 0, initial, nodes: vec![Vec::new(); compiled.dag.ops.len()] });
+        out.runs.push(SegmentSeries {
+            experiment: 0,
+            initial,
+            nodes: vec![Vec::new(); compiled.dag.ops.len()],
+        });
     }
     let needed: Vec<Vec<bool>> = (0..experiments)
         .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
@@ -370,12 +378,12 @@ fn equations<'a>(
         }
         out.solve()?;
     }
-    // the point itself is a solution
+    // the point itself must be a solution
     let holds = out.zero.iter().all(|p| p.at(&f, &out.values) == 0);
     if holds { Ok(out) } else { Err(NotCounted::NoPoint) }
 }
 
-/// Drops equations that only say what a variable is that nothing else needs.
+/// Drops equations that only define a variable which nothing else uses.
 fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynomial]) -> Vec<Polynomial> {
     let held =
         |p: &Polynomial| -> BTreeSet<u32> { p.terms().flat_map(|(m, _)| m.iter().map(|x| x.0)).collect() };
@@ -402,25 +410,26 @@ fn without_lonely(mut zero: Vec<Polynomial>, variables: usize, wanted: &[Polynom
 
 /// Random point in one of the two fields at which solutions are counted, with what is known there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Counted<'a> {
+pub(super) struct CountingPoint<'a> {
     pub(super) f: Field,
     /// Highest order of the derivatives of the outputs.
     pub(super) order: usize,
-    /// Runs from the same start with other values of the generic inputs.
+    /// Number of runs from the same start with other values of the generic inputs.
     pub(super) others: usize,
-    /// Consequences of relations.
-    pub(super) known: &'a Known,
-    /// Functions whose values are counted too, and with them all unknowns: of those that are not observable
-    /// the values where as many keep theirs as there are directions. `None`: only what is observable.
+    /// Consequences of relations for the unknowns.
+    pub(super) known: &'a RelationConsequences,
+    /// Functions whose values are counted too, together with all unknowns. For unknowns that are not
+    /// observable these are the values while as many of them are fixed as there are unobservable directions.
+    /// `None`: only observable unknowns.
     pub(super) functions: Option<&'a [Terms]>,
 }
 
-/// The values of the unknowns among all points with the same outputs as one.
+/// Values of the unknowns among all points with the same outputs.
 #[derive(Debug, Clone)]
 pub(super) struct Fibre {
     /// Values of the unknowns at the point itself.
     pub(super) values: Vec<u64>,
-    /// By unknown: a polynomial whose roots are the values that the unknown takes, constant term first.
+    /// Polynomial of every unknown whose roots are the values that it takes, constant term first.
     pub(super) polynomials: Vec<Result<Vec<u64>, NotCounted>>,
     /// True if all unknowns together take two values.
     pub(super) is_pair: bool,
@@ -428,12 +437,12 @@ pub(super) struct Fibre {
     pub(super) functions: Vec<Result<usize, NotCounted>>,
 }
 
-/// The values that every unknown takes at one random point.
+/// Values that every unknown takes at one random point.
 pub(super) fn at_point(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
-    at: Counted<'_>,
+    at: CountingPoint<'_>,
     rng: &mut SplitMix64,
     work: &mut Work,
 ) -> Result<Fibre, NotCounted> {
@@ -448,11 +457,11 @@ pub(super) fn at_point(
         |(lane, p): (usize, &Polynomial)| if counted(lane) { p.clone() } else { Polynomial::default() };
     let mut wanted: Vec<Polynomial> = lanes.iter().enumerate().map(shown).collect();
     let zero = without_lonely(zero, values.len(), &wanted);
-    // all together, by a random combination
+    // all unknowns together, by a random combination
     let mut joint = Polynomial::default();
     wanted.iter().for_each(|p| joint.add_scaled(&f, p, rng.below(f.modulus())));
     wanted.push(joint);
-    // the latest variables are the largest: they go first
+    // the latest variables are the largest: they are eliminated first
     let used: Vec<usize> = (0..values.len())
         .filter(|&v| zero.iter().chain(&wanted).any(|p| p.terms_with(v as u32) > 0))
         .rev()

@@ -7,13 +7,13 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Ratio, gcd};
 
 /// Largest numerator and denominator of a coefficient. There are fewer such fractions than elements of the
-/// field, but not many fewer: whatever is recovered is checked in a second field.
+/// field, but not many fewer: every recovered number is checked in a second field.
 const BOUND: u64 = 1 << 29;
 
 /// Terms with integer coefficients that share no divisor, the leading one positive and first.
 type Terms = Vec<(Monomial, i64)>;
 
-/// An expression in the names of its variables; `None` where it is zero in a denominator, or a coefficient is
+/// Text of an expression in the names of its variables; `None` if a denominator is zero, or a coefficient is
 /// too large.
 ///
 /// # Errors
@@ -29,13 +29,13 @@ pub(super) fn text(s: &mut Algebra, e: &Fraction, names: &[String]) -> Result<Op
         let mut factors = Vec::new();
         for (factor, power) in s.factors(p)? {
             let Some(terms) = integers(s, &factor) else { return Ok(None) };
-            // of the factor that counts, the leading coefficient is one
+            // the leading coefficient of the factor that is used is one
             let lead = f.from_i64(terms.first().map_or(1, |t| t.1));
             let lead = f.pow(lead, power.into());
             constant = f.mul(constant, if side == 0 { f.inv(lead) } else { lead });
             factors.push((terms, power));
         }
-        // the simplest first
+        // simplest factors first
         factors.sort_by(|a, b| a.0.len().cmp(&b.0.len()).then_with(|| lexicographic(&b.0[0].0, &a.0[0].0)));
         sides[side] = factors.iter().map(|(terms, power)| factor(terms, *power, names)).collect();
     }
@@ -47,7 +47,7 @@ pub(super) fn text(s: &mut Algebra, e: &Fraction, names: &[String]) -> Result<Op
     }
     let [above, below] = sides;
     let sign = if constant.num < 0 { "-" } else { "" };
-    // a sum that stands alone needs no brackets
+    // a sum alone needs no brackets
     let bare = |p: &str| p.strip_prefix('(').and_then(|p| p.strip_suffix(')')).map(str::to_string);
     let whole = below == ["1"];
     let above = match above.as_slice() {
@@ -61,7 +61,7 @@ pub(super) fn text(s: &mut Algebra, e: &Fraction, names: &[String]) -> Result<Op
     }))
 }
 
-/// A polynomial with rational coefficients, times what makes them integers without a common divisor.
+/// A polynomial with rational coefficients, multiplied to integers without a common divisor.
 fn integers(s: &Algebra, p: &Polynomial) -> Option<Terms> {
     let mut ratios: Vec<(Monomial, Ratio)> = Vec::new();
     for (m, c) in p.terms() {
@@ -80,7 +80,7 @@ fn integers(s: &Algebra, p: &Polynomial) -> Option<Terms> {
     Some(ratios.into_iter().zip(sizes).map(|((m, _), x)| (m, sign * (x / divisor))).collect())
 }
 
-/// `x^2`, `(x-2*y)`, `(x+1)^3`.
+/// Text of a factor: `x^2`, `(x-2*y)`, `(x+1)^3`.
 fn factor(terms: &Terms, power: u32, names: &[String]) -> String {
     let mut sum = String::new();
     for (m, c) in terms {

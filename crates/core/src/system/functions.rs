@@ -11,7 +11,7 @@ use crate::language::Function;
 const MAX_POWER: i64 = 1000;
 
 impl Dag {
-    /// A constant that every model knows.
+    /// Node of a constant that every model knows; `None` for another name.
     pub(super) fn constant(&mut self, name: &str) -> Option<usize> {
         if !matches!(name, "pi" | "deg") {
             return None;
@@ -24,10 +24,10 @@ impl Dag {
         Some(self.quotient(pi, half_turn))
     }
 
-    /// The node as a small rational number, if it is one: made of numbers, and of constants whose values are
-    /// known (`definite`).
+    /// Value of the node as a small rational number; `None` unless it consists of numbers and of constants
+    /// with known values (`definite`).
     pub(super) fn rational(&self, node: usize) -> Option<(i64, i64)> {
-        // operands come before what is made of them
+        // operands come before the operations that use them
         let mut found: HashMap<usize, (i64, i64)> = HashMap::new();
         for i in below(self, node) {
             let value = match self.ops[i] {
@@ -53,7 +53,7 @@ impl Dag {
         found.get(&node).copied()
     }
 
-    /// `x^m`.
+    /// Node of `x^m`.
     pub(super) fn integer_power(&mut self, x: usize, m: i64) -> Result<usize, DagError> {
         if m.abs() > MAX_POWER {
             return Err(DagError::TooLarge("an exponent above 1000"));
@@ -78,8 +78,8 @@ impl Dag {
         Ok(self.quotient(one, power))
     }
 
-    /// True if a node is made of numbers, and of constants whose values are known, and is proven to be beyond
-    /// what [`Self::rational`] holds.
+    /// True if a node consists of numbers and of constants with known values, and provably exceeds the range
+    /// of [`Self::rational`].
     fn is_beyond_powers(&self, node: usize) -> bool {
         let largest = i64::MAX as f64;
         let given = |s: &usize| self.definite.get(s).map(|&(p, q)| p as f64 / q as f64);
@@ -92,7 +92,7 @@ impl Dag {
         })
     }
 
-    /// `x^e`: repeated products for an integer, roots for half of one, else `exp(e log x)`.
+    /// Node of `x^e`: repeated products for an integer, roots for half of one, else `exp(e log x)`.
     pub(super) fn power(&mut self, x: usize, e: usize) -> Result<usize, DagError> {
         match self.rational(e) {
             Some((m, 1)) => self.integer_power(x, m),
@@ -113,7 +113,7 @@ impl Dag {
         }
     }
 
-    /// A function of a node.
+    /// Node of a function of a node, with checks.
     pub(super) fn call(&mut self, function: Function, node: usize) -> Result<usize, DagError> {
         match function {
             Function::Log if self.is(node, 0) => Err(DagError::Undefined("the logarithm of zero")),
@@ -121,7 +121,7 @@ impl Dag {
         }
     }
 
-    /// A function with its derivative.
+    /// Node of a function, with its derivative.
     pub(super) fn function(&mut self, function: Function, of: usize) -> usize {
         if let Some(&known) = self.functions.get(&(function, of)) {
             return known;
@@ -172,12 +172,12 @@ impl Dag {
     }
 }
 
-/// The greatest common divisor, not negative.
+/// Greatest common divisor, not negative.
 pub(super) fn gcd(a: i64, b: i64) -> i64 {
     obsdeg_exact::gcd(a.unsigned_abs(), b.unsigned_abs()) as i64
 }
 
-/// In lowest terms, the denominator positive; `None` beyond small numbers.
+/// Fraction in lowest terms, the denominator positive; `None` beyond small numbers.
 fn reduced(p: i64, q: i64) -> Option<(i64, i64)> {
     if q == 0 || p == i64::MIN || q == i64::MIN {
         return None;
@@ -186,12 +186,12 @@ fn reduced(p: i64, q: i64) -> Option<(i64, i64)> {
     Some((p / g, q / g))
 }
 
-/// Of rational numbers; `None` beyond small ones.
+/// Product of rational numbers; `None` beyond small ones.
 pub(super) fn times((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
     reduced(a.checked_mul(c)?, b.checked_mul(d)?)
 }
 
-/// Of rational numbers; `None` beyond small ones.
+/// Sum of rational numbers; `None` beyond small ones.
 pub(super) fn plus((a, b): (i64, i64), (c, d): (i64, i64)) -> Option<(i64, i64)> {
     reduced(a.checked_mul(d)?.checked_add(c.checked_mul(b)?)?, b.checked_mul(d)?)
 }

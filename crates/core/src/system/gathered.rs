@@ -1,11 +1,11 @@
-//! The rows of every output of a model at two points, from which verdicts on any set of outputs are ranks.
+//! Rows of every output of a model at two points. Verdicts on any set of outputs are ranks of these rows.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Field, Reals, SplitMix64};
 
 use super::addition::written_apart;
 use super::error::ModelError;
-use super::judge::{Judgement, Points, SystemCertainty, claim_of, judge_compiled, refuse, singular};
+use super::judge::{FieldChoice, Judgement, SystemCertainty, claim_of, judge_compiled, refuse, singular};
 use super::model::{Compiled, SystemModel};
 use super::rows::{Layout, PointRows, SystemRows};
 use super::values::Values;
@@ -14,9 +14,9 @@ use super::work::{Spent, Work};
 /// Rows of every output of a model at two points, by the kind of numbers.
 #[derive(Debug, Clone)]
 pub enum OutputRows {
-    /// In two prime fields.
+    /// Rows in two prime fields.
     Primes(Box<[PointRows<Field>; 2]>),
-    /// In real numbers of 192 and 308 digits.
+    /// Rows in real numbers of 192 and 308 digits.
     Digits(Box<(PointRows<Reals<10>>, PointRows<Reals<16>>)>),
 }
 
@@ -34,8 +34,8 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Bound on the probability that a verdict on one of so many sets of outputs is wrong, where it is the
-    /// same in both prime fields; `None` in real numbers.
+    /// Bound on the probability that a verdict on one of `sets` sets of outputs is wrong although both prime
+    /// fields agree; `None` in real numbers.
     pub fn error_bound(&self, sets: usize) -> Option<f64> {
         let decisions = self.decisions.saturating_mul(sets);
         let bound = || error_bound(&Claim { decisions, ..self.claim }, 2);
@@ -60,7 +60,7 @@ pub(super) enum RunRows {
 }
 
 /// Gathers the rows of every output of a judged model, run by run, and the order of the roots of unity of the
-/// fields. `attempt` draws other points.
+/// fields. `attempt` selects other points.
 ///
 /// # Errors
 /// [`ModelError`], of work beyond the limit too.
@@ -76,7 +76,7 @@ pub(super) fn gather_runs(
         SystemCertainty::Primes(_) => {
             let apart = if compiled.dag.is_rational() { None } else { written_apart(compiled) };
             let compiled = apart.as_ref().unwrap_or(compiled);
-            let points = Points { model, compiled, layout, orders: layout.unknowns.len() };
+            let points = FieldChoice { model, compiled, layout, orders: layout.unknowns.len() };
             let mut spent = Spent::default();
             let mut at = |i: usize| {
                 let name = format!("rows of outputs, attempt {attempt}, field {i}");
@@ -95,11 +95,11 @@ pub(super) fn gather_runs(
     }
 }
 
-/// Judges all outputs of a model together, and gathers the rows of each at two points. `attempt` draws other
-/// points, `bound` overrides the highest order.
+/// Judges all outputs of a model together, and gathers the rows of each at two points. `attempt` selects
+/// other points; `bound` overrides the highest order.
 ///
 /// # Errors
-/// [`ModelError`], of work beyond the limit too.
+/// [`ModelError`], also if the work exceeds its limit.
 pub fn gather(
     model: &SystemModel,
     seed: u64,

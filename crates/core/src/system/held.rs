@@ -1,4 +1,5 @@
-//! Points of any field at which the constraints of a model hold, and how many of these are independent there.
+//! Points of any field at which the constraints of a model hold, and the number of independent constraints
+//! there.
 
 use std::collections::BTreeSet;
 
@@ -6,16 +7,16 @@ use obsdeg_exact::{RowSpace, SplitMix64};
 
 use super::constraints::slots_of;
 use super::model::{Role, StateStart};
-use super::rows::{Maker, Point, Rows, dense};
+use super::rows::{Point, PointBuilder, Rows, dense};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::Values;
 use super::work::{Step, product};
 
-/// Bits that random starts near given values share with these, attempt by attempt.
+/// Numbers of bits that random starts near given values share with these, by attempt.
 pub(super) const CLOSE: [i64; 3] = [10, 25, 40];
 
-impl<S: Values> Maker<'_, '_, S> {
-    /// Moves states, and in the first experiment what all share, to where the constraints hold.
+impl<S: Values> PointBuilder<'_, '_, S> {
+    /// Changes states, and in the first experiment the shared values, so that the constraints hold.
     pub(super) fn hold_constraints(
         &self,
         point: &mut Point<S>,
@@ -33,7 +34,7 @@ impl<S: Values> Maker<'_, '_, S> {
             _ => self.field.zero(),
         };
         let mut values: Vec<S::Element> = (0..compiled.roles.len()).map(value).collect();
-        // what all share was moved in the first experiment
+        // shared values were changed in the first experiment
         let all = self.free(point.experiment);
         let shared = |role: &Role| !matches!(role, Role::State(_));
         let free: Vec<bool> =
@@ -62,7 +63,7 @@ impl<S: Values> Maker<'_, '_, S> {
         Ok(())
     }
 
-    /// Slots that constraints can move: states, parameters and generic constants.
+    /// Slots that constraints can change: states, parameters and generic constants.
     pub(super) fn free(&self, experiment: usize) -> Vec<bool> {
         let free = |role: &Role| match *role {
             Role::State(i) => !matches!(self.model.states[i].start, StateStart::Value(_)),
@@ -73,8 +74,8 @@ impl<S: Values> Maker<'_, '_, S> {
         self.compiled.roles.iter().map(free).collect()
     }
 
-    /// Moves `free` values that constraints hold to near those that the file gives for a simulation: they
-    /// share so many bits.
+    /// Sets the `free` values that constraints contain close to those that the file gives for a simulation:
+    /// they agree in the given number of bits.
     pub(super) fn near_given(
         &self,
         experiment: usize,
@@ -94,15 +95,15 @@ impl<S: Values> Maker<'_, '_, S> {
         }
     }
 
-    /// True if the file gives the value of something that a constraint can move.
+    /// True if the file gives a value that a constraint can change.
     pub(super) fn gives_start(&self) -> bool {
         let free = self.free(0);
         let slots = self.compiled.constraints.iter().flat_map(|&node| slots_of(&self.compiled.dag, node));
         slots.into_iter().any(|s| free[s] && self.model.given(self.compiled.roles[s], 0).is_some())
     }
 
-    /// Which of some constraints are independent of those before them at a point, by their derivatives in
-    /// what is `free`.
+    /// Constraints that are independent of those before them at a point, by their derivatives in the `free`
+    /// slots.
     pub(super) fn independent(
         &self,
         constraints: &[usize],
@@ -130,8 +131,8 @@ impl<S: Values> Maker<'_, '_, S> {
         Ok(out)
     }
 
-    /// The differentials of the constraints, and whether their first derivatives are zero here: then the
-    /// motion keeps them, and the point is generic among those that hold them.
+    /// Differentials of the constraints, and true if their first time derivatives are zero here. The motion
+    /// then keeps them, and the point is generic among those where they hold.
     pub(super) fn constraints(&self, point: &Point<S>) -> Result<(Rows<S>, bool), Singular> {
         let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
         if compiled.constraints.is_empty() {
@@ -156,14 +157,14 @@ impl<S: Values> Maker<'_, '_, S> {
     }
 }
 
-/// The nodes of a list, each once: entries that mirror each other are one node.
+/// Nodes of a list, each once: mirrored entries are one node.
 pub(super) fn distinct(nodes: &[usize]) -> Vec<usize> {
     let first = |(i, node): (usize, &usize)| (!nodes[..i].contains(node)).then_some(*node);
     nodes.iter().enumerate().filter_map(first).collect()
 }
 
-/// A list that begins with another of its entries at each attempt. Newton's steps follow the first
-/// constraints with independent gradients; where only others are independent at the point, these must come
+/// The list rotated so that another entry comes first at each attempt. Newton's steps follow the first
+/// constraints with independent gradients. If only others are independent at the point, these must come
 /// first.
 pub(super) fn turned(mut nodes: Vec<usize>, attempt: usize) -> Vec<usize> {
     let turn = attempt % nodes.len().max(1);

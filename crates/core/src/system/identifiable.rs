@@ -2,15 +2,15 @@
 //! unobservable direction changes.
 //!
 //! `f = sum_j a_j m_j` is observable at generic points iff its differential vanishes on every unobservable
-//! direction there: a linear system for the `a_j` from several random points, modulo a prime; rational `a_j`
-//! are reconstructed and the result is verified modulo the other prime. A scaling symmetry takes `f` to a sum
-//! of parts of one weight each, so that products of weight zero are enough.
+//! direction there. This is a linear system for the `a_j` from several random points, modulo a prime.
+//! Rational `a_j` are reconstructed, and the result is verified modulo the other prime. A scaling symmetry
+//! takes `f` to a sum of parts of one weight each, so products of weight zero suffice.
 
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{At, Judgement, climb_at};
+use super::judge::{Judgement, PointDegrees, climb_at};
 use super::lie::lie_derivatives;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{Powers, Terms};
@@ -18,43 +18,44 @@ use super::symmetry::{Invariant, Symmetries, integers, rationals};
 use super::work::Spent;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 
-/// Most products of a family: their number decides the work.
+/// Largest number of products of a family; it decides the work.
 const PRODUCTS: usize = 400;
-/// Most products that are looked at before those with a weight are left out.
+/// Largest number of products that are listed before those with a weight are removed.
 const LISTED: usize = 200_000;
-/// Most points.
+/// Largest number of points.
 const POINTS: usize = 250;
-/// Points with other verdicts before one is taken all the same: what it gives does not hold at the first.
+/// Number of points with other verdicts before one is taken nevertheless: its results do not hold at the
+/// first point.
 const ELSEWHERE: usize = 24;
-/// Operations of all points and eliminations of a search.
+/// Limit of operations of all points and eliminations of a search.
 const OPERATIONS: u64 = 200_000_000;
-/// Most terms of a function that is kept.
+/// Largest number of terms of a function that is kept.
 const TERMS: usize = 12;
 /// Highest degree among the unknowns that the functions found before do not express.
 const RESTRICTED: u32 = 4;
 
-/// An identifiable function.
+/// Identifiable function of unknowns.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct IdentifiableFunction {
     /// Integer coefficients and products of powers.
     pub(super) terms: Terms,
-    /// Its observable degree.
+    /// Observable degree of the function.
     pub(super) degree: usize,
 }
 
 /// Products among which functions are sought.
-struct Family {
+struct ProductFamily {
     variables: Vec<usize>,
-    /// Largest sum of the sizes of the exponents.
+    /// Largest sum of the absolute exponents.
     degree: u32,
     /// True if exponents may be negative.
     negative: bool,
 }
 
-/// Functions beyond the invariants of the symmetries, and how many are still missing.
+/// Functions beyond the invariants of the symmetries, and the number of missing ones.
 ///
 /// # Errors
-/// [`ModelError`] when a point cannot be had.
+/// [`ModelError`] if no point is found.
 pub(super) fn identifiable_functions(
     model: &SystemModel,
     compiled: &Compiled,
@@ -72,7 +73,7 @@ pub(super) fn identifiable_functions(
     if missing == 0 {
         return Ok((Vec::new(), 0));
     }
-    let mut search = Search::new(model, compiled, judged, f, seed)?;
+    let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
     (search.all, search.shown) = (all, shown);
     let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     for terms in &listed {
@@ -93,7 +94,7 @@ pub(super) fn identifiable_functions(
         for negative in [false, true] {
             if search.missing() > 0 {
                 let variables = search.not_expressed(&listed);
-                search.among(&Family { variables, degree, negative }.products(&weights))?;
+                search.among(&ProductFamily { variables, degree, negative }.products(&weights))?;
             }
         }
     }
@@ -107,7 +108,7 @@ pub(super) fn identifiable_functions(
     Ok((found.0, missing + found.1))
 }
 
-/// The number of independent functionals in a span that hold no other unknowns than those shown.
+/// Number of independent functionals in a span that contain only the unknowns in `shown`.
 fn of_shown(span: &Echelon, shown: &[bool]) -> usize {
     let hidden: Vec<usize> = (0..shown.len()).filter(|&c| !shown[c]).collect();
     let mut part = Echelon::new(span.field(), hidden.len());
@@ -118,7 +119,7 @@ fn of_shown(span: &Echelon, shown: &[bool]) -> usize {
     span.rank() - part.rank()
 }
 
-/// An invariant of the symmetries as a sum of products of powers.
+/// Invariant of the symmetries as a sum of products of powers.
 pub(super) fn terms_of(i: &Invariant) -> Terms {
     match i.product {
         true => vec![(1, i.terms.iter().map(|&(c, m)| (c, m as i32)).collect())],
@@ -126,7 +127,7 @@ pub(super) fn terms_of(i: &Invariant) -> Terms {
     }
 }
 
-/// Factors of a scaling on the unknowns, as integer exponents.
+/// Effect of a scaling on the unknowns, as integer exponents.
 fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
     let plain = symmetries.found.iter().filter(|s| s.translation.is_empty());
     let weights = plain.map(|s| {
@@ -136,8 +137,9 @@ fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
     weights.collect()
 }
 
-/// Of parameters alone first, then with states, then with what is observable; polynomials first.
-fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
+/// Families in the order of the search: parameters alone first, then with states, then with observable
+/// unknowns; polynomials first.
+fn families(judged: &Judgement, shown: &[bool]) -> Vec<ProductFamily> {
     let degrees = &judged.findings.degrees;
     let all: Vec<usize> =
         (0..judged.layout.unknowns.len()).filter(|&c| degrees.excited[c] && shown[c]).collect();
@@ -146,7 +148,7 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
     let parameters: Vec<usize> = moved.iter().copied().filter(is_parameter).collect();
     let family = |variables: &Vec<usize>, degree, negative| {
         let variables = variables.clone();
-        Family { variables, degree, negative }
+        ProductFamily { variables, degree, negative }
     };
     vec![
         family(&parameters, 2, false),
@@ -160,8 +162,9 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<Family> {
     ]
 }
 
-impl Family {
-    /// Products of no weight that hold one unknown at least, short ones first; none if there are too many.
+impl ProductFamily {
+    /// Products of weight zero that contain at least one unknown, short ones first; none if there are too
+    /// many.
     fn products(&self, weights: &[Vec<(usize, i64)>]) -> Vec<Powers> {
         let mut out: Vec<(u32, Powers)> = vec![(0, Vec::new())];
         for &v in &self.variables {
@@ -195,27 +198,27 @@ impl Family {
     }
 }
 
-/// A search at points of one field.
-struct Search<'a> {
+/// Search at points of one field.
+struct FunctionSearch<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
     f: Field,
     rng: SplitMix64,
-    /// Points with the unobservable directions there.
-    points: Vec<(At<Field>, Vec<Vec<u64>>)>,
-    /// Differentials of what is known to be identifiable, at the first point.
+    /// Points, with the unobservable directions there.
+    points: Vec<(PointDegrees<Field>, Vec<Vec<u64>>)>,
+    /// Differentials of functions known to be identifiable, at the first point.
     known: Echelon,
-    /// Number of independent identifiable functions of the unknowns that are shown.
+    /// Number of independent identifiable functions of the unknowns in `shown`.
     all: usize,
-    /// True of the unknowns that are shown: functions hold no others.
+    /// True for unknowns that functions may contain.
     shown: Vec<bool>,
     /// Operations so far.
     spent: Spent,
     found: Vec<IdentifiableFunction>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> FunctionSearch<'a> {
     fn new(
         model: &'a SystemModel,
         compiled: &'a Compiled,
@@ -251,7 +254,7 @@ impl<'a> Search<'a> {
         let spent = &mut self.spent;
         let mut at = climb_at(self.model, self.compiled, &self.judged.layout, self.f, &mut self.rng, spent)?;
         for _ in 0..ELSEWHERE {
-            // constraints that hold in several ways have points with other verdicts
+            // constraints that can hold in several ways have points with other verdicts
             if self.model.constraints.is_empty() || at.degrees == self.judged.findings.degrees {
                 break;
             }
@@ -262,7 +265,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    fn first(&self) -> &At<Field> {
+    fn first(&self) -> &PointDegrees<Field> {
         &self.points[0].0
     }
 
@@ -270,7 +273,7 @@ impl<'a> Search<'a> {
         self.all.saturating_sub(self.known.rank())
     }
 
-    fn gradient(&self, terms: &[(i64, Powers)], at: &At<Field>) -> Vec<u64> {
+    fn gradient(&self, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
         gradient(&at.span.field(), self.judged.layout.unknowns.len(), terms, at)
     }
 
@@ -315,7 +318,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Keeps a function that is identifiable and independent of those before it.
+    /// Keeps a function if it is identifiable and independent of those before it.
     fn keep(&mut self, terms: Terms) {
         if !terms.iter().flat_map(|t| &t.1).all(|p| self.shown[p.0]) {
             return;
@@ -328,7 +331,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Unknowns without one for each function found so far, which expresses it by the others.
+    /// Unknowns without one for each function found so far, as the function expresses it by the others.
     fn not_expressed(&self, listed: &[Terms]) -> Vec<usize> {
         let degrees = &self.judged.findings.degrees;
         let mut left: Vec<usize> =
@@ -347,7 +350,7 @@ impl<'a> Search<'a> {
         left
     }
 
-    /// The functions that are identifiable at a point of another field too, and the number of those that are
+    /// Functions that are identifiable at a point of another field too, and the number of those that are
     /// not.
     fn verified(self, other: Field) -> Result<(Vec<IdentifiableFunction>, usize), ModelError> {
         let mut rng = self.rng.clone();
@@ -362,7 +365,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The value of a product of powers.
+/// Value of a product of powers.
 fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64]) -> u64 {
     powers.iter().fold(f.one(), |x, &(c, e)| {
         let base = if e < 0 { inverses[c] } else { values[c] };
@@ -370,8 +373,8 @@ fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64])
     })
 }
 
-/// The differential of a function at a point, shape: unknowns.
-fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &At<Field>) -> Vec<u64> {
+/// Differential of a function at a point (shape: unknowns).
+fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
     let inverses: Vec<u64> = at.values.iter().map(|&x| f.inv(x)).collect();
     let mut out = vec![0; n];
     for (number, powers) in terms {
@@ -384,8 +387,7 @@ fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &At<Field>) -> Vec
 }
 
 impl IdentifiableFunction {
-    /// The function in words: `S*w`, `U*w + I*w`, `beta/(N*w)`; factors that all terms share stand before
-    /// brackets.
+    /// Function in words: `S*w`, `U*w + I*w`, `beta/(N*w)`; common factors stand before brackets.
     pub(super) fn text(&self, name: &dyn Fn(usize) -> String) -> String {
         let common: Powers = match self.terms.len() {
             0 | 1 => Vec::new(),
@@ -423,7 +425,7 @@ impl IdentifiableFunction {
     }
 }
 
-/// `2*a*b^2/(c*d)`.
+/// Text `2*a*b^2/(c*d)`.
 fn quotient(number: u64, powers: &[(usize, i32)], name: &dyn Fn(usize) -> String) -> String {
     let power = |&(c, e): &(usize, i32)| match e.unsigned_abs() {
         1 => name(c),

@@ -1,19 +1,20 @@
-//! Functions whose values are independent of each other at a generic point: then random values stand for
-//! them, and prime fields decide as they do for rational models.
+//! Functions whose values are independent of each other at a generic point. Random values then replace them,
+//! and prime fields decide as for rational models.
 //!
-//! Let `u_1 .. u_m` be what exp and tanh are taken of, and the logarithms; let `v_1 .. v_l` be what sin, cos
-//! and tan are taken of, and the arc tangents. If no combination of the `u` with rational coefficients, not
-//! all zero, is constant, and none of the `v`, then all `exp u_i`, `exp(i v_j)`, logarithms and arc tangents
-//! together are algebraically independent over the rational functions of the unknowns: Ax's theorem (Ax 1971,
-//! doi:10.2307/1970774: the transcendence degree of `(w, exp w)` is at least the number of independent `w`
-//! plus the rank of their differentials), applied to the `u`, the `i v` and generic multiples of all
-//! variables, by induction over functions of functions. So a point with random values of the functions is a
-//! generic point, and the degree of every minor in these values is bounded as for any other variable
-//! (crates/README.md, *Certainty*).
+//! Let `u_1 .. u_m` be the arguments of exp and tanh, and the logarithms; let `v_1 .. v_l` be the arguments
+//! of sin, cos and tan, and the arc tangents. Assume that no combination of the `u` with rational
+//! coefficients, not all zero, is constant, and none of the `v`. Then all `exp u_i`, `exp(i v_j)`,
+//! logarithms and arc tangents together are algebraically independent over the rational functions of the
+//! unknowns. This is Ax's theorem (Ax 1971, doi:10.2307/1970774: the transcendence degree of `(w, exp w)` is
+//! at least the number of independent `w` plus the rank of their differentials), applied to the `u`, the
+//! `i v` and generic multiples of all variables, by induction over functions of functions. So a point with
+//! random values of the functions is a generic point, and the degree of every minor in these values is
+//! bounded as for any other variable (crates/README.md, *Certainty*).
 //!
-//! That no combination is constant is proven by the rank of their gradients, side by side at random points of
-//! a prime field: a rank modulo a prime is never too large. Where it is not full, or an argument is special
-//! (a given start or value, the time, a jump), nothing is said here, and real numbers of many digits decide.
+//! The rank of the gradients proves that no combination is constant. The gradients stand side by side at
+//! random points of a prime field: a rank modulo a prime is never too large. If the rank is not full, or an
+//! argument is special (a given start or value, the time, a jump), nothing is concluded, and real numbers of
+//! many digits decide.
 
 use std::collections::BTreeSet;
 
@@ -22,17 +23,17 @@ use obsdeg_exact::{Echelon, Field, Reals, SplitMix64};
 use super::constraints::slots_of;
 use super::dag::Op;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
-use super::rows::{Layout, Maker, random_field};
+use super::rows::{Layout, PointBuilder, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
 use super::work::{Spent, Step, Work};
 use crate::language::Function;
 
-/// Most points at which gradients are taken.
+/// Largest number of points at which gradients are computed.
 const POINTS: usize = 32;
 
-/// What a function is to the argument above: with exponentials of the argument, or a logarithm itself; real
-/// or imaginary.
+/// Set of a function: true if it takes the exponential of its argument, false if it is a logarithm itself;
+/// true for real, false for imaginary arguments. `None` for other functions.
 fn family(function: Function) -> Option<(bool, bool)> {
     match function {
         Function::Exp | Function::Tanh => Some((false, true)),
@@ -43,8 +44,8 @@ fn family(function: Function) -> Option<(bool, bool)> {
     }
 }
 
-/// How many functions take part, if their values are proven to be independent, and there is a real point at
-/// which all are defined.
+/// Number of functions, if their values are proven to be independent and there is a real point at which all
+/// are defined; `None` otherwise.
 pub(super) fn independent_functions(
     model: &SystemModel,
     compiled: &Compiled,
@@ -59,7 +60,7 @@ pub(super) fn independent_functions(
     if model.experiments > 1 || !compiled.constraints.is_empty() {
         return None;
     }
-    // exp u and tanh u are one, as are sin v, cos v, tan v; exp(log x) and log x are not
+    // exp u and tanh u count as one, as do sin v, cos v, tan v; exp(log x) and log x do not
     let mut sets: [BTreeSet<(bool, usize)>; 2] = Default::default();
     for &(node, function, of) in &functions {
         let (inverse, real) = family(function)?;
@@ -68,16 +69,16 @@ pub(super) fn independent_functions(
         }
         sets[usize::from(real)].insert((inverse, if inverse { node } else { of }));
     }
-    // beyond its limit nothing is said of them
+    // beyond the limit of work nothing is concluded
     let work = Work::new(model.work_limit);
-    let maker = Maker { model, compiled, layout, field: random_field(rng), work: &work };
-    let free = sets.iter().all(|nodes| is_free(&maker, nodes, rng))
+    let builder = PointBuilder { model, compiled, layout, field: random_field(rng), work: &work };
+    let free = sets.iter().all(|nodes| is_free(&builder, nodes, rng))
         && is_somewhere(model, compiled, layout, rng, &work);
     spent.add(&work);
     free.then_some(functions.len())
 }
 
-/// True if there is a real point at which rates and outputs are defined: then they are around it.
+/// True if there is a real point at which rates and outputs are defined: then they are defined around it.
 fn is_somewhere(
     model: &SystemModel,
     compiled: &Compiled,
@@ -86,11 +87,11 @@ fn is_somewhere(
     work: &Work,
 ) -> bool {
     let field = Reals::<2>;
-    let maker = Maker { model, compiled, layout, field, work };
+    let builder = PointBuilder { model, compiled, layout, field, work };
     let roots: Vec<usize> =
         compiled.rates(0).iter().chain(compiled.outputs(0)).chain(&compiled.combinations).copied().collect();
     (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
-        let Some(values) = maker.values(rng, attempt) else { return false };
+        let Some(values) = builder.values(rng, attempt) else { return false };
         let starts = vec![None; values.len()];
         let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();
         let seed = SplitMix64::new(0);
@@ -98,7 +99,7 @@ fn is_somewhere(
     })
 }
 
-/// The functions that rates, outputs, starts, constants and jumps are made of: node, kind, argument.
+/// Functions in rates, outputs, starts, constants and jumps: node, kind, argument.
 fn functions(compiled: &Compiled) -> Vec<(usize, Function, usize)> {
     let dag = &compiled.dag;
     let experiments = 0..compiled.experiments.len();
@@ -132,8 +133,8 @@ fn functions(compiled: &Compiled) -> Vec<(usize, Function, usize)> {
     out
 }
 
-/// True if what an argument depends on is at a generic value wherever a run or a segment begins, and the same
-/// in all of them; or a number that never changes.
+/// True if the slots of an argument have generic values at the beginning of every run and segment, the same
+/// in all of them; or if it is a number that never changes.
 fn is_generic(model: &SystemModel, role: Role) -> bool {
     let changes = |name: &str| model.segments.iter().any(|s| s.constants.iter().any(|c| c.0 == name));
     let jumps = |name: &str| model.segments.iter().any(|s| s.carry.iter().any(|c| c.0 == name));
@@ -149,17 +150,21 @@ fn is_generic(model: &SystemModel, role: Role) -> bool {
     }
 }
 
-/// True if no combination of these nodes is constant: their gradients by all that is generic, at some points
-/// side by side, have full rank.
-fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &mut SplitMix64) -> bool {
-    let compiled = maker.compiled;
+/// True if no combination of these nodes is constant: their gradients by all generic slots, side by side at
+/// some points, have full rank.
+fn is_free(
+    builder: &PointBuilder<'_, '_, Field>,
+    nodes: &BTreeSet<(bool, usize)>,
+    rng: &mut SplitMix64,
+) -> bool {
+    let compiled = builder.compiled;
     let roots: Vec<usize> = nodes.iter().map(|n| n.1).collect();
     let given =
         |s: usize| matches!(compiled.roles[s], Role::Constant(c) if compiled.constants(0)[c].is_some());
     let lanes: Vec<usize> = (0..compiled.roles.len()).filter(|&s| !given(s)).collect();
     let mut rows: Vec<Vec<u64>> = vec![Vec::new(); roots.len()];
     for _ in 0..POINTS.min(roots.len()) {
-        let Some(values) = maker.values(rng, 0) else { return false };
+        let Some(values) = builder.values(rng, 0) else { return false };
         let signal = |(s, value): (usize, &u64)| Signal::Constant {
             value: *value,
             lane: lanes.binary_search(&s).ok(),
@@ -168,7 +173,7 @@ fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &
         let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
         let dag = &compiled.dag;
         let at =
-            Taylor::new(dag, maker.field, lanes.len(), signals, &starts, &roots, false, seed, maker.work);
+            Taylor::new(dag, builder.field, lanes.len(), signals, &starts, &roots, false, seed, builder.work);
         let Ok(at) = at else { return false };
         for (row, &node) in rows.iter_mut().zip(&roots) {
             let start = row.len();
@@ -180,10 +185,11 @@ fn is_free(maker: &Maker<'_, '_, Field>, nodes: &BTreeSet<(bool, usize)>, rng: &
         // each row against all before it
         let (count, columns) = (rows.len() as u64, rows[0].len() as u64);
         let elimination = count.saturating_mul(count).saturating_mul(columns);
-        if maker.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err() {
+        if builder.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err()
+        {
             return false;
         }
-        let mut space = Echelon::new(maker.field, rows[0].len());
+        let mut space = Echelon::new(builder.field, rows[0].len());
         if rows.iter().all(|row| space.insert(row)) {
             return true;
         }

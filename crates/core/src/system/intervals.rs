@@ -1,5 +1,5 @@
-//! Ranges of the nodes of the graph over all real points, by interval arithmetic: what they prove of the sign
-//! of a constraint.
+//! Ranges of the nodes of the graph over all real points, by interval arithmetic. They can prove the sign of
+//! a constraint.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use super::dag::{Dag, Op};
 use super::model::{Compiled, Role};
 use crate::language::Function;
 
-/// All numbers from `low` to `high`; bounds are rounded outwards.
+/// Interval of all numbers from `low` to `high`; bounds are rounded outwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interval {
     pub(super) low: f64,
     pub(super) high: f64,
-    /// True if zero is none of them, though it may be a bound.
+    /// True if the interval does not contain zero, although zero may be a bound.
     never_zero: bool,
 }
 
@@ -25,7 +25,7 @@ impl Interval {
         Self { low, high, never_zero: false }
     }
 
-    /// Bounds that are no numbers say nothing.
+    /// Interval of two bounds; bounds that are no numbers become infinite.
     fn new(low: f64, high: f64) -> Self {
         Self::between(
             if low.is_nan() { f64::NEG_INFINITY } else { low },
@@ -33,24 +33,24 @@ impl Interval {
         )
     }
 
-    /// True if zero is none of the numbers.
+    /// True if the interval does not contain zero.
     pub(super) fn excludes_zero(&self) -> bool {
         self.never_zero || self.low > 0.0 || self.high < 0.0
     }
 
-    /// The same without zero, if `holds`.
+    /// The interval without zero, if `holds`.
     fn without_zero(self, holds: bool) -> Self {
         Self { never_zero: self.never_zero || holds, ..self }
     }
 
-    /// With room for rounding; a bound of zero that is exact stays.
+    /// Interval with room for rounding; an exact bound of zero stays.
     fn rounded(low: f64, high: f64) -> Self {
         let down = if low == 0.0 { low } else { low.next_down() };
         let up = if high == 0.0 { high } else { high.next_up() };
         Self::new(down, up)
     }
 
-    /// About a number, with a relative error of some units of the last place.
+    /// Interval about a number, with a relative error of some units of the last place.
     pub(super) fn about(x: f64) -> Self {
         let room = x.abs() * 1e-14;
         Self::new(x - room, x + room)
@@ -66,7 +66,7 @@ impl Interval {
             z if z == 0.0 && x == 0.0 => z,
             z => next(z),
         };
-        // of one sign, and not both zero
+        // both of one sign, and not both zero
         let one_sign = self.low >= 0.0 && other.low >= 0.0 || self.high <= 0.0 && other.high <= 0.0;
         Self::new(bound(self.low, other.low, f64::next_down), bound(self.high, other.high, f64::next_up))
             .without_zero(one_sign && (self.excludes_zero() || other.excludes_zero()))
@@ -77,7 +77,7 @@ impl Interval {
         let product = |x: f64, y: f64| if x == 0.0 || y == 0.0 { 0.0 } else { x * y };
         let (a, b) = ([self.low, self.high], [other.low, other.high]);
         let all = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| product(a[i], b[j]));
-        // an underflow to zero is none
+        // an underflow to zero is no exact zero
         let exact = |x: f64| x == 0.0 && !a.iter().chain(&b).any(|y| *y != 0.0 && y.abs() < 1e-150);
         let (low, high) = (
             all.iter().copied().fold(f64::INFINITY, f64::min),
@@ -90,7 +90,7 @@ impl Interval {
         .without_zero(self.excludes_zero() && other.excludes_zero())
     }
 
-    /// One over it; where it may be zero only on one side, that side's.
+    /// Reciprocal; if the interval reaches zero on one side only, the reciprocal of that side.
     fn inverse(self) -> Self {
         match (self.low, self.high) {
             (low, high) if low >= 0.0 => {
@@ -106,7 +106,7 @@ impl Interval {
         Self { low: self.low.max(other.low), high: self.high.min(other.high), ..self }
     }
 
-    /// Of an increasing function.
+    /// Image under an increasing function.
     fn through(self, f: impl Fn(f64) -> f64) -> Self {
         let room = |x: f64| x.abs() * 1e-14 + 1e-300;
         let (low, high) = (f(self.low), f(self.high));
@@ -114,7 +114,7 @@ impl Interval {
     }
 }
 
-/// The range of a function.
+/// Range of a function.
 fn of_function(function: Function, x: Interval) -> Interval {
     let unit = Interval::between(-1.0, 1.0);
     match function {
@@ -133,7 +133,7 @@ fn of_function(function: Function, x: Interval) -> Interval {
         Function::Abs => Interval { low: 0.0, high: x.high.max(-x.low), ..x },
         Function::Sign if x.low > 0.0 => Interval::between(1.0, 1.0),
         Function::Sign if x.high < 0.0 => Interval::between(-1.0, -1.0),
-        // they change no faster than their argument
+        // sine and cosine change no faster than their argument
         Function::Sin | Function::Cos if x.high - x.low < 1e-9 => {
             let value = function.value(x.low);
             let room = (x.high - x.low) + 1e-14 * (1.0 + x.low.abs());
@@ -144,7 +144,7 @@ fn of_function(function: Function, x: Interval) -> Interval {
     }
 }
 
-/// The range of a node where the slots have these ranges (all numbers where none is given).
+/// Range of a node for given ranges of the slots (all numbers for slots without one).
 pub(super) fn of_node(dag: &Dag, node: usize, slots: &BTreeMap<usize, Interval>) -> Interval {
     let mut found: BTreeMap<usize, Interval> = BTreeMap::new();
     for i in below(dag, node) {
@@ -169,9 +169,9 @@ pub(super) fn of_node(dag: &Dag, node: usize, slots: &BTreeMap<usize, Interval>)
     found.get(&node).copied().unwrap_or(Interval::ALL)
 }
 
-/// True if every factor of a product stands in it an even number of times.
+/// True if every factor of a product occurs an even number of times.
 fn is_square(dag: &Dag, node: usize) -> bool {
-    /// Factors that are looked at.
+    /// Largest number of factors that are examined.
     const MOST: usize = 64;
     let (mut odd, mut open) = (BTreeMap::<usize, bool>::new(), vec![node]);
     let mut looked = 0;
@@ -190,7 +190,7 @@ fn is_square(dag: &Dag, node: usize) -> bool {
     odd.values().all(|odd| !odd)
 }
 
-/// The range of a node at the start of an experiment: constants have their values, all else is any number.
+/// Range of a node at the start of an experiment: constants have their values, all other slots any number.
 pub(super) fn range(compiled: &Compiled, node: usize, experiment: usize) -> Interval {
     let mut slots: BTreeMap<usize, Interval> = BTreeMap::new();
     for (c, formula) in compiled.constants(experiment).iter().enumerate() {
@@ -219,7 +219,8 @@ mod tests {
         of_node(&dag, node, &BTreeMap::new())
     }
 
-    /// Signs by the rules of sums, even powers, roots and sizes; and nothing where there is no rule.
+    /// Signs follow from the rules of sums, even powers, roots and absolute values; otherwise they are
+    /// unknown.
     #[test]
     fn signs_by_hand() {
         for text in [
@@ -244,7 +245,7 @@ mod tests {
         }
     }
 
-    /// No value of a random expression at a random point is outside.
+    /// Values of random expressions at random points lie inside their ranges.
     #[test]
     fn no_value_is_outside() {
         let mut rng = SplitMix64::new(5);

@@ -1,4 +1,4 @@
-//! Models as JSON objects: `states`, `params`, `equations`, `outputs` and what else there is to say.
+//! Models as JSON objects: `states`, `params`, `equations`, `outputs` and optional keys.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,7 +16,7 @@ use crate::language::file_error::{json_kind, words};
 use crate::language::{Names, parse_with};
 use crate::model::angle::excerpt;
 
-/// The layout; keys that are not listed are left alone.
+/// Layout of the object; other keys are ignored.
 #[derive(Debug, Deserialize)]
 struct Layout {
     name: String,
@@ -25,42 +25,42 @@ struct Layout {
     states: Vec<String>,
     #[serde(default)]
     params: Vec<String>,
-    equations: BTreeMap<String, Text>,
+    equations: BTreeMap<String, PlacedText>,
     outputs: Outputs,
     #[serde(default)]
     known_inputs: Vec<String>,
     #[serde(default)]
     unknown_inputs: Vec<String>,
-    /// Absent: arbitrary, as null.
+    /// Highest derivative of unknown inputs; missing or null: arbitrary.
     #[serde(default)]
     unknown_input_max_derivative: Option<usize>,
     #[serde(default)]
     known_constants: Vec<String>,
     #[serde(default)]
-    input_assumption: BTreeMap<String, Text>,
+    input_assumption: BTreeMap<String, PlacedText>,
     #[serde(default)]
-    known_initial_values: BTreeMap<String, Text>,
+    known_initial_values: BTreeMap<String, PlacedText>,
     #[serde(default)]
     known_initial_conditions: Vec<String>,
     #[serde(default)]
     experiments: Option<usize>,
     #[serde(default)]
-    segments: Vec<BTreeMap<String, Text>>,
+    segments: Vec<BTreeMap<String, PlacedText>>,
     #[serde(default)]
     segment_constants: Vec<String>,
     #[serde(default)]
-    observable_combinations: Vec<Text>,
+    observable_combinations: Vec<PlacedText>,
 }
 
-/// A text, and where in the memory of the file it was found.
+/// Text with its address in the memory of the file.
 #[derive(Debug)]
-struct Text {
+struct PlacedText {
     text: String,
     address: usize,
     length: usize,
 }
 
-impl<'de> Deserialize<'de> for Text {
+impl<'de> Deserialize<'de> for PlacedText {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let raw = <&RawValue>::deserialize(deserializer)?.get();
         let text = serde_json::from_str(raw)
@@ -71,7 +71,7 @@ impl<'de> Deserialize<'de> for Text {
 
 /// Outputs in the order of the file.
 #[derive(Debug)]
-struct Outputs(Vec<(String, Text)>);
+struct Outputs(Vec<(String, PlacedText)>);
 
 impl<'de> Deserialize<'de> for Outputs {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -82,7 +82,7 @@ impl<'de> Deserialize<'de> for Outputs {
                 f.write_str("an object")
             }
             fn visit_map<A: serde::de::MapAccess<'de>>(self, mut map: A) -> Result<Outputs, A::Error> {
-                let mut out: Vec<(String, Text)> = Vec::new();
+                let mut out: Vec<(String, PlacedText)> = Vec::new();
                 while let Some((name, text)) = map.next_entry()? {
                     out.retain(|(n, _)| *n != name);
                     out.push((name, text));
@@ -94,19 +94,19 @@ impl<'de> Deserialize<'de> for Outputs {
     }
 }
 
-/// The file.
-struct File<'a>(&'a str);
+/// Text of the file.
+struct JsonFile<'a>(&'a str);
 
-impl File<'_> {
-    /// Where a text stands, with its quotes.
-    fn span(&self, text: &Text) -> Option<Range<usize>> {
+impl JsonFile<'_> {
+    /// Byte range of a text in the file, with its quotes.
+    fn span(&self, text: &PlacedText) -> Option<Range<usize>> {
         let start = text.address.checked_sub(self.0.as_ptr().addr())?;
         (start + text.length <= self.0.len()).then_some(start..start + text.length)
     }
 
-    fn formula(&self, what: String, text: &Text) -> Result<PlacedExpression, ModelError> {
+    fn formula(&self, what: String, text: &PlacedText) -> Result<PlacedExpression, ModelError> {
         let span = self.span(text);
-        // a text without escapes stands in the file as it is
+        // a text without escapes is the same in the file
         let plain = |s: &Range<usize>| self.0.get(s.start + 1..s.end - 1) == Some(text.text.as_str());
         let place = Place { what, offset: span.clone().filter(plain).map(|s| s.start + 1) };
         let expression = parse_with(&text.text, Names::Plain).map_err(|e| {
@@ -117,14 +117,14 @@ impl File<'_> {
         Ok(PlacedExpression { text: text.text.clone(), expression, place })
     }
 
-    /// What the reader of JSON complains of: it says where it stands, behind what is wrong.
+    /// Error for a message of the JSON reader, which states its place after the fault.
     fn refused(&self, e: &serde_json::Error) -> ModelError {
         let message = e.to_string();
         let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(m, _)| m);
         let line = self.0.split_inclusive('\n').take(e.line().saturating_sub(1)).map(str::len).sum::<usize>();
         let end = (line + e.column()).min(self.0.len());
         let before = self.0.get(..end).unwrap_or("");
-        // back over the token that ends here
+        // go back over the token that ends here
         let start = match before.strip_suffix('"') {
             Some(inner) => inner.rfind('"').unwrap_or(0),
             None => before.trim_end_matches(|c: char| c.is_alphanumeric() || "-+.".contains(c)).len(),
@@ -145,11 +145,11 @@ fn named(name: &str) -> Named {
 /// Reads a model.
 ///
 /// # Errors
-/// [`ModelError`] with the byte range of the offender where it is known.
+/// [`ModelError`] with the byte range of the fault, if it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     check_signs(text)?;
-    let file = File(text);
-    // a key, at its first mention in quotes
+    let file = JsonFile(text);
+    // a key, at its first occurrence in quotes
     let key = |name: &str| text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
     let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: key(what) };
     let layout: Layout = serde_json::from_str(text).map_err(|e| file.refused(&e))?;
@@ -197,7 +197,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         model.known_inputs.push((named(input), kind));
     }
     let degree = layout.unknown_input_max_derivative;
-    // absent as a key: the signal itself is constant in none of the models, so arbitrary
+    // a missing key means arbitrary: in no model is the signal itself constant
     model.unknown_inputs = layout.unknown_inputs.iter().map(|u| (named(u), degree)).collect();
     let constants = layout.known_constants.iter().chain(&layout.segment_constants);
     model.constants = constants.map(|c| (named(c), Constant::Generic)).collect();

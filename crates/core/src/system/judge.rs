@@ -1,4 +1,4 @@
-//! Verdicts on any system: degrees, agreed on at two random points, modulo two primes or in many digits.
+//! Verdicts on any system: degrees on which two random points agree, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
@@ -11,7 +11,7 @@ use super::error::ModelError;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
-use super::rows::{Layout, Maker, SystemRows, random_field};
+use super::rows::{Layout, PointBuilder, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Step, Work, product};
@@ -20,73 +20,72 @@ use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
 use crate::language::Function;
 
-/// Pairs of fields that are tried.
+/// Number of pairs of fields that are tried.
 const ATTEMPTS: usize = 5;
 
-/// Operations of verdicts in prime fields up to which they are compared with those at a real point, where
-/// constraints hold.
+/// Largest number of operations of verdicts in prime fields for which they are compared with those at a real
+/// point, if there are constraints.
 const COMPARED: u64 = 2_000_000;
 
-/// Primes that are tried until constraints have a point.
+/// Number of primes tried until constraints have a point.
 const PRIMES: usize = 20;
 
-/// Points that are drawn in each.
+/// Number of points drawn modulo each prime.
 const POINTS: usize = 2;
 
-/// Largest bound on the probability of a wrong verdict with which a verdict is given.
+/// Largest bound on the probability of a wrong verdict.
 const CERTAIN: f64 = 1e-9;
 
-/// From so many orders on, about, fields have roots of unity.
+/// Number of orders from which, approximately, fields are chosen with roots of unity.
 const LONG: usize = 100;
 
-/// What is known of a system.
+/// Verdicts on a system, with their certainty.
 #[derive(Debug, Clone)]
 pub struct Judgement {
-    /// The unknowns and the bound.
+    /// Unknowns of the system, and the bound on the order.
     pub layout: Layout,
-    /// The verdicts.
+    /// Verdicts on the unknowns and on requested combinations.
     pub findings: Findings,
-    /// What they rest on.
+    /// Certainty of the verdicts.
     pub certainty: SystemCertainty,
-    /// The span of all rows in the first prime field, where there is one.
+    /// Span of all rows in the first prime field; `None` if real numbers decided.
     pub span: Option<Echelon>,
     /// The two prime fields of a rational model.
     pub fields: Option<[Field; 2]>,
-    /// Functions whose values are proven to be independent of each other, so that random ones stand for them;
-    /// `None` where true values were taken.
+    /// Number of functions whose values are proven to be independent of each other, so that random values
+    /// replace them; `None` if true values were used.
     pub independent_functions: Option<usize>,
-    /// Operations of the verdicts, at all points that were drawn.
+    /// Number of operations of the verdicts, at all points that were drawn.
     pub work: u64,
-    /// What is not observable would be so only beyond the bound on the order: it is not proven that there is
-    /// nothing.
+    /// True if unobservable unknowns might be observable beyond the bound on the order: it is not proven
+    /// that higher orders add nothing.
     pub rests_on_bound: bool,
     /// Sides of the branches of abs and sign at the two points.
     pub sides: Vec<BranchSide>,
 }
 
-/// What the verdicts on a system rest on.
+/// Certainty of the verdicts on a system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SystemCertainty {
-    /// A rational model, or one whose functions have independent values: two prime fields that agree.
+    /// Two prime fields that agree: a rational model, or one whose functions have independent values.
     Primes(ByPrimes),
-    /// Any other model with functions: two random real points that agree.
+    /// Two random real points that agree: any other model with functions.
     Digits(ByDigits),
 }
 
-/// How clear ranks were that real numbers decided. Decimal logarithms, relative to the largest entry of a
-/// row.
+/// Margin of rank decisions in real numbers. Decimal logarithms, relative to the largest entry of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByDigits {
-    /// Decimal digits of the numbers at the first point and at the second.
+    /// Numbers of decimal digits at the first point and at the second.
     pub digits: [usize; 2],
-    /// The smallest number that counts as different from zero: it is proven to be, by an error bound.
+    /// Smallest number that counts as non-zero: an error bound proves it.
     pub nonzero: f64,
-    /// The widest error bound of a number that holds zero and counts as zero.
+    /// Widest error bound of a number that counts as zero: it contains zero.
     pub zero: f64,
 }
 
 impl Judgement {
-    /// True if an unknown is spoken of: of arbitrary inputs only the signal itself is of interest.
+    /// True if an unknown is reported: of arbitrary inputs only the signal itself, not its derivatives.
     pub fn shown(&self, model: &SystemModel, unknown: usize) -> bool {
         let u = &self.layout.unknowns[unknown];
         match u.role {
@@ -95,23 +94,23 @@ impl Judgement {
         }
     }
 
-    /// The verdict on the unknown of a name, where it is spoken of.
+    /// Verdict on the unknown of a name; `None` if it is not reported.
     pub fn verdict(&self, model: &SystemModel, name: &str) -> Option<Verdict> {
         let unknown = self.layout.unknowns.iter().position(|u| u.name == name)?;
         self.shown(model, unknown).then(|| self.verdict_on(unknown))
     }
 
-    /// The verdict on an unknown, as far as it is proven.
+    /// Verdict on an unknown, as far as it is proven.
     pub fn verdict_on(&self, unknown: usize) -> Verdict {
         self.as_proven(self.findings.verdict(unknown))
     }
 
-    /// The verdicts on the combinations that were asked for, as far as they are proven.
+    /// Verdicts on requested combinations, as far as they are proven.
     pub fn asked(&self) -> impl Iterator<Item = Verdict> + '_ {
         self.findings.asked.iter().map(|v| self.as_proven(*v))
     }
 
-    /// What is not observable may be so at a higher order, where no end is proven.
+    /// Verdict that allows for a higher order: an unobservable unknown is not resolved if no end is proven.
     fn as_proven(&self, verdict: Verdict) -> Verdict {
         match verdict.degree {
             None if self.rests_on_bound => Verdict { status: Status::NotSeen, ..verdict },
@@ -121,30 +120,30 @@ impl Judgement {
 }
 
 /// Degrees at one random point.
-pub(crate) struct At<S: Values> {
+pub(crate) struct PointDegrees<S: Values> {
     pub(crate) degrees: Degrees,
     pub(crate) combinations: Vec<Verdict>,
-    /// The span of all rows.
+    /// Span of all rows.
     pub(crate) span: S::Space,
-    /// The value of every unknown there, then of every known constant.
+    /// Value of every unknown at the point, then of every known constant.
     pub(crate) values: Vec<S::Element>,
     /// True if the last order is proven to be the last.
     ended: bool,
     /// True if the point is generic, so that an order that adds nothing is the last.
     closed: bool,
     gap: Gap,
-    steps: Steps<S>,
+    steps: OrderedRows<S>,
     /// Signs of the arguments of abs and sign.
     signs: Signs,
 }
 
 /// New rows of `V_0, V_1, ...`, order by order, each zero at the pivots of those before.
-struct Steps<S: Values> {
+struct OrderedRows<S: Values> {
     field: S,
     rows: Vec<(usize, usize, Vec<S::Element>)>,
 }
 
-impl<S: Values> Steps<S> {
+impl<S: Values> OrderedRows<S> {
     fn add(&mut self, order: usize, basis: &S::Space) {
         let pivots = basis.pivot_columns();
         for (i, &pivot) in pivots.iter().enumerate().skip(self.rows.len()) {
@@ -152,7 +151,7 @@ impl<S: Values> Steps<S> {
         }
     }
 
-    /// The smallest k with a functional in `V_k`.
+    /// Observable degree: the smallest k with a functional in `V_k`.
     fn degree(&self, functional: &[S::Element]) -> Option<usize> {
         let f = &self.field;
         let mut rest = functional.to_vec();
@@ -171,15 +170,15 @@ impl<S: Values> Steps<S> {
     }
 }
 
-impl<S: Values> At<S> {
-    /// The degree of a functional there.
+impl<S: Values> PointDegrees<S> {
+    /// Observable degree of a functional at this point.
     pub(crate) fn degree(&self, functional: &[S::Element]) -> Option<usize> {
         self.steps.degree(functional)
     }
 }
 
-/// Climbs the staircase of a system at a random point of a field, and adds the operations to those that were
-/// `spent`, whether or not there is a verdict.
+/// Climbs the staircase of a system at a random point of a field. Adds the operations to `spent`, whether or
+/// not there is a verdict.
 pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -187,7 +186,7 @@ pub(crate) fn climb_at<S: Values>(
     field: S,
     rng: &mut SplitMix64,
     spent: &mut Spent,
-) -> Result<At<S>, ModelError> {
+) -> Result<PointDegrees<S>, ModelError> {
     let work = Work::new(model.work_limit);
     let found = climbed(model, compiled, layout, field, rng, &work);
     spent.add(&work);
@@ -201,7 +200,7 @@ fn climbed<S: Values>(
     field: S,
     rng: &mut SplitMix64,
     work: &Work,
-) -> Result<At<S>, ModelError> {
+) -> Result<PointDegrees<S>, ModelError> {
     let refused = || work.refused().map_or(Ok(()), Err);
     let mut rows = match SystemRows::new(model, compiled, layout, field.clone(), rng, work) {
         Ok(rows) => rows,
@@ -213,10 +212,10 @@ fn climbed<S: Values>(
     let gradients = rows.combinations().to_vec();
     let mut found = vec![None; gradients.len()];
     let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
-    let mut steps = Steps { field: field.clone(), rows: Vec::new() };
+    let mut steps = OrderedRows { field: field.clone(), rows: Vec::new() };
     let (mut refined, product) = (0, product::<S::Element>());
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
-        // rows that were made anew; what is refused ends the climb
+        // rows that were computed again; a refusal ends the climb
         let again = basis.refined() - std::mem::replace(&mut refined, basis.refined());
         let _refused = work.take(Step::Derivatives(order), again.saturating_mul(product), 0);
         for (degree, gradient) in found.iter_mut().zip(&gradients) {
@@ -240,10 +239,10 @@ fn climbed<S: Values>(
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
     let signs = rows.signs(&sided(compiled));
-    Ok(At { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
+    Ok(PointDegrees { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
-/// Where the model has no value, in words.
+/// Error that states where the model has no value.
 pub(super) fn singular<S: Values>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -265,14 +264,14 @@ pub(super) fn singular<S: Values>(
             return of.place.error(message, 0..of.text.len());
         }
         Singular::Dependent(c) => return dependent_at_points(model, c),
-        // said before, with what was too much
+        // reported before, with the exceeded limit
         Singular::Refused => return refuse("the limit of work".into()),
         Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
         Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => (
             node,
             format!(
-                "a power whose exponent is not known as a whole number or half of one is defined for a positive base alone, which it was at \
-                 none of {points} points that were tried"
+                "a power whose exponent is not known as a whole number or half of one is defined for a \
+                 positive base alone, which it was at none of {points} points that were tried"
             ),
         ),
         Singular::Domain(node, function) => (
@@ -299,7 +298,8 @@ pub(super) fn singular<S: Values>(
         StartTime::Generic => message,
         _ if !of_time => message,
         _ => format!(
-            "{message}; it depends on the time, which is that of the start: `time` in the file chooses another, or \"generic\""
+            "{message}; it depends on the time, which is that of the start: `time` in the file chooses \
+             another, or \"generic\""
         ),
     };
     match compiled.places.get(&node) {
@@ -308,8 +308,8 @@ pub(super) fn singular<S: Values>(
     }
 }
 
-/// Judges a model at two random points, each of a stream of its own of `seed` and the model: a rational one
-/// modulo two primes, and so one with functions whose values are independent; any other in many digits.
+/// Judges a model at two random points, each with its own stream of `seed` and the model. A rational model,
+/// or one whose functions have independent values, is judged modulo two primes; any other in many digits.
 /// `bound` overrides the highest order.
 ///
 /// # Errors
@@ -318,8 +318,8 @@ pub fn judge(model: &SystemModel, seed: u64, bound: Option<usize>) -> Result<Jud
     judge_compiled(model, &model.compile()?, seed, bound)
 }
 
-/// Judges a change of a judged model, on the same sides of abs and sign where it has as many. Adds the
-/// operations at all points to those that were `spent`, whether or not there is a verdict.
+/// Judges a change of a judged model, on the same sides of abs and sign if it has as many. Adds the
+/// operations at all points to `spent`, whether or not there is a verdict.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -337,7 +337,7 @@ pub(super) fn judge_beside(
     judge_within(model, &compiled, (judged.findings.seed, bound), sides, spent)
 }
 
-/// Judges a model that was compiled.
+/// Judges a compiled model.
 ///
 /// # Errors
 /// [`ModelError`].
@@ -350,7 +350,7 @@ pub fn judge_compiled(
     judge_within(model, compiled, (seed, bound), None, &mut Spent::default())
 }
 
-/// `sides`: those on which points should be.
+/// Judges a model at points on the given `sides`, if any.
 fn judge_within(
     model: &SystemModel,
     compiled: &Compiled,
@@ -366,7 +366,7 @@ fn judge_within(
         let apart = written_apart(compiled);
         let apart = apart.as_ref().unwrap_or(compiled);
         let independent = independent_functions(model, apart, &layout, &mut rng, spent);
-        // where prime fields fail, for whatever reason, digits say why
+        // if prime fields fail for any reason, real numbers give the reason
         if let Some(count) = independent
             && let Ok(judged) = judge_in_fields(model, apart, &layout, seed, spent)
         {
@@ -375,7 +375,7 @@ fn judge_within(
         return judge_by_digits(model, compiled, &layout, seed, spent);
     }
     match judge_in_fields(model, compiled, &layout, seed, spent) {
-        // constraints with real points that were found in no prime field, though the work was allowed
+        // constraints with real points but without points in prime fields, within the limit of work
         Err(_) if !compiled.constraints.is_empty() && !spent.refused => {
             judge_by_digits(model, compiled, &layout, seed, spent)
         }
@@ -396,7 +396,7 @@ fn judge_in_fields(
 ) -> Result<Judgement, ModelError> {
     let before = spent.operations;
     let orders = layout.unknowns.len() / model.outputs.len().max(1);
-    let points = Points { model, compiled, layout, orders };
+    let points = FieldChoice { model, compiled, layout, orders };
     let order = points.root_order();
     let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
@@ -412,8 +412,9 @@ fn judge_in_fields(
                 error_bound(&Claim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
             if error_bound > CERTAIN {
                 return Err(refuse(format!(
-                    "undecided, because the powers in it are too high for primes of 61 bits: two agree, but a verdict may be wrong with \
-                     probability {error_bound:.0e}, where {CERTAIN:.0e} is expected at most"
+                    "undecided, because the powers in it are too high for primes of 61 bits: two agree, \
+                     but a verdict may be wrong with probability {error_bound:.0e}, where {CERTAIN:.0e} is \
+                     expected at most"
                 )));
             }
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), error_bound };
@@ -425,13 +426,14 @@ fn judge_in_fields(
         }
     }
     Err(refuse(format!(
-        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 runs: please report this model"
+        "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 \
+         runs: please report this model"
     )))
 }
 
-/// False if verdicts in prime fields are others than those at a real point: constraints may be met in several
-/// parts, and one of these may have no real point, as where x = 1 or x^2 + y^2 = 0. True where the comparison
-/// would take too much work, or decides nothing.
+/// False if verdicts in prime fields differ from those at a real point. Constraints may hold on several
+/// components, one of them without a real point, as for x = 1 or x^2 + y^2 = 0. True if the comparison would
+/// take too much work, or decides nothing.
 fn holds_at_real_point(
     model: &SystemModel,
     compiled: &Compiled,
@@ -452,32 +454,31 @@ fn holds_at_real_point(
     }
 }
 
-/// Prime fields in which points of a model are drawn.
-pub(super) struct Points<'a> {
+/// Choice of prime fields in which points of a model are drawn.
+pub(super) struct FieldChoice<'a> {
     pub(super) model: &'a SystemModel,
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'a Layout,
-    /// Number of orders of derivatives that may be needed, about.
+    /// Approximate number of orders of derivatives that may be needed.
     pub(super) orders: usize,
 }
 
-impl Points<'_> {
-    /// Order of the roots of unity of a field: long series are multiplied by transforms, which need them.
+impl FieldChoice<'_> {
+    /// Order of the roots of unity in a field: long series are multiplied by transforms, which need them.
     pub(super) fn root_order(&self) -> u64 {
         if self.orders < LONG { 1 } else { (4 * self.orders as u64).next_power_of_two() }
     }
 
-    /// A random field in which the constraints hold at a point, as far as one is found; `own` draws these
-    /// points.
+    /// Random field in which the constraints hold at a point, if one is found; `own` draws these points.
     pub(super) fn field(&self, rng: &mut SplitMix64, own: &mut SplitMix64, spent: &mut Spent) -> Field {
         let order = self.root_order();
         let draw = |rng: &mut SplitMix64| match order {
             1 => random_field(rng),
-            // it has divisors enough
+            // this order has divisors enough
             _ => RootField::random(order, rng).map_or_else(|_| random_field(rng), |k| k.field),
         };
         let mut field = draw(rng);
-        // constraints that leave points alone have one modulo some primes
+        // constraints with isolated points have one modulo some primes
         for _ in 1..PRIMES {
             if can_hold(self.model, self.compiled, self.layout, field, own, spent) {
                 break;
@@ -501,21 +502,21 @@ fn can_hold(
         return true;
     }
     let work = Work::new(model.work_limit);
-    let maker = Maker { model, compiled, layout, field, work: &work };
-    let free = maker.free(0);
+    let builder = PointBuilder { model, compiled, layout, field, work: &work };
+    let free = builder.free(0);
     let found = (0..POINTS).any(|attempt| {
-        let Some(mut values) = maker.values(rng, attempt) else { return false };
+        let Some(mut values) = builder.values(rng, attempt) else { return false };
         field.hold(&compiled.dag, &compiled.constraints, &mut values, &free, rng, &work).is_ok()
     });
     spent.add(&work);
-    // beyond its limit another prime is of no use
+    // beyond the limit of work another prime does not help
     found || work.refused().is_some()
 }
 
-/// Judges a model by real numbers, whether it is rational or not: the other way to the same verdicts.
+/// Judges any model, rational or not, by real numbers: the independent path to the same verdicts.
 ///
 /// # Errors
-/// [`ModelError`]; of a model that no number of digits decides, with the reason.
+/// [`ModelError`], with the reason if no number of digits decides.
 pub fn judge_in_digits(
     model: &SystemModel,
     compiled: &Compiled,
@@ -568,7 +569,7 @@ fn checked_layout(
     }
 }
 
-/// The verdicts at a point in `64 A` bits and at another in `64 B`, or why they decide nothing.
+/// Verdicts at a point in `64 A` bits and at another in `64 B`, or the reason why they decide nothing.
 fn pair<const A: usize, const B: usize>(
     model: &SystemModel,
     compiled: &Compiled,
@@ -580,14 +581,15 @@ fn pair<const A: usize, const B: usize>(
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
     let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
     let unclear = |gap: Gap, digits: usize| {
-        // bounds wider than what they bound
+        // error bounds as wide as their numbers decide nothing
         if gap.zero >= 0.0 {
             return format!(
                 "with {digits} digits the numbers that decide a rank lose all of them to rounding"
             );
         }
         format!(
-            "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of the rest is 10^{:.0}",
+            "with {digits} digits what counts as zero is known to 10^{:.0} of its row, and the least of \
+             the rest is 10^{:.0}",
             decimal(gap.zero),
             decimal(gap.nonzero)
         )
@@ -596,7 +598,7 @@ fn pair<const A: usize, const B: usize>(
     if !first.gap.is_decisive(64 * A as i64) {
         return Ok(Err(unclear(first.gap, digits[0])));
     }
-    // all other points are on the side of this one
+    // all other points are on the sides of this one
     let layout = &Layout { sides: Some(first.signs.clone()), ..layout.clone() };
     let second = climb_at(model, compiled, layout, Reals::<B>, &mut random(1), spent)?;
     if !second.gap.is_decisive(64 * B as i64) {
@@ -612,14 +614,14 @@ fn pair<const A: usize, const B: usize>(
     Ok(Ok(Judgement { sides, ..Judgement::of(layout.clone(), first, certainty, seed) }))
 }
 
-impl<S: Values> At<S> {
-    fn agrees<T: Values>(&self, other: &At<T>) -> bool {
+impl<S: Values> PointDegrees<S> {
+    fn agrees<T: Values>(&self, other: &PointDegrees<T>) -> bool {
         (&self.degrees, &self.combinations, self.ended) == (&other.degrees, &other.combinations, other.ended)
     }
 }
 
 impl Judgement {
-    fn of<S: Values>(layout: Layout, at: At<S>, certainty: SystemCertainty, seed: u64) -> Self {
+    fn of<S: Values>(layout: Layout, at: PointDegrees<S>, certainty: SystemCertainty, seed: u64) -> Self {
         let full = at.degrees.rank() == layout.unknowns.len();
         Self {
             rests_on_bound: !full && !at.ended,
@@ -640,16 +642,16 @@ impl Judgement {
     }
 }
 
-/// What the error bound depends on: the degree and the coefficients of the polynomials that decide a rank
-/// (derivation: crates/README.md, *Certainty*).
+/// Size of the claim: the degree and the coefficients of the polynomials that decide a rank (derivation:
+/// crates/README.md, *Certainty*).
 ///
-/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`, where the degree of `P_k`
-/// grows by at most `delta = max(deg N, deg D) + deg D` an order, and its coefficients by what a derivative
-/// and two products make of them.
+/// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`. The degree of `P_k` grows
+/// by at most `delta = max(deg N, deg D) + deg D` an order. Its coefficients grow by the effect of a
+/// derivative and two products.
 fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
-    // at points drawn anew up to so many times: a rank at each order, of all runs and of each alone, here
-    // and at a generic point; that no unit vector comes an order early (if the ranks are right none comes
-    // late), and no column or entry of the last basis is zero by chance
+    // Decisions at each of ATTEMPTS points: a rank at each order, of all runs and of each alone, here and at
+    // a generic point; that no unit vector comes an order early (if the ranks are correct none comes late);
+    // and that no column or entry of the last basis is zero by chance.
     let decisions = ATTEMPTS
         * ((degrees.rank_profile.len() + 1) * (1 + 2 * runs)
             + 2 * layout.unknowns.len()
@@ -658,11 +660,11 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
     Claim { decisions, ..claim_of(compiled, layout, degrees.rank_profile.len()) }
 }
 
-/// The same of one decision on rows of so many orders.
+/// Size of the claim of one decision on rows of the given number of orders.
 pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> Claim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
-    let used: Vec<Fraction> = experiments
+    let used: Vec<QuotientBounds> = experiments
         .flat_map(|e| {
             let given = compiled.constants(e).iter().flatten();
             compiled.rates(e).iter().chain(compiled.outputs(e)).chain(given)
@@ -676,7 +678,7 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
         .collect();
     // over the product of all denominators
     let (below, below_bits) = used.iter().fold((0.0, 0.0), |(d, b), f| (d + f.below.0, b + f.below.1));
-    let above = |part: fn(&Fraction) -> f64| used.iter().map(part).fold(0.0, f64::max);
+    let above = |part: fn(&QuotientBounds) -> f64| used.iter().map(part).fold(0.0, f64::max);
     let (top, top_bits) = (above(|f| f.above.0) + below, above(|f| f.above.1) + below_bits);
     let delta = top.max(below) + below;
     let (orders, n) = (orders as f64, layout.unknowns.len() as f64);
@@ -696,14 +698,14 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
     }
 }
 
-/// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the sizes of its coefficients.
+/// Bounds of a quotient of polynomials: degree, and `log2` of the sum of the absolute coefficients.
 #[derive(Debug, Clone, Copy)]
-struct Fraction {
+struct QuotientBounds {
     above: (f64, f64),
     below: (f64, f64),
 }
 
-impl Fraction {
+impl QuotientBounds {
     const ZERO: Self = Self { above: (0.0, 0.0), below: (0.0, 0.0) };
     const VARIABLE: Self = Self { above: (1.0, 0.0), below: (0.0, 0.0) };
 
@@ -724,23 +726,23 @@ impl Fraction {
     }
 }
 
-/// Of a product of polynomials.
+/// Bounds of a product of polynomials.
 fn times(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
     (x.0 + y.0, x.1 + y.1)
 }
 
-/// The derivatives in time of the variables that stand for functions: `E' = E u'` of exp and tanh,
-/// `(1 + t^2)/2 u'` for `t = tan(u/2)` of sin, cos and tan, `weight u'` of a logarithm and an arc tangent.
-fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec<Fraction> {
+/// Time derivatives of the variables that replace functions: `E' = E u'` for exp and tanh, `(1 + t^2)/2 u'`
+/// with `t = tan(u/2)` for sin, cos and tan, `weight u'` for a logarithm and an arc tangent.
+fn function_rates(dag: &Dag, fractions: &[QuotientBounds], compiled: &Compiled) -> Vec<QuotientBounds> {
     // derivatives of all nodes; a jet of an input is a variable
-    let mut rates: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
+    let mut rates: Vec<QuotientBounds> = Vec::with_capacity(dag.ops.len());
     let mut out = Vec::new();
     for (i, op) in dag.ops.iter().enumerate() {
         rates.push(match *op {
-            Op::Number { .. } | Op::Pi => Fraction::ZERO,
+            Op::Number { .. } | Op::Pi => QuotientBounds::ZERO,
             Op::Slot(s) => match compiled.roles[s] {
                 Role::State(k) => fractions[compiled.rates(0)[k]],
-                _ => Fraction::VARIABLE,
+                _ => QuotientBounds::VARIABLE,
             },
             Op::Add(a, b) | Op::Subtract(a, b) => rates[a].plus(rates[b]),
             Op::Multiply(a, b) => rates[a].times(fractions[b]).plus(fractions[a].times(rates[b])),
@@ -751,9 +753,9 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
             }
             Op::Primitive { of, weight, function } => {
                 let factor = match function {
-                    Function::Exp | Function::Tanh => Fraction::VARIABLE,
+                    Function::Exp | Function::Tanh => QuotientBounds::VARIABLE,
                     Function::Sin | Function::Cos | Function::Tan => {
-                        Fraction { above: (2.0, 1.0), below: (0.0, 1.0) }
+                        QuotientBounds { above: (2.0, 1.0), below: (0.0, 1.0) }
                     }
                     _ => fractions[weight],
                 };
@@ -765,10 +767,10 @@ fn function_rates(dag: &Dag, fractions: &[Fraction], compiled: &Compiled) -> Vec
     out
 }
 
-/// Every node of a graph as a quotient of polynomials in the slots and in one variable for each function,
-/// over the integers.
-fn fractions(dag: &Dag) -> Vec<Fraction> {
-    let mut out: Vec<Fraction> = Vec::with_capacity(dag.ops.len());
+/// Every node of a graph as a quotient of polynomials over the integers, in the slots and in one variable
+/// for each function.
+fn fractions(dag: &Dag) -> Vec<QuotientBounds> {
+    let mut out: Vec<QuotientBounds> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
         let one = (0.0, 0.0);
         out.push(match *op {
@@ -776,17 +778,17 @@ fn fractions(dag: &Dag) -> Vec<Fraction> {
                 let digits = (mantissa.unsigned_abs().max(1) as f64).log2();
                 let ten = f64::from(decimals.abs()) * std::f64::consts::LOG2_10;
                 match decimals > 0 {
-                    true => Fraction { above: (0.0, digits), below: (0.0, ten) },
-                    false => Fraction { above: (0.0, digits + ten), below: one },
+                    true => QuotientBounds { above: (0.0, digits), below: (0.0, ten) },
+                    false => QuotientBounds { above: (0.0, digits + ten), below: one },
                 }
             }
-            Op::Slot(_) | Op::Pi => Fraction::VARIABLE,
+            Op::Slot(_) | Op::Pi => QuotientBounds::VARIABLE,
             Op::Primitive { function, .. } => match function {
-                // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and the like
+                // (E^2 - 1)/(E^2 + 1), 2t/(1 + t^2) and similar quotients
                 Function::Tanh | Function::Sin | Function::Cos | Function::Tan => {
-                    Fraction { above: (2.0, 1.0), below: (2.0, 1.0) }
+                    QuotientBounds { above: (2.0, 1.0), below: (2.0, 1.0) }
                 }
-                _ => Fraction::VARIABLE,
+                _ => QuotientBounds::VARIABLE,
             },
             Op::Add(a, b) | Op::Subtract(a, b) => out[a].plus(out[b]),
             Op::Multiply(a, b) => out[a].times(out[b]),

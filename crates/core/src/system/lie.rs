@@ -1,5 +1,5 @@
-//! Derivatives of the outputs as polynomials in the unknowns: identifiable functions by definition, of as
-//! many as there are none simpler of.
+//! Derivatives of the outputs as polynomials in the unknowns: identifiable functions by definition, used if
+//! no simpler ones were found.
 
 use obsdeg_exact::Field;
 use obsdeg_exact::Scalars;
@@ -11,13 +11,13 @@ use super::model::{Compiled, KnownInput, Role, SystemModel};
 use super::quotients::Terms;
 use super::values::Values;
 
-/// Most terms of a polynomial that is formed, and of a function that is given.
+/// Largest number of terms of a polynomial that is formed, and of a function that is returned.
 const FORMED: usize = 2000;
 const GIVEN: usize = 40;
 
-/// Coefficients of derivatives of the outputs by the products of inputs, in the order of the derivatives;
-/// none of a model that is not polynomial, with special starts, several runs, arbitrary inputs or generic
-/// constants.
+/// Coefficients of derivatives of the outputs by the products of inputs, in the order of the derivatives.
+/// Empty for a model that is not polynomial, or with special starts, several runs, arbitrary inputs or
+/// generic constants.
 pub(super) fn lie_derivatives(
     model: &SystemModel,
     compiled: &Compiled,
@@ -44,7 +44,7 @@ pub(super) fn lie_derivatives(
         for p in &derivatives {
             out.extend(coefficients(p, lanes as u32, &f));
         }
-        // the next derivative has one order more of the inputs
+        // the next derivative contains one order more of the inputs
         rates.extend((0..inputs).map(|i| (jet(i, order), Polynomial::variable(&f, jet(i, order + 1)))));
         for p in &mut derivatives {
             let mut next = Polynomial::default();
@@ -64,7 +64,7 @@ pub(super) fn lie_derivatives(
     out
 }
 
-/// Every node as a polynomial; `None` where one that takes part is none.
+/// Every node as a polynomial; `None` if a node in use is none.
 fn nodes(
     compiled: &Compiled,
     judged: &Judgement,
@@ -102,7 +102,7 @@ fn nodes(
     Some(out)
 }
 
-/// The coefficients of a polynomial by the products of variables from `first` on, with integers for numbers;
+/// Coefficients of a polynomial by the products of variables from `first` on, with integer numbers; only
 /// those with few terms.
 fn coefficients(p: &Polynomial, first: u32, f: &Field) -> Vec<Terms> {
     let mut parts: std::collections::BTreeMap<Monomial, Vec<(Monomial, u64)>> =

@@ -1,7 +1,9 @@
-//! The map that takes the one of two solutions to the other, as expressions of few unknowns.
+//! Map from one of two solutions to the other, as expressions of few unknowns.
 //!
-//! Where an unknown has two values, the second root of its polynomial is its value at the other solution. As
-//! an expression of the values of the first it is sought among quotients `a b/c` of unknowns, and sums of two
+//! If an unknown has two values, the second root of its polynomial is its value at the other solution. This
+//! value is sought as an expression of the values of the first solution, among quotients `a b/c` of unknowns
+//! and sums of two or three of these. An expression counts if it has that value at a random point of both
+//! fields.
 //! or three of these; an expression counts if it has that value at a random point of both fields.
 
 use std::collections::BTreeMap;
@@ -10,18 +12,18 @@ use obsdeg_exact::Field;
 
 use super::fibre::Fibre;
 
-/// Most unknowns among which quotients are formed.
+/// Largest number of unknowns among which quotients are formed.
 const FACTORS: usize = 24;
 
-/// A quotient of unknowns, `a b/c`, each of which may be missing.
+/// Quotient of unknowns, `a b/c`, each of which may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Term {
+struct QuotientTerm {
     above: [Option<usize>; 2],
     below: Option<usize>,
     negative: bool,
 }
 
-impl Term {
+impl QuotientTerm {
     fn value(&self, f: &Field, values: &[u64], inverses: &[u64]) -> u64 {
         let factors = self.above.iter().flatten().map(|&i| values[i]);
         let factors = factors.chain(self.below.iter().map(|&i| inverses[i]));
@@ -39,8 +41,8 @@ impl Term {
     }
 }
 
-/// All quotients of some of the values, short ones first.
-fn terms(n: usize) -> Vec<Term> {
+/// All quotients of `n` values, short ones first.
+fn terms(n: usize) -> Vec<QuotientTerm> {
     let places = || std::iter::once(None).chain((0..n).map(Some));
     let mut out = Vec::new();
     for below in places() {
@@ -48,12 +50,12 @@ fn terms(n: usize) -> Vec<Term> {
             for b in places().take_while(|b| b.is_none_or(|b| b <= a)) {
                 if below != Some(a) && (b.is_none() || below != b) {
                     let above = [Some(a), b];
-                    out.extend([false, true].map(|negative| Term { above, below, negative }));
+                    out.extend([false, true].map(|negative| QuotientTerm { above, below, negative }));
                 }
             }
         }
         if below.is_some() {
-            out.extend([false, true].map(|negative| Term { above: [None; 2], below, negative }));
+            out.extend([false, true].map(|negative| QuotientTerm { above: [None; 2], below, negative }));
         }
     }
     out.sort_by_key(|t| (t.above.iter().flatten().count() + usize::from(t.below.is_some()), t.negative));
@@ -61,7 +63,7 @@ fn terms(n: usize) -> Vec<Term> {
 }
 
 /// Values of the unknowns at a point, and of the terms.
-struct Point<'a> {
+struct SolutionPoint<'a> {
     f: Field,
     values: &'a [u64],
     /// Values of the terms.
@@ -70,7 +72,7 @@ struct Point<'a> {
 
 /// Sums of at most three terms with a value at each point.
 fn sum_with(
-    points: &[Point<'_>; 2],
+    points: &[SolutionPoint<'_>; 2],
     known: &BTreeMap<u64, usize>,
     lane: usize,
     targets: [u64; 2],
@@ -87,7 +89,7 @@ fn sum_with(
     {
         return Some(vec![t]);
     }
-    // the unknown itself and two more, or two
+    // the unknown itself and two more terms, or two terms
     let own = (0..first.terms.len()).find(|&t| first.terms[t] == first.values[lane]);
     for start in [None, own] {
         if start.is_none() && own.is_none() {
@@ -107,8 +109,8 @@ fn sum_with(
     None
 }
 
-/// The map between two solutions in words, `replace ka by ke, ke by ka, V by V*ke/ka`; `None` if there are
-/// not two, or where a value of the second is no short expression of those of the first.
+/// Map between two solutions in words, `replace ka by ke, ke by ka, V by V*ke/ka`; `None` if there are not
+/// two, or if a value of the second is no short expression of those of the first.
 pub(super) fn second_solution(
     fields: [Field; 2],
     fibres: [&Fibre; 2],
@@ -123,7 +125,7 @@ pub(super) fn second_solution(
         let (f, values) = (fields[i], &fibres[i].values[..]);
         let inverses: Vec<u64> = values.iter().map(|&x| if x == 0 { 0 } else { f.inv(x) }).collect();
         let of_terms = terms.iter().map(|t| t.value(&f, values, &inverses)).collect();
-        Point { f, values, terms: of_terms }
+        SolutionPoint { f, values, terms: of_terms }
     };
     let points = [point(0), point(1)];
     let mut known = BTreeMap::new();
@@ -136,7 +138,7 @@ pub(super) fn second_solution(
             let (f, value) = (&fields[i], fibres[i].values[lane]);
             match fibres[i].polynomials[lane].as_deref() {
                 Ok([_, _]) => Some(value),
-                // the roots of x^2 + b x + c add up to -b
+                // the roots of x^2 + b x + c sum to -b
                 Ok([_, b, a]) => Some(f.sub(f.neg(f.mul(*b, f.inv(*a))), value)),
                 _ => None,
             }
@@ -165,7 +167,8 @@ pub(super) fn second_solution(
 mod tests {
     use super::*;
 
-    /// The two solutions of absorption and elimination: rates change places, and the volume goes with them.
+    /// The two solutions of absorption and elimination: the rates exchange, and the volume changes with
+    /// them.
     #[test]
     fn quotients_are_found() {
         let fields = [Field::new((1 << 60) + 33), Field::new((1 << 60) + 195)];

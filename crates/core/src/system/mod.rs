@@ -1,8 +1,9 @@
 //! Observable degrees of any system `x' = f(x, u, p, t)`, `z = h`, on the same staircase as the platform.
 //!
-//! A model is read ([`model_file`], [`json`]), held as a graph of shared operations (`dag`), evaluated as
-//! Taylor series with a dual lane per unknown at a random point of a prime field (`taylor`, Sedoglavic 2002,
-//! doi:10.1006/jsco.2002.0532), and its outputs' duals are the derivative rows (`rows`).
+//! A model is read ([`model_file`], [`json`]) and stored as a graph of shared operations (`dag`). It is
+//! evaluated as Taylor series with a dual component per unknown at a random point of a prime field
+//! (`taylor`, Sedoglavic 2002, doi:10.1006/jsco.2002.0532). The dual components of its outputs are the
+//! derivative rows (`rows`).
 
 mod addition;
 mod adjoint;

@@ -1,4 +1,4 @@
-//! Any system `x' = f(x, u, p, t)`, `z = h`: what its file says, before any number is drawn.
+//! Any system `x' = f(x, u, p, t)`, `z = h`: the content of its file, before any number is drawn.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
@@ -10,77 +10,77 @@ use super::work::WorkLimit;
 use crate::language::{Expression, Function, MAX_NAME, among, nearest};
 use crate::model::recording::Recording;
 
-/// Where something is written.
+/// Place of a text in a model file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Place {
-    /// What it is: `the equation of x1`.
+    /// Description of the entry: `the equation of x1`.
     pub what: String,
-    /// The byte in the file at which its text begins, where that is known.
+    /// Byte offset in the file at which the text begins; `None` if it is unknown.
     pub offset: Option<usize>,
 }
 
-/// An expression and its place.
+/// Expression with its place.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlacedExpression {
-    /// As written.
+    /// Text as written.
     pub text: String,
-    /// What was read.
+    /// Expression that was read from the text.
     pub expression: Expression,
-    /// Where.
+    /// Place of the text.
     pub place: Place,
 }
 
-/// A name with what the reader should know of it.
+/// Name with unit and description.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Named {
-    /// The name.
+    /// Name in the model.
     pub name: String,
-    /// Its unit; empty when none is given.
+    /// Unit; empty if none is given.
     pub unit: String,
-    /// What it is; empty when nothing is said.
+    /// Description; empty if none is given.
     pub description: String,
 }
 
-/// What is known of the start of a state.
+/// Knowledge of the start of a state.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum StateStart {
-    /// Nothing.
+    /// Unknown start.
     #[default]
     Unknown,
-    /// It is known; its value is generic.
+    /// Known start of generic value.
     Known,
-    /// It is known to have this value.
+    /// Known start with this value.
     Value(PlacedExpression),
 }
 
-/// A state.
+/// State of a system.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct State {
-    /// Its name.
+    /// Name, unit and description.
     pub named: Named,
-    /// Its derivative.
+    /// Derivative of the state by time.
     pub equation: PlacedExpression,
-    /// Its start.
+    /// Start of the state.
     pub start: StateStart,
 }
 
-/// A known input.
+/// Known input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KnownInput {
-    /// A generic function of time.
+    /// Generic function of time.
     Generic,
-    /// A polynomial in time of this degree with generic coefficients (0: a constant).
+    /// Polynomial in time of this degree with generic coefficients (0: a constant).
     Polynomial(usize),
-    /// This function of the time `t`.
+    /// Given function of the time `t`.
     Function(PlacedExpression),
 }
 
-/// A known constant.
+/// Known constant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Constant {
-    /// Of generic value.
+    /// Generic value.
     Generic,
-    /// Of this value.
+    /// Given value.
     Value(PlacedExpression),
 }
 
@@ -95,19 +95,19 @@ pub struct Candidate {
     pub cost: f64,
 }
 
-/// A part of the timeline with constants of its own and a map of the states at its beginning.
+/// Part of the timeline with its own constants and a map of the states at its beginning.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Segment {
-    /// Constants that take another value.
+    /// Constants with another value.
     pub constants: Vec<(String, PlacedExpression)>,
-    /// States that jump: their values behind the jump, in terms of those before.
+    /// States that jump: their values after the jump, in terms of those before.
     pub carry: Vec<(String, PlacedExpression)>,
 }
 
-/// What one experiment has of its own.
+/// Entries in which one experiment differs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Experiment {
-    /// Constants that take another value.
+    /// Constants with another value.
     pub constants: Vec<(String, PlacedExpression)>,
     /// Known inputs of another kind.
     pub known_inputs: Vec<(String, KnownInput)>,
@@ -116,22 +116,22 @@ pub struct Experiment {
 /// Time at which the first segment begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StartTime {
-    /// Zero.
+    /// Time zero.
     #[default]
     Zero,
-    /// `mantissa / 10^decimals`.
+    /// Decimal `mantissa / 10^decimals`.
     At {
-        /// The digits.
+        /// All digits as an integer.
         mantissa: i128,
-        /// Number of digits behind the point.
+        /// Number of digits after the decimal point.
         decimals: i32,
     },
-    /// A time that is not given: verdicts are those of almost every time.
+    /// Generic time: verdicts are those of almost every time.
     Generic,
 }
 
 impl StartTime {
-    /// The time; 1 stands for a generic one.
+    /// Time as a number; 1 for a generic one.
     pub fn number(self) -> f64 {
         match self {
             Self::Zero => 0.0,
@@ -141,12 +141,12 @@ impl StartTime {
     }
 }
 
-/// Numbers for a simulation, as far as the file gives them; in the units of the model.
+/// Numbers for a simulation in the units of the model, as far as the file gives them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nominal {
-    /// How long it runs.
+    /// Duration of a run.
     pub duration: Option<f64>,
-    /// Between two samples.
+    /// Time between two samples.
     pub step: Option<f64>,
     /// True values of states at the start, parameters, unknown inputs and generic constants.
     pub values: BTreeMap<String, f64>,
@@ -158,40 +158,40 @@ pub struct Nominal {
     pub inputs: BTreeMap<String, PlacedExpression>,
 }
 
-/// A system.
+/// Model of a system.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SystemModel {
-    /// Its name.
+    /// Name of the system.
     pub name: String,
-    /// What it is and where it comes from.
+    /// Description and source of the system.
     pub description: String,
-    /// States.
+    /// States of the system.
     pub states: Vec<State>,
     /// Unknown constants.
     pub parameters: Vec<Named>,
-    /// Known inputs.
+    /// Known inputs, each with its kind.
     pub known_inputs: Vec<(Named, KnownInput)>,
-    /// Unknown inputs: polynomials in time of this degree, or arbitrary.
+    /// Unknown inputs, each with its degree as a polynomial in time; `None`: arbitrary.
     pub unknown_inputs: Vec<(Named, Option<usize>)>,
-    /// Known constants.
+    /// Known constants, each with its value.
     pub constants: Vec<(Named, Constant)>,
-    /// Names for subexpressions, in order of use.
+    /// Names of subexpressions, in order of use.
     pub definitions: Vec<(String, PlacedExpression)>,
-    /// Outputs.
+    /// Outputs, each with its expression.
     pub outputs: Vec<(Named, PlacedExpression)>,
-    /// Runs with starts of their own (and unknown inputs of their own); parameters are shared.
+    /// Number of experiments: runs with their own starts and unknown inputs; parameters are shared.
     pub experiments: usize,
-    /// What the experiments have of their own; none: nothing.
+    /// Differences of the experiments; empty if there are none.
     pub own: Vec<Experiment>,
-    /// Segments; none: one, as the model says.
+    /// Segments; empty for a single one without changes.
     pub segments: Vec<Segment>,
-    /// What is zero at the start of every experiment: expressions of states, parameters and constants, with
-    /// the equation as their text.
+    /// Constraints: expressions of states, parameters and constants that are zero at the start of every
+    /// experiment, with the equation as their text.
     pub constraints: Vec<PlacedExpression>,
-    /// Factors that stand for constraints that are products.
+    /// Factors that replace constraints that are products.
     pub factors: Vec<ConstraintFactor>,
-    /// What is not negative where the constraints hold: the other sides of those with a root alone on the
-    /// left, which is taken squared.
+    /// Expressions that are not negative where the constraints hold: the other sides of constraints with a
+    /// single root on the left, which is squared.
     pub not_negative: Vec<PlacedExpression>,
     /// Combinations to be judged.
     pub combinations: Vec<PlacedExpression>,
@@ -201,29 +201,29 @@ pub struct SystemModel {
     pub time: StartTime,
     /// Numbers for a simulation.
     pub simulation: Nominal,
-    /// How its records are read.
+    /// Reading of the records of its runs.
     pub recording: Recording,
-    /// Limit of the work of a verdict, an option and no part of the model.
+    /// Limit of the work of a verdict; an option, not part of the model.
     pub work_limit: WorkLimit,
 }
 
-/// Most unknowns of a system.
+/// Largest number of unknowns of a system.
 pub(crate) const MAX_UNKNOWNS: usize = 4000;
-/// Most experiments.
+/// Largest number of experiments.
 pub(crate) const MAX_EXPERIMENTS: usize = 20;
 /// Highest degree of an input that is a polynomial in time.
 pub(crate) const MAX_DEGREE: usize = 50;
-/// Most characters of a unit of an unknown, an input or an output.
+/// Largest number of characters of a unit of an unknown, an input or an output.
 const MAX_UNIT: usize = 256;
-/// Most characters of a description of one of these, and of the name of a model.
+/// Largest number of characters of a description of one of these, and of the name of a model.
 const MAX_DESCRIPTION: usize = 4000;
-/// Most operations of a system.
+/// Largest number of operations of a system.
 pub(crate) const MAX_NODES: usize = 200_000;
-/// Most signs `+ - * /` and powers in the text of a system, which are counted before it is read: of these
-/// operations some are written more than once.
+/// Largest number of signs `+ - * /` and powers in the text of a system. They are counted before the text is
+/// read; operations may be written more than once.
 const MAX_SIGNS: usize = 2 * MAX_NODES;
 
-/// Refuses a text with more signs of operations than a system may have.
+/// Refuses a text with more operation signs than a system may have.
 pub(super) fn check_signs(text: &str) -> Result<(), ModelError> {
     let mut signs = text.bytes().enumerate().filter(|(_, b)| b"+-*/^".contains(b));
     let Some((at, _)) = signs.nth(MAX_SIGNS) else { return Ok(()) };
@@ -232,63 +232,63 @@ pub(super) fn check_signs(text: &str) -> Result<(), ModelError> {
 }
 
 impl Nominal {
-    /// What `map` says of `x@2`, or else of `x`.
+    /// Value of `x@2` in `map`, or else of `x`.
     pub fn named(&self, map: &BTreeMap<String, f64>, name: &str) -> Option<f64> {
         let shared = name.split('@').next().unwrap_or_default();
         map.get(name).or_else(|| map.get(shared)).copied()
     }
 
-    /// The value of `name` in an experiment (counted from 0).
+    /// Value of `name` in an experiment (counted from 0).
     pub fn value(&self, name: &str, experiment: usize) -> Option<f64> {
         self.named(&self.values, &format!("{name}@{}", experiment + 1))
     }
 }
 
 impl Place {
-    /// An error in the text of this place, at a range of it.
+    /// Error in the text of this place, at a byte range of it.
     pub fn error(&self, message: String, range: Range<usize>) -> ModelError {
         let span = self.offset.map(|o| o + range.start..o + range.end);
         ModelError { what: self.what.clone(), message, span }
     }
 }
 
-/// What a slot of the graph is.
+/// Role of a slot of the graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// State i.
+    /// State of this index.
     State(usize),
-    /// Parameter i.
+    /// Parameter of this index.
     Parameter(usize),
-    /// Known input i.
+    /// Known input of this index.
     KnownInput(usize),
-    /// Unknown input i.
+    /// Unknown input of this index.
     UnknownInput(usize),
-    /// Known constant i.
+    /// Known constant of this index.
     Constant(usize),
-    /// The time.
+    /// Time.
     Time,
 }
 
-/// A system as a graph.
+/// System as a graph.
 #[derive(Debug, Clone)]
 pub struct Compiled {
-    /// The graph.
+    /// Graph of operations.
     pub dag: Dag,
-    /// What every slot is.
+    /// Role of every slot.
     pub roles: Vec<Role>,
-    /// The nodes that differ from experiment to experiment: one for each, or one for all.
+    /// Nodes that differ between experiments: one entry for each, or one for all.
     pub experiments: Vec<CompiledExperiment>,
-    /// The nodes of known starts, by state.
+    /// Nodes of known starts, by state.
     pub starts: Vec<Option<usize>>,
-    /// Per segment: nodes of constants and of carried states.
+    /// Nodes of constants and of carried states, per segment.
     pub segments: Vec<CompiledSegment>,
-    /// The nodes of the constraints: zero at the start.
+    /// Nodes of the constraints: zero at the start.
     pub constraints: Vec<usize>,
-    /// The nodes that are not negative where the constraints hold.
+    /// Nodes that are not negative where the constraints hold.
     pub not_negative: Vec<usize>,
-    /// The nodes of the combinations.
+    /// Nodes of the combinations.
     pub combinations: Vec<usize>,
-    /// Where each division and root was written first.
+    /// Place at which each division and root was written first.
     pub places: HashMap<usize, (Place, Range<usize>)>,
 }
 
@@ -297,22 +297,22 @@ impl Compiled {
         &self.experiments[i.min(self.experiments.len() - 1)]
     }
 
-    /// The node of every state's derivative in an experiment.
+    /// Node of every state's derivative in an experiment.
     pub fn rates(&self, experiment: usize) -> &[usize] {
         &self.experiment(experiment).rates
     }
 
-    /// The nodes of the outputs in an experiment.
+    /// Nodes of the outputs in an experiment.
     pub fn outputs(&self, experiment: usize) -> &[usize] {
         &self.experiment(experiment).outputs
     }
 
-    /// The nodes of known constants in an experiment, by constant.
+    /// Nodes of known constants in an experiment, by constant.
     pub fn constants(&self, experiment: usize) -> &[Option<usize>] {
         &self.experiment(experiment).constants
     }
 
-    /// True if a rate or an output holds the time itself.
+    /// True if a rate or an output depends on the time explicitly.
     pub fn uses_time(&self) -> bool {
         let mut seen = vec![false; self.dag.ops.len()];
         let parts = self.experiments.iter().flat_map(|e| e.rates.iter().chain(&e.outputs));
@@ -333,7 +333,7 @@ impl Compiled {
         false
     }
 
-    /// The same in another graph, which has these nodes for those of this one.
+    /// The system in another graph; `nodes` are the nodes there for those of this one.
     pub(super) fn with(&self, dag: Dag, nodes: &[usize]) -> Self {
         let all = |list: &[usize]| list.iter().map(|&i| nodes[i]).collect();
         let given = |list: &[Option<usize>]| list.iter().map(|i| i.map(|i| nodes[i])).collect();
@@ -358,14 +358,14 @@ impl Compiled {
         }
     }
 
-    /// The node of what has this role; `None` where nothing uses it.
+    /// Node of the slot with this role; `None` if nothing uses it.
     pub(crate) fn node_of(&self, role: Role) -> Option<usize> {
         let slot = self.roles.iter().position(|r| *r == role)?;
         self.dag.ops.iter().position(|op| *op == Op::Slot(slot))
     }
 }
 
-/// An experiment as nodes.
+/// Experiment as nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CompiledExperiment {
     rates: Vec<usize>,
@@ -373,16 +373,16 @@ pub struct CompiledExperiment {
     constants: Vec<Option<usize>>,
 }
 
-/// A segment as nodes.
+/// Segment as nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CompiledSegment {
-    /// Constant and node.
+    /// Constants, each with its node.
     pub constants: Vec<(usize, usize)>,
-    /// State and node.
+    /// States, each with its node.
     pub carry: Vec<(usize, usize)>,
 }
 
-/// Refuses a text of more than `most` characters of what is named `of`.
+/// Refuses a text of more than `most` characters; `of` names the entry.
 fn check_length(what: &str, of: &str, text: &str, most: usize) -> Result<(), ModelError> {
     if text.chars().nth(most).is_none() {
         return Ok(());
@@ -394,9 +394,9 @@ fn check_length(what: &str, of: &str, text: &str, most: usize) -> Result<(), Mod
 }
 
 impl SystemModel {
-    /// The equations as written, known inputs that are functions of time first, then definitions: `u = ...`,
-    /// `a = ...`, `x' = ...`, `y = ...`; what one text says of all entries of a vector stands once. An
-    /// experiment with a function of its own is named.
+    /// Equations as written: known inputs that are functions of time, then definitions, rates and outputs:
+    /// `u = ...`, `a = ...`, `x' = ...`, `y = ...`. A text for all entries of a vector stands once. An
+    /// experiment with its own function is named.
     pub(crate) fn equations(&self) -> Vec<String> {
         let mut inputs = Vec::new();
         for (i, (named, _)) in self.known_inputs.iter().enumerate() {
@@ -431,22 +431,22 @@ impl SystemModel {
         out
     }
 
-    /// The constraints as written; one text may hold those of all entries of a vector.
+    /// Constraints as written; one text may contain those of all entries of a vector.
     pub(crate) fn constraint_texts(&self) -> Vec<String> {
         let mut out: Vec<&PlacedExpression> = self.constraints.iter().collect();
         out.dedup_by(|a, b| a.place == b.place);
         out.into_iter().map(|c| c.text.clone()).collect()
     }
 
-    /// A known input in an experiment (counted from 0).
+    /// Known input in an experiment (counted from 0).
     pub fn known_input(&self, experiment: usize, i: usize) -> &KnownInput {
         let (named, kind) = &self.known_inputs[i];
         let own = self.own.get(experiment).and_then(|e| e.known_inputs.iter().find(|u| u.0 == named.name));
         own.map_or(kind, |u| &u.1)
     }
 
-    /// A known constant in an experiment (counted from 0), before the first segment changes it: its own
-    /// formula if it has one.
+    /// Known constant in an experiment (counted from 0), before the first segment changes it: its own
+    /// formula, if it has one.
     pub fn constant_formula(&self, experiment: usize, i: usize) -> Option<&PlacedExpression> {
         let (named, constant) = &self.constants[i];
         let own = self.own.get(experiment).and_then(|e| e.constants.iter().find(|c| c.0 == named.name));
@@ -456,8 +456,8 @@ impl SystemModel {
         }
     }
 
-    /// The value that the file gives for a simulation of what has this role, in an experiment (counted from
-    /// 0).
+    /// Value that the file gives for a simulation to the quantity with this role, in an experiment (counted
+    /// from 0).
     pub(super) fn given(&self, role: Role, experiment: usize) -> Option<f64> {
         let name = match role {
             Role::State(i) => &self.states[i].named.name,
@@ -468,7 +468,7 @@ impl SystemModel {
         self.simulation.value(name, experiment)
     }
 
-    /// The names of all slots.
+    /// Names of all slots.
     pub(super) fn slot_names(&self) -> Vec<String> {
         self.roles().into_iter().map(|(name, _)| name).collect()
     }
@@ -491,11 +491,11 @@ impl SystemModel {
         out
     }
 
-    /// The graph of the system.
+    /// Graph of the system.
     ///
     /// # Errors
-    /// [`ModelError`] for names that are not known, are given twice or are taken, and for what is never
-    /// defined.
+    /// [`ModelError`] for names that are unknown, defined twice or reserved, and for expressions that are
+    /// never defined.
     pub fn compile(&self) -> Result<Compiled, ModelError> {
         self.check()?;
         let found = self.states.len() + self.parameters.len();
@@ -506,7 +506,8 @@ impl SystemModel {
         self.compile_into(Dag::default())
     }
 
-    /// Checks what needs no graph: at least one state or parameter and one output, names of their own.
+    /// Checks conditions that need no graph: at least one state or parameter, one output, and distinct
+    /// names.
     pub(super) fn check(&self) -> Result<(), ModelError> {
         let refuse = |what: String, message: String| Err(ModelError { what, message, span: None });
         if self.states.is_empty() && self.parameters.is_empty() {
@@ -515,7 +516,7 @@ impl SystemModel {
         if self.outputs.is_empty() {
             return refuse("the model".into(), "no output; expected at least one".into());
         }
-        // an output may be named as the state it is
+        // an output may have the name of the state that it equals
         let mut outputs: Vec<&str> = self.outputs.iter().map(|o| o.0.name.as_str()).collect();
         outputs.sort_unstable();
         if let Some(pair) = outputs.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -611,7 +612,7 @@ impl SystemModel {
             }
             Ok(node)
         };
-        // what may stand in the value of a constant: other constants that come before
+        // names in the value of a constant: other constants that come before
         let constant_names: HashMap<String, usize> =
             self.constants.iter().map(|(n, _)| (n.name.clone(), names[&n.name])).collect();
         let shared = names.clone();
@@ -620,7 +621,7 @@ impl SystemModel {
             self.segments.iter().flat_map(|s| &s.constants).map(|(name, _)| name.as_str()).collect();
         let slot_of: HashMap<String, usize> =
             roles.iter().enumerate().map(|(i, r)| (r.0.clone(), i)).collect();
-        // what starts, jumps and combinations may rely on: the same in all experiments
+        // names in starts, jumps and combinations: values that are the same in all experiments
         let mut always: Option<HashMap<usize, (i64, i64)>> = None;
         for experiment in 0..self.own.len().max(1) {
             let mut own = CompiledExperiment::default();
@@ -630,7 +631,7 @@ impl SystemModel {
                 let formula = self.constant_formula(experiment, i);
                 own.constants.push(formula.map(|f| node(&mut dag, f, &before)).transpose()?);
                 before.insert(named.name.clone(), names[&named.name]);
-                // a segment may give it another value
+                // a segment may change the value
                 let own_value = own.constants[i].filter(|_| !changed.contains(named.name.as_str()));
                 if let Some(value) = own_value.and_then(|node| dag.rational(node)) {
                     dag.definite.insert(slot_of[&named.name], value);
@@ -668,7 +669,7 @@ impl SystemModel {
             });
         }
         dag.definite = always.unwrap_or_default();
-        // a known start may depend on what is constant, and on states whose start is not given by a formula
+        // a known start may depend on constants, and on states whose start is not given by a formula
         let mut start_names = constant_names.clone();
         for p in &self.parameters {
             start_names.insert(p.name.clone(), names[&p.name]);
@@ -739,7 +740,8 @@ impl SystemModel {
         })
     }
 
-    /// A constraint is rational in states whose start is not given, parameters and constants, and can move.
+    /// Checks that a constraint is rational in states whose start is not given, parameters and constants,
+    /// and that its value can change.
     fn check_constraint(
         &self,
         dag: &Dag,

@@ -1,4 +1,4 @@
-//! Model files: TOML, with errors that know their place.
+//! Model files: TOML, with errors that state their place.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
@@ -14,7 +14,7 @@ use super::model::{
     StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
-use super::reader::{Formulas, Reader, base, declared, in_order, last_mention};
+use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::ModelRecord;
@@ -130,8 +130,8 @@ pub struct SegmentEntry {
     carry: BTreeMap<String, Spanned<Value>>,
 }
 
-impl Reader<'_> {
-    /// A table's entry, and a check that there is nothing else in it.
+impl ModelReader<'_> {
+    /// Checks that a table has no other keys than the given ones.
     pub(super) fn known_keys(
         &self,
         what: &str,
@@ -147,7 +147,7 @@ impl Reader<'_> {
         Err(self.at(start..start + wrong.len(), what.into(), message))
     }
 
-    /// A name with what a table says of it.
+    /// Name with unit and description from a table.
     pub(super) fn named(&self, name: &str, table: Option<&toml::Table>) -> Named {
         let text = |key: &str| {
             table.and_then(|t| t.get(key)).and_then(Value::as_str).unwrap_or_default().to_string()
@@ -155,7 +155,7 @@ impl Reader<'_> {
         Named { name: name.into(), unit: text("unit"), description: text("description") }
     }
 
-    /// Names of the entries of `name`, each with what the file says of the whole.
+    /// Names of the entries of `name`, each with unit and description of the whole.
     fn named_entries(&self, name: &str, table: Option<&toml::Table>) -> Vec<Named> {
         self.entries(name).iter().map(|n| self.named(n, table)).collect()
     }
@@ -186,7 +186,7 @@ impl Reader<'_> {
         Ok(named.into_iter().zip(equations).zip(starts).map(state).collect())
     }
 
-    /// `0`, `2.5` or `"generic"`.
+    /// Start time: `0`, `2.5` or `"generic"`.
     fn time(&self, entry: &Spanned<Value>) -> Result<StartTime, ModelError> {
         let text = match entry.get_ref() {
             Value::String(word) if word == "generic" => return Ok(StartTime::Generic),
@@ -208,7 +208,7 @@ impl Reader<'_> {
         .map_err(|()| self.at(entry.span(), "time".into(), "expected a number or \"generic\"".into()))
     }
 
-    /// `{ polynomial = 2 }`.
+    /// Degree of `{ polynomial = 2 }`.
     fn polynomial(&self, what: &str, table: &toml::Table, span: &Range<usize>) -> Result<usize, ModelError> {
         let degree = table.get("polynomial").and_then(Value::as_integer);
         degree.and_then(|d| usize::try_from(d).ok()).filter(|d| *d <= MAX_DEGREE).ok_or_else(|| {
@@ -216,7 +216,7 @@ impl Reader<'_> {
         })
     }
 
-    /// The parameters, in the order of the file.
+    /// Parameters, in the order of the file.
     fn parameters(&mut self, entry: &Spanned<Value>) -> Result<Vec<Named>, ModelError> {
         let span = entry.span();
         let mut out = Vec::new();
@@ -269,12 +269,13 @@ impl Reader<'_> {
                 functions.into_iter().map(KnownInput::Function).collect()
             }
             Value::Table(t) => {
-                // a function was looked for above
+                // the key `function` was handled above
                 self.known_keys(&what, t, &span, &["polynomial", "function", "unit", "description"])?;
                 vec![KnownInput::Polynomial(self.polynomial(&what, t, &span)?); named.len()]
             }
             _ => {
-                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \"sin(t)\" }";
+                let message = "expected \"generic\", \"constant\", { polynomial = degree } or { function = \
+                               \"sin(t)\" }";
                 return Err(self.at(span, what, message.into()));
             }
         };
@@ -323,7 +324,8 @@ impl Reader<'_> {
         Ok(self.named_entries(name, table).into_iter().zip(values).collect())
     }
 
-    /// The entries of an output. It may be named as the state it is: no expression can refer to it.
+    /// Entries of an output. It may have the name of the state that it equals: no expression can refer to
+    /// it.
     fn output(&self, key: &str, value: &Spanned<Value>) -> Result<(Vec<Named>, Formulas), ModelError> {
         let (what, span) = (format!("the output {}", base(key)), value.span());
         let (name, shape) = declared(key).map_err(|m| self.at(span.clone(), format!("`{key}`"), m))?;
@@ -343,7 +345,7 @@ impl Reader<'_> {
         Ok((named, found))
     }
 
-    /// What experiment `i`, counted from 0, has of its own.
+    /// Differences of experiment `i`, counted from 0.
     fn experiment(
         &self,
         i: usize,
@@ -396,14 +398,14 @@ pub fn is_model(text: &str) -> bool {
 /// Reads a model.
 ///
 /// # Errors
-/// [`ModelError`] with the byte range of the offender where it is known.
+/// [`ModelError`] with the byte range of the fault, if it is known.
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     check_signs(text)?;
     let file: ModelFile = toml::from_str(text).map_err(|e| {
         let (message, span) = explain::<ModelFile>(text, &e);
         ModelError { what: "the model file".into(), message, span }
     })?;
-    let mut r = Reader { text, shapes: Shapes::new() };
+    let mut r = ModelReader { text, shapes: Shapes::new() };
     let mut model = SystemModel {
         name: file.name.clone().unwrap_or_default(),
         description: file.description,
@@ -430,7 +432,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         }
         model.experiments = own;
     }
-    // sizes first: expressions may name what comes later
+    // sizes first: expressions may use names that are declared later
     let (states, known, unknown) =
         (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
     for (key, value) in states.iter().chain(&known).chain(&unknown) {
@@ -504,7 +506,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     if !model.candidates.is_empty() {
         model.measuring(&model.candidates, true).0.compile().map_err(placed)?;
     }
-    // it stands in no equation: what is wrong with these is said first
+    // the missing name concerns no equation: faults of these are reported first
     if file.name.is_none() {
         model.compile().map_err(placed)?;
         let message = "the key `name` is missing; expected it at the top of the file".into();
@@ -513,7 +515,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     Ok(model.by_one_factor())
 }
 
-/// Where keys stand in a text: the line that a key begins, or its place in an inline table, of the first part
+/// Places of keys in a text: the line that a key begins, or its place in an inline table in the first part
 /// of the text.
 struct Places<'t> {
     lines: HashMap<&'t str, usize>,
@@ -521,7 +523,7 @@ struct Places<'t> {
 }
 
 impl<'t> Places<'t> {
-    /// Places in a text, whose first `inline` bytes may be an inline table.
+    /// Places in a text whose first `inline` bytes may be an inline table.
     fn of(text: &'t str, inline: usize) -> Self {
         let (mut out, mut at) = (Self { lines: HashMap::new(), inline: HashMap::new() }, 0);
         for (k, line) in text.lines().enumerate() {
@@ -546,7 +548,7 @@ impl<'t> Places<'t> {
         out
     }
 
-    /// What keys are sorted by, those of an inline table first.
+    /// Sort key of a name: names in an inline table come first.
     fn of_key(&self, name: &str) -> (Option<usize>, Option<usize>) {
         (self.lines.get(name).copied(), self.inline.get(name).copied())
     }
@@ -556,8 +558,8 @@ impl<'t> Places<'t> {
 mod tests {
     use super::*;
 
-    /// The order of parameters in a file is that of its lines or of its inline table, by keys of every kind;
-    /// the time for many does not grow with their square.
+    /// Parameters keep the order of their lines or of the inline table, for keys of every kind; the time for
+    /// many parameters does not grow with their square.
     #[test]
     fn parameters_keep_the_order_of_the_file() {
         let order = |parameters: &str| {

@@ -4,38 +4,39 @@ use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
 
 use super::dag::{Dag, Op};
 use super::taylor::{Signal, Taylor};
-use super::values::NotHeld;
+use super::values::ConstraintFailure;
 use super::work::{Step, Work, product};
 
-/// Steps of Newton's method from one start: near a point they double the digits.
+/// Number of steps of Newton's method from one start: near a point they double the digits.
 const STEPS: usize = 80;
-/// Steps in a row that gain less than two bits each, near a point: at one whose gradients are independent
-/// none does. So many that what is left of the constraints falls far below what it is where they hold
-/// nowhere.
+/// Number of successive slow steps near a point, of less than two bits of gain each, that end the search.
+/// Near a point with independent gradients no step is slow. After so many steps the residual lies far below
+/// its value where the constraints hold nowhere.
 const SLOW: usize = 40;
-/// Bits by which the residual after them is below one over the fourth power of the size of the point.
+/// Bits by which the residual after the slow steps is below the inverse fourth power of the size of the
+/// point.
 const DEEP: f64 = 24.0;
-/// Length, as a power of two, of the first of them at most.
+/// Largest length of the first slow step, as a power of two.
 const SHORT: f64 = -8.0;
-/// Bits by which the step from a point at which constraints hold is shorter than the point is far from zero.
+/// Bits by which the step from a point where the constraints hold must be shorter than the point's size.
 const STILL: f64 = 32.0;
-/// Most terms into which the sum that a constraint is will be taken apart.
+/// Largest number of terms into which a constraint is expanded as a sum.
 const TERMS: usize = 64;
 /// Relative residual, as a power of two, below which a point is near.
 const NEAR: f64 = -16.0;
-/// Logarithm of the ratio of sides from which on a point is far from holding a constraint.
+/// Logarithm of the ratio of sides from which a point counts as far.
 const FAR: f64 = 0.5;
-/// Least gain of that logarithm by a step from far away, or half of it.
+/// Smallest gain of that logarithm by a step from far away; a gain of half the logarithm suffices too.
 const GAIN: f64 = 0.2;
 /// Relative residual, as a power of two, below which a constraint holds at values of double precision.
 const HELD: f64 = -40.0;
-/// Change of a constraint where its point changes by its size, relative to its terms and as a power of two,
-/// below which its gradient vanishes there.
+/// Relative change of a constraint, as a power of two, below which its gradient vanishes: change when the
+/// point changes by its size, relative to the terms of the constraint.
 const VANISHES: f64 = -16.0;
-/// Bits by which a step may be longer than the point is far from zero.
+/// Bits by which a step may exceed the size of the point.
 const LONGEST: f64 = 6.0;
 
-/// A constraint as a sum of terms: true for what is subtracted.
+/// Constraint as a sum of terms; true marks a subtracted term.
 struct Sum {
     node: usize,
     terms: Vec<(bool, usize)>,
@@ -60,25 +61,25 @@ impl Sum {
 
 /// Constraints and their derivatives at a point.
 struct Linear<const N: usize> {
-    /// By constraint.
+    /// Rows of the constraints, in their order.
     rows: Vec<Row<N>>,
-    /// Largest residual relative to its terms, as a power of two.
+    /// Largest residual relative to the terms of its constraint, as a power of two.
     off: f64,
-    /// The constraint that has it.
+    /// Index of the constraint with that residual.
     worst: usize,
-    /// Largest residual relative to how much its constraint changes where what it holds changes by its size,
-    /// as a power of two.
+    /// Largest residual relative to the change of its constraint when its slots change by their size, as a
+    /// power of two.
     shift: f64,
     /// Largest residual, as a power of two.
     residual: f64,
-    /// How far the point is from holding the constraints: the largest logarithm of a ratio of sides.
+    /// Distance from the constraints: the largest logarithm of a ratio of sides.
     far: f64,
     /// True if every residual is as small as the rounding of its terms.
     holds: bool,
 }
 
-/// One constraint at a point: its derivatives and its value, of the sum of its terms and of the logarithm of
-/// the ratio of the positive ones and the negative ones, where there are both.
+/// One constraint at a point: derivatives and value of the sum of its terms. If it has terms of both signs,
+/// also those of the logarithm of the ratio of the positive to the negative ones.
 struct Row<const N: usize> {
     sum: (Vec<Ball<N>>, Ball<N>),
     ratio: Option<(Vec<Ball<N>>, Ball<N>)>,
@@ -93,7 +94,7 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Constraints and their derivatives at a point; `None` where one is not defined, or beyond the limit of
+    /// Constraints and their derivatives at a point; `None` if one is not defined, or beyond the limit of
     /// work.
     fn linear<const N: usize>(&self, values: &[Ball<N>]) -> Option<Linear<N>> {
         let signal = |s: usize| Signal::Constant {
@@ -117,7 +118,7 @@ impl Newton<'_> {
             self.work,
         );
         let at = at.ok()?;
-        // the rank of the rows, their products, and the system of these
+        // rank of the rows, their products, and the system of these
         let (rows, columns) = (self.sums.len() as u64, lanes as u64);
         let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
         self.work.take(Step::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
@@ -137,7 +138,7 @@ impl Newton<'_> {
             let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
             for &(minus, term) in &sum.terms {
                 let value = at.start(term).midpoint();
-                // on the side on which it is positive
+                // counted on the side on which it is positive
                 let side = usize::from(minus != value.is_negative());
                 sides[side] = sides[side].add(&if value.is_negative() { value.neg() } else { value });
                 for (&lane, x) in at.lanes_of(term).iter().zip(at.dual(term, 0)) {
@@ -148,17 +149,17 @@ impl Newton<'_> {
             let sides = sides.map(|side| side.midpoint());
             let row: Vec<Ball<N>> = slopes[0].iter().zip(&slopes[1]).map(|(a, b)| a.sub(b)).collect();
             let ratio = ratio(&sides, &slopes);
-            // how much it changes where what it holds changes by its size
+            // change of the constraint when its slots change by their size
             let change = row.iter().zip(&here).map(|(slope, x)| slope.size_log2() + x.size_log2().max(0.0));
             let change = change.fold(f64::NEG_INFINITY, f64::max);
-            // both sides of x*y = x*z shrink on the way to x = 0
+            // both sides of x*y = x*z decrease on the way to x = 0
             let scale = if ratio.is_some() { size(&sides).max(change) } else { change };
             let value = at.start(sum.node);
             let left = value.midpoint();
             out.shift = out.shift.max(left.size_log2() - change);
             out.residual = out.residual.max(left.size_log2());
             let off = if left.is_zero() { f64::NEG_INFINITY } else { left.size_log2() - scale };
-            // what rounding makes of the terms, and of what they are made of
+            // rounding of the terms, and of their operands
             let bits = Ball::<N>::BITS as f64;
             let rounding = value.radius_log2().max(change - bits) - scale + 8.0;
             out.holds &= off <= rounding.min(-bits / 2.0).max(24.0 - bits);
@@ -171,8 +172,8 @@ impl Newton<'_> {
         Some(out)
     }
 
-    /// The shortest step `J' y` with `J J' y = -g` for independent rows J; `by_ratio`: of the logarithms,
-    /// where there are any.
+    /// Shortest step `J' y` with `J J' y = -g` for independent rows J; if `by_ratio`, of the logarithms
+    /// where they exist.
     fn step<const N: usize>(&self, linear: &Linear<N>, by_ratio: bool) -> Option<Vec<Ball<N>>> {
         let mut space = RealSpace::new(Reals, self.places.len());
         let mut rows: Vec<(Vec<Ball<N>>, Ball<N>)> = Vec::new();
@@ -200,7 +201,7 @@ impl Newton<'_> {
         Some((0..self.places.len()).map(entry).collect())
     }
 
-    /// The values after a step, halved so many times.
+    /// Values after a step that is halved `halved` times.
     fn after<const N: usize>(&self, values: &[Ball<N>], step: &[Ball<N>], halved: i64) -> Vec<Ball<N>> {
         let mut out = values.to_vec();
         for (&s, dx) in self.places.iter().zip(step) {
@@ -209,8 +210,8 @@ impl Newton<'_> {
         out
     }
 
-    /// A step from far away that leads nearer: that of the logarithms, by which a high power is near its
-    /// value soon, or that of the sums, whichever leads nearest, shorter where neither does. `None` where
+    /// Step from far away that leads nearer: by the logarithms, which bring a high power near its value in
+    /// few steps, or by the sums. The one that leads nearest is taken, shortened if neither does. `None` if
     /// none was found.
     fn nearer<const N: usize>(
         &self,
@@ -247,34 +248,34 @@ fn ratio<const N: usize>(
     Some((row.map(|(a, b)| a.mul(&above).sub(&b.mul(&below))).collect(), value))
 }
 
-/// `log2` of the largest entry.
+/// Largest `log2` of an entry.
 fn size<const N: usize>(list: &[Ball<N>]) -> f64 {
     list.iter().map(Ball::size_log2).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// A point near the values at which the constraints hold: Newton's steps of least length in the `free` ones.
-/// The residual of the constraints is in the error of the values.
+/// Point near the values at which the constraints hold, by Newton's steps of least length in the `free`
+/// slots. The residual of the constraints is included in the error bounds of the values.
 ///
 /// # Errors
-/// [`NotHeld`], with the constraint that is farthest off.
+/// [`ConstraintFailure`], with the constraint of the largest residual.
 pub(super) fn hold_by_newton<const N: usize>(
     dag: &Dag,
     constraints: &[usize],
     values: &mut [Ball<N>],
     free: &[bool],
     work: &Work,
-) -> Result<(), NotHeld> {
+) -> Result<(), ConstraintFailure> {
     let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
     let newton =
         Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
-    // what was refused once stays refused
-    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(NotHeld::Refused, |()| reason);
+    // a refusal holds for all later steps
+    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
     let (mut before, mut far_before, mut slow, mut stuck) = (f64::INFINITY, f64::INFINITY, 0, false);
-    // residual and size of the point where steps became slow
+    // residual and size of the point when the steps became slow
     let mut from = (f64::INFINITY, 0.0);
-    let mut linear = newton.linear(values).ok_or_else(|| failed(NotHeld::Constraint(0)))?;
+    let mut linear = newton.linear(values).ok_or_else(|| failed(ConstraintFailure::Constraint(0)))?;
     for _ in 0..STEPS {
-        let nowhere = NotHeld::Constraint(linear.worst);
+        let nowhere = ConstraintFailure::Constraint(linear.worst);
         if linear.far > FAR && !stuck {
             if let Some((there, next)) = newton.nearer(values, &linear) {
                 values.copy_from_slice(&there);
@@ -286,18 +287,17 @@ pub(super) fn hold_by_newton<const N: usize>(
         let step = newton.step(&linear, false).ok_or_else(|| failed(nowhere))?;
         let here: Vec<Ball<N>> = newton.places.iter().map(|&s| values[s]).collect();
         let (length, far) = (size(&step), size(&here).max(0.0));
-        // where constraints hold in the limit alone, the next step is as long as the way so far
+        // require a short step: if constraints hold only in the limit, it is as long as the distance so far
         if linear.holds && length <= far - STILL {
             let error = (length + 8.0).max(far - Ball::<N>::BITS as f64 + 24.0);
             newton.places.iter().for_each(|&s| values[s] = values[s].midpoint().widened(error));
             return Ok(());
         }
-        // what holds some of them and is no nearer to the others
+        // the point satisfies some constraints and comes no nearer to the others
         if length <= far - Ball::<N>::BITS as f64 + 8.0 {
             return Err(failed(nowhere));
         }
-        // near a point where gradients depend on each other steps shrink by a constant factor, and so do both
-        // sides
+        // near a point with dependent gradients the steps shrink by a constant factor, and so do both sides
         let stays = linear.far > FAR && linear.far > far_before - GAIN / 2.0 && linear.shift < NEAR;
         slow = if (linear.off < NEAR || stays) && length < SHORT && length > before - 2.0 {
             slow + 1
@@ -307,13 +307,13 @@ pub(super) fn hold_by_newton<const N: usize>(
         if slow == 0 {
             from = (linear.residual, far);
         }
-        // towards a point residuals fall by more than a bit a step; away from all points they stay, or the
-        // point does not
+        // towards a point residuals fall by more than a bit per step; away from all points they stay, or the
+        // values grow
         let settles = from.0 - linear.residual >= SLOW as f64 && far < from.1 + 1.0;
-        // and fall below what far values leave of a sum that is nowhere zero
+        // and fall below the residual that large values leave in a sum that is nowhere zero
         let settles = settles && linear.residual < -4.0 * far - DEEP;
         if slow >= SLOW && settles {
-            return Err(NotHeld::Dependent(linear.worst));
+            return Err(ConstraintFailure::Dependent(linear.worst));
         }
         (before, far_before) = (length, linear.far);
         let shorter = (length - far - LONGEST).max(0.0).ceil() as i64;
@@ -321,10 +321,10 @@ pub(super) fn hold_by_newton<const N: usize>(
         values.copy_from_slice(&there);
         linear = newton.linear(values).ok_or_else(|| failed(nowhere))?;
     }
-    Err(failed(NotHeld::Constraint(linear.worst)))
+    Err(failed(ConstraintFailure::Constraint(linear.worst)))
 }
 
-/// The first constraint that holds at a point where its gradient vanishes.
+/// First constraint that holds at a point where its gradient vanishes.
 pub(super) fn vanishing<const N: usize>(
     dag: &Dag,
     constraints: &[usize],
@@ -340,8 +340,7 @@ pub(super) fn vanishing<const N: usize>(
     })
 }
 
-/// Residual of the constraint that is farthest off, relative to its terms, as a power of two; `None` where
-/// there is none.
+/// Largest residual of a constraint, relative to its terms, as a power of two; `None` without constraints.
 pub(super) fn off<const N: usize>(
     dag: &Dag,
     constraints: &[usize],

@@ -1,4 +1,4 @@
-//! The numbers for a simulation in a model file.
+//! Numbers for a simulation in a model file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -10,7 +10,7 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{Named, SystemModel};
-use super::reader::Reader;
+use super::reader::ModelReader;
 use crate::language::{Node, Shapes, nearest};
 
 /// Numbers for a simulation, in the units of the model.
@@ -44,7 +44,7 @@ pub(super) struct SimulationEntry {
     inputs: BTreeMap<String, Spanned<Value>>,
 }
 
-/// The numbers in a value, row by row; `None` where there is something else.
+/// Numbers in a value, row by row; `None` if it contains anything else.
 fn numbers(value: &Value) -> Option<Vec<f64>> {
     match value {
         Value::Integer(i) => Some(vec![*i as f64]),
@@ -54,9 +54,9 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
     }
 }
 
-/// Numbers for a simulation: names that are known, numbers that can be.
+/// Checked numbers for a simulation: known names, admitted numbers.
 pub(super) fn nominal(
-    r: &Reader<'_>,
+    r: &ModelReader<'_>,
     outputs: &Shapes,
     entry: &SimulationEntry,
     model: &mut SystemModel,
@@ -72,7 +72,7 @@ pub(super) fn nominal(
     let mut values = unknowns.clone();
     values.extend(names(&mut model.constants.iter().map(|c| &c.0)));
     let outputs_known = names(&mut model.outputs.iter().map(|o| &o.0));
-    // `p` is all of p[1], p[2], ..., `p@2` these in the second experiment
+    // `p` stands for all of p[1], p[2], ..., `p@2` for these in the second experiment
     let experiments = model.experiments;
     let in_one = |name: &str| {
         name.split_once('@').map_or((name.to_string(), None), |(n, e)| (n.into(), Some(e.to_string())))
@@ -103,7 +103,7 @@ pub(super) fn nominal(
         ("priors", &entry.priors, &unknowns, &r.shapes, &mut nominal.priors, true),
         ("noise", &entry.noise, &outputs_known, outputs, &mut nominal.noise, true),
     ] {
-        // an entry of its own comes behind the whole
+        // entries with an index come after the whole
         let mut ordered: Vec<_> = map.iter().collect();
         ordered.sort_by_key(|(name, _)| name.contains('['));
         for (name, value) in ordered {

@@ -7,27 +7,27 @@ use obsdeg_exact::multivariate::Polynomial;
 
 use super::undecided::{NotCounted, SOLUTIONS};
 
-/// The work that one remainder by an unfinished basis may take.
+/// Limit of the work of one remainder by an unfinished basis.
 const REMAINDER: u64 = 100_000;
 
-/// A product of powers: `(unknown, exponent)`.
+/// Product of powers: `(unknown, exponent)`.
 pub(super) type Powers = Vec<(usize, i32)>;
 
-/// A sum of products of powers with integer coefficients.
+/// Sum of products of powers with integer coefficients.
 pub(super) type Terms = Vec<(i64, Powers)>;
 
-/// The quotient ring of equations by their Groebner basis.
+/// Quotient ring of equations by their Groebner basis.
 pub(super) struct Quotients<'a> {
     pub(super) f: Field,
     pub(super) basis: &'a mut Basis,
 }
 
 impl Quotients<'_> {
-    /// A polynomial whose roots are the values of an element at all solutions, constant term first.
+    /// Polynomial whose roots are the values of an element at all solutions, constant term first.
     pub(super) fn values(&mut self, p: &Polynomial, work: &mut Work) -> Result<Vec<u64>, NotCounted> {
         let f = self.f;
         if !self.basis.is_complete() {
-            // what is a number in an ideal is one in every larger one
+            // an element that is a number modulo an ideal is one modulo every larger ideal
             let number = self.basis.remainder(p, &mut Work::new(REMAINDER))?.as_constant();
             return number.map(|x| vec![f.neg(x), f.one()]).ok_or(NotCounted::OverLimit);
         }
@@ -41,8 +41,7 @@ impl Quotients<'_> {
         Ok(self.basis.remainder(&out, work)?)
     }
 
-    /// The inverse of an element that vanishes at no solution: with `m(p) = 0`, it is `(m(0) - m(p))/(m(0)
-    /// p)`.
+    /// Inverse of an element that vanishes at no solution: with `m(p) = 0`, it is `(m(0) - m(p))/(m(0) p)`.
     fn inverse(&mut self, p: &Polynomial, work: &mut Work) -> Result<Polynomial, NotCounted> {
         let f = self.f;
         let minimal = self.values(p, work)?;
@@ -58,7 +57,7 @@ impl Quotients<'_> {
         Ok(out.scaled(&f, f.neg(last)))
     }
 
-    /// A function of the unknowns, which are elements of the ring.
+    /// Element of the ring for a function of the unknowns.
     pub(super) fn function(
         &mut self,
         terms: &Terms,

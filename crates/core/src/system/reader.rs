@@ -1,5 +1,4 @@
-//! What the keys and texts of a model file say: sizes of vectors, expressions of any shape, their order of
-//! use.
+//! Keys and texts of a model file: sizes of vectors, expressions of any shape, their order of use.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
@@ -13,31 +12,31 @@ use crate::language::vectors::{Mismatch, stacked};
 use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation};
 use crate::model::angle::excerpt;
 
-/// A key and what it says.
+/// Key with its value.
 pub(super) type Entry<'a> = (&'a String, &'a Spanned<Value>);
 
-/// In the order of the file.
+/// Entries in the order of the file.
 pub(super) fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<Entry<'_>> {
     let mut out: Vec<_> = map.iter().collect();
     out.sort_by_key(|(_, v)| v.span().start);
     out
 }
 
-/// A file under way.
-pub(super) struct Reader<'a> {
+/// Reader of a model file.
+pub(super) struct ModelReader<'a> {
     pub(super) text: &'a str,
-    /// The names that are no scalars.
+    /// Shapes of the names that are no scalars.
     pub(super) shapes: Shapes,
 }
 
-/// An expression of any shape: those of its entries, row by row.
+/// Expression of any shape: the expressions of its entries, row by row.
 pub(super) struct Formulas {
     pub(super) shape: Shape,
     pub(super) parts: Vec<PlacedExpression>,
 }
 
 impl Formulas {
-    /// True if it is the number 0.
+    /// True for the number 0.
     fn is_zero(&self) -> bool {
         let zero =
             |p: &PlacedExpression| matches!(p.expression.nodes[..], [Node::Number { mantissa: 0, .. }]);
@@ -45,7 +44,7 @@ impl Formulas {
     }
 }
 
-/// `p[3]` is `p` and the shape of a vector, `p` has none.
+/// Name and shape of a key: `p[3]` declares `p` as a vector, `p` has no shape.
 pub(super) fn declared(key: &str) -> Result<(&str, Option<Shape>), String> {
     let Some((base, sizes)) = key.split_once('[') else { return Ok((key, None)) };
     let sizes: Option<Vec<usize>> =
@@ -59,17 +58,18 @@ pub(super) fn declared(key: &str) -> Result<(&str, Option<Shape>), String> {
     match shape.filter(|s| most(s) && s.entries() > 1) {
         Some(shape) => Ok((base.trim_end(), Some(shape))),
         None => Err(format!(
-            "not a size; expected that of a vector, as in {base}[3], or of a matrix, as in {base}[3,3], with 2 to {MAX_ENTRIES} entries"
+            "not a size; expected that of a vector, as in {base}[3], or of a matrix, as in {base}[3,3], \
+             with 2 to {MAX_ENTRIES} entries"
         )),
     }
 }
 
-/// A key without its size.
+/// Key without its size.
 pub(super) fn base(key: &str) -> &str {
     key.split_once('[').map_or(key, |(base, _)| base.trim_end())
 }
 
-/// The names in a text; those before a bracket are functions.
+/// Names in a text; names before a bracket are functions and are left out.
 fn names_in(text: &str) -> impl Iterator<Item = &str> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut rest = text;
@@ -95,10 +95,10 @@ fn texts(value: &Value) -> Vec<&str> {
     }
 }
 
-/// The entries such that each comes behind those that its texts name, otherwise in the order of the file.
+/// Entries sorted so that each comes after those that its texts name; otherwise in the order of the file.
 ///
 /// # Errors
-/// The names of a circle, the first one again at its end.
+/// Names of a cycle, the first one again at its end.
 fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
     let place: HashMap<&str, usize> = entries.iter().enumerate().map(|(i, e)| (base(e.0), i)).collect();
     let uses = |i: usize| -> Vec<usize> {
@@ -107,7 +107,7 @@ fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
     };
     let (mut out, mut done) = (Vec::new(), vec![false; entries.len()]);
     for first in 0..entries.len() {
-        // what is under way, each with what it still needs
+        // entries in progress, each with its open dependencies
         let mut path: Vec<(usize, Vec<usize>)> = Vec::new();
         let mut next = (!done[first]).then_some(first);
         while let Some(i) = next {
@@ -131,13 +131,13 @@ fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
     Ok(out)
 }
 
-impl Reader<'_> {
+impl ModelReader<'_> {
     pub(super) fn at(&self, span: Range<usize>, what: String, message: String) -> ModelError {
         ModelError { what, message, span: Some(span) }
     }
 
-    /// An expression of any shape; its text is as written for a number, its contents for a string, and one
-    /// for each entry in a list.
+    /// Expression of any shape. Its text is as written for a number, the contents for a string, and one for
+    /// each entry in a list.
     pub(super) fn formulas(
         &self,
         what: &str,
@@ -147,7 +147,7 @@ impl Reader<'_> {
         self.formulas_from(what, value, &span, &mut span.start.clone())
     }
 
-    /// The same, with its text looked for from `cursor` on.
+    /// Expression of any shape; its text is searched from `cursor` on.
     fn formulas_from(
         &self,
         what: &str,
@@ -178,7 +178,7 @@ impl Reader<'_> {
                 return Err(self.at(span.clone(), what.into(), message));
             }
         };
-        // escapes aside, the expression stands in the file as it is
+        // except for escapes, the expression is the same text in the file
         let offset = match source.is_empty() {
             true => Some(*cursor),
             false => self.text[*cursor..span.end].find(&source).map(|o| *cursor + o),
@@ -198,8 +198,8 @@ impl Reader<'_> {
         Ok(Formulas { shape: read.shape, parts: read.entries.into_iter().map(part).collect() })
     }
 
-    /// The entries of `left - right` of an equation, and what is not negative where it holds; their text is
-    /// the equation.
+    /// Entries of `left - right` of an equation, and the expressions that are not negative where it holds;
+    /// their text is the equation.
     pub(super) fn constraint(
         &self,
         equation: &Spanned<String>,
@@ -216,7 +216,7 @@ impl Reader<'_> {
         Ok((read.entries.into_iter().map(part).collect(), size.map(part)))
     }
 
-    /// The expressions of the entries of `name`, whose shape is known; 0 stands for every entry.
+    /// Expressions of the entries of `name`, whose shape is known; 0 stands for every entry.
     pub(super) fn fitted(
         &self,
         (name, what): (&str, &str),
@@ -245,7 +245,7 @@ impl Reader<'_> {
         Ok(found.parts)
     }
 
-    /// No vector has a name that something else has.
+    /// Checks that no vector has the name of another entry.
     pub(super) fn names_of_their_own(
         &self,
         sections: &[&[Entry<'_>]],
@@ -265,7 +265,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Entries in an order in which each comes behind those that it names.
+    /// Entries sorted so that each comes after those that it names.
     pub(super) fn by_use<'e>(&self, kind: &str, entries: &[Entry<'e>]) -> Result<Vec<Entry<'e>>, ModelError> {
         by_use(entries).map_err(|circle| {
             let names: Vec<&str> = circle.iter().map(|&i| base(entries[i].0)).collect();
@@ -274,12 +274,12 @@ impl Reader<'_> {
         })
     }
 
-    /// The names of the entries of `name`.
+    /// Names of the entries of `name`.
     pub(super) fn entries(&self, name: &str) -> Vec<String> {
         self.shapes.get(name).map_or_else(|| vec![name.to_string()], |shape| shape.names(name))
     }
 
-    /// Notes the size that a key declares; the name without it.
+    /// Records the size that a key declares; returns the name without it.
     pub(super) fn declare<'k>(&mut self, key: &'k str, span: Range<usize>) -> Result<&'k str, ModelError> {
         let (name, shape) = declared(key).map_err(|message| self.at(span, format!("`{key}`"), message))?;
         if let Some(shape) = shape {
@@ -288,7 +288,7 @@ impl Reader<'_> {
         Ok(name)
     }
 
-    /// The name of a key whose shape is that of its expression, and the expressions of its entries.
+    /// Name of a key whose shape is that of its expression, and the expressions of its entries.
     pub(super) fn defined<'k>(
         &mut self,
         (key, what): (&'k str, &str),
@@ -307,7 +307,8 @@ impl Reader<'_> {
     }
 }
 
-/// Where a name in quotes (`` `x` ``) is last given: as a key, or in a list of names.
+/// Byte range of the last place where a name in quotes (`` `x` ``) is defined: as a key, or in a list of
+/// names.
 pub(super) fn last_mention(text: &str, quoted: &str) -> Option<Range<usize>> {
     let name = quoted.strip_prefix('`')?.strip_suffix('`')?;
     let given = |at: usize| {

@@ -1,4 +1,5 @@
-//! Real points at which the constraints of a model hold: prime fields have points where there is no real one.
+//! Real points at which the constraints of a model hold: prime fields may have points where there is no real
+//! one.
 
 use obsdeg_exact::{Ball, Reals, SplitMix64};
 
@@ -7,40 +8,41 @@ use super::held::{CLOSE, distinct, turned};
 use super::intervals::range;
 use super::model::{Compiled, SystemModel};
 use super::newton::{hold_by_newton, off, vanishing};
-use super::rows::{Layout, Maker};
+use super::rows::{Layout, PointBuilder};
 use super::taylor::{Signal, Singular, Taylor};
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::{Refused, Spent, Work};
 
-/// Starts of Newton's method: near the values of the file first, then random points, the later the farther.
+/// Number of starts of Newton's method: first near the values of the file, then at random points of growing
+/// size.
 const TRIES: usize = 200;
-/// Random attempts from one start to the next: sizes grow with them.
+/// Number of random attempts from one start to the next; their sizes grow.
 const FARTHER: usize = 10;
-/// Starts from which only points with dependent gradients were reached, before no other kind is expected.
+/// Number of starts that reach only points with dependent gradients, before the search ends.
 const DEPENDENT: usize = 20;
-/// Points near a point at which it is tried whether constraints follow from the others.
+/// Number of points near a point at which constraints are tested for following from the others.
 const NEARBY: usize = 3;
 /// Relative residual, as a power of two, below which a constraint holds at such a point.
 const HOLDS: f64 = -128.0;
 
-/// Bits of the values of a file.
+/// Number of bits of the values of a file.
 const DOUBLE: i64 = 52;
 
 /// Outcome of one start.
-enum Found {
+enum StartOutcome {
     /// A point, and the number of constraints that follow from the others there.
     Point(usize),
-    /// A point at which gradients of constraints depend on each other, though the constraints do not.
+    /// A point at which gradients of constraints are dependent, although the constraints are not.
     Dependent(usize),
     Nothing,
 }
 
-/// Looks for a real point at which all constraints hold and their gradients are independent. The number of
-/// constraints that follow from the others there.
+/// Searches for a real point at which all constraints hold and their gradients are independent. Returns the
+/// number of constraints that follow from the others there.
 ///
 /// # Errors
-/// [`ModelError`] where the signs of both sides contradict, where constraints hold only where gradients
-/// depend on each other, where no point was found, and where the search is beyond the limit of work.
+/// [`ModelError`] if the signs of both sides contradict, if constraints hold only at points with dependent
+/// gradients, if no point was found, or if the search exceeds the limit of work.
 pub(super) fn real_point(
     model: &SystemModel,
     compiled: &Compiled,
@@ -66,27 +68,27 @@ fn sought(
     work: &Work,
 ) -> Result<usize, ModelError> {
     let Some(first) = model.constraints.first() else { return Ok(0) };
-    let maker = Maker { model, compiled, layout, field: Reals::<4>, work };
+    let builder = PointBuilder { model, compiled, layout, field: Reals::<4>, work };
     let mut rng = model.random(seed, "real points");
-    let free = maker.free(0);
+    let free = builder.free(0);
     let mut dependent: Vec<usize> = Vec::new();
-    if maker.gives_start()
-        && let Some(mut values) = maker.values(&mut rng.clone(), 0)
+    if builder.gives_start()
+        && let Some(mut values) = builder.values(&mut rng.clone(), 0)
     {
-        maker.near_given(0, &free, &mut values, DOUBLE, &mut rng.clone());
+        builder.near_given(0, &free, &mut values, DOUBLE, &mut rng.clone());
         if let Some(c) = vanishing(&compiled.dag, &compiled.constraints, &values, &free, work) {
             return Err(dependent_at_points(model, c));
         }
     }
     for attempt in 0..TRIES {
-        let Some(mut values) = maker.values(&mut rng, attempt * FARTHER) else { continue };
+        let Some(mut values) = builder.values(&mut rng, attempt * FARTHER) else { continue };
         if let Some(&bits) = CLOSE.get(attempt) {
-            maker.near_given(0, &free, &mut values, bits, &mut rng);
+            builder.near_given(0, &free, &mut values, bits, &mut rng);
         }
-        match from_start(&maker, values, &free, attempt, &mut rng) {
-            Ok(Found::Point(following)) => return Ok(following),
-            Ok(Found::Dependent(c)) => dependent.push(c),
-            Ok(Found::Nothing) => {}
+        match from_start(&builder, values, &free, attempt, &mut rng) {
+            Ok(StartOutcome::Point(following)) => return Ok(following),
+            Ok(StartOutcome::Dependent(c)) => dependent.push(c),
+            Ok(StartOutcome::Nothing) => {}
             Err(Refused) => break,
         }
         if dependent.len() >= DEPENDENT && dependent.len() > attempt / 2 {
@@ -100,21 +102,23 @@ fn sought(
     let all = if model.constraints.len() > 1 { " together with the others" } else { "" };
     let message = format!(
         "no real point was found at which it holds{all}, by Newton's method from {TRIES} starts{}",
-        match maker.gives_start() {
+        match builder.gives_start() {
             true =>
-                ", the first three near the values given under [simulation.values]; if there is one, give values nearer to it",
+                ", the first three near the values given under [simulation.values]; if there is one, give \
+                 values nearer to it",
             false => "; if there is one, give it under [simulation.values]",
         }
     );
     Err(first.place.error(message, 0..first.text.len()))
 }
 
-/// The refusal of a constraint at whose points gradients depend on each other.
+/// Error for a constraint at whose points gradients are dependent.
 pub(super) fn dependent_at_points(model: &SystemModel, c: usize) -> ModelError {
     let own = &model.constraints[c];
-    let message = "at the points found at which it holds its gradient vanishes or depends on those of the other constraints, so that \
-                   derivatives do not say what it leaves free; expected constraints with independent gradients (x = 0 and y = 0 in \
-                   place of x^2 + y^2 = 0, and none that follows from the others)";
+    let message = "at the points found at which it holds its gradient vanishes or depends on those of the \
+                   other constraints, so that derivatives do not say what it leaves free; expected \
+                   constraints with independent gradients (x = 0 and y = 0 in place of x^2 + y^2 = 0, and \
+                   none that follows from the others)";
     own.place.error(message.into(), 0..own.text.len())
 }
 
@@ -131,8 +135,9 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
                 }
                 right if right.high <= 0.0 => {
                     return refuse(
-                        "it holds only where both sides are zero, because its right side is never positive and a root or norm never \
-                         negative; expected these conditions as constraints of their own",
+                        "it holds only where both sides are zero, because its right side is never positive \
+                         and a root or norm never negative; expected these conditions as constraints of \
+                         their own",
                     );
                 }
                 _ => {}
@@ -153,40 +158,43 @@ fn signs(model: &SystemModel, compiled: &Compiled) -> Result<(), ModelError> {
                 ));
             }
             return refuse(format!(
-                "its left side minus its right side is never {sign}: where it holds, if anywhere, its gradient vanishes and says nothing; expected the \
-                 conditions themselves as constraints (x = 0 and y = 0 in place of x^2 + y^2 = 0)"
+                "its left side minus its right side is never {sign}: where it holds, if anywhere, its \
+                 gradient vanishes and says nothing; expected the conditions themselves as constraints (x \
+                 = 0 and y = 0 in place of x^2 + y^2 = 0)"
             ));
         }
     }
     Ok(())
 }
 
-/// Newton's method from one start, and what the point is.
+/// Newton's method from one start, and the kind of the point that it reaches.
 fn from_start(
-    maker: &Maker<'_, '_, Reals<4>>,
+    builder: &PointBuilder<'_, '_, Reals<4>>,
     mut values: Vec<Ball<4>>,
     free: &[bool],
     attempt: usize,
     rng: &mut SplitMix64,
-) -> Result<Found, Refused> {
-    let compiled = maker.compiled;
+) -> Result<StartOutcome, Refused> {
+    let compiled = builder.compiled;
     let (dag, all) = (&compiled.dag, turned(distinct(&compiled.constraints), attempt));
     let place = |c: usize| compiled.constraints.iter().position(|node| *node == all[c]).unwrap_or(0);
-    match hold_by_newton(dag, &all, &mut values, free, maker.work) {
+    match hold_by_newton(dag, &all, &mut values, free, builder.work) {
         Ok(()) => {}
-        Err(NotHeld::Constraint(_)) => return Ok(Found::Nothing),
-        Err(NotHeld::Dependent(c)) => return Ok(Found::Dependent(place(c))),
-        Err(NotHeld::Refused) => return Err(Refused),
+        Err(ConstraintFailure::Constraint(_)) => return Ok(StartOutcome::Nothing),
+        Err(ConstraintFailure::Dependent(c)) => return Ok(StartOutcome::Dependent(place(c))),
+        Err(ConstraintFailure::Refused) => return Err(Refused),
     }
-    if !are_not_negative(maker, &values) {
-        return Ok(Found::Nothing);
+    if !are_not_negative(builder, &values) {
+        return Ok(StartOutcome::Nothing);
     }
-    let independent = match maker.independent(&all, &values, free) {
+    let independent = match builder.independent(&all, &values, free) {
         Ok(independent) => independent,
         Err(Singular::Refused) => return Err(Refused),
-        Err(_) => return Ok(Found::Nothing),
+        Err(_) => return Ok(StartOutcome::Nothing),
     };
-    let Some(other) = (0..all.len()).find(|c| !independent.contains(c)) else { return Ok(Found::Point(0)) };
+    let Some(other) = (0..all.len()).find(|c| !independent.contains(c)) else {
+        return Ok(StartOutcome::Point(0));
+    };
     // the others hold wherever the independent ones do, or only at points like this one
     let kept: Vec<usize> = independent.iter().map(|&c| all[c]).collect();
     let others: Vec<usize> = (0..all.len()).filter(|c| !independent.contains(c)).map(|c| all[c]).collect();
@@ -195,18 +203,18 @@ fn from_start(
         for (x, _) in nearby.iter_mut().zip(free).filter(|(_, free)| **free) {
             *x = Reals::<4>.near(x.to_f64(), CLOSE[0], rng).unwrap_or(*x);
         }
-        hold_by_newton(dag, &kept, &mut nearby, free, maker.work).is_ok()
-            && off(dag, &others, &nearby, maker.work).is_some_and(|off| off < HOLDS)
+        hold_by_newton(dag, &kept, &mut nearby, free, builder.work).is_ok()
+            && off(dag, &others, &nearby, builder.work).is_some_and(|off| off < HOLDS)
     });
-    Ok(if follow { Found::Point(others.len()) } else { Found::Dependent(place(other)) })
+    Ok(if follow { StartOutcome::Point(others.len()) } else { StartOutcome::Dependent(place(other)) })
 }
 
-/// True if no root that constraints hold would be negative at a point.
-fn are_not_negative(maker: &Maker<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
-    let compiled = maker.compiled;
+/// True if no root in a constraint would be negative at a point.
+fn are_not_negative(builder: &PointBuilder<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
+    let compiled = builder.compiled;
     let signals = values.iter().map(|value| Signal::Constant { value: *value, lane: None }).collect();
     let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
     let nodes = &compiled.not_negative;
-    let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, maker.work);
+    let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, builder.work);
     at.is_ok_and(|at| nodes.iter().all(|&node| !at.start(node).is_negative()))
 }

@@ -1,11 +1,11 @@
-//! A fully observable model with the outputs of another one over complex numbers: as many unknowns as there
-//! are unobservable directions take fixed numbers, and the others stand for identifiable functions. Of real
-//! outputs it may lack some: those of `a b^2 < 0` where `a` is fixed at 1.
+//! Reduced models: a fully observable model with the outputs of another one over complex numbers. As many
+//! unknowns as there are unobservable directions take fixed numbers; the others represent identifiable
+//! functions. Some real outputs may be missing: those with `a b^2 < 0` if `a` is fixed at 1.
 //!
-//! The unknowns that are fixed are independent of all that the outputs determine. Where the model that is
-//! left is fully observable, it has as many unknowns as the rank of the first, so that the outputs of both
-//! fill a variety of the same dimension; it is irreducible, and the outputs of the second are among those of
-//! the first: at generic points, complex ones included, each has the outputs of the other.
+//! The fixed unknowns are independent of all functions that the outputs determine. If the remaining model is
+//! fully observable, its number of unknowns is the rank of the first model, so the outputs of both fill a
+//! variety of the same dimension. This variety is irreducible, and the outputs of the second model are among
+//! those of the first. So at generic points, complex ones included, each has the outputs of the other.
 
 use std::fmt::Write as _;
 
@@ -21,36 +21,36 @@ use super::model_file;
 use super::quotients::Terms;
 use super::symmetry::symmetries;
 
-/// Reason that there is no reduced model.
+/// Reasons for the lack of a reduced model.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ReducedError {
     /// The model has a fault.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Nothing is to be reduced.
+    /// The model is fully observable: there is nothing to reduce.
     #[error("the model is fully observable: there is nothing to reduce")]
     FullyObservable,
-    /// Kind of model that no reduced one is written for.
+    /// The model is of a kind that is not covered.
     #[error("no reduced model is written for a model {0}")]
     NotCovered(&'static str),
-    /// No numbers were found.
+    /// No suitable numbers were found.
     #[error("no numbers were found with which the model is fully observable")]
     NoNumbers,
 }
 
-/// A model with fewer unknowns and the same outputs.
+/// Model with fewer unknowns and the same outputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reduced {
-    /// The model file, TOML.
+    /// Text of the model file, TOML.
     pub text: String,
     /// Unknowns with a fixed number, as `(name, number)`.
     pub fixed: Vec<(String, i64)>,
-    /// Functions that unknowns which are left stand for, as `(name, identifiable function)`, where it was
+    /// Functions that the remaining unknowns represent, as `(name, identifiable function)`, if they were
     /// found.
     pub stands_for: Vec<(String, String)>,
 }
 
-/// The reduced model, judged again as fully observable, with the rank of the model.
+/// The reduced model, which was judged again: it is fully observable, with the rank of the model.
 ///
 /// # Errors
 /// [`ReducedError`].
@@ -79,7 +79,7 @@ pub fn reduced(model: &SystemModel, seed: u64, order: Option<usize>) -> Result<R
             false => Vec::new(),
         };
         let fixed: Vec<(String, i64)> = numbers.iter().map(|&(l, x)| (name(l), x)).collect();
-        let text = Written { model, fixed: &fixed, stands_for: &stands_for }.text();
+        let text = FileContent { model, fixed: &fixed, stands_for: &stands_for }.text();
         let holds = |m: &SystemModel| -> Result<bool, ModelError> {
             let again = judge(m, seed, order)?;
             let found = again.findings.degrees.rank();
@@ -108,7 +108,8 @@ fn covered(model: &SystemModel) -> Result<(), ReducedError> {
     Err(ReducedError::NotCovered(reason))
 }
 
-/// Unknowns that are independent of all that the outputs determine, one for each direction: parameters first.
+/// Unknowns that are independent of all functions that the outputs determine, one for each direction:
+/// parameters first.
 fn fixed_lanes(judged: &Judgement, span: &Echelon) -> Vec<usize> {
     let (f, n) = (span.field(), judged.layout.unknowns.len());
     let is_parameter = |lane: &usize| matches!(judged.layout.unknowns[*lane].role, Role::Parameter(_));
@@ -123,7 +124,7 @@ fn fixed_lanes(judged: &Judgement, span: &Echelon) -> Vec<usize> {
     order
 }
 
-/// Function that an unknown stands for where the fixed ones are one: a product in which it is the only other
+/// Function that an unknown represents when the fixed ones are one: a product in which it is the only other
 /// factor.
 fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Option<(String, String)> {
     let [(1, powers)] = &terms[..] else { return None };
@@ -136,7 +137,7 @@ fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Opti
     }
     let powers = powers.iter().map(|&(l, e)| (l, e * exponent)).collect();
     let function = super::identifiable::IdentifiableFunction { terms: vec![(1, powers)], degree: 0 };
-    // a state that is fixed is so at the start
+    // a fixed state is fixed at the start
     let name = |l: usize| {
         let u = &judged.layout.unknowns[l];
         let at_start = matches!(u.role, Role::State(_)) && is_fixed(l);
@@ -145,25 +146,25 @@ fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Opti
     Some((name(lane), function.text(&name)))
 }
 
-/// A text as a string of JSON, which is one of TOML.
+/// Text as a string of JSON, which is also one of TOML.
 fn quoted(text: &str) -> String {
     serde_json::Value::String(text.into()).to_string()
 }
 
-/// Contents of a model file.
-struct Written<'a> {
+/// Content of a model file.
+struct FileContent<'a> {
     model: &'a SystemModel,
     fixed: &'a [(String, i64)],
     stands_for: &'a [(String, String)],
 }
 
-impl Written<'_> {
+impl FileContent<'_> {
     fn number(&self, name: &str) -> Option<i64> {
         self.fixed.iter().find(|f| f.0 == name).map(|f| f.1)
     }
 
-    /// ` description = ... `, with what the unknown stands for; empty where nothing is said. Units are left
-    /// out: those of what it stands for are others.
+    /// Text ` description = ... `, with the function that the unknown represents; empty if there is none.
+    /// Units are omitted: those of the function differ.
     fn description(&self, name: &str, own: &str) -> String {
         let meaning = self.stands_for.iter().find(|s| s.0 == name).map(|s| format!("stands for {}", s.1));
         let both = [meaning.unwrap_or_default(), own.to_string()];

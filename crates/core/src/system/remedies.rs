@@ -1,4 +1,4 @@
-//! Remedies of a model: one value known, one more output that is a state, or two of these.
+//! Remedies of a model: one known value, one state as another output, or two of these.
 
 use std::cmp::Reverse;
 
@@ -11,44 +11,44 @@ use super::model::{
 use super::values::Values;
 use super::work::{Spent, product};
 use crate::language::{Expression, Node};
-use crate::remedies::{Change, Directions, MOST_PAIRED, Remedies, Remedy, Resolved, Told};
+use crate::remedies::{Change, Directions, Information, MOST_PAIRED, Remedies, Remedy, Resolved};
 use crate::why::{Improvement, is_lower};
 
-/// Most verdicts on single changes, and half as many on pairs, of a model of up to `UNKNOWNS`; beyond, the
-/// number falls as the square of the unknowns, as the work of a verdict grows at least: 10 of a model of 90
-/// unknowns, none from 300 on.
+/// Largest number of verdicts on single changes of a model of up to `UNKNOWNS` unknowns; half as many on
+/// pairs. For larger models the number falls as the square of the unknowns, since the work of a verdict
+/// grows at least as fast: 10 for 90 unknowns, none from 300 on.
 const MOST_VERDICTS: usize = 24;
-/// Unknowns up to which that many verdicts are computed.
+/// Number of unknowns up to which that many verdicts are computed.
 const UNKNOWNS: usize = 60;
-/// Most verdicts of a model whose functions are evaluated in many digits.
+/// Largest number of verdicts of a model whose functions are evaluated in many digits.
 const MOST_IN_DIGITS: usize = 12;
-/// Most changes that are tried for one unknown.
+/// Largest number of changes tried for one unknown.
 const MOST_EXPLAINED: usize = 200;
-/// Most values that are tried of unknowns that determine each other.
+/// Largest number of values tried for unknowns that determine each other.
 const MOST_ALIKE: usize = 6;
 
 /// Search for remedies of one model.
-struct Search<'a> {
+struct ModelRemedySearch<'a> {
     model: &'a SystemModel,
     judged: &'a Judgement,
     order: Option<usize>,
-    /// Columns of unknowns that are not observable and are spoken of.
+    /// Columns of reported unknowns that are not observable.
     open: Vec<usize>,
-    /// Names of the columns, each once, with all columns that it has.
+    /// Roles of the columns, each once, with all its columns.
     roles: Vec<(Role, Vec<usize>)>,
-    /// Most verdicts on single changes.
+    /// Largest number of verdicts on single changes.
     budget: usize,
-    /// Operations that are left.
+    /// Operations that remain.
     left: u64,
-    /// True once it was these that ended the search.
+    /// True once the limit of operations ended the search.
     ended: bool,
     /// True once a changed model was judged where constraints hold in another way.
     elsewhere: bool,
     out: Remedies,
 }
 
-/// The remedies of a model that was judged, after `before` operations of other searches; bounds of the work
-/// stand at the head of this file.
+/// Remedies of a judged model, after `before` operations of other searches. The constants at the top of this
+/// file limit the search.
 pub(super) fn remedies(
     model: &SystemModel,
     compiled: &Compiled,
@@ -72,12 +72,22 @@ pub(super) fn remedies(
     }
     let n = unknowns.len().max(UNKNOWNS);
     let in_digits = judged.digits().map_or(MOST_VERDICTS, |_| MOST_IN_DIGITS);
-    // all together, with the search for symmetries before them, take no more than one verdict may
+    // all verdicts, and the search for symmetries before them, take at most the limit of one verdict
     let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
     let out = Remedies::default();
-    let mut search =
-        Search { model, judged, order, open, roles, budget, left, ended: false, elsewhere: false, out };
+    let mut search = ModelRemedySearch {
+        model,
+        judged,
+        order,
+        open,
+        roles,
+        budget,
+        left,
+        ended: false,
+        elsewhere: false,
+        out,
+    };
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -92,7 +102,9 @@ pub(super) fn remedies(
         }
     }
     if search.elsewhere {
-        let text = "known values and outputs: the constraints hold in several ways, and with a change verdicts are those of another one".into();
+        let text = "known values and outputs: the constraints hold in several ways, and with a change \
+                    verdicts are those of another one"
+            .into();
         let verdicts = search.out.verdicts;
         search.out = Remedies { not_tried: vec![text], verdicts, ..Remedies::default() };
     }
@@ -101,8 +113,8 @@ pub(super) fn remedies(
     search.out
 }
 
-impl Search<'_> {
-    /// Single changes, then pairs for what these do not resolve.
+impl ModelRemedySearch<'_> {
+    /// Tries single changes, then pairs for unknowns that no single change resolves.
     fn all<S: Values>(&mut self, directions: &Directions<S>) {
         let open = self.open.len();
         let products = self.roles.iter().map(|(_, columns)| directions.products(columns.len(), open));
@@ -132,9 +144,9 @@ impl Search<'_> {
         self.two(directions, &states.collect::<Vec<_>>());
     }
 
-    /// Single changes in the order in which they are tried: a value of every set of unknowns that determine
-    /// each other, parameters first; then outputs, those first whose value alone resolves most; then other
-    /// values of the sets.
+    /// Single changes in the order of the search: one value of every set of unknowns that determine each
+    /// other, parameters first; then outputs, those first whose value alone resolves most; then other values
+    /// of the sets.
     fn singles<S: Values>(&self, directions: &Directions<S>) -> Vec<Change> {
         let resolves = |columns: &[usize]| directions.resolved(&directions.known(columns), &self.open);
         let mut sets: Vec<(Vec<usize>, Vec<Role>)> = Vec::new();
@@ -163,7 +175,7 @@ impl Search<'_> {
         alike(0).chain(outputs).chain((1..MOST_ALIKE).flat_map(alike)).collect()
     }
 
-    /// Two values known, or two outputs more, for what no single change resolves.
+    /// Tries two known values, or two more outputs, for unknowns that no single change resolves.
     fn two<S: Values>(&mut self, directions: &Directions<S>, outputs: &[Role]) {
         let most = self.budget.div_ceil(2);
         let mut work = most;
@@ -172,17 +184,17 @@ impl Search<'_> {
         let mut complete =
             self.spend::<S>(directions.products_of_pairs(self.roles.len(), widest, left.len()));
         if complete {
-            // one more than are paired says that there are more
+            // one more than are paired shows that there are more
             let paired = self.roles.iter().take(MOST_PAIRED + 1);
-            let values: Vec<Told<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
+            let values: Vec<Information<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
             complete = directions.pairs(&values, None, left, |i, j| {
                 work = work.checked_sub(1)?;
                 let changes = [i, j].map(|k| self.known(self.roles[k].0));
                 self.judge(changes.into())
             });
         }
-        // rows of an output more are those of another random point: only the engine can say what two of them
-        // tell
+        // rows of another output come from another random point: only the engine can decide about two of
+        // them
         for (i, j) in (0..outputs.len()).flat_map(|j| (0..j).map(move |i| (i, j))) {
             if self.left().is_empty() {
                 break;
@@ -200,8 +212,7 @@ impl Search<'_> {
         }
     }
 
-    /// Counts products of numbers before they are formed; false where they take more operations than are
-    /// left.
+    /// Counts products of numbers before they are formed; false if they take more operations than remain.
     fn spend<S: Values>(&mut self, products: u64) -> bool {
         let operations = products.saturating_mul(product::<S::Element>());
         let enough = operations <= self.left;
@@ -212,7 +223,7 @@ impl Search<'_> {
         enough
     }
 
-    /// Unknowns that no remedy resolves so far.
+    /// Unknowns without a remedy so far.
     fn left(&self) -> Vec<usize> {
         let name = |c: usize| &self.judged.layout.unknowns[c].name;
         self.open.iter().copied().filter(|&c| !self.out.resolves(name(c))).collect()
@@ -225,7 +236,7 @@ impl Search<'_> {
             Role::UnknownInput(i) => &self.model.unknown_inputs[i].0,
             Role::KnownInput(i) => &self.model.known_inputs[i].0,
             Role::Constant(i) => &self.model.constants[i].0,
-            // no unknown
+            // these roles are no unknowns
             Role::Time => &self.model.outputs[0].0,
         }
     }
@@ -238,14 +249,15 @@ impl Search<'_> {
         Change::Output { state: self.named(role).name.clone() }
     }
 
-    /// Where it was the work that ended the search, the option that allows more, after a semicolon.
+    /// Option that allows more work, after a semicolon, if the limit of work ended the search; otherwise
+    /// empty.
     fn option(&self) -> &'static str {
         if self.ended { "; a larger --work-limit allows more" } else { "" }
     }
 
-    /// True if a changed model may have been judged where the model was: constraints that hold in several
-    /// ways are judged in one. k columns that are left out lower a rank by less than k, since none is
-    /// observable; an output adds to it.
+    /// True if a changed model may have been judged on the same component of the constraints as the model.
+    /// Removing k columns lowers a rank by less than k, since none of them is observable; an output raises
+    /// it.
     fn is_of_same_part(&self, judged: &Judgement, changes: &[Change]) -> bool {
         let rank = |judged: &Judgement| judged.findings.degrees.rank();
         let (before, after) = (rank(self.judged), rank(judged));
@@ -255,16 +267,15 @@ impl Search<'_> {
             || after + left_out.saturating_sub(1) >= before && (outputs || after <= before)
     }
 
-    /// Judges the model with some changes, and enters what they resolve; `None` where that takes more
-    /// operations than are left.
+    /// Judges the model with some changes, and records the unknowns that they resolve; `None` if that takes
+    /// more operations than remain.
     fn judge(&mut self, changes: Vec<Change>) -> Option<Vec<usize>> {
         if self.left < self.judged.work {
             self.ended = true;
             return None;
         }
         let mut model = changed(self.model, &changes);
-        // a point more than is left, where that is little: the memory that is allowed goes with the
-        // operations
+        // allow more than remains if little remains: the allowed memory grows with the operations
         let most = self.left.max(self.judged.work.saturating_mul(8));
         model.work_limit = self.model.work_limit.within(most);
         // given values add nothing beyond the last order of the model itself
@@ -320,7 +331,7 @@ pub(super) fn improvements(
     let out = Remedies::default();
     let (ended, elsewhere) = (false, false);
     let mut search =
-        Search { model, judged, order, open, roles, budget: MOST_EXPLAINED, left, ended, elsewhere, out };
+        ModelRemedySearch { model, judged, order, open, roles, budget: MOST_EXPLAINED, left, ended, elsewhere, out };
     let is_state = |role: &Role| matches!(role, Role::State(_));
     let roles: Vec<Role> = search.roles.iter().map(|r| r.0).collect();
     // with constraints, ranks tell only of values that are not observable where a changed model was judged
@@ -358,14 +369,14 @@ pub(super) fn improvements(
     (found, Vec::from_iter(not_tried), search.out.verdicts)
 }
 
-/// The model with some changes, without the combinations that it asks for.
+/// The model with some changes, without requested combinations.
 fn changed(model: &SystemModel, changes: &[Change]) -> SystemModel {
     let mut out = SystemModel { combinations: Vec::new(), ..model.clone() };
     for change in changes {
         match change {
             Change::Known { name } => know(&mut out, name),
             Change::Output { state } => measure(&mut out, state),
-            // of schemes
+            // changes of schemes only
             Change::Attitude { .. } | Change::Carry { .. } => {}
         }
     }
@@ -384,7 +395,7 @@ fn know(model: &mut SystemModel, name: &str) {
     }
 }
 
-/// Adds an output that is a state.
+/// Adds a state as an output.
 fn measure(model: &mut SystemModel, state: &str) {
     let mut name = state.split('[').next().unwrap_or(state).to_string();
     while model.outputs.iter().any(|o| o.0.name == name) {

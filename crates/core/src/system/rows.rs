@@ -1,4 +1,4 @@
-//! Any system as a source of derivative rows: the duals of the Taylor coefficients of its outputs.
+//! Any system as a source of derivative rows: the dual components of the Taylor coefficients of its outputs.
 
 use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
@@ -15,50 +15,50 @@ mod by_output;
 
 pub use by_output::{OwnRows, PointRows};
 
-/// Orders that are followed where no end is proven, at least.
+/// Smallest number of orders that are followed if no end is proven.
 const ORDERS: usize = 60;
-/// Rows are computed backwards where there are so many lanes for each output: with fewer there are few
-/// orders, and lanes are faster.
+/// Number of unknowns per output from which rows are computed backwards (`adjoint`): with fewer unknowns
+/// there are few orders, and forward computation is faster.
 const LONG: usize = 48;
-/// And from so many lanes on anyway, for the memory.
+/// Number of unknowns from which rows are always computed backwards, to save memory.
 const MANY: usize = 256;
 
-/// An unknown of a system.
+/// Unknown of a system.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unknown {
-    /// Its name; `x@2` in the second experiment.
+    /// Name of the unknown; `x@2` in the second experiment.
     pub name: String,
-    /// What it is.
+    /// Role of the unknown.
     pub role: Role,
-    /// The Taylor coefficient of an unknown input that it is.
+    /// Order of the Taylor coefficient, for an unknown input; 0 for others.
     pub derivative: usize,
-    /// The experiment it belongs to; parameters belong to all.
+    /// Experiment of the unknown; `None` for parameters, which all experiments share.
     pub experiment: Option<usize>,
 }
 
-/// The unknowns of a system, and how far it has to be differentiated.
+/// Unknowns of a system, and the orders to which it has to be differentiated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// Every lane.
+    /// Unknowns, in the order of the columns.
     pub unknowns: Vec<Unknown>,
-    /// The highest order that is looked at.
+    /// Highest order of derivatives.
     pub bound: usize,
-    /// The point is generic and every input is, so that an order that adds nothing is the end.
+    /// True if the point and every input are generic, so that an order that adds nothing is the last.
     pub closed: bool,
     /// Number of constraints that follow from the others where these hold.
     pub dependent: usize,
-    /// Signs of the arguments of abs and sign that points should have, those of the first one: verdicts are
-    /// of one side. `None` before the first point.
+    /// Required signs of the arguments of abs and sign at all points: those of the first point, since
+    /// verdicts hold on one side. `None` before the first point.
     pub(super) sides: Option<Signs>,
 }
 
 impl Layout {
-    /// The unknowns of `model`; `bound` overrides the order at which it is given up.
+    /// Unknowns of `model`; `bound` overrides the highest order.
     pub fn new(model: &SystemModel, compiled: &Compiled, bound: Option<usize>) -> Self {
         let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
         let starts = model.states.iter().all(|s| s.start == StateStart::Unknown);
         let jumps = model.segments.iter().any(|s| !s.carry.is_empty());
-        // whether the motion keeps constraints is seen at a point
+        // only a point shows whether the motion keeps constraints
         let free = compiled.constraints.is_empty();
         let closed = starts && !arbitrary && !jumps && !compiled.uses_time() && free;
         let finite: usize = model.unknown_inputs.iter().map(|u| u.1.map_or(1, |d| d + 1)).sum();
@@ -112,37 +112,37 @@ impl Layout {
     }
 }
 
-/// The rows of a system at one random point of one field.
+/// Rows of a system at one random point of one field.
 #[derive(Debug, Clone)]
 pub(crate) struct SystemRows<'a, S: Values> {
     field: S,
     lanes: usize,
-    runs: Vec<Run<'a, S>>,
+    runs: Vec<RunRows<'a, S>>,
     bound: usize,
     /// Work of the points that were tried, and of all rows so far.
     work: &'a Work,
-    /// Of the ranks at generic points.
+    /// Margin of the ranks at generic points.
     gap: Gap,
 }
 
-/// Why a run needs to be followed no further.
+/// Condition that ends a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum End {
+enum EndCondition {
     /// The point is generic: an order that adds nothing is the last.
     Stagnation,
-    /// No rank beyond this one is possible: it is that at a generic point, of all outputs together, or of
+    /// No higher rank is possible: these are the ranks at a generic point, of all outputs together, or of
     /// each alone.
     Rank(Vec<usize>),
-    /// Nothing moves: the rows are `C A^k`, and by Cayley and Hamilton those of this order are the last that
-    /// can add anything.
+    /// The system is at rest: the rows are `C A^k`, and by Cayley-Hamilton those of this order are the last
+    /// that can add anything.
     Order(usize),
-    /// Nothing is known.
+    /// No end is proven.
     Open,
 }
 
-impl End {
-    /// True if a run needs to be followed no further: its rows, or those of one of its outputs, had this rank
-    /// after an order that `grew`.
+impl EndCondition {
+    /// True if a run has ended: its rows, or those of one of its outputs, have this rank after an order;
+    /// `grew` is true if that order raised the rank.
     fn is_reached(&self, output: usize, order: usize, grew: bool, rank: usize) -> bool {
         match self {
             Self::Stagnation => !grew,
@@ -154,22 +154,22 @@ impl End {
 }
 
 #[derive(Debug, Clone)]
-struct Run<'a, S: Values> {
+struct RunRows<'a, S: Values> {
     taylor: Taylor<'a, S>,
-    /// Its rows, where there are many lanes.
+    /// Rows computed backwards, if there are many unknowns.
     adjoint: Option<Adjoint<'a, S>>,
     outputs: &'a [usize],
-    /// Its own rank.
+    /// Span of the run's own rows.
     own: S::Space,
-    end: End,
+    end: EndCondition,
     done: bool,
-    /// Differentials of the constraints at the start of its experiment.
+    /// Differentials of the constraints at the start of the experiment.
     known: Rows<S>,
-    /// Gradients of the combinations at its start.
+    /// Gradients of the combinations at the start of the run.
     combinations: Rows<S>,
 }
 
-/// A random prime `2^60 < p < 2^61`.
+/// Field modulo a random prime `2^60 < p < 2^61`.
 pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
     loop {
         let p = (1 << 60) + rng.below(1 << 60) / 2 * 2 + 1;
@@ -179,12 +179,12 @@ pub(crate) fn random_field(rng: &mut SplitMix64) -> Field {
     }
 }
 
-/// Points that are drawn until one is on the side that is asked for.
+/// Number of points drawn until one is on the required side.
 const SIDES: usize = 200;
 
-/// Runs of a system at a point, beyond one for each segment and experiment.
+/// Additional runs at a point, beyond one for each segment and experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Followed {
+struct AdditionalRuns {
     /// Number of runs from the same start with other values of the generic inputs.
     others: usize,
     /// True if every output is followed to the end of its own rows.
@@ -194,7 +194,7 @@ struct Followed {
 /// Rows over the unknowns.
 pub(super) type Rows<S> = Vec<Vec<<S as Scalars>::Element>>;
 
-/// What the runs of one experiment share at a point.
+/// Values at a point that the runs of one experiment share.
 #[derive(Clone)]
 pub(super) struct Point<S: Values> {
     pub(super) signals: Vec<Signal<S::Element>>,
@@ -204,7 +204,7 @@ pub(super) struct Point<S: Values> {
 }
 
 impl<S: Values> Point<S> {
-    /// The point with known inputs that are generic at constant values.
+    /// The point with generic known inputs replaced by constant values.
     fn with_constant_inputs(&self, mut constant: impl FnMut() -> S::Element) -> Self {
         let mut out = self.clone();
         for signal in &mut out.signals {
@@ -216,8 +216,8 @@ impl<S: Values> Point<S> {
     }
 }
 
-/// Everything a point is made from.
-pub(super) struct Maker<'a, 'b, S: Values> {
+/// Builder of points: model, graph, unknowns, field and work.
+pub(super) struct PointBuilder<'a, 'b, S: Values> {
     pub(super) model: &'b SystemModel,
     pub(super) compiled: &'a Compiled,
     pub(super) layout: &'b Layout,
@@ -225,13 +225,13 @@ pub(super) struct Maker<'a, 'b, S: Values> {
     pub(super) work: &'b Work,
 }
 
-impl<'a, S: Values> Maker<'a, '_, S> {
+impl<'a, S: Values> PointBuilder<'a, '_, S> {
     fn slot_of(&self, role: Role) -> Option<usize> {
         self.compiled.roles.iter().position(|r| *r == role)
     }
 
-    /// Random values of all that is not given; lanes of states as the layout has them, or counted through
-    /// where every state is one.
+    /// Random values of all slots that are not given. Columns of states are those of the layout, or
+    /// consecutive numbers if every state is an unknown.
     fn draw(
         &self,
         experiment: usize,
@@ -241,7 +241,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         attempt: usize,
     ) -> Result<Point<S>, Singular> {
         let (f, model) = (&self.field, self.model);
-        // each slot looks for its lane
+        // each slot searches for its column
         let looks = self.compiled.roles.len().saturating_mul(self.layout.unknowns.len());
         self.work.take(Step::Points, looks as u64, 0)?;
         let mut random = || f.random(rng, attempt);
@@ -274,8 +274,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         Ok(Point { signals, initial, seed: rng.next_u64(), experiment })
     }
 
-    /// Values of all slots at a start: those that are given, random ones of all else. `None` where a given
-    /// one is not defined.
+    /// Values of all slots at a start: given ones, and random ones for the rest. `None` if a given one is
+    /// not defined.
     pub(super) fn values(&self, rng: &mut SplitMix64, attempt: usize) -> Option<Vec<S::Element>> {
         let f = &self.field;
         let random =
@@ -310,7 +310,8 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         )
     }
 
-    /// Gives constants the values of their formulas, one after the other: one may use those before it.
+    /// Sets constants to the values of their formulas, one after the other: a formula may use constants
+    /// before it.
     fn set_constants(
         &self,
         point: &mut Point<S>,
@@ -338,7 +339,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         }
     }
 
-    /// Gives states the values of their formulas, all at once.
+    /// Sets states to the values of their formulas, all at once.
     fn set_states(&self, point: &mut Point<S>, formulas: &[(usize, usize)]) -> Result<(), Singular> {
         if formulas.is_empty() {
             return Ok(());
@@ -356,7 +357,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         Ok(())
     }
 
-    /// The series of a run.
+    /// Taylor series of a run.
     fn series(&self, point: &Point<S>, lanes: usize) -> Result<Taylor<'a, S>, Singular> {
         let compiled = self.compiled;
         let roots: Vec<usize> =
@@ -374,7 +375,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         )
     }
 
-    /// The rows of a run without lanes in every node, where there are many.
+    /// Rows of a run computed backwards; `None` if there are few unknowns.
     fn adjoint(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
         let outputs = self.compiled.outputs(point.experiment).len();
         if lanes < MANY && lanes < LONG * outputs { None } else { self.backwards(point, lanes) }
@@ -387,7 +388,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         Adjoint::new(dag, f, lanes, &point.signals, &point.initial, outputs, values)
     }
 
-    /// A run at a random point, by lanes and backwards.
+    /// A run at a random point, computed forwards and backwards.
     #[cfg(test)]
     pub(super) fn both(&self, rng: &mut SplitMix64) -> (Taylor<'a, S>, Adjoint<'a, S>) {
         let f = &self.field;
@@ -399,10 +400,10 @@ impl<'a, S: Values> Maker<'a, '_, S> {
         (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
     }
 
-    /// The ranks that the rows of a run cannot exceed, of all outputs together or of each `apart`: those at a
-    /// generic point, where every state is an unknown, the time is anything, and the first order that adds
-    /// nothing is the last; seen through the derivatives of the run's states by the unknowns. A minor that is
-    /// not zero at the run's own point is not zero there either.
+    /// Upper bounds on the ranks of a run's rows, of all outputs together or (`apart`) of each. They are the
+    /// ranks at a generic point, where every state is an unknown, the time is arbitrary, and the first order
+    /// that adds nothing is the last, multiplied by the derivatives of the run's states by the unknowns. A
+    /// minor that is not zero at the run's own point is not zero there either.
     fn generic_ranks(
         &self,
         point: &Point<S>,
@@ -459,7 +460,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
                 {
                     let group = i.min(groups - 1);
                     grew |= whole[group].insert(&row);
-                    // by the unknowns themselves, and through the states
+                    // derivatives by the unknowns themselves, and through the states
                     let mut through = row[..unknowns].to_vec();
                     for (x, &slot) in row[unknowns..].iter().zip(&states) {
                         for (lane, d) in point.initial[slot].iter().flat_map(|s| &s.1) {
@@ -483,7 +484,7 @@ impl<'a, S: Values> Maker<'a, '_, S> {
     }
 }
 
-/// What the rows of a run cost.
+/// Cost of the rows of a run.
 fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs: usize) -> Cost {
     let [fixed, growing, nodes, products] = taylor.operations();
     Cost {
@@ -498,7 +499,7 @@ fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs
     }
 }
 
-/// The rows of an order of all outputs.
+/// Rows of an order of all outputs.
 fn rows_of<S: Values>(
     taylor: &mut Taylor<'_, S>,
     adjoint: Option<&mut Adjoint<'_, S>>,
@@ -517,12 +518,12 @@ fn rows_of<S: Values>(
     outputs.iter().map(row).collect()
 }
 
-/// What is given, with its place.
+/// Given entries, each with its index.
 fn given(list: &[Option<usize>]) -> Vec<(usize, usize)> {
     list.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).collect()
 }
 
-/// A row with zeros where it has no lanes.
+/// Full row of a sparse one: zeros outside its support.
 pub(super) fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
     let mut out = vec![f.zero(); lanes];
     for (&lane, x) in support.iter().zip(row) {
@@ -532,10 +533,10 @@ pub(super) fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::E
 }
 
 impl<'a, S: Values> SystemRows<'a, S> {
-    /// The rows of a system at a random point.
+    /// Rows of a system at a random point.
     ///
     /// # Errors
-    /// [`Singular`] when no point could be found, or where `work` refused to look further.
+    /// [`Singular`] if no point was found, or if `work` refused to continue.
     pub(crate) fn new(
         model: &SystemModel,
         compiled: &'a Compiled,
@@ -544,15 +545,15 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed::default())
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns::default())
     }
 
-    /// The rows of a system at a random point, then those of so many runs from the same start with other
-    /// values of the generic inputs: the first with zeros, the others with random constants.
+    /// Rows of a system at a random point, then of `others` runs from the same start with other values of
+    /// the generic inputs: the first with zeros, the others with random constants.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// [`Singular`], as for [`Self::new`].
     pub(super) fn with_inputs(
         model: &SystemModel,
         compiled: &'a Compiled,
@@ -561,21 +562,21 @@ impl<'a, S: Values> SystemRows<'a, S> {
         (rng, others): (&mut SplitMix64, usize),
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed { others, apart: false })
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns { others, apart: false })
     }
 
     fn drawn(
-        maker: &Maker<'a, '_, S>,
+        builder: &PointBuilder<'a, '_, S>,
         work: &'a Work,
         rng: &mut SplitMix64,
-        followed: Followed,
+        followed: AdditionalRuns,
     ) -> Result<Self, Singular> {
-        let (compiled, layout) = (maker.compiled, maker.layout);
+        let (compiled, layout) = (builder.compiled, builder.layout);
         let mut last = Singular::Division(0);
         let (mut attempt, mut tries, mut elsewhere) = (0, 0, None);
         while attempt < S::ATTEMPTS {
-            match Self::at(maker, work, (rng, followed), attempt) {
+            match Self::at(builder, work, (rng, followed), attempt) {
                 Err(singular) if singular != Singular::Refused => {
                     last = singular;
                     attempt += 1;
@@ -591,19 +592,19 @@ impl<'a, S: Values> SystemRows<'a, S> {
         elsewhere.ok_or(last)
     }
 
-    /// True if the arguments of abs and sign have the signs that the layout asks for.
+    /// True if the arguments of abs and sign have the signs that the layout requires.
     fn is_on_side(&self, compiled: &Compiled, layout: &Layout) -> bool {
         layout.sides.as_ref().is_none_or(|sides| *sides == self.signs(&sided(compiled)))
     }
 
     fn at(
-        maker: &Maker<'a, '_, S>,
+        builder: &PointBuilder<'a, '_, S>,
         work: &'a Work,
-        (rng, followed): (&mut SplitMix64, Followed),
+        (rng, followed): (&mut SplitMix64, AdditionalRuns),
         attempt: usize,
     ) -> Result<Self, Singular> {
-        let (model, compiled, f) = (maker.model, maker.compiled, &maker.field);
-        let lanes = maker.layout.unknowns.len();
+        let (model, compiled, f) = (builder.model, builder.compiled, &builder.field);
+        let lanes = builder.layout.unknowns.len();
         let mut parameters: Vec<S::Element> =
             model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
         let mut constants: Vec<S::Element> = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
@@ -618,9 +619,9 @@ impl<'a, S: Values> SystemRows<'a, S> {
             StartTime::Generic => f.random(rng, attempt),
         };
         for experiment in 0..model.experiments.max(1) {
-            let mut point = maker.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
-            maker.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
-            maker.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
+            let mut point = builder.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
+            builder.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
+            builder.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
             let value = |slot: usize| match &point.signals[slot] {
                 Signal::Constant { value, .. } => Some(*value),
                 _ => None,
@@ -632,86 +633,88 @@ impl<'a, S: Values> SystemRows<'a, S> {
                     _ => {}
                 }
             }
-            maker.set_states(&mut point, &given(&compiled.starts))?;
-            let (known, kept) = maker.constraints(&point)?;
+            builder.set_states(&mut point, &given(&compiled.starts))?;
+            let (known, kept) = builder.constraints(&point)?;
             let mut generic = kept && model.states.iter().all(|s| s.start == StateStart::Unknown);
             let mut begins = time;
             for (number, segment) in segments.iter().enumerate() {
                 if number > 0
-                    && let Some(slot) = maker.slot_of(Role::Time)
+                    && let Some(slot) = builder.slot_of(Role::Time)
                 {
-                    // when a later segment begins is not given, but it is later
+                    // the start time of a later segment is not given, but it is later
                     let lasts = f.random(rng, 0);
                     let lasts = if f.is_positive(&lasts) == Some(false) { f.neg(&lasts) } else { lasts };
                     begins = f.add(&begins, &lasts);
                     point.signals[slot] = Signal::Time { value: begins };
                 }
-                maker.set_constants(&mut point, &segment.constants, true)?;
-                maker.set_states(&mut point, &segment.carry)?;
+                builder.set_constants(&mut point, &segment.constants, true)?;
+                builder.set_states(&mut point, &segment.carry)?;
                 generic &= segment.carry.is_empty();
-                let taylor = maker.series(&point, lanes)?;
+                let taylor = builder.series(&point, lanes)?;
                 let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
                 let combinations = compiled.combinations.iter().map(gradient).collect();
                 let end = match () {
-                    () if arbitrary => End::Open,
-                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => End::Stagnation,
-                    () if taylor.is_at_rest() => End::Order(lanes + model.states.len()),
-                    () => match maker.generic_ranks(&point, &known, followed.apart, rng) {
-                        None => End::Open,
+                    () if arbitrary => EndCondition::Open,
+                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => {
+                        EndCondition::Stagnation
+                    }
+                    () if taylor.is_at_rest() => EndCondition::Order(lanes + model.states.len()),
+                    () => match builder.generic_ranks(&point, &known, followed.apart, rng) {
+                        None => EndCondition::Open,
                         Some((ranks, clear)) => {
                             gap = gap.and(clear);
-                            End::Rank(ranks)
+                            EndCondition::Rank(ranks)
                         }
                     },
                 };
                 let own = S::Space::new(f.clone(), lanes);
                 let outputs = compiled.outputs(experiment);
-                let adjoint = maker.adjoint(&point, lanes);
+                let adjoint = builder.adjoint(&point, lanes);
                 let known = known.clone();
-                runs.push(Run { taylor, adjoint, outputs, own, end, done: false, known, combinations });
+                runs.push(RunRows { taylor, adjoint, outputs, own, end, done: false, known, combinations });
                 for number in 0..followed.others {
                     let other = point.with_constant_inputs(|| match number {
                         0 => f.zero(),
                         _ => f.random(rng, attempt),
                     });
-                    let taylor = maker.series(&other, lanes)?;
-                    runs.push(Run { taylor, ..runs[0].clone() });
+                    let taylor = builder.series(&other, lanes)?;
+                    runs.push(RunRows { taylor, ..runs[0].clone() });
                 }
             }
         }
-        Ok(Self { field: f.clone(), lanes, runs, bound: maker.layout.bound, work, gap })
+        Ok(Self { field: f.clone(), lanes, runs, bound: builder.layout.bound, work, gap })
     }
 
-    /// The gradients of the combinations at the start of the first run.
+    /// Gradients of the combinations at the start of the first run.
     pub(crate) fn combinations(&self) -> &[Vec<S::Element>] {
         self.runs.first().map_or(&[], |r| &r.combinations)
     }
 
-    /// Signs of some nodes at the start of every run, where they take part.
+    /// Signs of some nodes at the start of every run in which they occur.
     pub(crate) fn signs(&self, nodes: &[usize]) -> Signs {
-        let sign = |run: &Run<'_, S>, node: usize| {
+        let sign = |run: &RunRows<'_, S>, node: usize| {
             let taylor = &run.taylor;
             taylor.takes_part(node).then(|| self.field.is_positive(&taylor.start(node))).flatten()
         };
         nodes.iter().map(|&node| self.runs.iter().map(|run| sign(run, node)).collect()).collect()
     }
 
-    /// How clear the ranks of single runs were.
+    /// Margin of the ranks of single runs.
     pub(crate) fn gap(&self) -> Gap {
         self.runs.iter().fold(self.gap, |gap, run| gap.and(run.own.gap()))
     }
 
     /// True if every run starts at a generic point.
     pub(crate) fn is_generic(&self) -> bool {
-        self.runs.iter().all(|r| r.end == End::Stagnation)
+        self.runs.iter().all(|r| r.end == EndCondition::Stagnation)
     }
 
-    /// True if the end of every run is proven, as far as its orders were asked for.
+    /// True if the end of every run is proven, as far as its orders were requested.
     pub(crate) fn is_done(&self) -> bool {
         self.runs.iter().all(|r| r.done)
     }
 
-    /// The derivative of this order of a node at the start of the first run.
+    /// Derivative of the given order of a node at the start of the first run.
     pub(crate) fn derivative(&mut self, node: usize, order: usize) -> S::Element {
         let f = self.field.clone();
         let Some(run) = self.runs.first_mut() else { return f.zero() };
@@ -727,13 +730,13 @@ impl<'a, S: Values> SystemRows<'a, S> {
         (1..=order).fold(value, |x, k| f.mul(&x, &f.integer(k as i64)))
     }
 
-    /// The Taylor coefficient of a node at the start of a run.
+    /// Taylor coefficient of a node at the start of a run.
     pub(super) fn coefficient(&mut self, run: usize, node: usize, order: usize) -> S::Element {
         let taylor = &mut self.runs[run].taylor;
         while taylor.length <= order {
             taylor.advance();
         }
-        // of a jump into the run nothing takes part in it
+        // a node that occurs only in a jump takes no part in the run
         match order {
             0 => taylor.start_of(node).unwrap_or(self.field.zero()),
             _ => taylor.value(node, order),
@@ -745,7 +748,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         self.runs[run].taylor.is_known(node)
     }
 
-    /// The value of every unknown at this point, then of every known constant (in the first segment).
+    /// Value of every unknown at this point, then of every known constant (in the first segment).
     pub(crate) fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<S::Element> {
         let segments = compiled.segments.len().max(1);
         let node_of = |role: Role| compiled.node_of(role);
@@ -781,15 +784,16 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
                 return false;
             }
             let (mut grew, before) = (false, run.own.refined());
-            // a constraint is an output of which only the start is known
+            // a constraint is an output that is known at the start only
             for row in run.known.iter().filter(|_| order == 0) {
                 sink(row);
                 run.own.insert(row);
             }
             for row in rows_of(&mut run.taylor, run.adjoint.as_mut(), run.outputs, order) {
                 let new = sink(&row);
-                // where runs share the rank, each has to be followed until its own stalls
-                grew |= if single && run.end == End::Stagnation { new } else { run.own.insert(&row) };
+                // runs that share the rank are each followed until their own rank stalls
+                grew |=
+                    if single && run.end == EndCondition::Stagnation { new } else { run.own.insert(&row) };
             }
             let again = (run.own.refined() - before).saturating_mul(product::<S::Element>());
             if self.work.take(Step::Derivatives(order), again, 0).is_err() {

@@ -1,9 +1,9 @@
-//! Solving expressions: what an unknown is in terms of outputs, inputs, their derivatives, and unknowns that
-//! are solved with fewer.
+//! Solving expressions: an unknown in terms of outputs, inputs, their derivatives, and unknowns of lower
+//! degrees.
 //!
 //! Elimination over the first prime field finds them (`elimination`), with integers recovered from it
 //! (`formula`). Every expression is then evaluated at random points of both prime fields, where it must give
-//! the unknown's value, and only what holds is shown.
+//! the unknown's value. Only expressions that pass are shown.
 
 use std::collections::BTreeSet;
 
@@ -24,73 +24,74 @@ use super::values::Values;
 use super::work::Work as VerdictWork;
 use crate::language::{Environment, Names, evaluate, parse_with};
 
-/// Most unknowns.
+/// Largest number of unknowns.
 const UNKNOWNS: usize = 30;
-/// Highest order.
+/// Highest order of derivatives.
 const ORDER: usize = 16;
-/// Orders beyond its degree to which an expression may go: there what has finitely many solutions may have
-/// one.
+/// Number of orders beyond its degree to which an expression may go: there an unknown with finitely many
+/// solutions may have one.
 const BEYOND: usize = 2;
-/// Longest expression that is kept.
+/// Longest expression that is kept, in characters.
 const KEPT: usize = 50_000;
-/// Products of coefficients that the elimination may take: about a second.
+/// Limit of products of coefficients of the elimination: about a second.
 const WORK: u64 = 100_000_000;
 
-/// A symbol of expressions.
+/// Symbol in expressions.
 #[derive(Debug, Clone)]
 struct Symbol {
-    /// Its name, which is that of no other.
+    /// Internal name, which no other symbol has.
     raw: String,
-    /// Its name in the answer.
+    /// Name in the answer.
     shown: String,
-    /// The node and the order of the derivative that it stands for.
+    /// Node and derivative order that the symbol stands for.
     node: Option<usize>,
     order: usize,
 }
 
-/// Why there are no solving expressions, or some are missing.
+/// Reasons why there are no solving expressions, or why some are missing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NoExpressions {
-    /// Experiments or segments.
+    /// The model has several experiments or segments.
     #[error("no solving expressions: they are sought for a single experiment without segments")]
     Parts,
     /// An input is unknown.
     #[error("no solving expressions: they are not sought where an input is unknown")]
     UnknownInput,
-    /// Too large a system.
+    /// The system is too large.
     #[error("no solving expressions: more than {UNKNOWNS} unknowns, or a degree above {ORDER}")]
     TooMany,
-    /// A function in an equation.
+    /// An equation contains a function.
     #[error(
-        "solving expressions are sought for models without functions only (elsewhere only where an unknown is an output or its derivative)"
+        "solving expressions are sought for models without functions only (elsewhere only where an unknown \
+         is an output or its derivative)"
     )]
     NotRational,
-    /// The work of the elimination.
+    /// The elimination exceeds its limit of work.
     #[error(
         "solving expressions are missing where the elimination is beyond its limit of work, which no option raises"
     )]
     OverLimit,
 }
 
-/// What an unknown is.
+/// Solving expression of an unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Expression {
-    /// In the names of the model.
+pub(super) struct SolvingExpression {
+    /// Text in the names of the model.
     pub(super) text: String,
-    /// Every unknown in it is known to have one solution, or has such an expression itself; in the end they
-    /// rest on outputs, inputs and constants: there is one solution.
+    /// True if the unknown is known to have one solution: every unknown in the expression has one solution,
+    /// or has such an expression itself. In the end they depend on outputs, inputs and constants alone.
     pub(super) unique: bool,
 }
 
-/// Expressions for the unknowns, in the order of the layout, and why there are none, or some are missing;
-/// `single` says of which it is known otherwise that they have one solution.
+/// Expressions for the unknowns, in the order of the layout, and the reason why there are none, or why some
+/// are missing; `single` is true for unknowns that are otherwise known to have one solution.
 pub(super) fn solutions(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
     seed: u64,
     single: &[bool],
-) -> (Vec<Option<Expression>>, Option<NoExpressions>) {
+) -> (Vec<Option<SolvingExpression>>, Option<NoExpressions>) {
     let n = judged.layout.unknowns.len();
     let none = |reason| (vec![None; n], reason);
     let highest = judged.findings.degrees.degree.iter().flatten().copied().max();
@@ -120,12 +121,12 @@ pub(super) fn solutions(
     let unique = unique(&rests_on, single);
     let kept = |((text, on), unique): ((Option<String>, Option<BTreeSet<usize>>), bool)| {
         let text = on.and(text)?;
-        Some(Expression { text: shown(&text, &signals.symbols), unique })
+        Some(SolvingExpression { text: shown(&text, &signals.symbols), unique })
     };
     (out.into_iter().zip(rests_on).zip(unique).map(kept).collect(), reason)
 }
 
-/// The name of an unknown in expressions before they are shown.
+/// Internal name of an unknown in expressions.
 fn raw(role: Role) -> String {
     match role {
         Role::State(i) => format!("x_{i}"),
@@ -137,7 +138,7 @@ fn raw(role: Role) -> String {
     }
 }
 
-/// The texts of states, then of constants, in the order of the layout, without those that are too long.
+/// Texts of states, then of constants, in the order of the layout, without those that are too long.
 fn in_layout(
     model: &SystemModel,
     judged: &Judgement,
@@ -154,7 +155,7 @@ fn in_layout(
     out
 }
 
-/// Expressions by elimination over the field, and whether all were sought within its work.
+/// Expressions by elimination over the field, and true if all were sought within the limit of work.
 fn by_elimination(
     mut s: Algebra,
     model: &SystemModel,
@@ -193,7 +194,7 @@ fn by_elimination(
     Ok((in_layout(model, judged, texts), complete))
 }
 
-/// The nodes that rates and outputs are made of, as fractions; `None` where their work is beyond the limit.
+/// Nodes that rates and outputs depend on, as fractions; `None` if their work exceeds the limit.
 fn fractions(
     s: &mut Algebra,
     compiled: &Compiled,
@@ -240,7 +241,7 @@ fn fractions(
     Ok(Some(out))
 }
 
-/// The unknowns in every expression.
+/// Unknowns in every expression.
 fn rests_on(
     judged: &Judgement,
     compiled: &Compiled,
@@ -248,15 +249,15 @@ fn rests_on(
     expressions: &[Option<String>],
 ) -> Vec<Option<BTreeSet<usize>>> {
     let lane_of = |word: &str| {
-        // of states, parameters and inputs that are unknown; an output may share the node of one
+        // symbols of unknown states, parameters and inputs; an output may share the node of one
         let symbol = symbols.iter().find(|s| s.raw == word && word.starts_with(['x', 'p', 'w']))?;
         judged.layout.unknowns.iter().position(|u| compiled.node_of(u.role) == symbol.node)
     };
     expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect()
 }
 
-/// Drops what is no solution: an expression that holds its own unknown, itself or in those of the unknowns in
-/// it.
+/// Drops expressions that are no solutions: an expression contains its own unknown, directly or through the
+/// expressions of the unknowns in it.
 fn drop_circles(rests_on: &mut [Option<BTreeSet<usize>>]) {
     for lane in 0..rests_on.len() {
         let (mut seen, mut left) = (BTreeSet::new(), vec![lane]);
@@ -267,7 +268,7 @@ fn drop_circles(rests_on: &mut [Option<BTreeSet<usize>>]) {
     }
 }
 
-/// Which expressions rest on nothing but what is `single` or has an expression that does.
+/// True for expressions that depend only on unknowns that are `single` or have such an expression.
 fn unique(rests_on: &[Option<BTreeSet<usize>>], single: &[bool]) -> Vec<bool> {
     let mut unique = vec![false; rests_on.len()];
     loop {
@@ -289,29 +290,29 @@ fn roles_of_parameters(model: &SystemModel) -> impl Iterator<Item = Role> {
         .chain((0..model.unknown_inputs.len()).map(Role::UnknownInput))
 }
 
-/// The symbols of a system, by their places in the list.
+/// Symbols of a system, by their indices in the list.
 struct Signals {
     symbols: Vec<Symbol>,
-    /// The symbol of every slot; `None` of one that has none.
+    /// Symbol of every slot; `None` for a slot without one.
     slots: Vec<Option<usize>>,
     states: Vec<usize>,
-    /// Unknown constants.
+    /// Symbols of the unknown constants.
     parameters: Vec<usize>,
-    /// Of every output: `y, y', y'', ...`.
+    /// Symbols of every output and its derivatives: `y, y', y'', ...`.
     outputs: Vec<Vec<usize>>,
-    /// Of every known input: `u, u', ...`, and whether the derivatives beyond vanish.
+    /// Symbols of every known input and its derivatives: `u, u', ...`; true if further derivatives vanish.
     inputs: Vec<(Vec<usize>, bool)>,
     time: Option<usize>,
     /// Known starts: state, and the symbol of its value.
     starts: Vec<(usize, usize)>,
     /// Degree of every state, then of every unknown constant.
     degrees: Vec<Option<usize>>,
-    /// Unknown constants that a symmetry moves.
+    /// Unknown constants that a symmetry changes.
     free: Vec<usize>,
 }
 
 impl Signals {
-    /// Of a model whose expressions are sought.
+    /// Symbols of a model whose expressions are sought.
     fn new(
         model: &SystemModel,
         compiled: &Compiled,
@@ -395,7 +396,7 @@ impl Signals {
     }
 }
 
-/// `y`, `y'`, `y''`, `y'''`, `y^(4)`.
+/// Name of a derivative: `y`, `y'`, `y''`, `y'''`, `y^(4)`.
 fn derivative(name: &str, order: usize) -> String {
     match order {
         0..=3 => format!("{name}{}", "'".repeat(order)),
@@ -403,9 +404,9 @@ fn derivative(name: &str, order: usize) -> String {
     }
 }
 
-struct Point<'a>(&'a [(String, u64)]);
+struct SymbolPoint<'a>(&'a [(String, u64)]);
 
-impl Environment for Point<'_> {
+impl Environment for SymbolPoint<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         self.0.iter().find(|(n, _)| n == name).map(|(_, x)| *x)
     }
@@ -419,7 +420,7 @@ impl Environment for Point<'_> {
     }
 }
 
-/// Whether the expressions give the unknowns at a random point.
+/// True, per expression, if it gives its unknown at a random point.
 fn check(
     model: &SystemModel,
     compiled: &Compiled,
@@ -441,14 +442,14 @@ fn check(
     let holds = |(text, truth): (&Option<String>, &u64)| {
         let value = text.as_ref().and_then(|t| {
             let parsed = parse_with(t, Names::Plain).ok()?;
-            evaluate(&parsed, &field, &Point(&values)).ok()
+            evaluate(&parsed, &field, &SymbolPoint(&values)).ok()
         });
         value == Some(*truth)
     };
     expressions.iter().zip(&truth).map(holds).collect()
 }
 
-/// Names and what stands between them.
+/// Names in a text and the parts between them.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {

@@ -1,97 +1,97 @@
-//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that no output
-//! sees, at any point.
+//! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that change no
+//! output, at any point.
 
 use obsdeg_exact::{Reals, RowSpace};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{At, Judgement, climb_at};
+use super::judge::{Judgement, PointDegrees, climb_at};
 use super::model::{Compiled, SystemModel};
 use super::values::Values;
 use super::work::{Spent, WorkLimit, product};
 use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, support_in};
 
-/// Points at which a direction must vanish, at most.
+/// Largest number of points at which a direction must vanish.
 const POINTS: usize = 8;
-/// Points with other verdicts, where constraints hold in several ways, before no more are drawn.
+/// Number of points with other verdicts, if constraints hold in several ways, before no more are drawn.
 const ELSEWHERE: usize = 24;
-/// Most unknowns among which directions that are polynomials in them are sought.
+/// Largest number of unknowns among which polynomial directions are sought.
 const MOVED: usize = 16;
-/// Verdicts on changes for which work is left, where they take no more than a tenth of it.
+/// Number of verdicts on changes for which work is reserved, if they take at most a tenth of it.
 const RESERVED: u64 = 40;
-/// Points that these take, at most.
+/// Largest number of points of polynomial directions.
 const POLYNOMIAL_POINTS: usize = 400;
-/// Their highest degree.
+/// Highest degree of polynomial directions.
 pub const POLYNOMIAL_DEGREE: usize = 4;
 
-/// A rational coefficient of an unknown.
-pub(crate) type Term = (usize, (i64, i64));
+/// Rational coefficient of an unknown.
+pub(crate) type RationalTerm = (usize, (i64, i64));
 
-/// A direction in which nothing changes: `x_i` grows by `c_i x_i + d_i`.
+/// Direction that changes no output: `x_i` grows by `c_i x_i + d_i`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Symmetry {
-    /// The `c_i` that are not zero.
-    pub scaling: Vec<Term>,
-    /// The `d_i` that are not zero.
-    pub translation: Vec<Term>,
+    /// Coefficients `c_i` other than zero.
+    pub scaling: Vec<RationalTerm>,
+    /// Constants `d_i` other than zero.
+    pub translation: Vec<RationalTerm>,
 }
 
-/// What stays the same: a product of powers, or a sum.
+/// Invariant of the symmetries: a product of powers, or a sum.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invariant {
-    /// Integer exponents (or, of a sum, coefficients).
+    /// Integer exponents of a product, or coefficients of a sum.
     pub terms: Vec<(usize, i64)>,
-    /// A product of powers, not a sum.
+    /// True for a product of powers, false for a sum.
     pub product: bool,
-    /// Its degree.
+    /// Observable degree of the invariant.
     pub degree: usize,
 }
 
-/// The factors of a product, and its rational coefficient.
+/// Factors of a product, and its rational coefficient.
 pub(crate) type PolynomialTerm = (Vec<usize>, (i64, i64));
 
-/// A direction whose components are polynomials in the unknowns and the known constants:
-/// `(unknown, [(factors, coefficient)])`; a factor is an unknown or a known constant (counted on behind the
+/// Direction whose components are polynomials in the unknowns and the known constants:
+/// `(unknown, [(factors, coefficient)])`. A factor is an unknown or a known constant (numbered after the
 /// unknowns).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PolynomialDirection {
-    /// Of every unknown that it moves.
+    /// Component of every unknown that the direction changes.
     pub components: Vec<(usize, Vec<PolynomialTerm>)>,
 }
 
-/// The symmetries of a system, and the invariant combinations that they leave observable.
+/// Symmetries of a system, and the invariant combinations that remain observable.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Symmetries {
-    /// Independent ones.
+    /// Independent scalings and translations.
     pub found: Vec<Symmetry>,
-    /// Directions beyond these that are polynomials in the unknowns: turns, for instance.
+    /// Polynomial directions beyond these: rotations, for instance.
     pub polynomial: Vec<PolynomialDirection>,
-    /// What each direction beyond all of these moves: of unobservable directions among unknowns that are
-    /// excited.
+    /// Unknowns that each remaining unobservable direction changes, among excited unknowns.
     pub unexplained: Vec<Vec<usize>>,
     /// Observable combinations of unobservable unknowns.
     pub invariants: Vec<Invariant>,
-    /// Where the search ended before its end: what was too much, and the option that allows more.
+    /// Reason why the search ended early: the exceeded limit, and the option that allows more; `None` if it
+    /// was complete.
     pub stopped: Option<String>,
     /// Operations of the points of the search.
     pub(super) work: u64,
 }
 
-/// Operations that a search for symmetries may still take: all points together as many as one verdict, and
-/// all searches for short vectors as many again.
+/// Operations that remain for a search for symmetries: all points together take at most the limit of one
+/// verdict, and all searches for short vectors as much again.
 struct Budget {
     limit: WorkLimit,
-    /// Operations that the changes that are tried afterwards may need.
+    /// Operations that are reserved for the changes that are tried afterwards.
     reserved: u64,
     spent: u64,
-    /// Operations of the searches for short vectors.
+    /// Operations that remain for the searches for short vectors.
     short: u64,
-    /// True once something was refused.
+    /// True once an operation was refused.
     over: bool,
 }
 
 impl Budget {
-    /// Counts operations before they are done; false if they are beyond the limit.
+    /// Counts operations before they are done; false if they exceed the limit.
     fn spend(&mut self, operations: u64) -> bool {
         let most = self.limit.operations().saturating_sub(self.reserved);
         self.over |= self.spent.saturating_add(operations) > most;
@@ -101,16 +101,15 @@ impl Budget {
         !self.over
     }
 
-    /// Puts a row into a space, and counts what that took beyond an elimination; false if it is beyond the
-    /// limit.
+    /// Inserts a row into a space, and counts the work beyond an elimination; false if it exceeds the limit.
     fn insert<S: Values>(&mut self, space: &mut S::Space, row: &[S::Element]) -> bool {
         let before = space.refined();
         space.insert(row);
         self.spend((space.refined() - before).saturating_mul(product::<S::Element>()))
     }
 
-    /// Independent vectors of the span of `rows` as short as possible, beyond what `span` holds; none where
-    /// they are beyond the limit. `from` is the space that the rows are from.
+    /// Independent vectors of the span of `rows`, as short as possible, outside of `span`; empty if they
+    /// exceed the limit. `from` is the space of the rows.
     fn short_vectors<S: Values>(
         &mut self,
         f: &S,
@@ -118,7 +117,7 @@ impl Budget {
         from: &S::Space,
         span: &mut S::Space,
     ) -> Vec<Vec<S::Element>> {
-        // what was made anew there is made anew here, row by row
+        // rows that were recomputed there are recomputed here, row by row
         let again = if from.refined() > 0 { rows.len() as u64 } else { 1 };
         let products = products_of_short_vectors(rows.len(), span.columns()).saturating_mul(again);
         let short = self.short.saturating_add(products.saturating_mul(product::<S::Element>()));
@@ -130,13 +129,14 @@ impl Budget {
         extend_by_short_vectors(f, rows, span)
     }
 
-    /// Why the search ended.
+    /// Reason why the search ended; `None` if it did not end early.
     fn stopped(&self) -> Option<String> {
         let limit = self.limit.0;
         self.over.then(|| {
             format!(
-                "not all symmetries were sought: with the changes tried after it the search takes more operations than one verdict may, beyond \
-                 --work-limit {limit} ({:.1e} operations); a larger --work-limit allows more",
+                "not all symmetries were sought: with the changes tried after it the search takes more \
+                 operations than one verdict may, beyond --work-limit {limit} ({:.1e} operations); a \
+                 larger --work-limit allows more",
                 self.limit.operations() as f64
             )
         })
@@ -151,14 +151,14 @@ fn cost_of_point<S: Values>(verdict: u64, rows: usize, columns: usize) -> u64 {
     verdict.saturating_add(elimination)
 }
 
-/// The vector as small rationals, one at its first entry.
+/// Vector as small rationals, scaled to one at its first non-zero entry.
 pub(super) fn rationals<S: Values>(f: &S, v: &[S::Element]) -> Option<Vec<(i64, i64)>> {
     let lead = v.iter().find(|x| !f.is_zero(x))?;
     let inverse = f.inverse(lead)?;
     v.iter().map(|x| f.rational(&f.mul(x, &inverse))).collect()
 }
 
-/// Rationals times their common denominator.
+/// Rationals multiplied by their common denominator.
 pub(super) fn integers(v: &[(i64, i64)]) -> Vec<i64> {
     let common = v.iter().filter(|x| x.0 != 0).fold(1, |l, x| l / gcd(l, x.1) * x.1);
     let scaled: Vec<i64> = v.iter().map(|x| x.0 * (common / x.1)).collect();
@@ -166,11 +166,10 @@ pub(super) fn integers(v: &[(i64, i64)]) -> Vec<i64> {
     scaled.iter().map(|x| x / divisor).collect()
 }
 
-/// The symmetries of a judged model: of a rational one in a prime field, of one with functions in many
-/// digits.
+/// Symmetries of a judged model: in a prime field for a rational one, in many digits for one with functions.
 ///
 /// # Errors
-/// [`ModelError`] when a point cannot be had.
+/// [`ModelError`] if no point is found.
 pub fn symmetries(
     model: &SystemModel,
     compiled: &Compiled,
@@ -200,21 +199,21 @@ fn symmetries_in<S: Values>(
     let mut rng = model.random(seed, "symmetries");
     let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
     let mut basis = space(2 * n);
-    // an unknown that no output sees is said so by itself; an observable one never moves
+    // an unknown that is not excited is reported separately; an observable one never changes
     for c in (0..n).filter(|&c| !excited[c] || judged.findings.degrees.degree[c].is_some()) {
         for column in [c, n + c] {
             let unit: Vec<_> = (0..2 * n).map(|j| if j == column { f.one() } else { f.zero() }).collect();
             basis.insert(&unit);
         }
     }
-    let (mut last, mut at): (usize, Option<At<S>>) = (0, None);
+    let (mut last, mut at): (usize, Option<PointDegrees<S>>) = (0, None);
     let rank = judged.findings.degrees.rank();
     let reserved = judged.work.saturating_mul(RESERVED).min(model.work_limit.operations() / 10);
     let mut budget = Budget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false };
-    // a verdict rests on two points
+    // a verdict takes two points
     let mut verdict = judged.work / 2;
-    // constraints that hold in several ways have points with other verdicts
-    let alike = |at: &At<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
+    // constraints that can hold in several ways have points with other verdicts
+    let alike = |at: &PointDegrees<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
     let (mut point, mut elsewhere) = (0, 0);
     while point < POINTS && elsewhere < ELSEWHERE {
         if !budget.spend(cost_of_point::<S>(verdict, rank, 2 * n)) {
@@ -254,7 +253,7 @@ fn symmetries_in<S: Values>(
     for v in short {
         let tangent: Vec<_> = (0..n).map(|c| f.add(&f.mul(&v[c], &at.values[c]), &v[n + c])).collect();
         let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
-        let terms = |half: &[(i64, i64)]| -> Vec<Term> {
+        let terms = |half: &[(i64, i64)]| -> Vec<RationalTerm> {
             half.iter().copied().enumerate().filter(|(_, k)| k.0 != 0).collect()
         };
         out.found.push(Symmetry { scaling: terms(&k[..n]), translation: terms(&k[n..]) });
@@ -275,7 +274,7 @@ fn symmetries_in<S: Values>(
             }
             Ok(None)
         };
-        // constants that every segment and experiment shares may be factors too
+        // constants that all segments and experiments share may be factors too
         let changed =
             model.segments.iter().map(|s| &s.constants).chain(model.own.iter().map(|e| &e.constants));
         let changed: Vec<&String> = changed.flatten().map(|(name, _)| name).collect();
@@ -329,23 +328,25 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// A verdict at one more random point, for rows of this many columns; none once the work is used up.
-type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<At<S>>, ModelError> + 'a;
+/// Draws one more random point with its verdict, for rows of this many columns; `None` once the work is used
+/// up.
+type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<PointDegrees<S>>, ModelError> + 'a;
 
-/// Directions `v_i = sum_j a_ij m_j` over the unknowns that move, m_j products of unknowns and known
-/// constants: a linear system for the a_ij from rows at several points, which `draw` makes as long as work is
-/// left.
+/// Directions `v_i = sum_j a_ij m_j` over the unknowns that change, with m_j products of unknowns and known
+/// constants. The a_ij solve a linear system of rows at several points, which `draw` provides as long as
+/// work remains.
 fn directions<S: Values>(
     f: &S,
     moved: &[usize],
     products: &[Vec<usize>],
     tangents: &mut S::Space,
-    at: &At<S>,
+    at: &PointDegrees<S>,
     (budget, draw): (&mut Budget, &mut Draw<'_, S>),
 ) -> Result<Vec<PolynomialDirection>, ModelError> {
     let width = products.len();
-    let value =
-        |at: &At<S>, product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]));
+    let value = |at: &PointDegrees<S>, product: &Vec<usize>| {
+        product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]))
+    };
     let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
     let mut basis = space(moved.len() * width);
     let (mut rank, mut still) = (0, 0);
@@ -387,13 +388,13 @@ fn directions<S: Values>(
     Ok(out)
 }
 
-/// Products of powers that every scaling leaves alone, and sums that every translation does, as far as they
-/// are observable.
+/// Products of powers that every scaling leaves unchanged, and sums that every translation leaves unchanged,
+/// as far as they are observable.
 fn invariants<S: Values>(
     f: &S,
     n: usize,
     found: &[Symmetry],
-    at: &At<S>,
+    at: &PointDegrees<S>,
     budget: &mut Budget,
 ) -> Vec<Invariant> {
     let mut out = Vec::new();
@@ -412,7 +413,7 @@ fn invariants<S: Values>(
             }
             rows.insert(&row);
         }
-        // the null vectors of what is not moved are units
+        // null vectors of unknowns that do not change are unit vectors
         let kept: Vec<Vec<S::Element>> =
             rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
         for m in budget.short_vectors(f, &kept, &rows, &mut space()) {

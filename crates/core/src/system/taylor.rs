@@ -1,9 +1,9 @@
-//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (a
-//! dual lane each), in any field.
+//! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (one
+//! dual component each), in any field.
 //!
-//! A node has lanes only for what it can depend on (a weight of a function none at all: of `dF = weight du`
-//! its values are enough), and orders are kept only where a later one needs them: as a factor of a product of
-//! two that change.
+//! A node has dual components (lanes) only for unknowns that it can depend on. The weight of a function has
+//! none: for `dF = weight du` its values suffice. Orders are kept only if a later order needs them, as
+//! factors of a product of two changing nodes.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,65 +12,65 @@ use obsdeg_exact::{SplitMix64, interrupt};
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
-use super::values::{NotHeld, Values};
+use super::values::{ConstraintFailure, Values};
 use super::work::{PER_NODE, Refused, Step, Work, operations_of, product};
 use crate::language::Function;
 
-/// What a slot holds in one run.
+/// Content of a slot in one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Signal<E> {
-    /// A state: the node of its derivative.
+    /// State, by the node of its derivative.
     State {
-        /// The right-hand side.
+        /// Node of the right-hand side.
         rate: usize,
     },
-    /// A number that does not change, with its lane if it is unknown.
+    /// Number that does not change, with its lane if it is unknown.
     Constant {
-        /// The value.
+        /// Value of the number.
         value: E,
-        /// The unknown.
+        /// Lane of the unknown; `None` if the number is known.
         lane: Option<usize>,
     },
-    /// A known input that starts at a value and has random derivatives up to this order (`None`: all).
+    /// Known input that starts at a value and has random derivatives up to this order (`None`: all).
     Known {
-        /// The value at the start.
+        /// Value at the start.
         value: E,
-        /// The order.
+        /// Highest order of a derivative that is not zero.
         degree: Option<usize>,
     },
-    /// An unknown input: its start, the lane of its first Taylor coefficient, and how many there are.
+    /// Unknown input: its start, the lane of its first Taylor coefficient, and the number of lanes.
     Unknown {
-        /// The value at the start.
+        /// Value at the start.
         value: E,
-        /// The first lane.
+        /// First lane.
         lane: usize,
         /// The number of lanes.
         count: usize,
     },
-    /// Time, which starts here.
+    /// Time of the run.
     Time {
-        /// The time at the start.
+        /// Time at the start.
         value: E,
     },
 }
 
-/// The start of a state: its value and its derivative by every unknown (lane, value).
+/// Start of a state: its value and its derivative by every unknown (lane, value).
 pub(crate) type Initial<E> = (E, Vec<(usize, E)>);
 
-/// Why there is no series at this point.
+/// Reasons why there is no series at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Singular {
-    /// A division by zero, at this node.
+    /// Division by zero, at this node.
     Division(usize),
-    /// A function that is not defined here, at this node.
+    /// Function that is not defined here, at this node.
     Domain(usize, Function),
-    /// A function that is defined but has no derivative here, at this node.
+    /// Function that is defined but has no derivative here, at this node.
     Kink(usize, Function),
     /// Constraints that could not be solved here, this one among them.
     Constraint(usize),
-    /// Constraints whose gradients depend on each other here, this one among them.
+    /// Constraints whose gradients are dependent here, this one among them.
     Dependent(usize),
-    /// Values or gradients beyond the limit of work, which says what was too much.
+    /// Values or gradients beyond the limit of work, which records the reason.
     Refused,
 }
 
@@ -80,17 +80,17 @@ impl From<Refused> for Singular {
     }
 }
 
-impl From<NotHeld> for Singular {
-    fn from(reason: NotHeld) -> Self {
+impl From<ConstraintFailure> for Singular {
+    fn from(reason: ConstraintFailure) -> Self {
         match reason {
-            NotHeld::Constraint(c) => Self::Constraint(c),
-            NotHeld::Dependent(c) => Self::Dependent(c),
-            NotHeld::Refused => Self::Refused,
+            ConstraintFailure::Constraint(c) => Self::Constraint(c),
+            ConstraintFailure::Dependent(c) => Self::Dependent(c),
+            ConstraintFailure::Refused => Self::Refused,
         }
     }
 }
 
-/// The series of one run.
+/// Taylor series of one run.
 #[derive(Debug, Clone)]
 pub(crate) struct Taylor<'a, S: Values> {
     dag: &'a Dag,
@@ -98,35 +98,36 @@ pub(crate) struct Taylor<'a, S: Values> {
     lanes: usize,
     signals: Vec<Signal<S::Element>>,
     rng: SplitMix64,
-    /// What takes part.
+    /// True, per node, if it takes part in the run.
     needed: Vec<bool>,
-    /// Whether the duals of a node are needed: of a weight that nothing else uses the values are enough.
+    /// True, per node, if its duals are needed: for a weight that nothing else uses the values suffice.
     differentiated: Vec<bool>,
-    /// Whether a node is constant in time.
+    /// True, per node, if it is constant in time.
     constant: Vec<bool>,
-    /// Whether a node depends on no unknown.
+    /// True, per node, if it depends on no unknown.
     known: Vec<bool>,
-    /// Whether every order of a node's duals is needed later; of the others two are kept.
+    /// True, per node, if every order of its duals is needed later; otherwise two orders are kept.
     kept: Vec<bool>,
-    /// The lanes that a node has, in order.
+    /// Lanes of each node, ascending.
     support: Vec<Arc<[u32]>>,
-    /// `values[node][k]`.
+    /// Taylor coefficients `values[node][k]`.
     values: Vec<Vec<S::Element>>,
-    /// `duals[node][k * lanes of the node + i]`, k modulo 2 where they are not kept.
+    /// Dual components `duals[node][k * lanes of the node + i]`, with k modulo 2 for nodes that are not
+    /// kept.
     duals: Vec<Vec<S::Element>>,
     /// Inverses of small integers.
     inverses: Vec<S::Element>,
-    /// Coefficients that are computed.
+    /// Number of coefficients that are computed.
     pub length: usize,
     sums: Vec<S::Sum>,
 }
 
 impl<'a, S: Values> Taylor<'a, S> {
-    /// The series at order 0 of the nodes `roots` and what they are made of: `initial` gives every state's
-    /// start (by slot). Rates take part when `moving`. Without lanes these are the values alone.
+    /// Series at order 0 of the nodes `roots` and all nodes that they depend on. `initial` gives every
+    /// state's start (by slot). Rates take part if `moving`. Without lanes the series have values alone.
     ///
     /// # Errors
-    /// [`Singular`] when the point is none, or where its values and gradients are beyond the limit of `work`.
+    /// [`Singular`] if the point has no series, or if its values and gradients exceed the limit of `work`.
     #[allow(clippy::too_many_arguments, reason = "all of a run")]
     pub(crate) fn new(
         dag: &'a Dag,
@@ -171,7 +172,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(out)
     }
 
-    /// What does not change, and what is known: functions as their arguments.
+    /// Marks nodes that are constant or known; functions are like their arguments.
     fn classify(&mut self) {
         for (i, op) in self.dag.ops.iter().enumerate() {
             let (constant, known) = match *op {
@@ -192,7 +193,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
     }
 
-    /// What a node is made of; of a state that moves its rate, of a function its argument.
+    /// Operands of a node; the rate of a state if `moving`; the argument of a function.
     fn operands(&self, i: usize, moving: bool) -> impl Iterator<Item = usize> {
         let both = match self.dag.ops[i] {
             Op::Number { .. } | Op::Pi => [None; 2],
@@ -206,8 +207,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         both.into_iter().flatten()
     }
 
-    /// Marks what takes part. The derivative of a function of known constants is nowhere used: at the ends of
-    /// its range it need not exist.
+    /// Marks the nodes that take part. The derivative of a function of known constants is not used: at the
+    /// ends of its domain it need not exist.
     fn need(&mut self, roots: &[usize], moving: bool) {
         let mut left = roots.to_vec();
         while let Some(i) = left.pop() {
@@ -242,7 +243,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     fn start_values(&mut self, initial: &[Option<Initial<S::Element>>], work: &Work) -> Result<(), Singular> {
         work.take(Step::Points, PER_NODE * self.dag.ops.len() as u64, 0)?;
         for (i, op) in self.dag.ops.iter().enumerate() {
-            // what a slot holds is asked for even where nothing uses it
+            // the content of a slot is needed even if nothing uses it
             let x = match *op {
                 Op::Slot(s) => match &self.signals[s] {
                     Signal::State { .. } => initial[s].as_ref().map_or(self.f.zero(), |x| x.0),
@@ -262,7 +263,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(())
     }
 
-    /// The start of an operation from those of its operands.
+    /// Start value of an operation from those of its operands.
     fn start_value(&self, i: usize) -> Result<S::Element, Singular> {
         let f = &self.f;
         let value = |a: usize| &self.values[a][0];
@@ -279,7 +280,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             }
             Op::Primitive { function, of, .. } => {
                 let argument = value(of);
-                // zero where there is no derivative
+                // zero where the function has no derivative
                 let edge = match function {
                     Function::Abs | Function::Sign | Function::Sqrt => Some(*argument),
                     Function::Asin | Function::Acos => Some(f.sub(&f.one(), &f.mul(argument, argument))),
@@ -293,7 +294,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         })
     }
 
-    /// The start of a node that may not take part.
+    /// Start value of a node that may not take part.
     pub(crate) fn start_of(&mut self, node: usize) -> Result<S::Element, Singular> {
         for i in below(self.dag, node) {
             if self.values[i].is_empty() {
@@ -304,7 +305,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(self.start(node))
     }
 
-    /// Which lanes a node can depend on, at any order.
+    /// Lanes of the unknowns that each node can depend on, at any order.
     fn find_support(
         &mut self,
         initial: &[Option<Initial<S::Element>>],
@@ -331,7 +332,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                 _ => {}
             }
         }
-        // what a node is made of, until nothing is added
+        // add lanes of operands until nothing is added
         loop {
             work.take(Step::Gradients, operations, bytes)?;
             let mut grew = false;
@@ -420,8 +421,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(())
     }
 
-    /// Writes the sums (times a factor) as the duals of order k, with what is added to single lanes, and
-    /// clears them.
+    /// Writes the sums (times a factor) as the duals of order k, adds contributions to single lanes, and
+    /// clears the sums.
     fn store(
         &mut self,
         i: usize,
@@ -456,18 +457,18 @@ impl<'a, S: Values> Taylor<'a, S> {
     fn inverse(&mut self, k: usize) {
         while self.inverses.len() <= k {
             let next = self.f.integer(self.inverses.len() as i64);
-            // no integer as small as an order is zero
+            // no integer as small as an order is zero in the field
             self.inverses.push(self.f.inverse(&next).unwrap_or(self.f.zero()));
         }
     }
 
-    /// The coefficient of a node at order k; zero beyond the start of what is constant.
+    /// Coefficient of a node at order k; zero beyond order 0 for a constant.
     pub(crate) fn value(&self, a: usize, k: usize) -> S::Element {
         self.values[a].get(k).copied().unwrap_or(self.f.zero())
     }
 
-    /// The derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty when it is zero. Of
-    /// orders before the last, only those that are needed again are there.
+    /// Derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty if it is zero. Of
+    /// orders before the last, only those that are needed again are stored.
     pub(crate) fn dual(&self, a: usize, k: usize) -> &[S::Element] {
         if k > 0 && self.constant[a] {
             return &[];
@@ -476,17 +477,17 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.duals[a].get(place * width..(place + 1) * width).unwrap_or(&[])
     }
 
-    /// The unknowns that a node can depend on.
+    /// Lanes of the unknowns that a node can depend on.
     pub(crate) fn lanes_of(&self, a: usize) -> &[u32] {
         &self.support[a]
     }
 
-    /// The field.
+    /// Field of the series.
     pub(super) fn field(&self) -> S {
         self.f.clone()
     }
 
-    /// The number of unknowns.
+    /// Number of unknowns.
     pub(super) fn lanes(&self) -> usize {
         self.lanes
     }
@@ -496,7 +497,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.needed[a]
     }
 
-    /// All coefficients of a node that there are; one of what is constant.
+    /// All coefficients of a node that are computed; one for a constant.
     pub(super) fn series(&self, a: usize) -> &[S::Element] {
         &self.values[a]
     }
@@ -506,12 +507,12 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.known[a]
     }
 
-    /// The value of a node at order 0.
+    /// Value of a node at order 0.
     pub(crate) fn start(&self, a: usize) -> S::Element {
         self.value(a, 0)
     }
 
-    /// True if a node takes part and depends on the time itself.
+    /// True if any node that takes part depends on the time explicitly.
     pub(crate) fn depends_on_time(&self) -> bool {
         let is_time = |s: usize| matches!(self.signals[s], Signal::Time { .. });
         self.dag
@@ -521,7 +522,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             .any(|(op, needed)| *needed && matches!(*op, Op::Slot(s) if is_time(s)))
     }
 
-    /// True if nothing moves: every rate is zero and every signal constant.
+    /// True if the system is at rest: every rate is zero and every signal constant.
     pub(crate) fn is_at_rest(&self) -> bool {
         self.dag.ops.iter().zip(&self.needed).all(|(op, needed)| match *op {
             Op::Slot(s) if *needed => match self.signals[s] {
@@ -535,8 +536,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         })
     }
 
-    /// Products and sums of the next order, by lanes: those that do not grow with it, and those for each
-    /// order before it; and the numbers of nodes that take part, and of products of two series among them.
+    /// Products and sums of the next order, by lanes: those independent of the order, and those for each
+    /// order before it; then the number of nodes that take part, and of products of two series among them.
     pub(super) fn operations(&self) -> [u64; 4] {
         let mut out = [0u64; 4];
         for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
@@ -625,7 +626,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
     }
 
-    /// One over the start of a node: it is not zero, or there were no series.
+    /// Reciprocal of the start of a node, which is not zero: otherwise the series would not exist.
     fn reciprocal(&self, b: usize) -> S::Element {
         self.f.inverse(&self.values[b][0]).unwrap_or(self.f.zero())
     }
@@ -665,7 +666,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             }
             Op::Multiply(a, b) => {
                 for (a, b) in [(a, b), (b, a)] {
-                    // a_j db_(k-j); what is constant has order 0 only
+                    // a_j db_(k-j); a constant has order 0 only
                     let js = if self.constant[a] { 0..=0 } else { 0..=k };
                     for j in js.filter(|j| !self.constant[b] || *j == k) {
                         self.gather(&mut sums, &mut pending, b, k - j, &of(a, j));

@@ -1,12 +1,12 @@
-//! A node of the graph as text: what a reader is shown of it.
+//! Nodes of the graph as text for readers.
 
 use super::dag::{Dag, Op};
 use crate::language::Function;
 
-/// Most operations that are written: shared ones count each time.
+/// Largest number of operations that are written: shared ones count each time.
 const MAX_OPERATIONS: usize = 60;
 
-/// Strength of what stands outermost in a text.
+/// Binding strength of the outermost operation of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binding {
     Sum,
@@ -14,7 +14,7 @@ enum Binding {
     Power,
 }
 
-/// The node in the names of the slots, with `+ - * / ^` and functions; `None` beyond 60 operations.
+/// Text of a node in the names of the slots, with `+ - * / ^` and functions; `None` beyond 60 operations.
 pub(super) fn text(dag: &Dag, node: usize, names: &[String]) -> Option<String> {
     let mut left = MAX_OPERATIONS;
     Writer { dag, names, left: &mut left }.write(node).map(|(text, _)| text)
@@ -63,7 +63,7 @@ impl Writer<'_> {
         })
     }
 
-    /// Factors, equal ones as powers; a factor of -1 as a sign.
+    /// Product of factors, equal ones as powers; a factor of -1 as a sign.
     fn product(&mut self, node: usize) -> Option<(String, Binding)> {
         let (mut factors, mut open): (Vec<(usize, usize)>, _) = (Vec::new(), vec![node]);
         while let Some(i) = open.pop() {
@@ -103,14 +103,14 @@ impl Writer<'_> {
         Some((text, binding))
     }
 
-    /// In brackets where it binds less than `least`.
+    /// Text of an operand, in brackets if it binds less than `least`.
     fn operand(&mut self, node: usize, least: Binding) -> Option<String> {
         let (text, binding) = self.write(node)?;
         Some(if binding < least { format!("({text})") } else { text })
     }
 }
 
-/// `mantissa / 10^decimals` in digits.
+/// Decimal `mantissa / 10^decimals` in digits.
 fn number(mantissa: i128, decimals: i32) -> String {
     let (sign, digits) = (if mantissa < 0 { "-" } else { "" }, mantissa.unsigned_abs().to_string());
     let places = decimals.unsigned_abs() as usize;
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::language::{Names, evaluate_f64, parse_with};
 
-    /// Texts of nodes, read again, have the values of the nodes.
+    /// Texts of nodes, read again, give the values of the nodes.
     #[test]
     fn written_and_read_again() {
         let names = ["x", "y", "t"].map(String::from);

@@ -1,10 +1,9 @@
-//! Maps that take every solution of a rational model to another: unknowns change their signs, or change
-//! places.
+//! Maps that take every solution of a rational model to another: unknowns change their signs, or exchange.
 //!
-//! A map of states and constants is one if right-hand sides, outputs, known starts, constraints and jumps go
-//! along with it. Changes of sign are found structurally: the sign of a product is the product of signs, both
-//! terms of a sum have the same sign, which is a linear system over two elements, and needs no chance.
-//! Exchanges of places are tried, and hold at a random point of each prime field.
+//! A map of states and constants is valid if right-hand sides, outputs, known starts, constraints and jumps
+//! transform accordingly. Changes of sign are found structurally: the sign of a product is the product of
+//! signs, and both terms of a sum have the same sign. This is a linear system over two elements, without
+//! random choices. Exchanges are tried, and must hold at a random point of each prime field.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,24 +15,25 @@ use super::model::{Compiled, Role};
 use super::rows::{Layout, Unknown};
 use super::values::Values;
 
-/// Most slots of unknowns among which exchanges of two pairs are tried, and of three.
+/// Largest number of slots of unknowns among which exchanges of two and of three pairs are tried.
 const TWO_PAIRS: usize = 24;
 const THREE_PAIRS: usize = 10;
 
-/// A map of unknown states and constants: the slot that replaces a slot, and true if with the other sign.
+/// Map of unknown states and constants: for each slot the slot that replaces it, and true if its sign
+/// changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Twin {
     images: BTreeMap<usize, (usize, bool)>,
 }
 
-/// A set of slots, for sums modulo two.
+/// Set of slots, for sums modulo two.
 type Parity = BTreeSet<usize>;
 
 fn sum(a: &Parity, b: &Parity) -> Parity {
     a.symmetric_difference(b).copied().collect()
 }
 
-/// The maps of a model that change something observable.
+/// Maps of a model that change an observable unknown.
 pub(super) fn twins(
     compiled: &Compiled,
     layout: &Layout,
@@ -60,7 +60,8 @@ pub(super) fn twins(
             out.push(Twin { images: signs.into_iter().map(|s| (s, (s, true))).collect() });
         }
     }
-    let points: Vec<Tested> = fields.into_iter().filter_map(|f| Tested::new(compiled, f, rng)).collect();
+    let points: Vec<TestPoint> =
+        fields.into_iter().filter_map(|f| TestPoint::new(compiled, f, rng)).collect();
     for pairs in exchanges(compiled, &slots) {
         let images = pairs.iter().flat_map(|&(a, b)| [(a, (b, false)), (b, (a, false))]).collect();
         let twin = Twin { images };
@@ -72,8 +73,8 @@ pub(super) fn twins(
     out
 }
 
-/// The nodes that a map must carry along, each with the state it belongs to: rates, starts and jumps; outputs
-/// with none.
+/// Nodes that a map must transform, each with the state it belongs to: rates, starts and jumps; outputs
+/// belong to none.
 fn carried(compiled: &Compiled) -> Vec<(Option<usize>, usize)> {
     let slot = |s: usize| compiled.roles.iter().position(|r| *r == Role::State(s));
     let mut out = Vec::new();
@@ -94,7 +95,7 @@ fn negations(compiled: &Compiled, slots: &[usize]) -> Vec<Parity> {
     let roots = carried.iter().map(|c| c.1).chain(compiled.constraints.iter().copied());
     let needed: BTreeSet<usize> = roots.flat_map(|node| below(dag, node)).collect();
     let mut signs: BTreeMap<usize, Parity> = BTreeMap::new();
-    // sums of slots' signs that are even
+    // sums of slots' signs that must be even
     let mut even: Vec<Parity> = Vec::new();
     for &i in &needed {
         let of = |node: usize| signs.get(&node).cloned().unwrap_or_default();
@@ -110,7 +111,7 @@ fn negations(compiled: &Compiled, slots: &[usize]) -> Vec<Parity> {
                 }
             },
             Op::Multiply(a, b) | Op::Divide(a, b) => sum(&of(a), &of(b)),
-            // the sign of its argument stays
+            // the sign of its argument must not change
             Op::Primitive { of: argument, .. } => {
                 even.push(of(argument));
                 Parity::new()
@@ -131,7 +132,7 @@ fn is_zero(dag: &Dag, node: usize) -> bool {
     matches!(dag.ops[node], Op::Number { mantissa: 0, .. })
 }
 
-/// A basis of the sets of slots that share an even number with every one of `even`.
+/// Basis of the sets of slots that share an even number with every one of `even`.
 fn null_sets(slots: &[usize], even: Vec<Parity>) -> Vec<Parity> {
     // reduced rows by their pivots
     let mut rows: BTreeMap<usize, Parity> = BTreeMap::new();
@@ -155,7 +156,7 @@ fn null_sets(slots: &[usize], even: Vec<Parity>) -> Vec<Parity> {
     free.map(set).collect()
 }
 
-/// Exchanges of places that are tried: one pair, then two and three disjoint ones, of unknowns of one kind.
+/// Exchanges that are tried: one pair, then two and three disjoint ones, of unknowns of one kind.
 fn exchanges(compiled: &Compiled, slots: &[usize]) -> Vec<Vec<(usize, usize)>> {
     let kind = |slot: usize| std::mem::discriminant(&compiled.roles[slot]);
     let mut pairs = Vec::new();
@@ -181,21 +182,21 @@ fn exchanges(compiled: &Compiled, slots: &[usize]) -> Vec<Vec<(usize, usize)>> {
     out
 }
 
-/// A random point of a field at which maps are tried, with the values of all nodes there.
-struct Tested {
+/// Random point of a field at which maps are tested, with the values of all nodes there.
+struct TestPoint {
     f: Field,
     point: Vec<u64>,
     nodes: Vec<u64>,
 }
 
-impl Tested {
+impl TestPoint {
     fn new(compiled: &Compiled, f: Field, rng: &mut SplitMix64) -> Option<Self> {
         let point: Vec<u64> = compiled.roles.iter().map(|_| rng.below(f.modulus())).collect();
         let nodes = values(&compiled.dag, &f, &point)?;
         Some(Self { f, point, nodes })
     }
 
-    /// True if everything goes along with an exchange of places.
+    /// True if all nodes transform with an exchange.
     fn holds(&self, compiled: &Compiled, twin: &Twin) -> bool {
         let image = |slot: usize| twin.images.get(&slot).map_or(slot, |i| i.0);
         let moved: Vec<u64> = (0..self.point.len()).map(|s| self.point[image(s)]).collect();
@@ -237,7 +238,7 @@ impl Tested {
     }
 }
 
-/// The value of every node of a rational graph; `None` where something is divided by zero or a function.
+/// Value of every node of a rational graph; `None` for a division by zero or a function.
 fn values(dag: &Dag, f: &Field, slots: &[u64]) -> Option<Vec<u64>> {
     let mut out: Vec<u64> = Vec::with_capacity(dag.ops.len());
     for op in &dag.ops {
@@ -255,7 +256,7 @@ fn values(dag: &Dag, f: &Field, slots: &[u64]) -> Option<Vec<u64>> {
     Some(out)
 }
 
-/// The place of the unknown that is `u` in another slot.
+/// Index of the unknown in another slot that corresponds to `u`.
 fn in_slot(compiled: &Compiled, layout: &Layout, u: &Unknown, slot: usize) -> Option<usize> {
     let role = compiled.roles[slot];
     let same = |o: &Unknown| {
@@ -267,7 +268,7 @@ fn in_slot(compiled: &Compiled, layout: &Layout, u: &Unknown, slot: usize) -> Op
 }
 
 impl Twin {
-    /// Slot that takes the place of an unknown, its own or another, and true if with the other sign.
+    /// Slot that replaces an unknown, its own or another, and true if the sign changes.
     fn image(&self, compiled: &Compiled, layout: &Layout, lane: usize) -> Option<(usize, bool)> {
         let u = &layout.unknowns[lane];
         let slot = compiled.roles.iter().position(|r| *r == u.role)?;
@@ -275,7 +276,7 @@ impl Twin {
         Some((in_slot(compiled, layout, u, to)?, negative))
     }
 
-    /// The map in words: `negate q[1], q[2]`, `swap k1 and k2, x1 and x2`.
+    /// Map in words: `negate q[1], q[2]`, `swap k1 and k2, x1 and x2`.
     pub(super) fn words(&self, compiled: &Compiled, name: &dyn Fn(Role) -> String) -> String {
         let of = |slot: usize| name(compiled.roles[slot]);
         let negated: Vec<String> = self.images.iter().filter(|i| i.1.1).map(|i| of(*i.0)).collect();
@@ -288,8 +289,8 @@ impl Twin {
     }
 }
 
-/// Number of different values that the maps give an unknown at a point (values by unknown): at least so many
-/// solutions it has.
+/// Number of distinct values that the maps give to an unknown at a point (values by unknown): a lower bound
+/// on its number of solutions.
 pub(super) fn images(
     twins: &[Twin],
     compiled: &Compiled,
@@ -316,7 +317,8 @@ pub(super) fn images(
 mod tests {
     use super::*;
 
-    /// Of all sets of five slots those with an even number in common with every given one, by brute force.
+    /// The basis generates all sets of five slots with an even number in common with every given one, by
+    /// enumeration.
     #[test]
     fn null_sets_are_all() {
         let slots = [2, 3, 5, 7, 11];

@@ -1,4 +1,4 @@
-//! Evaluation of a model's numbers and functions in a field, and random points there: what a field offers.
+//! Operations that a field offers to models: values of numbers and functions, and random points.
 
 use obsdeg_exact::{Scalars, SplitMix64};
 
@@ -6,20 +6,19 @@ use super::dag::Dag;
 use super::work::{Refused, Work};
 use crate::language::Function;
 
-/// Why no point was found at which constraints hold.
+/// Reasons why no point was found at which constraints hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum NotHeld {
+pub(crate) enum ConstraintFailure {
     /// This constraint could not be solved.
     Constraint(usize),
-    /// Only points were found at which the gradients of the constraints depend on each other, this one among
-    /// them.
+    /// Only points with dependent gradients of the constraints were found; this constraint is among them.
     Dependent(usize),
-    /// The work is beyond its limit.
+    /// The work exceeds its limit.
     Refused,
 }
 
-impl NotHeld {
-    /// The same, with the constraint that `place` names for its own.
+impl ConstraintFailure {
+    /// The reason with the index of its constraint replaced by `place`.
     pub(super) fn of(self, place: impl FnOnce(usize) -> usize) -> Self {
         match self {
             Self::Constraint(c) => Self::Constraint(place(c)),
@@ -29,28 +28,28 @@ impl NotHeld {
     }
 }
 
-impl From<Refused> for NotHeld {
+impl From<Refused> for ConstraintFailure {
     fn from(_: Refused) -> Self {
         Self::Refused
     }
 }
 
-/// A field in which a model has values.
+/// Field in which a model has values.
 pub(crate) trait Values: Scalars {
-    /// How many points are tried before what is not defined there is taken to be so everywhere.
+    /// Number of points tried before an undefined expression counts as undefined everywhere.
     const ATTEMPTS: usize;
-    /// Bits of a number, where what is zero is told by a gap.
+    /// Bits of a number; in real numbers zero is distinguished by a gap.
     const BITS: i64;
-    /// Most coefficients of a direction that is sought among polynomials.
+    /// Largest number of coefficients of a polynomial direction that is sought.
     const COEFFICIENTS: usize;
 
-    /// What products of series need.
+    /// Precomputed data for products of series.
     type Plan: Clone + std::fmt::Debug;
 
-    /// For series of this length.
+    /// Plan for series of this length.
     fn plan(&self, length: usize) -> Self::Plan;
-    /// The first `n` coefficients of the product of a series with each of several, which are known to the
-    /// plan by their keys.
+    /// First `n` coefficients of the product of a series with each of several others, which the plan knows
+    /// by their keys.
     fn products(
         &self,
         plan: &mut Self::Plan,
@@ -58,26 +57,26 @@ pub(crate) trait Values: Scalars {
         factors: &[(usize, &[Self::Element])],
         n: usize,
     ) -> Vec<Vec<Self::Element>>;
-    /// `mantissa / 10^decimals`.
+    /// Decimal `mantissa / 10^decimals`.
     fn number(&self, mantissa: i128, decimals: i32) -> Self::Element;
-    /// The half turn.
+    /// Number pi.
     fn pi(&self) -> Self::Element;
-    /// The true value of a function; `None` where it is not defined.
+    /// True value of a function; `None` if it is not defined.
     fn function(&self, function: Function, x: &Self::Element) -> Option<Self::Element>;
-    /// True if a number is positive, false if it is negative; `None` where it is zero or has no sign.
+    /// True for a positive number, false for a negative one; `None` if it is zero or has no sign.
     fn is_positive(&self, x: &Self::Element) -> Option<bool>;
-    /// A random value of something generic at the given attempt to find a point.
+    /// Random value of a generic quantity at the given attempt to find a point.
     fn random(&self, rng: &mut SplitMix64, attempt: usize) -> Self::Element;
-    /// A random number that shares so many bits with a given one (with 0: is below one by them); `None` where
+    /// Random number that shares `bits` bits with a given one (near 0: below one by as many); `None` if
     /// numbers have no distance.
     fn near(&self, x: f64, bits: i64, rng: &mut SplitMix64) -> Option<Self::Element>;
-    /// A random Taylor coefficient of a generic signal.
+    /// Random Taylor coefficient of a generic signal.
     fn coefficient(&self, rng: &mut SplitMix64) -> Self::Element;
-    /// Changes the values of `free` slots such that the nodes `constraints` (rational, of slots alone) are
+    /// Changes the values of `free` slots so that the nodes `constraints` (rational, of slots alone) are
     /// zero.
     ///
     /// # Errors
-    /// The constraint that could not be solved, or that the work is beyond its limit.
+    /// Constraint that could not be solved, or an exceeded limit of work.
     fn hold(
         &self,
         dag: &Dag,
@@ -86,5 +85,5 @@ pub(crate) trait Values: Scalars {
         free: &[bool],
         rng: &mut SplitMix64,
         work: &Work,
-    ) -> Result<(), NotHeld>;
+    ) -> Result<(), ConstraintFailure>;
 }

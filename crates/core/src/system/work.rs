@@ -1,23 +1,23 @@
-//! Work of a verdict on a model: it is counted before it is done, and refused beyond a limit.
+//! Work of a verdict on a model: counted before it is done, and refused beyond a limit.
 
 use std::cell::Cell;
 
 use super::dag::Op;
 use super::error::ModelError;
 
-/// Operations in a unit of the limit.
+/// Operations per unit of the limit.
 const UNIT: u64 = 1_000_000;
 /// Operations that cost as much as a byte of memory.
 const PER_BYTE: u64 = 2;
-/// Series that are held for every operation of a model, backwards.
+/// Number of series that the backward computation stores for every operation of a model.
 const HELD: u64 = 4;
-/// Operations of the three transforms of a product with two factors, for each point and each halving: half of
-/// them multiply and take two sums, which count as one and a half.
+/// Operations of the three transforms of a product with two factors, for each point and each halving. Half
+/// of them multiply and take two sums, which count as one and a half.
 const TRANSFORM: (u64, u64) = (9, 4);
 
-/// Operations that cost as much as what a series keeps of an operation, whether or not it takes part.
+/// Operations that cost as much as the stored series of an operation, whether or not it takes part.
 pub(super) const PER_NODE: u64 = 32;
-/// Products that cost as much as an inverse, and as a function.
+/// Number of products that cost as much as an inverse, and as a function.
 const PER_INVERSE: u64 = 64;
 const PER_FUNCTION: u64 = 256;
 
@@ -27,7 +27,7 @@ pub(super) fn product<E>() -> u64 {
     words * words
 }
 
-/// Operations of an operation's value in such numbers.
+/// Operations of the value of an operation in such numbers.
 pub(super) fn operations_of<E>(op: Op) -> u64 {
     let products = match op {
         Op::Number { decimals, .. } => PER_INVERSE + u64::from(decimals.unsigned_abs()),
@@ -46,33 +46,34 @@ pub struct WorkLimit(
 );
 
 impl WorkLimit {
-    /// The limit without an option.
+    /// Limit without an option.
     pub const DEFAULT: Self = Self(600);
 
-    /// The limit in operations.
+    /// Limit in operations.
     pub fn operations(self) -> u64 {
         self.0.saturating_mul(UNIT)
     }
 }
 
 impl WorkLimit {
-    /// The smallest limit that allows these operations, at most this one.
+    /// Smallest limit that allows these operations, at most this one.
     pub(super) fn within(self, operations: u64) -> Self {
         Self(operations.div_ceil(UNIT).min(self.0))
     }
 
-    /// The limit in bytes of memory.
+    /// Limit in bytes of memory.
     pub fn bytes(self) -> u64 {
         self.operations() / PER_BYTE
     }
 
-    /// Why a model is not judged that takes more bytes, or more operations, than the limit.
+    /// Error for a model that takes more bytes, or more operations, than the limit.
     pub(super) fn refuse(self, step: &str, what: &str) -> ModelError {
         ModelError {
             what: "the model".into(),
             message: format!(
-                "too large to be judged at the limit of work: {step} take {what}, beyond --work-limit {} ({:.1e} operations, {:.1e} \
-                 bytes); a larger --work-limit allows more, and a lower --order, a smaller model or fewer unknowns need less",
+                "too large to be judged at the limit of work: {step} take {what}, beyond --work-limit {} \
+                 ({:.1e} operations, {:.1e} bytes); a larger --work-limit allows more, and a lower \
+                 --order, a smaller model or fewer unknowns need less",
                 self.0,
                 self.operations() as f64,
                 self.bytes() as f64
@@ -88,7 +89,7 @@ impl Default for WorkLimit {
     }
 }
 
-/// What may be beyond the limit.
+/// Step that may exceed the limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     /// Values of the model at the random points that are tried.
@@ -104,7 +105,7 @@ pub(crate) enum Step {
 }
 
 impl Step {
-    /// What takes the work, in words.
+    /// Description of the step in words.
     fn words(self) -> String {
         match self {
             Self::Points => "values of its operations at random points".into(),
@@ -116,7 +117,7 @@ impl Step {
     }
 }
 
-/// The work is beyond its limit; [`Work::refused`] says why.
+/// Error for work beyond its limit; [`Work::refused`] gives the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Refused;
 
@@ -125,22 +126,22 @@ pub(crate) struct Refused;
 pub(crate) struct Work {
     limit: WorkLimit,
     spent: Cell<u64>,
-    /// What was refused first: the step, with the operations and the bytes that it would have reached.
+    /// First refusal: the step, with the operations and the bytes that it would have reached.
     refused: Cell<Option<(Step, u64, u64)>>,
 }
 
-/// Series that the rows of an order take.
+/// Series that the rows of an order take when computed backwards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sweeps {
-    /// Length of the longest.
+    /// Length of the longest series.
     pub(super) longest: u64,
-    /// Number of sweeps through the graph, each with series that are shorter by one.
+    /// Number of sweeps through the graph; each takes series that are shorter by one.
     pub(super) count: u64,
-    /// Orders of the values that are held before, and then.
+    /// Numbers of orders of the values that are stored before and after.
     pub(super) values: [u64; 2],
 }
 
-/// What the derivatives of a run cost.
+/// Cost of the derivatives of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cost {
     /// Products and sums of an order that do not grow with it, by unknowns.
@@ -149,16 +150,16 @@ pub(super) struct Cost {
     pub(super) growing: u64,
     /// Number of operations of the model that take part.
     pub(super) nodes: u64,
-    /// Number of those that multiply or divide two series.
+    /// Number of these operations that multiply or divide two series.
     pub(super) products: u64,
-    /// Series of the rows that are computed backwards, output by output; none where they are computed
+    /// Series of the rows that are computed backwards, output by output; `None` if they are computed
     /// forwards.
     pub(super) backwards: Option<Sweeps>,
     /// Number of outputs.
     pub(super) outputs: u64,
     /// Number of unknowns.
     pub(super) lanes: u64,
-    /// Words of 64 bits of a number.
+    /// Number of words of 64 bits in a number.
     pub(super) words: u64,
 }
 
@@ -175,7 +176,7 @@ impl Cost {
         rows.saturating_add(elimination).saturating_mul(self.words.saturating_mul(self.words))
     }
 
-    /// Operations of the values that are missing, and of sweeps through the graph.
+    /// Operations of the missing values, and of sweeps through the graph.
     fn swept(&self, sweeps: Sweeps) -> u64 {
         let triangle = |n: u64| n.saturating_mul(n + 1) / 2;
         let [before, then] = sweeps.values.map(triangle);
@@ -184,7 +185,7 @@ impl Cost {
             let short = length.saturating_mul(length);
             let points = (2 * length.max(1)).next_power_of_two();
             let transforms = points * u64::from(points.ilog2()) * TRANSFORM.0 / TRANSFORM.1;
-            // many digits are multiplied coefficient by coefficient
+            // numbers of many digits are multiplied coefficient by coefficient
             let product = if self.words > 1 { short } else { short.min(transforms) };
             let sums = self.nodes.saturating_mul(length);
             sums.saturating_add(self.products.saturating_mul(product))
@@ -210,16 +211,16 @@ impl Work {
         Self { limit, spent: Cell::new(0), refused: Cell::new(None) }
     }
 
-    /// Counts the rows of an order before they are computed; false if they are beyond the limit.
+    /// Counts the rows of an order before they are computed; false if they exceed the limit.
     pub(super) fn spend(&self, order: usize, cost: &Cost) -> bool {
         let (operations, bytes) = (cost.operations(order as u64), cost.bytes(order as u64));
         self.take(Step::Derivatives(order), operations, bytes).is_ok()
     }
 
-    /// Counts operations before they are done, and bytes before they are taken.
+    /// Counts operations before they are done, and bytes before they are allocated.
     ///
     /// # Errors
-    /// [`Refused`] if they are beyond the limit, or something was before.
+    /// [`Refused`] if they exceed the limit, or if anything was refused before.
     pub(super) fn take(&self, step: Step, operations: u64, bytes: u64) -> Result<(), Refused> {
         if self.refused.get().is_some() {
             return Err(Refused);
@@ -233,7 +234,7 @@ impl Work {
         Ok(())
     }
 
-    /// Why the verdict was not computed, if it was not.
+    /// Error with the reason why the verdict was not computed; `None` if nothing was refused.
     pub(crate) fn refused(&self) -> Option<ModelError> {
         let (step, spent, bytes) = self.refused.get()?;
         let what = match bytes > self.limit.bytes() {
@@ -247,14 +248,14 @@ impl Work {
 /// Operations of several verdicts or points.
 #[derive(Debug, Default)]
 pub(crate) struct Spent {
-    /// Operations, whether or not they led to a verdict.
+    /// Number of operations, whether or not they led to a verdict.
     pub(crate) operations: u64,
-    /// True if one of them was refused more.
+    /// True if any verdict or point was refused.
     pub(crate) refused: bool,
 }
 
 impl Spent {
-    /// Adds what was done at a point.
+    /// Adds the operations at a point.
     pub(super) fn add(&mut self, work: &Work) {
         self.operations = self.operations.saturating_add(work.spent.get());
         self.refused |= work.refused.get().is_some();
@@ -269,7 +270,7 @@ mod tests {
         Cost { fixed: 10, growing: 6, nodes: 5, products: 3, backwards, outputs: 2, lanes: 7, words: 1 }
     }
 
-    /// By hand: 10 + 6 * 4 of the rows of order 3, and 2 rows of 7 against a rank of at most 7.
+    /// By hand: 10 + 6 * 4 for the rows of order 3, and 2 rows of 7 against a rank of at most 7.
     #[test]
     fn operations_by_hand() {
         assert_eq!(cost(None).operations(3), 10 + 6 * 4 + 2 * 7 * 7);
@@ -308,7 +309,7 @@ mod tests {
         assert!(message.contains("order 9 take 8.0e8 bytes"), "{message}");
     }
 
-    /// What was refused once stays refused, however little is asked for next, and the first reason stands.
+    /// A refusal is final, however little is requested next, and the first reason stays.
     #[test]
     fn a_refusal_stays() {
         let work = Work::new(WorkLimit(1));

@@ -9,27 +9,29 @@ use crate::design::answer::Found;
 /// Changes that would meet every requirement, where no scheme does.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nearest {
-    /// The scheme with the largest worst margin of those evaluated; `None` where none determines what is
-    /// required.
+    /// Scheme with the largest worst margin of those evaluated; `None` if none determines the required
+    /// coefficients.
     pub scheme: Option<Found>,
-    /// That scheme with the shortest dwell that meets every requirement, to three digits.
+    /// Same scheme with the shortest dwell that meets every requirement, to three digits; `None` if
+    /// none was found.
     pub dwell: Option<Found>,
-    /// The largest dwell that was tried, in s.
+    /// Largest dwell that was tried, in s.
     pub longest_s: f64,
-    /// A scheme with the fewest positions, of those tried, that meets every requirement.
+    /// Scheme with the fewest positions, of those tried, that meets every requirement; `None` if none
+    /// does.
     pub positions: Option<Found>,
-    /// The largest number of positions that was tried.
+    /// Largest number of positions that was tried.
     pub most: usize,
-    /// Other candidates that were tried, as `--candidates` names them, with the best scheme of as many
-    /// positions.
+    /// Other candidates that were tried, as `--candidates` names them, with their best scheme of the
+    /// same number of positions.
     pub candidates: Vec<(String, Option<Found>)>,
     /// Number of sequences that were evaluated.
     pub examined: u64,
-    /// True if it was interrupted, or if the work ended, before all was tried.
+    /// True if the search was interrupted or reached its limit of work before all was tried.
     pub unfinished: bool,
 }
 
-/// `margin 0.71 (D_SX)`, or what is not determined.
+/// Text `margin 0.71 (D_SX)`, or the coefficients that are not determined.
 fn margin(of: &Found) -> String {
     let r = &of.requirements;
     let unseen: Vec<&str> =
@@ -41,7 +43,7 @@ fn margin(of: &Found) -> String {
     }
 }
 
-/// One line for each thing that would do, or was tried.
+/// One line per change that meets the requirements, or that was tried.
 impl fmt::Display for Nearest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let route = |found: &Found| found.positions.join(" ");
@@ -101,7 +103,8 @@ impl fmt::Display for Nearest {
         let ended = if self.unfinished { "; not all was tried" } else { "" };
         write!(
             f,
-            "by exchange, {} sequences evaluated{ended}: there may be nearer schemes, and shorter dwells or fewer positions that do",
+            "by exchange, {} sequences evaluated{ended}: there may be nearer schemes, and shorter dwells or \
+             fewer positions that do",
             self.examined
         )
     }

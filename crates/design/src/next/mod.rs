@@ -14,7 +14,7 @@ use obsdeg_core::remedies::Resolved;
 use obsdeg_evidence::simulation::{
     Conditions, KnownCovariance, MeasurementReport, general_first, latitude_of, resolve,
 };
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 pub use answer::*;
 pub use options::NextOptions;
@@ -109,8 +109,7 @@ fn listed(compared: &Compared<'_>, going: &(dyn Fn(u64, u64) -> bool + Sync)) ->
         let count = done.fetch_add(1, Ordering::Relaxed);
         if going(count, all) { compared.extended(sequence).map(Some) } else { Ok(None) }
     };
-    let judged: Vec<Option<Extended>> =
-        sequences.par_iter().map(judge).collect::<Result<_, DesignError>>()?;
+    let judged: Vec<Option<Extended>> = parallel::try_map(sequences.len(), |i| judge(&sequences[i]))?;
     let interrupted = judged.iter().any(Option::is_none);
     let examined = judged.iter().flatten().count() as u64;
     let mut found: Vec<Extended> = judged.into_iter().flatten().filter(Extended::is_possible).collect();

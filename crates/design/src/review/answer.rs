@@ -1,4 +1,4 @@
-//! What a review holds: plain data.
+//! Contents of a design review: plain data.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::Pose;
@@ -12,45 +12,45 @@ use obsdeg_evidence::system::{RunError, SystemEvidence, SystemRun};
 use crate::design::DesignError;
 use crate::design::answer::{Certificate, Found, Minimum};
 
-/// A review of schemes and models.
+/// Design review of schemes and models.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignReview {
     /// Version of the program.
     pub version: String,
-    /// The schemes, in the order given.
+    /// Schemes in the order given.
     pub schemes: Vec<SchemeReview>,
     /// Schemes with generic angles, in the order given.
     pub generic: Vec<GenericReview>,
-    /// The models, in the order given.
+    /// Models in the order given.
     pub models: Vec<ModelReview>,
     /// Predicted sigmas, drop-one and sensitivity of all schemes.
     pub comparison: Comparison,
-    /// Monte Carlo runs of the evidence.
+    /// Number of Monte Carlo runs of the evidence.
     pub runs: usize,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// One scheme.
+/// Review of one scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SchemeReview {
-    /// Its name.
+    /// Name of the scheme.
     pub name: String,
-    /// What it is for.
+    /// Purpose of the scheme.
     pub description: String,
-    /// The exact verdicts.
+    /// Exact verdicts.
     pub analysis: Analysis,
-    /// Its positions.
+    /// Positions of the scheme in numbers.
     pub positions: Vec<PositionReview>,
-    /// The platform at each of them, and the turns between them.
+    /// Platform at each position, with the turns between positions.
     pub poses: Vec<Pose>,
-    /// The way of gravity through the platform.
+    /// Gravity in platform axes over time.
     pub attitudes: Vec<Attitude>,
     /// One run of the filter.
     pub simulation: Simulation,
-    /// The same, sample by sample.
+    /// Same run, sample by sample.
     pub traces: Traces,
-    /// Verdicts against the filter, or why they cannot be held against it.
+    /// Verdicts against the filter, or the reason why they cannot be compared.
     pub evidence: Result<CrossCheck, SimulationError>,
     /// Predicted sigma, with a bench the total uncertainty, against the latitude in degrees.
     pub latitudes: Sweep,
@@ -60,62 +60,62 @@ pub struct SchemeReview {
     pub alternatives: Alternatives,
 }
 
-/// A scheme whose angles have no numbers: exact verdicts, without predictions.
+/// Review of a scheme with generic angles: exact verdicts, without predictions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GenericReview {
-    /// Its name.
+    /// Name of the scheme.
     pub name: String,
-    /// What it is for.
+    /// Purpose of the scheme.
     pub description: String,
-    /// The exact verdicts.
+    /// Exact verdicts.
     pub analysis: Analysis,
-    /// The platform at each of its positions, as far as these have numbers.
+    /// Platform at each position, as far as its angles are numbers.
     pub poses: Vec<Pose>,
-    /// The generic angles.
+    /// Names of the generic angles.
     pub angles: Vec<String>,
-    /// The latitude at which the earth rate is drawn, in degrees.
+    /// Latitude at which the earth rate is drawn, in degrees.
     pub latitude_deg: f64,
 }
 
-/// One position in numbers.
+/// Position of a scheme in numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PositionReview {
-    /// Its name.
+    /// Name of the position.
     pub name: String,
-    /// When it begins, in s.
+    /// Start of the position, in s.
     pub start_s: f64,
-    /// How long it lasts, in s.
+    /// Dwell of the position, in s.
     pub dwell_s: f64,
-    /// How long the way there takes, in s; `None`: no time.
+    /// Duration of the slew to the position, in s; `None` for instantaneous repositioning.
     pub slew_s: Option<f64>,
-    /// How it turns.
+    /// Turn of a rotating segment; `None` for a position.
     pub turn: Option<Turn>,
     /// Components of g along I, O, S of gyro X, Y, Z, in g.
     pub g: [[f64; 3]; 3],
 }
 
-/// Gravity in the platform at one time.
+/// Gravity in platform axes at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitude {
-    /// The time in s.
+    /// Time in s.
     pub t_s: f64,
-    /// The position, or the one that a slew goes to.
+    /// Index of the position, during a slew of the one that it goes to.
     pub position: usize,
     /// Components along X_p, Y_p, Z_p, in g.
     pub g: [f64; 3],
 }
 
-/// A condition, and every unknown's sigma there.
+/// Value of a condition, with the predicted sigma of every unknown.
 pub(super) type Point = (f64, Vec<(String, Option<f64>)>);
 
-/// Predicted sigmas over a condition, with a bench total uncertainties.
+/// Predicted sigmas against a condition, with a bench total uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Sweep {
-    /// The unknowns.
+    /// Names of the unknowns.
     pub names: Vec<String>,
-    /// The condition.
+    /// Values of the condition.
     pub x: Vec<f64>,
-    /// Per condition and unknown; `None` where it is not observable.
+    /// Sigmas by condition and unknown; `None` where it is not observable.
     pub sigmas: Vec<Vec<Option<f64>>>,
 }
 
@@ -131,7 +131,8 @@ impl Sweep {
         out
     }
 
-    /// The largest sigma of a coefficient among `of` at every condition at which all are observable.
+    /// Largest sigma among the coefficients `of`, with the condition, for conditions at which all are
+    /// observable.
     pub fn worst(&self, of: &[String]) -> Vec<(f64, f64)> {
         let columns: Vec<usize> = (0..self.names.len()).filter(|&c| of.contains(&self.names[c])).collect();
         let at = |row: &Vec<Option<f64>>| -> Option<f64> {
@@ -142,35 +143,36 @@ impl Sweep {
     }
 }
 
-/// Smaller and other schemes.
+/// Smaller and other schemes than the one reviewed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Alternatives {
-    /// The coefficients that the scheme makes observable.
+    /// Coefficients that the scheme makes observable.
     pub required: Vec<String>,
-    /// The fewest of its positions that keep them so.
+    /// Fewest of its positions that keep these observable; `None` if not searched.
     pub kept: Option<Minimum>,
-    /// The fewest cardinal attitudes that make every coefficient observable.
+    /// Fewest cardinal attitudes that make every coefficient observable; `None` if not searched.
     pub all: Option<Minimum>,
-    /// Schemes of `front_positions` cardinal attitudes that none found beats in both total time and the
-    /// largest sigma of these.
+    /// Schemes of `front_positions` cardinal attitudes that no scheme found beats in both total time
+    /// and the largest sigma of these coefficients.
     pub front: Vec<Found>,
-    /// Their number of positions.
+    /// Number of positions of the schemes in `front`.
     pub front_positions: usize,
-    /// How good the best of so many cardinal attitudes can be; `None` where no bound is known.
+    /// Bound on the best scheme of `front_positions` cardinal attitudes; `None` where no bound is
+    /// known.
     pub certificate: Option<Certificate>,
-    /// Why some of these were not searched for.
+    /// Errors of searches that were not possible.
     pub refused: Vec<DesignError>,
 }
 
-/// One model.
+/// Review of one model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelReview {
-    /// The exact verdicts.
+    /// Exact verdicts.
     pub analysis: SystemAnalysis,
-    /// One run of the filter, sample by sample.
+    /// One run of the filter, sample by sample; `None` without one.
     pub run: Option<(SystemRun, Traces)>,
-    /// Verdicts against the information of the samples.
+    /// Verdicts against the information of the samples; `None` without them.
     pub evidence: Option<SystemEvidence>,
-    /// Why there is no run, or no evidence.
+    /// Reason why there is no run, or no evidence; `None` if there are both.
     pub refused: Option<RunError>,
 }

@@ -1,5 +1,4 @@
-//! All that a design review of torquing schemes needs, gathered: verdicts, predictions, evidence,
-//! alternatives.
+//! Design review of torquing schemes: verdicts, predictions, evidence, alternatives.
 
 pub(crate) mod answer;
 
@@ -13,65 +12,65 @@ use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
 use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, latitude_of, simulate};
 use obsdeg_evidence::system::{RunError, crosscheck_system, simulate_system};
+use obsdeg_exact::parallel;
 use obsdeg_symbolic::Worker;
-use rayon::prelude::*;
 
 use crate::design::{Candidates, DesignError, DesignOptions, design};
 
-/// Between two latitudes of the sweep, in degrees.
+/// Step of the latitudes of the sweep, in degrees.
 const LATITUDE_STEP: i32 = 5;
-/// The dwells are scaled by up to so many octaves, in halves.
+/// Largest factor on the dwells of the sweep in octaves, up and down, in steps of half an octave.
 const OCTAVES: i32 = 3;
-/// Most positions of the schemes that the front is searched for.
+/// Largest number of positions of the schemes on the front.
 const FRONT_POSITIONS: usize = 5;
-/// The same under reset carry, where sets are searched and a bound says when a scheme is good enough.
+/// Largest number of positions under reset carry, where sets are searched and a bound ends the search.
 const FRONT_OF_SETS: usize = 12;
-/// Most positions of a scheme whose smallest sufficient part is looked for.
+/// Largest number of positions of a scheme whose smallest sufficient subset is searched.
 const SUBSETS: usize = 24;
 
-/// How much is done.
+/// Options of a review.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReviewOptions {
-    /// Monte Carlo runs of the evidence.
+    /// Number of Monte Carlo runs of the evidence.
     pub runs: usize,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// Why there is no review.
+/// Error of a review.
 #[derive(Debug, thiserror::Error)]
 pub enum ReviewError {
-    /// A verdict.
+    /// Verdicts of a scheme that fail.
     #[error("{name}: {error}")]
     Analysis {
-        /// The scheme.
+        /// Name of the scheme.
         name: String,
-        /// What is wrong.
+        /// Error of the analysis.
         error: AnalysisError,
     },
-    /// A scheme that cannot be simulated.
+    /// Scheme that cannot be simulated.
     #[error("{name}: {error}")]
     Simulation {
-        /// The scheme.
+        /// Name of the scheme.
         name: String,
-        /// What is wrong.
+        /// Error of the simulation.
         error: SimulationError,
     },
-    /// A model.
+    /// Model that cannot be judged.
     #[error("model {}: {error}", model + 1)]
     Model {
-        /// Its index.
+        /// Index of the model, from 0.
         model: usize,
-        /// What is wrong.
+        /// Error of the model.
         error: ModelError,
     },
-    /// Interrupted.
+    /// Interruption of the review.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Reviews schemes and models. `progress` hears what is done next, with a share of the whole, and says
-/// whether to go on.
+/// Reviews schemes and models. `progress` receives the name of the next step and the fraction of work
+/// done; the review stops when it returns false.
 ///
 /// # Errors
 /// [`ReviewError`].
@@ -129,7 +128,7 @@ fn scheme(
 ) -> Result<SchemeReview, ReviewError> {
     let Entry { name, scheme, conditions } = entry;
     let failed = |error: SimulationError| ReviewError::Simulation { name: name.clone(), error };
-    // what cannot be run is refused before anything is computed
+    // a scheme that cannot be run is refused before anything is computed
     let plan = Plan::new(scheme, conditions).map_err(failed)?;
     step(0.0, "verdicts")?;
     let analysis = verdicts(entry, options, worker)?;
@@ -164,7 +163,7 @@ fn scheme(
     })
 }
 
-/// The exact verdicts.
+/// Exact verdicts of a scheme.
 fn verdicts(
     entry: &Entry,
     options: ReviewOptions,
@@ -177,7 +176,7 @@ fn verdicts(
     Ok(analysis)
 }
 
-/// A scheme without numbers to predict anything for.
+/// Review of a scheme with generic angles.
 fn generic(
     entry: &Entry,
     options: ReviewOptions,
@@ -228,7 +227,7 @@ fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<Posit
     scheme.positions.iter().enumerate().map(row).collect()
 }
 
-/// The platform at every position; a slew rate of the conditions says how each is reached.
+/// Platform at every position; a slew rate of the conditions decides how each is reached.
 fn poses(scheme: &Scheme, conditions: &Conditions) -> Vec<Pose> {
     let mut scheme = scheme.clone();
     scheme.simulation.slew_rate_deg_s = conditions.slew_rate_deg_s.filter(|_| conditions.slews);
@@ -265,32 +264,34 @@ fn attitudes(plan: &Plan) -> Vec<Attitude> {
 }
 
 fn latitudes(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let at = |k: i32| {
-        let degrees = k * LATITUDE_STEP;
+    let at = |k: usize| {
+        let degrees = k as i32 * LATITUDE_STEP;
         let other = Scheme { latitude: degrees.to_string().parse().ok(), ..scheme.clone() };
-        Ok((f64::from(degrees), predicted(&other, conditions, seed)?))
+        Ok::<_, SimulationError>((f64::from(degrees), predicted(&other, conditions, seed)?))
     };
-    Ok(Sweep::of((0..=90 / LATITUDE_STEP).into_par_iter().map(at).collect::<Result<_, SimulationError>>()?))
+    Ok(Sweep::of(parallel::try_map((90 / LATITUDE_STEP) as usize + 1, at)?))
 }
 
 fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
-    let at = |k: i32| {
-        let factor = 2f64.powf(f64::from(k) / 2.0);
+    let at = |k: usize| {
+        let factor = 2f64.powf(f64::from(k as i32 - 2 * OCTAVES) / 2.0);
         let other = scheme.with_dwells(conditions.dwell_s, factor)?;
         // a step is at most half a dwell
         let shortest = other.positions.iter().filter_map(|p| p.dwell).map(Dwell::seconds);
         let step_s = shortest.fold(conditions.step_s, |step, dwell| step.min(dwell / 2.0));
-        Ok((factor, predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?))
+        Ok::<_, SimulationError>((
+            factor,
+            predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?,
+        ))
     };
-    let factors = (-2 * OCTAVES..=2 * OCTAVES).into_par_iter();
-    Ok(Sweep::of(factors.map(at).collect::<Result<_, SimulationError>>()?))
+    Ok(Sweep::of(parallel::try_map(4 * OCTAVES as usize + 1, at)?))
 }
 
-/// The least that keeps what is seen, the least that sees all, and the front of schemes out of the cardinal
-/// attitudes.
+/// Smallest subset that keeps the same coefficients observable, smallest scheme for all coefficients,
+/// and front of schemes of the cardinal attitudes.
 fn alternatives(scheme: &Scheme, conditions: &Conditions, analysis: &Analysis, seed: u64) -> Alternatives {
     let mut out = Alternatives::default();
-    // beside predictions, which have no prior and white noise of Z
+    // conditions of the predictions: no prior and white noise of Z
     let conditions = &Conditions {
         priors: Conditions::default().priors,
         accelerometer_instability_ug: 0.0,
@@ -345,14 +346,14 @@ fn alternatives(scheme: &Scheme, conditions: &Conditions, analysis: &Analysis, s
     out
 }
 
-/// What follows needs no formulas, and may take long: another process may have the engine.
+/// Releases the engine to other processes: the next steps need no formulas and may take long.
 fn rest(worker: Option<&mut Worker>) {
     if let Some(worker) = worker {
         worker.rest();
     }
 }
 
-/// A model with its run and its evidence, where it has the numbers for them.
+/// Review of a model, with run and evidence if it has numbers for them.
 fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
     let analysis = analyze_system(model, SystemOptions { seed, ..SystemOptions::default() })?;
     let mut refused = None;

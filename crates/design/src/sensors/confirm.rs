@@ -1,4 +1,4 @@
-//! Sets judged again by the verdicts of a model that has these outputs.
+//! Confirmation of sets by the verdicts of a model with these outputs.
 
 use std::collections::HashSet;
 
@@ -6,21 +6,21 @@ use obsdeg_core::system::{Candidate, judge};
 
 use super::cuts::members;
 use super::ranks::Set;
-use super::{SensorError, Task, degree, names};
+use super::{SensorError, SensorTask, degree, names};
 
-/// Most sets that are judged again.
+/// Largest number of sets that are judged again.
 const MOST: usize = 48;
 
-/// What was judged again.
-pub(super) struct Confirmed {
-    /// Number of sets.
+/// Result of the confirmation.
+pub(super) struct Confirmation {
+    /// Number of sets judged again.
     pub(super) sets: usize,
 }
 
-impl Confirmed {
-    /// Judges sets in their order, as far as the limit of the work of one verdict goes; empty ones have no
-    /// model of their own.
-    pub(super) fn of(task: &mut Task<'_>, sets: Vec<Set>) -> Result<Self, SensorError> {
+impl Confirmation {
+    /// Judges sets again in their order, as far as the limit of work of one verdict goes. Empty sets
+    /// without own outputs have no model and are skipped.
+    pub(super) fn of(task: &mut SensorTask<'_>, sets: Vec<Set>) -> Result<Self, SensorError> {
         let (mut seen, mut left, mut alike) = (HashSet::new(), task.model.work_limit.operations(), 0);
         for set in sets.into_iter().filter(|set| *set != 0 || task.options.own_outputs) {
             if seen.len() >= MOST || left == 0 {
@@ -30,7 +30,7 @@ impl Confirmed {
                 continue;
             }
             let Ok(found) = task.search.degrees(set).map(<[u16]>::to_vec) else { break };
-            // what has no verdict of its own is not counted
+            // a set without a verdict of its own is not counted
             let Some(work) = judged_alike(task, set, &found)? else { continue };
             left = left.saturating_sub(work);
             alike += 1;
@@ -39,9 +39,9 @@ impl Confirmed {
     }
 }
 
-/// Checks the degrees under a set against those of a model with these outputs; the operations that it took,
-/// `None` where that model is not judged.
-fn judged_alike(task: &Task<'_>, set: Set, found: &[u16]) -> Result<Option<u64>, SensorError> {
+/// Compares the degrees under a set with those of a model with these outputs. Returns the number of
+/// operations; `None` if that model is not judged.
+fn judged_alike(task: &SensorTask<'_>, set: Set, found: &[u16]) -> Result<Option<u64>, SensorError> {
     let options = task.options;
     let chosen: Vec<Candidate> = members(set).map(|c| options.candidates[c].clone()).collect();
     let (model, _) = task.model.measuring(&chosen, options.own_outputs);

@@ -1,14 +1,14 @@
-//! Sets that hit every cut: the cheapest, and all minimal ones.
+//! Sets that hit every cut: the cheapest one, and all minimal ones.
 //!
-//! What holds of a set holds of every larger one: an output more never raises a degree. So a set that fails
-//! lies in a maximal one that fails, and every set that does not fail holds a candidate outside that one: it
-//! hits the *cut*, the complement. The sets that do not fail are those that hit all cuts of maximal failing
-//! sets, and the minimal ones among them are the minimal transversals of these cuts (Berge 1989,
-//! *Hypergraphs*, chapter 2).
+//! Another output never raises a degree, so every property of a set holds for all larger sets. A
+//! failing set lies in a maximal failing set, and every set that does not fail contains a candidate
+//! outside it: it hits the *cut*, the complement. The sets that do not fail are those that hit the cuts
+//! of all maximal failing sets. The minimal ones among them are the minimal transversals of these cuts
+//! (Berge 1989, *Hypergraphs*, chapter 2).
 
 use super::ranks::Set;
 
-/// The members of a set, ascending.
+/// Members of a set, ascending.
 pub(crate) fn members(set: Set) -> impl Iterator<Item = usize> {
     let mut left = set;
     std::iter::from_fn(move || {
@@ -18,12 +18,12 @@ pub(crate) fn members(set: Set) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The sum of the costs of the members.
+/// Sum of the costs of the members.
 pub(crate) fn cost_of(set: Set, costs: &[u64]) -> u64 {
     members(set).map(|c| costs[c]).sum()
 }
 
-/// Cuts without those that hold another one.
+/// Cuts that contain no other cut.
 pub(crate) fn smallest(mut cuts: Vec<Set>) -> Vec<Set> {
     cuts.sort_by_key(|cut| (cut.count_ones(), *cut));
     let mut out: Vec<Set> = Vec::new();
@@ -40,20 +40,21 @@ pub(crate) struct Cheapest<'a> {
     cuts: &'a [Set],
     costs: &'a [u64],
     best: Option<(u64, Set)>,
-    /// Nodes that may still be visited.
+    /// Number of nodes that may still be visited.
     nodes: u64,
 }
 
 impl<'a> Cheapest<'a> {
-    /// The cheapest set that hits every cut; `None` where more than so many nodes would be visited. Of equal
-    /// costs it is the first in an order that the cuts give.
+    /// Cheapest set that hits every cut; `None` if more than `nodes` nodes would be visited. Among
+    /// equal costs it is the first in an order that the cuts determine.
     pub(crate) fn of(cuts: &'a [Set], costs: &'a [u64], nodes: u64) -> Option<Set> {
         let mut search = Self { cuts, costs, best: None, nodes };
         search.branch(0, 0, 0)?;
         search.best.map(|(_, set)| set)
     }
 
-    /// Goes on from a set with its cost, without the members of `left_out`.
+    /// Branches from a set with its cost, without the members of `left_out`; `None` at the limit of
+    /// nodes.
     fn branch(&mut self, set: Set, cost: u64, left_out: Set) -> Option<()> {
         self.nodes = self.nodes.checked_sub(1)?;
         let (mut bound, mut used, mut open) = (cost, 0, None);
@@ -62,7 +63,7 @@ impl<'a> Cheapest<'a> {
             if free == 0 {
                 return Some(());
             }
-            // cuts without common members are paid for one by one
+            // cuts without common members add up in the bound
             if free & used == 0 {
                 used |= free;
                 bound += members(free).map(|c| self.costs[c]).min().unwrap_or(0);
@@ -89,30 +90,30 @@ impl<'a> Cheapest<'a> {
     }
 }
 
-/// The minimal sets that hit every cut, of up to so many members.
+/// Minimal sets that hit every cut, of up to `members` members.
 #[derive(Debug, Clone)]
 pub(crate) struct Transversals {
     cuts: Vec<Set>,
     pub(crate) sets: Vec<Set>,
-    /// Largest number of members: the list holds all minimal sets of up to so many.
+    /// Largest number of members up to which the list is complete.
     pub(crate) members: u32,
-    /// Most sets that are held.
+    /// Largest number of sets that are stored.
     most: usize,
-    /// Comparisons of a set with a cut that may still be made.
+    /// Number of comparisons of a set with a cut that may still be made.
     left: u64,
 }
 
-/// Most comparisons of sets with cuts.
+/// Largest number of comparisons of sets with cuts.
 const COMPARISONS: u64 = 2_000_000_000;
 
 impl Transversals {
-    /// Of no cut: the empty set. At most `most` sets are held.
+    /// Transversals of no cut: the empty set. At most `most` sets are stored.
     pub(crate) fn new(most: usize) -> Self {
         Self { cuts: Vec::new(), sets: vec![0], members: Set::BITS, most, left: COMPARISONS }
     }
 
-    /// Takes up a cut; false if that would take more comparisons than are left. A minimal set that hits it
-    /// too is one of those that do, or one of the others with a member of the cut more.
+    /// Adds a cut; false if that would take more comparisons than are left. A minimal set that hits it
+    /// too is either a present one, or one with another member from the cut.
     pub(crate) fn add(&mut self, cut: Set) -> bool {
         if self.cuts.iter().any(|own| own & !cut == 0) {
             return true;
@@ -152,7 +153,7 @@ mod tests {
     use super::*;
     use obsdeg_exact::SplitMix64;
 
-    /// Random cuts of up to ten candidates against all sets one by one.
+    /// Random cuts of up to ten candidates, compared with all sets one by one.
     #[test]
     fn hitting_sets_are_those_of_all_sets() {
         let mut rng = SplitMix64::new(5);
@@ -171,7 +172,7 @@ mod tests {
             let mut transversals = Transversals::new(usize::MAX);
             assert!(cuts.iter().all(|cut| transversals.add(*cut)));
             assert_eq!(transversals.sets, minimal, "{cuts:?}");
-            // of few that are held, all up to the number of members that is said
+            // with few sets stored, the list is complete up to the stated number of members
             let mut few = Transversals::new(3);
             assert!(cuts.iter().all(|cut| few.add(*cut)));
             let short = |set: &&Set| set.count_ones() <= few.members;

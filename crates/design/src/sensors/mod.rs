@@ -1,7 +1,8 @@
 //! Sets of outputs of a model: which quantities to measure so that its unknowns are observable, with proof.
 //!
-//! The rows of all candidates are computed once, at two random points; what a set determines is a matter of
-//! ranks. An output more never raises a degree, so failing sets exclude all that they hold (`cuts`).
+//! The rows of all candidates are computed once, at two random points; the degrees under a set follow
+//! from ranks. Another output never raises a degree, so a failing set excludes all its subsets
+//! (`cuts`).
 //!
 //! ```
 //! use obsdeg_core::system::model_file;
@@ -24,41 +25,40 @@ mod search;
 use obsdeg_core::system::{
     Candidate, Gathered, Judgement, ModelError, OutputRows, Role, SystemModel, check_cost, gather,
 };
-
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 pub use answer::{FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable};
-use confirm::Confirmed;
+use confirm::Confirmation;
 use cuts::{cost_of, members};
 use ranks::NONE;
 pub use ranks::{Ordered, Ranks, Set};
-use search::{Best, Goal, Search, Stopped};
+use search::{CheapestSet, Goal, SetSearch, StopReason};
 
-/// Most candidates.
+/// Largest number of candidates.
 pub const MAX_SENSORS: usize = 64;
-/// Pairs of points that are tried.
+/// Number of pairs of points that are tried.
 const ATTEMPTS: usize = 5;
-/// Times the limit of the work of a verdict that all sets together may take.
+/// Limit of work of all sets together, as a multiple of that of one verdict.
 const LIMITS: u64 = 50;
-/// Sets that are judged whatever the limit.
+/// Number of sets that are judged whatever the limit of work.
 const LEAST: u64 = 1000;
 /// Millionths in a unit of cost.
 const MILLION: f64 = 1e6;
 
-/// What is asked.
+/// Options of a search for outputs to measure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorOptions {
-    /// What sets are chosen from.
+    /// Candidates of the sets.
     pub candidates: Vec<Candidate>,
     /// True if the outputs of the model are measured in every set.
     pub own_outputs: bool,
-    /// Unknowns that must be observable; none: all.
+    /// Unknowns that must be observable; if empty, all unknowns.
     pub required: Vec<String>,
-    /// Largest degrees: of one unknown, or of all.
+    /// Largest degrees: of one unknown, or of all (`None`).
     pub max_degree: Vec<(Option<String>, usize)>,
-    /// Most minimal sets that are listed.
+    /// Largest number of minimal sets in the list.
     pub keep: usize,
-    /// Highest order of derivatives, where the model's own bound is not meant.
+    /// Highest order of derivatives; `None` for the bound of the model.
     pub order: Option<usize>,
     /// Seed of all random choices.
     pub seed: u64,
@@ -78,53 +78,65 @@ impl Default for SensorOptions {
     }
 }
 
-/// Why no sets are found.
+/// Error of a search for outputs to measure.
 #[derive(Debug, thiserror::Error)]
 pub enum SensorError {
-    /// The model.
+    /// Error of the model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Too many, or none.
+    /// Too many candidates, or none.
     #[error("{found} candidates; expected 1 to {MAX_SENSORS}")]
     Candidates {
-        /// Their number.
+        /// Number of candidates.
         found: usize,
     },
-    /// No unknown of this name.
+    /// Name that is no unknown.
     #[error("`{name}` is no unknown of the model; expected one of {}", known.join(", "))]
     Unknown {
-        /// The name.
+        /// Name that was found.
         name: String,
-        /// Those that there are.
+        /// Available names.
         known: Vec<String>,
     },
-    /// A cost that is none.
+    /// Largest degree of an unknown that is not required.
+    #[error(
+        "a largest degree of {name} does nothing, because {name} is not required; expected one of {}",
+        required.join(", ")
+    )]
+    NotRequired {
+        /// The unknown.
+        name: String,
+        /// Required unknowns.
+        required: Vec<String>,
+    },
+    /// Cost that is no positive number in range.
     #[error("the cost of {name}: {expected}")]
     Cost {
-        /// The candidate.
+        /// Name of the candidate.
         name: String,
-        /// What was expected.
+        /// Expected value, in words.
         expected: String,
     },
     /// Points that disagree, or leave ranks undecided.
     #[error("undecided: {reason}")]
     Undecided {
-        /// Why.
+        /// Reason in words.
         reason: String,
     },
-    /// Interrupted before anything was found.
+    /// Interruption before a set was found.
     #[error("interrupted before a set was found")]
     Interrupted,
 }
 
-/// An unknown in question.
-struct Asked {
+/// Unknown whose degree is computed.
+struct TargetUnknown {
     name: String,
     unit: String,
     column: usize,
 }
 
-/// Finds sets of outputs. `going` hears how many sets are judged, and ends the search by false.
+/// Finds sets of outputs. `going` receives the number of sets judged; the search ends when it returns
+/// false.
 ///
 /// # Errors
 /// [`SensorError`].
@@ -153,8 +165,9 @@ pub fn sensors(
         };
         let n = gathered.judged.layout.unknowns.len() as u64;
         let most = (LIMITS * model.work_limit.operations() / (n * n * n / 2 + 1)).max(LEAST);
-        let search = Search::new(&*first, costs.clone(), asked.len(), most, going);
-        let mut task = Task { model, options, gathered: &gathered, asked, search, required: Vec::new() };
+        let search = SetSearch::new(&*first, costs.clone(), asked.len(), most, going);
+        let mut task =
+            SensorTask { model, options, gathered: &gathered, asked, search, required: Vec::new() };
         let answer = task.answer()?;
         match task.differs(&*second) {
             None if first.is_clear() && second.is_clear() => return Ok(answer),
@@ -171,7 +184,7 @@ pub fn sensors(
     Err(SensorError::Undecided { reason })
 }
 
-/// The costs in millionths.
+/// Costs of the candidates in millionths.
 fn checked(candidates: &[Candidate]) -> Result<Vec<u64>, SensorError> {
     let found = candidates.len();
     if found == 0 || found > MAX_SENSORS {
@@ -184,14 +197,14 @@ fn checked(candidates: &[Candidate]) -> Result<Vec<u64>, SensorError> {
     candidates.iter().map(cost).collect()
 }
 
-/// Which candidate each output belongs to, as a set; empty of those that stay.
+/// Candidate of each output, as a set; the empty set for the own outputs of the model.
 fn owners(outputs: usize, ranges: &[std::ops::Range<usize>]) -> Vec<Set> {
     let owner = |i: usize| ranges.iter().position(|range| range.contains(&i)).map_or(0, |c| 1 << c);
     (0..outputs).map(owner).collect()
 }
 
-/// The unknowns that are spoken of.
-fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<Asked> {
+/// Unknowns of the model with their units.
+fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<TargetUnknown> {
     let unit = |role: Role| match role {
         Role::State(i) => model.states[i].named.unit.clone(),
         Role::Parameter(i) => model.parameters[i].unit.clone(),
@@ -199,7 +212,7 @@ fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<Asked> {
         _ => String::new(),
     };
     let all = judged.layout.unknowns.iter().enumerate().filter(|(c, _)| judged.shown(model, *c));
-    all.map(|(column, u)| Asked { name: u.name.clone(), unit: unit(u.role), column }).collect()
+    all.map(|(column, u)| TargetUnknown { name: u.name.clone(), unit: unit(u.role), column }).collect()
 }
 
 fn names(set: Set, options: &SensorOptions) -> Vec<String> {
@@ -210,21 +223,23 @@ fn degree(degree: u16) -> Option<usize> {
     (degree < NONE).then_some(degree.into())
 }
 
-/// One search.
-struct Task<'a> {
+/// Search with its options.
+struct SensorTask<'a> {
     model: &'a SystemModel,
     options: &'a SensorOptions,
     gathered: &'a Gathered,
-    asked: Vec<Asked>,
-    search: Search<'a>,
-    /// Unknowns that are asked for, by their place among all.
+    asked: Vec<TargetUnknown>,
+    search: SetSearch<'a>,
+    /// Required unknowns: indices among all.
     required: Vec<usize>,
 }
 
-impl Task<'_> {
-    /// The unknowns that a name stands for: one, or that of every experiment.
+impl SensorTask<'_> {
+    /// Indices of the unknowns with this name: one, or one per experiment.
     fn named(&self, name: &str) -> Result<Vec<usize>, SensorError> {
-        let is = |u: &Asked| u.name == name || u.name.split_once('@').is_some_and(|(base, _)| base == name);
+        let is = |u: &TargetUnknown| {
+            u.name == name || u.name.split_once('@').is_some_and(|(base, _)| base == name)
+        };
         let found: Vec<usize> = (0..self.asked.len()).filter(|&u| is(&self.asked[u])).collect();
         match found.is_empty() {
             false => Ok(found),
@@ -235,7 +250,8 @@ impl Task<'_> {
         }
     }
 
-    /// Reads what is required; those that all candidates together do not reach are left out and listed.
+    /// Sets the limits of the required unknowns; those beyond the reach of all candidates are left out
+    /// and listed.
     fn require(&mut self) -> Result<Vec<Unattainable>, SensorError> {
         let mut limits = vec![NONE - 1; self.asked.len()];
         for (name, most) in &self.options.max_degree {
@@ -252,6 +268,12 @@ impl Task<'_> {
         };
         required.sort_unstable();
         required.dedup();
+        for name in self.options.max_degree.iter().filter_map(|(name, _)| name.as_ref()) {
+            if !self.named(name)?.iter().any(|u| required.contains(u)) {
+                let required = self.options.required.clone();
+                return Err(SensorError::NotRequired { name: name.clone(), required });
+            }
+        }
         let everything = self.search.all;
         let reached = self.search.degrees(everything).map_err(|_| SensorError::Interrupted)?.to_vec();
         let (reach, never): (Vec<usize>, Vec<usize>) =
@@ -273,13 +295,13 @@ impl Task<'_> {
         millionths as f64 / MILLION
     }
 
-    /// The front of cost against degree, as far as it is found: sets with what proves them.
-    fn front(&mut self, out: &mut Vec<(Set, FrontSet)>) -> Result<(), Stopped> {
+    /// Adds the front of cost against degree to `out`, as far as it is found: sets with their proofs.
+    fn front(&mut self, out: &mut Vec<(Set, FrontSet)>) -> Result<(), StopReason> {
         let (mut most, everything) = (NONE - 1, self.search.worst(self.search.all)?);
         loop {
             let best = self.search.best(&Goal::All, most)?;
             let cuts = self.search.needed(&best);
-            let Best { set, degree: worst, examined, .. } = best;
+            let CheapestSet { set, degree: worst, examined, .. } = best;
             let one_of_each = cuts.into_iter().map(|cut| names(cut, self.options)).collect();
             let SensorSet { outputs, cost, degree } = self.set(set, worst);
             let below = (most < NONE - 1).then_some(most.into());
@@ -291,8 +313,8 @@ impl Task<'_> {
         }
     }
 
-    /// Per unknown the cheapest set.
-    fn of_unknowns(&mut self, stopped: &mut Option<Stopped>) -> Vec<SensorUnknown> {
+    /// Cheapest set for every unknown.
+    fn of_unknowns(&mut self, stopped: &mut Option<StopReason>) -> Vec<SensorUnknown> {
         let reached = self.search.degrees(self.search.all).map(<[u16]>::to_vec).unwrap_or_default();
         let mut out = Vec::new();
         for u in 0..self.asked.len() {
@@ -311,7 +333,7 @@ impl Task<'_> {
         out
     }
 
-    /// The candidates, each with the degrees that it gives alone.
+    /// Candidates, each with the degrees under it alone.
     fn candidates(&mut self) -> Vec<SensorCandidate> {
         let alone: Vec<Set> = (0..self.options.candidates.len()).map(|c| 1 << c).collect();
         let judged = self.search.judge(&alone).is_ok();
@@ -345,7 +367,7 @@ impl Task<'_> {
         if any {
             stopped = self.front(&mut front).err();
             complete = if stopped.is_some() { 0 } else { complete };
-            if front.is_empty() && stopped == Some(Stopped::Interrupted) {
+            if front.is_empty() && stopped == Some(StopReason::Interrupted) {
                 return Err(SensorError::Interrupted);
             }
         }
@@ -363,7 +385,7 @@ impl Task<'_> {
         }
         let least = self.search.worst(self.search.all).ok().filter(|_| any);
         let relied = front.iter().map(|f| f.0).chain(sets).chain(self.proofs(&front));
-        let confirmed = Confirmed::of(self, relied.collect())?;
+        let confirmed = Confirmation::of(self, relied.collect())?;
         Ok(Sensors {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -402,7 +424,7 @@ impl Task<'_> {
         })
     }
 
-    /// The failing sets that the proofs of a front rest on.
+    /// Failing sets that the proofs of a front rest on.
     fn proofs(&self, front: &[(Set, FrontSet)]) -> Vec<Set> {
         let place = |name: &String| {
             self.options.candidates.iter().position(|c| c.named.name == *name).map_or(0, |c| 1 << c)
@@ -412,16 +434,16 @@ impl Task<'_> {
         cuts.map(|cut| self.search.all & !cut).collect()
     }
 
-    /// A judged set under which another point gives other degrees.
+    /// Judged set under which another point gives other degrees; `None` if there is none.
     fn differs(&self, other: &dyn Ranks) -> Option<Set> {
         let judged = &self.search.judged;
         let mut sets: Vec<Set> = judged.keys().copied().collect();
         sets.sort_unstable();
-        sets.par_iter().copied().find_first(|set| judged[set] != other.degrees(*set))
+        parallel::find_first(sets.len(), |i| (judged[&sets[i]] != other.degrees(sets[i])).then_some(sets[i]))
     }
 }
 
-impl Stopped {
+impl StopReason {
     fn words(self) -> &'static str {
         match self {
             Self::Work => {

@@ -1,19 +1,19 @@
-//! Degrees of all unknowns under any set of outputs, by the rank of their rows at one point.
+//! Degrees of all unknowns under any set of outputs, by the ranks of their rows at one point.
 
 use std::sync::Mutex;
 
 use obsdeg_core::system::PointRows;
 use obsdeg_exact::{Field, Gap, Reals, RowSpace, Scalars};
 
-/// A set of candidates, one bit each.
+/// Set of candidates, one bit each.
 pub type Set = u64;
 
-/// Degree that stands for none.
+/// Degree of an unknown that is not observable.
 pub(crate) const NONE: u16 = u16::MAX;
 
 /// Degrees under sets of candidates at one point.
 pub trait Ranks: Sync {
-    /// The degree of every unknown in question, `u16::MAX` where it is not observable.
+    /// Degree of every unknown in question, `u16::MAX` where it is not observable.
     fn degrees(&self, set: Set) -> Box<[u16]>;
 
     /// True if every decision so far was clear.
@@ -22,8 +22,8 @@ pub trait Ranks: Sync {
     }
 }
 
-/// A row: its order, the candidate that it belongs to as a set (empty: it is there under every set), and its
-/// place among all rows.
+/// Row with its order, its candidate as a set (the empty set: present under every set), and its index
+/// among all rows.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     order: usize,
@@ -31,7 +31,7 @@ struct Row {
     start: usize,
 }
 
-/// Rows of all candidates at one point, by their order.
+/// Rows of all candidates at one point, sorted by order.
 #[derive(Debug)]
 pub struct Ordered<S: Scalars> {
     field: S,
@@ -44,8 +44,8 @@ pub struct Ordered<S: Scalars> {
 }
 
 impl<S: Scalars> Ordered<S> {
-    /// Of the rows of outputs: `owners` says which candidate an output belongs to, as a set; `asked` are the
-    /// columns of the unknowns in question.
+    /// Sorts the rows of all outputs. `owners` is the candidate of each output, as a set; `asked` are
+    /// the columns of the unknowns in question.
     pub fn new(point: &PointRows<S>, owners: &[Set], asked: &[usize]) -> Self {
         let mut all: Vec<(usize, Set, &[S::Element])> =
             point.known.iter().map(|row| (0, 0, row.as_slice())).collect();
@@ -63,7 +63,7 @@ impl<S: Scalars> Ordered<S> {
         Self { field, columns, rows, entries, asked, gap: Mutex::new(point.gap) }
     }
 
-    /// Climbs the orders: the rows of a set go into a space until nothing more can be found.
+    /// Adds the rows of a set to a space, order by order, until no more unknowns can become observable.
     fn climb<B: Basis<S::Element>>(&self, set: Set, basis: &mut B) -> Box<[u16]> {
         let mut degrees = vec![NONE; self.asked.len()].into_boxed_slice();
         let (mut open, mut rows) = (self.asked.len(), self.rows.as_slice());
@@ -92,7 +92,7 @@ impl<S: Scalars> Ordered<S> {
     }
 }
 
-/// A row space that grows.
+/// Row space that rows are added to.
 trait Basis<E> {
     /// Adds a row; true if the rank grew.
     fn add(&mut self, row: &[E]) -> bool;
@@ -114,7 +114,7 @@ where
     <Reals<N> as Scalars>::Element: Sync,
 {
     fn degrees(&self, set: Set) -> Box<[u16]> {
-        let mut space = Space(<<Reals<N> as Scalars>::Space as RowSpace>::new(Reals::<N>, self.columns));
+        let mut space = AnyBasis(<<Reals<N> as Scalars>::Space as RowSpace>::new(Reals::<N>, self.columns));
         let degrees = self.climb(set, &mut space);
         if let Ok(mut gap) = self.gap.lock() {
             *gap = gap.and(space.0.gap());
@@ -127,10 +127,10 @@ where
     }
 }
 
-/// Any row space.
-struct Space<R>(R);
+/// Basis from any row space.
+struct AnyBasis<R>(R);
 
-impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for Space<R> {
+impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for AnyBasis<R> {
     fn add(&mut self, row: &[E]) -> bool {
         self.0.insert(row)
     }
@@ -144,19 +144,19 @@ impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for Space<R> {
     }
 }
 
-/// A row space over a prime field in reduced echelon form of which only the columns without a pivot are
-/// stored: `d_i e_(pivot i) + sum_j b_ij e_(free j)`. A third of the products of a form with all columns.
+/// Row space over a prime field in reduced echelon form. Only columns without a pivot are stored: `d_i
+/// e_(pivot i) + sum_j b_ij e_(free j)`. This takes a third of the products of a form with all columns.
 struct Compact {
     field: Field,
     columns: usize,
     free: Vec<u32>,
     /// `b_ij` at `i * columns + j`.
     rest: Vec<u64>,
-    /// Per row the pivot column and its entry `d_i`.
+    /// Pivot column and its entry `d_i`, by row.
     pivots: Vec<(u32, u64)>,
     new: Vec<u64>,
     sums: Vec<u128>,
-    /// Per row that takes part in a reduction: its place, and its weight.
+    /// Index and weight of each row that takes part in a reduction.
     live: Vec<(usize, u64)>,
 }
 
@@ -174,8 +174,8 @@ impl Compact {
         }
     }
 
-    /// A multiple of a row plus basis rows, in the free columns: `D row - sum_i row[pivot_i] (D / d_i) b_i`
-    /// with the product D of the `d_i` that take part.
+    /// Reduces a row in the free columns: `D row - sum_i row[pivot_i] (D / d_i) b_i` with the product D
+    /// of the `d_i` that take part.
     fn reduce(&mut self, row: &[u64]) {
         let (f, columns) = (self.field, self.columns);
         self.live.clear();
@@ -249,7 +249,8 @@ mod tests {
     use super::*;
     use obsdeg_exact::{Echelon, SplitMix64};
 
-    /// Random sparse rows against the basis with all columns: ranks and unit vectors after every row.
+    /// Random sparse rows compared with the basis with all columns: ranks and unit vectors after every
+    /// row.
     #[test]
     fn stored_columns_are_enough() {
         let f = Field::new((1 << 60) + 33);

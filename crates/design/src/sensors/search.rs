@@ -1,28 +1,28 @@
-//! Search for sets of candidates: the cheapest for a goal, and all minimal ones, with the failing sets that
-//! prove them.
+//! Search for sets of candidates: the cheapest for a goal, and all minimal ones, with the failing sets
+//! that prove them.
 
 use std::collections::{BTreeSet, HashMap};
 
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::cuts::{Cheapest, Transversals, cost_of, members, smallest};
 use super::ranks::{NONE, Ranks, Set};
 
-/// Most nodes of a search for a cheapest set.
+/// Largest number of nodes of a search for a cheapest set.
 const NODES: u64 = 4_000_000;
-/// Orders in which candidates are added to a failing set at once.
+/// Number of orders in which candidates are added to a failing set at once.
 const ORDERS: usize = 4;
-/// Failing sets of a goal that are made to cuts before all sets of a cost are judged one by one: where many
-/// sets are alike, a cut excludes few.
+/// Number of rounds of cuts before all sets of a cost are judged one by one: if many sets are alike, a
+/// cut excludes few.
 const ROUNDS: usize = 40;
-/// Sets that are judged at once where all of a cost are.
+/// Number of sets judged at once if all sets of a cost are judged.
 const BATCH: usize = 4096;
-/// Sets that are judged at once in the search for all minimal ones.
+/// Number of sets judged at once in the search for all minimal ones.
 const AT_ONCE: usize = 64;
-/// Most minimal sets that are held.
+/// Largest number of minimal sets that are stored.
 const HELD: usize = 5_000;
 
-/// What a set of candidates should do.
+/// Goal of a set of candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Goal {
     /// Make every required unknown observable, each with a degree of at most its own limit and this one.
@@ -31,30 +31,30 @@ pub(crate) enum Goal {
     One(usize, u16),
 }
 
-/// Why a search ended before its end.
+/// Reason why a search ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Stopped {
-    /// More sets would be judged than the limit of work allows.
+pub(crate) enum StopReason {
+    /// Limit of work: more sets would be judged than it allows.
     Work,
-    /// Too many ways to hit all cuts.
+    /// Limit of nodes: too many sets hit all cuts.
     Nodes,
-    /// Nobody waits for it.
+    /// Interruption by the caller.
     Interrupted,
 }
 
-/// A cheapest set.
+/// Cheapest set with its proof.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Best {
+pub(crate) struct CheapestSet {
     pub(crate) set: Set,
-    /// Degree in question.
+    /// Degree of the goal.
     pub(crate) degree: u16,
-    /// Cuts that show that no cheaper set reaches the goal, beside those that were examined.
+    /// Cuts that prove, with the examined sets, that no cheaper set reaches the goal.
     pub(crate) cuts: Vec<Set>,
     /// Number of cheaper sets that hit all these cuts and were judged one by one.
     pub(crate) examined: usize,
 }
 
-/// Most sums of costs that are told apart.
+/// Largest number of different sums of costs.
 const SUMS: usize = 20_000;
 
 /// All sums of costs, ascending; `None` if there are too many.
@@ -70,17 +70,18 @@ fn sums(costs: &[u64]) -> Option<BTreeSet<u64>> {
     Some(out)
 }
 
-/// All sets of one cost that hit every cut.
-struct OfCost<'a> {
+/// Enumeration of all sets of one cost that hit every cut.
+struct EqualCostSets<'a> {
     cuts: &'a [Set],
     costs: &'a [u64],
-    /// Nodes that may still be visited.
+    /// Number of nodes that may still be visited.
     nodes: u64,
     out: Vec<Set>,
 }
 
-impl OfCost<'_> {
-    /// Goes on from a set with candidates from one on, for what is left of the cost; `None` beyond the limit.
+impl EqualCostSets<'_> {
+    /// Extends a set by candidates from `next` on with the total cost `left`; `None` at the limit of
+    /// nodes.
     fn go_on(&mut self, set: Set, next: usize, left: u64) -> Option<()> {
         self.nodes = self.nodes.checked_sub(1)?;
         let later = if next >= 64 { 0 } else { Set::MAX << next };
@@ -102,24 +103,24 @@ impl OfCost<'_> {
 }
 
 /// Search among sets of candidates of one model.
-pub(crate) struct Search<'a> {
+pub(crate) struct SetSearch<'a> {
     ranks: &'a dyn Ranks,
     /// Cost of each candidate, in millionths.
     pub(crate) costs: Vec<u64>,
-    /// All candidates.
+    /// Set of all candidates.
     pub(crate) all: Set,
-    /// Per unknown in question: the largest degree that is allowed, `None` of one that is not required.
+    /// Largest degree allowed for each unknown in question; `None` if it is not required.
     pub(crate) limits: Vec<Option<u16>>,
     /// Degrees under every set that was judged.
     pub(crate) judged: HashMap<Set, Box<[u16]>>,
-    /// Maximal failing sets that were found, for whatever goal.
+    /// Maximal failing sets that were found, for any goal.
     failing: Vec<Set>,
-    /// Sets that may still be judged.
+    /// Number of sets that may still be judged.
     left: u64,
     going: &'a (dyn Fn(u64) -> bool + Sync),
 }
 
-impl<'a> Search<'a> {
+impl<'a> SetSearch<'a> {
     pub(crate) fn new(
         ranks: &'a dyn Ranks,
         costs: Vec<u64>,
@@ -133,35 +134,35 @@ impl<'a> Search<'a> {
     }
 
     /// Judges sets that are not judged yet, on all cores.
-    pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), Stopped> {
+    pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), StopReason> {
         let mut new: Vec<Set> = sets.iter().copied().filter(|s| !self.judged.contains_key(s)).collect();
         new.sort_unstable();
         new.dedup();
         if new.is_empty() {
             return Ok(());
         }
-        self.left = self.left.checked_sub(new.len() as u64).ok_or(Stopped::Work)?;
+        self.left = self.left.checked_sub(new.len() as u64).ok_or(StopReason::Work)?;
         let ranks = self.ranks;
         let found: Vec<_> = match new.len() {
             1 => vec![ranks.degrees(new[0])],
-            _ => new.par_iter().map(|set| ranks.degrees(*set)).collect(),
+            _ => parallel::map(new.len(), |i| ranks.degrees(new[i])),
         };
         self.judged.extend(new.into_iter().zip(found));
         match (self.going)(self.judged.len() as u64) {
             true => Ok(()),
-            false => Err(Stopped::Interrupted),
+            false => Err(StopReason::Interrupted),
         }
     }
 
-    /// The degrees under a set.
-    pub(crate) fn degrees(&mut self, set: Set) -> Result<&[u16], Stopped> {
+    /// Degrees under a set.
+    pub(crate) fn degrees(&mut self, set: Set) -> Result<&[u16], StopReason> {
         self.judge(&[set])?;
-        self.judged.get(&set).map(|d| &**d).ok_or(Stopped::Work)
+        self.judged.get(&set).map(|d| &**d).ok_or(StopReason::Work)
     }
 
-    /// The largest degree of the required unknowns under a set, `NONE` where one is not observable by its
+    /// Largest degree of the required unknowns under a set; `NONE` if one is not observable within its
     /// limit.
-    pub(crate) fn worst(&mut self, set: Set) -> Result<u16, Stopped> {
+    pub(crate) fn worst(&mut self, set: Set) -> Result<u16, StopReason> {
         self.judge(&[set])?;
         Ok(self.worst_of(set))
     }
@@ -184,14 +185,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The cuts of the failing sets known so far, for a goal.
+    /// Cuts of the failing sets known so far, for a goal.
     pub(crate) fn cuts(&self, goal: Goal) -> Vec<Set> {
         let failing = self.failing.iter().filter(|set| !self.reaches(**set, goal));
         smallest(failing.map(|set| self.all & !set).collect())
     }
 
-    /// Adds candidates to failing sets while they fail, each in its own order; what cannot grow is kept.
-    fn grow(&mut self, sets: Vec<(Set, usize)>, goal: Goal) -> Result<(), Stopped> {
+    /// Adds candidates to failing sets as long as they fail, each in its own order, and keeps the
+    /// maximal ones.
+    fn grow(&mut self, sets: Vec<(Set, usize)>, goal: Goal) -> Result<(), StopReason> {
         let n = self.costs.len();
         let mut sets = sets;
         for step in 0..n {
@@ -212,12 +214,13 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// A cheapest set that reaches a goal, which all candidates together must, and the number of cheaper ones
-    /// that hit all cuts and were judged one by one; `None` if every one costs more than `most`.
-    fn cheapest(&mut self, goal: Goal, most: u64) -> Result<Option<(Set, usize)>, Stopped> {
+    /// Cheapest set that reaches a goal, and the number of cheaper sets that hit all cuts and were
+    /// judged one by one. All candidates together must reach the goal. `None` if every set costs more
+    /// than `most`.
+    fn cheapest(&mut self, goal: Goal, most: u64) -> Result<Option<(Set, usize)>, StopReason> {
         for _ in 0..ROUNDS {
             let cuts = self.cuts(goal);
-            let set = Cheapest::of(&cuts, &self.costs, NODES).ok_or(Stopped::Nodes)?;
+            let set = Cheapest::of(&cuts, &self.costs, NODES).ok_or(StopReason::Nodes)?;
             if cost_of(set, &self.costs) > most {
                 return Ok(None);
             }
@@ -230,12 +233,13 @@ impl<'a> Search<'a> {
             self.grow(starts, goal)?;
         }
         let cuts = self.cuts(goal);
-        let least = Cheapest::of(&cuts, &self.costs, NODES).ok_or(Stopped::Nodes)?;
+        let least = Cheapest::of(&cuts, &self.costs, NODES).ok_or(StopReason::Nodes)?;
         let (from, mut failed) = (cost_of(least, &self.costs), 0);
-        let sums = sums(&self.costs).ok_or(Stopped::Nodes)?;
+        let sums = sums(&self.costs).ok_or(StopReason::Nodes)?;
         for cost in sums.into_iter().filter(|cost| (from..=most).contains(cost)) {
-            let mut sets = OfCost { cuts: &cuts, costs: &self.costs.clone(), nodes: NODES, out: Vec::new() };
-            sets.go_on(0, 0, cost).ok_or(Stopped::Nodes)?;
+            let mut sets =
+                EqualCostSets { cuts: &cuts, costs: &self.costs.clone(), nodes: NODES, out: Vec::new() };
+            sets.go_on(0, 0, cost).ok_or(StopReason::Nodes)?;
             for batch in sets.out.chunks(BATCH) {
                 self.judge(batch)?;
                 if let Some(set) = batch.iter().find(|set| self.reaches(**set, goal)) {
@@ -247,34 +251,34 @@ impl<'a> Search<'a> {
         Ok(None)
     }
 
-    /// A cheapest set that reaches a goal, of the smallest degree at this cost, with what proves its cost;
-    /// `with` is the goal of a degree.
-    pub(crate) fn best(&mut self, with: &dyn Fn(u16) -> Goal, most: u16) -> Result<Best, Stopped> {
-        let (mut set, examined) = self.cheapest(with(most), u64::MAX)?.ok_or(Stopped::Nodes)?;
+    /// Cheapest set that reaches a goal, of the smallest degree at this cost, with the proof of its
+    /// cost; `with` is the goal for a degree.
+    pub(crate) fn best(&mut self, with: &dyn Fn(u16) -> Goal, most: u16) -> Result<CheapestSet, StopReason> {
+        let (mut set, examined) = self.cheapest(with(most), u64::MAX)?.ok_or(StopReason::Nodes)?;
         let cuts = self.cuts(with(most));
         let everything = self.degree_of(self.all, with(most))?;
         loop {
             let degree = self.degree_of(set, with(most))?;
             if degree <= everything {
-                return Ok(Best { set, degree, cuts, examined });
+                return Ok(CheapestSet { set, degree, cuts, examined });
             }
             match self.cheapest(with(degree - 1), cost_of(set, &self.costs))? {
                 Some((other, _)) => set = other,
-                None => return Ok(Best { set, degree, cuts, examined }),
+                None => return Ok(CheapestSet { set, degree, cuts, examined }),
             }
         }
     }
 
-    fn degree_of(&mut self, set: Set, goal: Goal) -> Result<u16, Stopped> {
+    fn degree_of(&mut self, set: Set, goal: Goal) -> Result<u16, StopReason> {
         match goal {
             Goal::All(_) => self.worst(set),
             Goal::One(u, _) => Ok(self.degrees(set)?[u]),
         }
     }
 
-    /// Cuts without those that the proof of a cheapest set needs not: where no set was judged one by one, all
-    /// sets that hit the others cost as much.
-    pub(crate) fn needed(&self, best: &Best) -> Vec<Set> {
+    /// Cuts that the proof of a cheapest set needs. If no set was judged one by one, a cut is dropped
+    /// if all sets that hit the others cost as much.
+    pub(crate) fn needed(&self, best: &CheapestSet) -> Vec<Set> {
         let (mut cuts, cost) = (best.cuts.clone(), cost_of(best.set, &self.costs));
         let mut at = if best.examined > 0 { 0 } else { cuts.len() };
         while at > 0 {
@@ -289,13 +293,13 @@ impl<'a> Search<'a> {
         cuts
     }
 
-    /// All minimal sets that reach a goal, and the number of members up to which they are all; with what
-    /// ended the search early.
-    pub(crate) fn minimal(&mut self, goal: Goal) -> (Vec<Set>, u32, Option<Stopped>) {
+    /// All minimal sets that reach a goal, the number of members up to which the list is complete, and
+    /// the reason for an early end.
+    pub(crate) fn minimal(&mut self, goal: Goal) -> (Vec<Set>, u32, Option<StopReason>) {
         let mut found = Transversals::new(HELD);
         let all_added = |found: &mut Transversals, cuts: Vec<Set>| cuts.into_iter().all(|cut| found.add(cut));
         let mut within = all_added(&mut found, self.cuts(goal));
-        // sets of fewer members than this one are all judged
+        // all sets with fewer members than this one are judged
         let mut shortest;
         let stopped = loop {
             let mut open: Vec<Set> =
@@ -305,7 +309,7 @@ impl<'a> Search<'a> {
             let mut failing: Vec<Set> =
                 found.sets.iter().copied().filter(|s| self.known_failing(*s, goal)).collect();
             if !within {
-                break Some(Stopped::Nodes);
+                break Some(StopReason::Nodes);
             }
             if failing.is_empty() && open.is_empty() {
                 break None;
@@ -345,8 +349,8 @@ mod tests {
     use super::*;
     use obsdeg_exact::SplitMix64;
 
-    /// Degrees that an output more never raises: per unknown some sets with a degree each, the least of those
-    /// inside counts.
+    /// Random degrees that another output never raises: per unknown some sets with a degree each; the
+    /// least degree of the sets contained counts.
     struct Drawn(Vec<Vec<(Set, u16)>>);
 
     impl Ranks for Drawn {
@@ -359,7 +363,8 @@ mod tests {
         }
     }
 
-    /// Drawn degrees against all sets one by one: cheapest sets and their degrees, minimal sets, proofs.
+    /// Random degrees compared with all sets one by one: cheapest sets and their degrees, minimal sets,
+    /// proofs.
     #[test]
     fn sets_are_those_of_exhaustion() {
         let mut rng = SplitMix64::new(2);
@@ -371,7 +376,7 @@ mod tests {
             };
             let drawn = Drawn((0..3).map(|_| unknown(&mut rng)).collect());
             let costs: Vec<u64> = (0..n).map(|_| 1 + if round % 2 == 0 { 0 } else { rng.below(4) }).collect();
-            let mut search = Search::new(&drawn, costs.clone(), 3, u64::MAX, &|_| true);
+            let mut search = SetSearch::new(&drawn, costs.clone(), 3, u64::MAX, &|_| true);
             search.limits = vec![Some(NONE - 1), Some(4), None];
             let all: Vec<Set> = (0..1 << n).collect();
             search.judge(&all).expect("few");
@@ -404,7 +409,8 @@ mod tests {
                 assert_eq!((sets, stopped), (minimal, None));
                 assert!(complete >= n as u32);
             }
-            let Best { set: found, degree, .. } = search.best(&|k| Goal::One(2, k), NONE - 1).expect("few");
+            let CheapestSet { set: found, degree, .. } =
+                search.best(&|k| Goal::One(2, k), NONE - 1).expect("few");
             let degree_of = |s: Set| drawn.degrees(s)[2];
             let fits = || all.iter().filter(|s| degree_of(**s) < NONE);
             let cheapest = fits().map(|s| cost(*s)).min();
@@ -414,8 +420,8 @@ mod tests {
         }
     }
 
-    /// Where any five of 14 candidates do and no four, cuts are too many: all sets of four are judged one by
-    /// one.
+    /// 14 candidates of which any five reach the goal and no four: cuts are too many, so all sets of
+    /// four are judged one by one.
     #[test]
     fn alike_candidates_are_judged_one_by_one() {
         struct AnyFive;
@@ -424,29 +430,29 @@ mod tests {
                 Box::new([if set.count_ones() >= 5 { 1 } else { NONE }])
             }
         }
-        let mut search = Search::new(&AnyFive, vec![1; 14], 1, u64::MAX, &|_| true);
+        let mut search = SetSearch::new(&AnyFive, vec![1; 14], 1, u64::MAX, &|_| true);
         search.limits = vec![Some(NONE - 1)];
         let best = search.best(&Goal::All, NONE - 1).expect("few");
         assert_eq!((best.set.count_ones(), best.degree), (5, 1));
         assert!(best.examined > 500 && best.examined <= 2002, "{}", best.examined);
-        let mut sets = OfCost { cuts: &[0b11], costs: &[1, 2, 3, 4], nodes: 99, out: Vec::new() };
+        let mut sets = EqualCostSets { cuts: &[0b11], costs: &[1, 2, 3, 4], nodes: 99, out: Vec::new() };
         assert_eq!(sets.go_on(0, 0, 5), Some(()));
         assert_eq!((sets.out, sums(&[1, 1, 3])), (vec![0b1001, 0b0110], Some([0, 1, 2, 3, 4, 5].into())));
     }
 
-    /// The limit of sets, and an interruption.
+    /// The limit of sets and an interruption are reported.
     #[test]
     fn what_ends_a_search_is_said() {
         let drawn = Drawn(vec![vec![(0b11_1000, 1), (0b111, 0)]]);
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 3, &|_| true);
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 3, &|_| true);
         search.limits = vec![Some(NONE - 1)];
-        assert_eq!(search.cheapest(Goal::All(9), 9), Err(Stopped::Work));
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 99, &|_| false);
+        assert_eq!(search.cheapest(Goal::All(9), 9), Err(StopReason::Work));
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 99, &|_| false);
         search.limits = vec![Some(NONE - 1)];
-        assert_eq!(search.cheapest(Goal::All(9), 9), Err(Stopped::Interrupted));
-        let mut search = Search::new(&drawn, vec![1; 6], 1, 5, &|_| true);
+        assert_eq!(search.cheapest(Goal::All(9), 9), Err(StopReason::Interrupted));
+        let mut search = SetSearch::new(&drawn, vec![1; 6], 1, 5, &|_| true);
         search.limits = vec![Some(NONE - 1)];
         let (sets, complete, stopped) = search.minimal(Goal::All(9));
-        assert!(sets.is_empty() && complete == 0 && stopped == Some(Stopped::Work));
+        assert!(sets.is_empty() && complete == 0 && stopped == Some(StopReason::Work));
     }
 }

@@ -1,4 +1,4 @@
-//! The claims in words, judged by the engine.
+//! Claims of the paper in words, judged by the engine.
 
 use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
@@ -12,7 +12,7 @@ use obsdeg_exact::{Echelon, SplitMix64};
 use super::equations::{ANY, PSI_C, everywhere};
 use super::{AuditError, Finding, Line, finding, line};
 
-/// Positions at generic angles.
+/// Scheme of `n` positions at generic angles.
 fn generic(n: usize, carry: Carry) -> Scheme {
     let angle = |i: usize, k: usize| format!("a{i}x{k}").parse().unwrap_or_else(|_| Angle::from_degrees(0));
     let angles = (0..n).map(|i| std::array::from_fn(|k| angle(i, k)));
@@ -47,7 +47,7 @@ impl Judged {
         })
     }
 
-    /// The degrees of the coefficients that satisfy `which`.
+    /// Degrees of the coefficients whose names satisfy `which`.
     fn of_coefficients(&self, which: impl Fn(&str) -> bool) -> Vec<Option<usize>> {
         let pairs = self.names.iter().zip(&self.degrees.degree);
         pairs.filter(|(n, _)| n.starts_with("D_") && which(n)).map(|(_, d)| *d).collect()
@@ -62,7 +62,7 @@ pub(super) fn show(d: Option<usize>) -> String {
     d.map_or_else(|| "not observable".into(), |k| format!("degree {k}"))
 }
 
-/// Random samples of the platform at generic angles, each in a field of its own.
+/// Number of random samples of the platform at generic angles, each in a field of its own.
 const SAMPLES: usize = 4;
 
 fn samples(platform: &Platform, seed: u64) -> Result<Vec<Sample>, AnalysisError> {
@@ -78,15 +78,15 @@ fn column(platform: &Platform, name: &str) -> usize {
     platform.names().iter().position(|n| n == name).unwrap_or(0)
 }
 
-/// What `eps^n = (0,-d,0)` for D_IX = D_IY = D_IZ = d rests on.
+/// Properties of the common drift `eps^n = (0,-d,0)`, which D_IX = D_IY = D_IZ = d causes.
 struct CommonMode {
-    /// It is so at every attitude.
+    /// True if the drift is `(0,-d,0)` at every attitude.
     vertical: bool,
-    /// eps_y^n has no part in Z and Z'.
+    /// True if eps_y^n does not enter Z and Z'.
     unseen: bool,
-    /// No derivative beyond the second says anything new of a position.
+    /// True if no derivative beyond the second adds a row at a position.
     ends_at_two: bool,
-    /// At a pole eps_y^n has no part in any derivative.
+    /// True if eps_y^n enters no derivative at a pole.
     unseen_at_pole: bool,
 }
 
@@ -110,9 +110,9 @@ fn common_mode(seed: u64) -> Result<CommonMode, AnalysisError> {
     Ok(out)
 }
 
-/// Whether nothing that one position shows moves along psi^n = (0,1,0), eps^n = (0,0,wN), and the zero-order
-/// coefficients make this drift at every attitude: then psi, which it turns, is not observable at one
-/// position, whatever its attitude.
+/// True if the outputs of one position do not change along psi^n = (0,1,0), eps^n = (0,0,wN), and the
+/// zero-order coefficients cause this drift at every attitude. Then psi, which turns with this direction, is
+/// not observable at one position of any attitude.
 fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
     let platform = Platform::new(generic(1, carry))?;
     for sample in samples(&platform, seed)? {
@@ -120,8 +120,8 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
         let block = &platform.blocks(&sample.point)[0];
         let mut direction = vec![0; platform.names().len()];
         for axis in 0..3 {
-            // C_n^c takes (0,1,0) and (0,0,wN) into platform axes; psi is in the first three columns whatever
-            // its name
+            // C_n^c takes (0,1,0) and (0,0,wN) into platform axes; psi occupies the first three columns under
+            // every name
             direction[axis] = c[1][axis];
             direction[column(&platform, ["D_FX", "D_FY", "D_FZ"][axis])] = f.mul(w_n, c[2][axis]);
         }
@@ -139,16 +139,16 @@ fn azimuth_is_hidden(carry: Carry, seed: u64) -> Result<bool, AnalysisError> {
     Ok(true)
 }
 
-/// What component `row` of eps^n (0: x, 1: y) tells of the coefficients at many generic attitudes.
-struct Told {
+/// Coefficients that component `row` of eps^n (0: x, 1: y) determines at many generic attitudes.
+struct DeterminedCoefficients {
     names: Vec<String>,
     single: Vec<bool>,
-    /// True if the differences of the D_I are in it.
+    /// True if the component determines the differences of the D_I.
     differences: bool,
 }
 
-impl Told {
-    /// What every one of the samples tells; `positions` generic attitudes.
+impl DeterminedCoefficients {
+    /// Coefficients that every one of the samples determines, at `positions` generic attitudes.
     fn of(row: usize, positions: usize, seed: u64) -> Result<Self, AnalysisError> {
         let platform = Platform::new(generic(positions, Carry::Platform))?;
         let n = platform.coefficients();
@@ -184,13 +184,13 @@ impl Told {
     }
 }
 
-/// Generic attitudes at which the parts of one component of eps^n are told apart.
+/// Number of generic attitudes at which the terms of one component of eps^n are separated.
 const ATTITUDES: usize = 16;
 
-/// The attitudes of section 3.2.
+/// Attitudes of section 3.2.
 pub(super) const PAPER: [&str; 2] = ["0,0,0", "180,0,0"];
 
-/// Section 2.2, and what section 3.3 says without a filter.
+/// Claims of section 2.2, and those of section 3.3 that need no filter.
 pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
     let mut out = Vec::new();
     let unit = everywhere(ANY, seed, |at| Ok(at.value("gx^2 + gy^2 + gz^2")? == at.field.one()))?;
@@ -203,20 +203,21 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             if unit { "add up" } else { "do not add up" }
         ),
     ));
-    let x = Told::of(0, ATTITUDES, seed)?;
+    let x = DeterminedCoefficients::of(0, ATTITUDES, seed)?;
     let (others, inputs) = (x.all(|n| !input_axis(n)), x.any(input_axis));
     out.push(line(
         "section 2.2",
         "eps_x^n at several attitudes tells D_F, D_O, D_S apart, of the D_I only differences",
         finding(others && !inputs && x.differences),
         format!(
-            "the coefficients that (22) tells at {ATTITUDES} generic attitudes: D_F, D_O, D_S {}, differences of the D_I {}, a D_I by itself {}",
+            "the coefficients that (22) tells at {ATTITUDES} generic attitudes: D_F, D_O, D_S {}, \
+             differences of the D_I {}, a D_I by itself {}",
             yes(others),
             yes(x.differences),
             yes(inputs)
         ),
     ));
-    let y = Told::of(1, ATTITUDES, seed)?.all(input_axis);
+    let y = DeterminedCoefficients::of(1, ATTITUDES, seed)?.all(input_axis);
     out.push(line(
         "section 2.2",
         "eps_y^n at several attitudes tells D_IX, D_IY, D_IZ",
@@ -224,12 +225,12 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
         format!("at {ATTITUDES} generic attitudes the mended (23) tells each of them: {}", yes(y)),
     ));
 
-    // which coefficients need Z''
+    // coefficients that need Z''
     let one_order = |n: usize, carry: Carry| -> Result<bool, AnalysisError> {
         let judged = Judged::of(generic(n, carry), seed)?;
         Ok(judged.of_coefficients(|name| !input_axis(name)).iter().all(|d| *d == Some(1)))
     };
-    // None: not with so many
+    // None: not with fewer than `ATTITUDES` positions
     let fewest = |carry: Carry| -> Result<Option<usize>, AnalysisError> {
         for n in 1..ATTITUDES {
             if one_order(n, carry)? {
@@ -261,7 +262,7 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
         ),
     ));
 
-    // how many positions psi takes
+    // number of positions that psi needs
     let hidden = Carry::ALL.map(|carry| azimuth_is_hidden(carry, seed));
     let mut needs_two = true;
     for hidden in hidden {
@@ -283,8 +284,10 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
         "at least two different positions are needed for psi",
         finding(needs_two && together),
         format!(
-            "psi^n = (0,1,0) with eps^n = (0,0,wN), which D_F can make, leaves Z and all derivatives zero at {} attitude and under {} carry; \
-             the squares of the coefficients of psi_y^n in (24) {} to 1, so they are never all zero. Two generic positions suffice under {} carry, not under {} carry",
+            "psi^n = (0,1,0) with eps^n = (0,0,wN), which D_F can make, leaves Z and all derivatives zero at \
+             {} attitude and under {} carry; \
+             the squares of the coefficients of psi_y^n in (24) {} to 1, so they are never all zero. Two \
+             generic positions suffice under {} carry, not under {} carry",
             if needs_two { "every" } else { "not every" },
             if needs_two { "every" } else { "not every" },
             if together { "add up" } else { "do not add up" },
@@ -309,7 +312,8 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             _ => Finding::Disagree,
         },
         format!(
-            "it has {}; at the paper's p1 p2 D_FX, D_FY, D_FZ: {list}; at six generic positions, platform and inertial carry, {}",
+            "it has {}; at the paper's p1 p2 D_FX, D_FY, D_FZ: {list}; at six generic positions, platform \
+             and inertial carry, {}",
             show(local.combination),
             if enough { "all three have its degree" } else { "not all have its degree" }
         ),
@@ -321,19 +325,19 @@ fn yes(b: bool) -> &'static str {
     if b { "yes" } else { "no" }
 }
 
-/// The degrees of one position in (psi^n, eps^n).
-struct Local {
+/// Degrees at one position in terms of (psi^n, eps^n).
+struct LocalDegrees {
     psi: [Option<usize>; 2],
     eps: [Option<usize>; 2],
-    /// Of wN psi_y - eps_z.
+    /// Degree of wN psi_y - eps_z.
     combination: Option<usize>,
-    /// Of psi_y'.
+    /// Degree of psi_y'.
     rate: Option<usize>,
-    /// The unknowns that are not observable.
+    /// Unknowns that are not observable.
     lost: Vec<String>,
 }
 
-fn single_position(seed: u64) -> Result<Local, AnalysisError> {
+fn single_position(seed: u64) -> Result<LocalDegrees, AnalysisError> {
     let scheme = Scheme {
         unknowns: Unknowns::Drift,
         combinations: vec!["wN*psi_y^n - eps_z^n".into(), "wN*psi_z^n + eps_y^n".into()],
@@ -345,7 +349,7 @@ fn single_position(seed: u64) -> Result<Local, AnalysisError> {
     let mut asked = local.combinations.iter().filter(|c| c.requested).map(|c| c.degree);
     let (combination, rate) = (asked.next().flatten(), asked.next().flatten());
     let lost = local.quantities.iter().filter(|q| q.status != Status::Observable).map(|q| q.name.clone());
-    Ok(Local {
+    Ok(LocalDegrees {
         psi: ["psi_x^n", "psi_z^n"].map(unknown),
         eps: ["eps_x^n", "eps_y^n"].map(unknown),
         combination,
@@ -354,7 +358,7 @@ fn single_position(seed: u64) -> Result<Local, AnalysisError> {
     })
 }
 
-/// What section 3.3 says of segment 1 without a filter.
+/// Claims of section 3.3 about segment 1 that need no filter.
 pub(super) fn segment_1(seed: u64) -> Result<[Line; 2], AnalysisError> {
     let p1 = Judged::of(positions(&PAPER[..1]), seed)?;
     let psi_y = p1.degree("psi_y");
@@ -388,7 +392,7 @@ pub(super) fn segment_1(seed: u64) -> Result<[Line; 2], AnalysisError> {
     ])
 }
 
-/// Both conclusions.
+/// Both conclusions of the paper.
 pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
     let local = single_position(seed)?;
     let ([best_x, best_z], [eps_x, eps_y]) = (local.psi, local.eps);
@@ -401,7 +405,8 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
         "psi_x, psi_z best; eps_x, psi_y', wN psi_y(0) - eps_z in the middle; eps_y worst",
         finding(classes),
         format!(
-            "degrees: psi_x, psi_z {}, {}; eps_x {}; wN psi_y - eps_z {}; eps_y {}; psi_y' = wN psi_z + eps_y needs eps_y: {} ({} not observable \
+            "degrees: psi_x, psi_z {}, {}; eps_x {}; wN psi_y - eps_z {}; eps_y {}; psi_y' = wN psi_z + \
+             eps_y needs eps_y: {} ({} not observable \
              by themselves)",
             show(best_x),
             show(best_z),
@@ -414,7 +419,7 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
     );
 
     let lemma = common_mode(seed)?;
-    // a second path: schemes tried
+    // second path: concrete schemes
     let mut tried = true;
     let cardinals = || Scheme::of_angles(cardinal_names().iter().filter_map(|n| cardinal(n)));
     for carry in Carry::ALL {
@@ -439,7 +444,8 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
         "the D_I always have a poor degree, whatever the scheme",
         finding(lemma.vertical && lemma.unseen && lemma.ends_at_two && tried),
         format!(
-            "D_IX = D_IY = D_IZ = d makes eps^n = (0,-d,0) {}, and eps_y^n is {} Z and Z': so no scheme brings a D_I below degree 2, {} \
+            "D_IX = D_IY = D_IZ = d makes eps^n = (0,-d,0) {}, and eps_y^n is {} Z and Z': so no scheme \
+             brings a D_I below degree 2, {} \
              (24 cardinal and 12 generic attitudes, every carry: {}){}. Accuracy orders of D_IX D_IY D_IZ, \
              which count the dwell, at generic positions: {} carry",
             if lemma.vertical { "at every attitude" } else { "not at every attitude" },

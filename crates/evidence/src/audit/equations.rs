@@ -12,22 +12,21 @@ use obsdeg_exact::{Field, RootField, SplitMix64};
 
 use super::{Finding, Line, finding, line};
 
-/// Random points at which an identity is tested, each in a random prime field of its own.
+/// Number of random points at which an identity is tested, each in a random prime field of its own.
 const POINTS: usize = 6;
 
-/// One point: angles, rates, psi and the twelve coefficients at random, and what the model makes of
-/// them.
-pub(super) struct At {
+/// Random point (angles, rates, psi and the twelve coefficients) with the values of the model there.
+pub(super) struct RandomPoint {
     pub(super) field: Field,
     /// `C_c^n`.
     pub(super) attitude: Matrix3<u64>,
-    /// Cosine and sine of alpha, beta, gamma.
+    /// Cosine and sine of alpha, beta and gamma.
     pub(super) angles: [(u64, u64); 3],
     names: Vec<(String, u64)>,
 }
 
-impl At {
-    /// The value of a formula.
+impl RandomPoint {
+    /// Value of a formula at this point.
     pub(super) fn value(&self, text: &str) -> Result<u64, AnalysisError> {
         let wrap = |e: ExpressionError| CombinationError {
             text: text.into(),
@@ -37,14 +36,14 @@ impl At {
         Ok(evaluate(&parse(text).map_err(wrap)?, &self.field, self).map_err(wrap)?)
     }
 
-    /// The values of three formulas.
+    /// Values of three formulas at this point.
     pub(super) fn vector(&self, texts: [&str; 3]) -> Result<[u64; 3], AnalysisError> {
         let [x, y, z] = texts.map(|t| self.value(t));
         Ok([x?, y?, z?])
     }
 }
 
-impl Environment for At {
+impl Environment for RandomPoint {
     fn name(&self, name: &str) -> Option<u64> {
         self.names.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
     }
@@ -56,11 +55,11 @@ impl Environment for At {
     }
 }
 
-/// The model at a random point of a random field, under names for the formulas of the paper:
-/// `psi_x psi_y psi_z` and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in c,
-/// `Z1 Z3` with `p`, `pp` for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n; `t q h` are
-/// random numbers, `rx ry rz` a random rate.
-pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisError> {
+/// Model at a random point of a random field, under names for the formulas of the paper: `psi_x psi_y psi_z`
+/// and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in c, `Z1 Z3` with `p`, `pp`
+/// for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n. `t q h` are random numbers, `rx ry rz` a
+/// random rate.
+pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomPoint, AnalysisError> {
     let angles = parse_attitude(attitude)
         .unwrap_or_else(|_| std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0)));
     let platform = Platform::new(Scheme::of_angles([angles]))?;
@@ -109,7 +108,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
     for (name, value) in ["Zcx", "Zcy", "Zcz"].into_iter().zip(to_c(z_n)) {
         put(name, value);
     }
-    Ok(At {
+    Ok(RandomPoint {
         field: f,
         attitude: *c,
         angles: platform.scheme().positions[0]
@@ -120,12 +119,12 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<At, AnalysisErr
     })
 }
 
-/// Whether something holds at random points of random fields, at the attitude given (`alpha,beta,gamma` for a
-/// random one).
+/// True if `holds` returns true at random points of random fields, at the attitude given (`alpha,beta,gamma`
+/// for a random one).
 pub(super) fn everywhere(
     attitude: &str,
     seed: u64,
-    mut holds: impl FnMut(&At) -> Result<bool, AnalysisError>,
+    mut holds: impl FnMut(&RandomPoint) -> Result<bool, AnalysisError>,
 ) -> Result<bool, AnalysisError> {
     let mut rng = SplitMix64::new(seed);
     for _ in 0..POINTS {
@@ -136,7 +135,7 @@ pub(super) fn everywhere(
     Ok(true)
 }
 
-/// Whether every `left = right`.
+/// True if `left = right` for every pair.
 fn identity(attitude: &str, pairs: &[(&str, &str)], seed: u64) -> Result<bool, AnalysisError> {
     everywhere(attitude, seed, |point| {
         for (left, right) in pairs {
@@ -204,7 +203,7 @@ pub(super) const PSI_C: [(&str, &str); 3] = [
     ("psi_z", "-px*sin(beta) + py*sin(alpha)*cos(beta) + pz*cos(alpha)*cos(beta)"),
 ];
 
-/// What a test of an identity has shown.
+/// Reason of an audit line that tests an identity without conditions.
 pub(super) fn plain(ok: bool) -> String {
     if ok {
         format!("an identity: holds at {POINTS} random points, each in a prime field of its own")
@@ -283,7 +282,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         holds(ANY, &[("ey", &mended)])?,
     ];
     let reason = format!(
-        "as printed {}; with the first D_FZ read as D_FY and the last factor of (D_OX sin g - D_OY cos g) sin a cos b sin b \
+        "as printed {}; with the first D_FZ read as D_FY and the last factor of (D_OX sin g - D_OY cos g) \
+         sin a cos b sin b \
          read as cos a {}; with one of the two alone {}",
         plain(a),
         if d { "an identity" } else { "still none" },

@@ -1,11 +1,11 @@
-//! The equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random
+//! Equations that set up the model, (1)-(5), (7), (8), (11), (19), as printed, at random points of random
 //! prime fields.
 
 use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::model::{GYROS, Matrix3, SignedAxis, elementary, product};
 use obsdeg_exact::Field;
 
-use super::equations::{ANY, At, G, PSI_C, everywhere, plain};
+use super::equations::{ANY, G, PSI_C, RandomPoint, everywhere, plain};
 use super::{Finding, Line, finding, line};
 
 fn transpose(a: &Matrix3<u64>) -> Matrix3<u64> {
@@ -24,18 +24,18 @@ fn sum(f: &Field, a: &[u64; 3], b: &[u64; 3]) -> [u64; 3] {
     std::array::from_fn(|i| f.add(a[i], b[i]))
 }
 
-/// `a x b`.
+/// Cross product `a x b`.
 fn cross(f: &Field, a: &[u64; 3], b: &[u64; 3]) -> [u64; 3] {
     apply(f, &skew(f, a), b)
 }
 
-/// `[v x]`.
+/// Skew-symmetric matrix `[v x]`.
 fn skew(f: &Field, v: &[u64; 3]) -> Matrix3<u64> {
     let [x, y, z] = *v;
     [[0, f.neg(z), y], [z, 0, f.neg(x)], [f.neg(y), x, 0]]
 }
 
-/// `a + k b`.
+/// Matrix sum `a + k b`.
 fn plus(f: &Field, a: &Matrix3<u64>, k: u64, b: &Matrix3<u64>) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| f.add(a[i][j], f.mul(k, b[i][j]))))
 }
@@ -44,9 +44,12 @@ fn identity(f: &Field) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { f.one() } else { 0 }))
 }
 
-/// Whether a polynomial of degree two in a small quantity has no terms of degree 0 and 1: whether it is `h^2`
-/// times its value at 1 at the random size h of the point.
-fn of_second_order(at: &At, polynomial: impl Fn(u64) -> Matrix3<u64>) -> Result<bool, AnalysisError> {
+/// True if a polynomial of degree two in a small quantity has no terms of degree 0 and 1: its value at the
+/// random size h of the point is `h^2` times its value at 1.
+fn of_second_order(
+    at: &RandomPoint,
+    polynomial: impl Fn(u64) -> Matrix3<u64>,
+) -> Result<bool, AnalysisError> {
     let (f, h) = (&at.field, at.value("h")?);
     let zero = [[0; 3]; 3];
     Ok(polynomial(h) == plus(f, &zero, f.mul(h, h), &polynomial(f.one())))
@@ -62,9 +65,9 @@ const EPS: [&str; 3] = ["cx", "cy", "cz"];
 const GRAVITY: [&str; 3] = ["gx", "gy", "gz"];
 const RATES: [&str; 3] = ["wN", "wU", "0"];
 
-/// True if the platform that turns with `omega_c + eps` in inertial space while the computed frame turns with
-/// `omega_c` has, in the first order of psi and eps, the derivative of psi that (2) says.
-fn kinematics(at: &At, minus: bool) -> Result<bool, AnalysisError> {
+/// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with
+/// `omega_c + eps` in inertial space, the computed frame with `omega_c`.
+fn kinematics(at: &RandomPoint, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
     let derivative = sum(f, &cross(f, &psi, &rate), &eps);
@@ -91,16 +94,21 @@ fn mountings() -> impl Iterator<Item = Mounting> {
     })
 }
 
-/// `I x O = S`.
+/// True if `I x O = S`.
 fn right_handed([i, o, s]: &Mounting) -> bool {
     let (a, b) = (i.vector(), o.vector());
     let at = |k: usize| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
     [at(0), at(1), at(2)] == s.vector()
 }
 
-/// The mountings of a gyro with which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28);
-/// eps counted positive about +I or about -I.
-fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<Vec<Mounting>, AnalysisError> {
+/// Mountings of a gyro for which (3), with `a = g^c` or `a = -g^c`, gives the drift of (22), (27), (28); eps
+/// is counted positive about +I or about -I.
+fn fitting_mountings(
+    gyro: usize,
+    along_g: bool,
+    about_plus: bool,
+    seed: u64,
+) -> Result<Vec<Mounting>, AnalysisError> {
     let mut fitting: Vec<Mounting> = mountings().collect();
     everywhere(ANY, seed, |at| {
         let f = &at.field;
@@ -120,7 +128,7 @@ fn that_fit(gyro: usize, along_g: bool, about_plus: bool, seed: u64) -> Result<V
     Ok(fitting)
 }
 
-/// One mounting in words, or how many there are.
+/// Mounting in words, or the number of mountings if several fit.
 fn shown(fitting: &[Vec<Mounting>; 3]) -> String {
     let one = |(gyro, found): (char, &Vec<Mounting>)| match found[..] {
         [[i, o, s]] => {
@@ -132,10 +140,10 @@ fn shown(fitting: &[Vec<Mounting>; 3]) -> String {
     GYROS.into_iter().zip(fitting).map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// (3) and (4): how the gyros would have to be mounted.
+/// Audit of (3) and (4): mountings of the gyros that these equations require.
 fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     let fit = |along_g: bool, about_plus: bool| -> Result<[Vec<Mounting>; 3], AnalysisError> {
-        let [x, y, z] = [0, 1, 2].map(|gyro| that_fit(gyro, along_g, about_plus, seed));
+        let [x, y, z] = [0, 1, 2].map(|gyro| fitting_mountings(gyro, along_g, about_plus, seed));
         Ok([x?, y?, z?])
     };
     let (plus, plus_reversed) = (fit(true, true)?, fit(true, false)?);
@@ -147,7 +155,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
         "eps = D_F + D_I a_I + D_O a_O + D_S a_S along the axes of each gyro",
         finding([&plus, &plus_reversed, &minus, &minus_reversed].into_iter().any(every)),
         format!(
-            "of the 48 ways to mount a gyro along platform axes, with a = g^c and eps positive about +I, these give the drift of \
+            "of the 48 ways to mount a gyro along platform axes, with a = g^c and eps positive about +I, \
+             these give the drift of \
              (22), (27), (28): {} (Fig. 1, the mounting, is missing)",
             shown(&plus)
         ),
@@ -158,7 +167,8 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
         _ => Finding::Conditional,
     };
     let reason = format!(
-        "when eps is positive about +I, {} with -g^c gives the drift of (22), (27), (28), {} with +g^c; when eps is positive about -I: {} with \
+        "when eps is positive about +I, {} with -g^c gives the drift of (22), (27), (28), {} with +g^c; when \
+         eps is positive about -I: {} with \
          -g^c, {} with +g^c. Fig. 1, which would tell, is missing; obsdeg takes eps positive about +I, and +g^c",
         if none(&minus) { "no mounting".into() } else { shown(&minus) },
         if every(&plus) { "that of (3)".into() } else { shown(&plus) },
@@ -168,9 +178,9 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
     Ok([three, line("(4)", "the g-sensitive terms multiply a = C_n^c (-g^n) = -g^c", finding, reason)])
 }
 
-/// The derivative of eps in c while c turns with `rate` against n: the first-order terms take
+/// Derivative of eps in c while c turns with `rate` against n: the first-order terms take
 /// `g^c' = g^c x rate`.
-fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
+fn drift_rate(at: &RandomPoint, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
     let d = |name: &str| at.value(name);
@@ -185,8 +195,8 @@ fn drift_rate(at: &At, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     ])
 }
 
-/// Which of the eight choices of passive and active elementary matrices give (20) and (24); bit k set: axis k
-/// is active.
+/// Choices, out of eight, of passive and active elementary matrices that give (20) and (24); bit k is set if
+/// axis k is active.
 fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
     let mut right = Vec::new();
     for active in 0..8usize {
@@ -211,7 +221,7 @@ fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
 }
 
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
-    let holds = |test: &dyn Fn(&At) -> Result<bool, AnalysisError>| everywhere(ANY, seed, test);
+    let holds = |test: &dyn Fn(&RandomPoint) -> Result<bool, AnalysisError>| everywhere(ANY, seed, test);
     let mut out = Vec::new();
 
     let rotation = holds(&|at| {
@@ -238,7 +248,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         "psi' = [psi x] omega_c + eps",
         finding(sign),
         format!(
-            "what is of first order in psi and eps when the platform turns with omega_c + eps and the computed frame with omega_c, any \
+            "what is of first order in psi and eps when the platform turns with omega_c + eps and the \
+             computed frame with omega_c, any \
              omega_c: {}",
             plain(sign)
         ),
@@ -246,7 +257,7 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     out.extend(mounting_lines(seed)?);
 
     // C_n^p (-g^n) = -C_c^p C_n^c g^n
-    let output = |at: &At| -> Result<[u64; 3], AnalysisError> {
+    let output = |at: &RandomPoint| -> Result<[u64; 3], AnalysisError> {
         let f = &at.field;
         let to_p = product(f, &small_turn(f, &at.vector(PSI)?, f.one(), true), &transpose(&at.attitude));
         Ok(apply(f, &to_p, &[0, f.one(), 0]))
@@ -285,8 +296,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         })
     };
     let printed = from_c(true)? || from_c(false)?;
-    // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) and at any other
-    let rate = |at: &At, tracks: bool| -> Result<[u64; 3], AnalysisError> {
+    // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) or at a random one
+    let rate = |at: &RandomPoint, tracks: bool| -> Result<[u64; 3], AnalysisError> {
         let f = &at.field;
         let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);
         let commanded = if tracks { earth } else { at.vector(["rx", "ry", "rz"])? };
@@ -339,7 +350,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         "eps' = 0",
         finding(still && !turning),
         format!(
-            "with g^c' = g^c x omega_nc the derivative of (3) is {} at the omega_c of (7), {} at random ones; products of psi and \
+            "with g^c' = g^c x omega_nc the derivative of (3) is {} at the omega_c of (7), {} at random \
+             ones; products of psi and \
              coefficients are left out, as the paper says",
             if still { "zero" } else { "not zero" },
             if turning { "zero as well" } else { "not" }

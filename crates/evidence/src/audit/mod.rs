@@ -1,8 +1,9 @@
 //! The paper against the algebra: every numbered equation and claim, recomputed.
 //!
 //! The source is Ding, Cai, Huang, J. NUDT 39(1), 2017, 1001-2486(2017)01-040-06. Equations are compared with
-//! the model as identities in random prime fields; claims about degrees are judged by the engine, those of
-//! section 3.3 by the filter under the conditions of section 3.1. What is not covered is a line of its own.
+//! the model as identities in random prime fields. Claims about degrees are judged by the engine, those of
+//! section 3.3 by the filter under the conditions of section 3.1. Every statement that is not covered has a
+//! line of its own.
 
 mod claims;
 mod equations;
@@ -58,7 +59,7 @@ pub struct Audit {
     pub lines: Vec<Line>,
 }
 
-/// Why the paper cannot be audited.
+/// Reason why the paper cannot be audited.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AuditError {
     /// A verdict cannot be reached.
@@ -72,7 +73,7 @@ pub enum AuditError {
     Simulation(#[from] SimulationError),
 }
 
-/// What no line judges, and why.
+/// Place, claim and reason of every statement of the paper that is not judged.
 const NOT_COVERED: [[&str; 3]; 8] = [
     [
         "introduction",
@@ -108,11 +109,12 @@ const NOT_COVERED: [[&str; 3]; 8] = [
     [
         "section 4",
         "the analysis holds for all torquing schemes",
-        "its equations take (7), a platform that tracks the geographic frame; the lines here judge positions, no rotating segments",
+        "its equations take (7), a platform that tracks the geographic frame; the lines here judge \
+         positions, no rotating segments",
     ],
 ];
 
-/// Recomputes every line.
+/// Recomputes every line of the audit.
 ///
 /// # Errors
 /// [`AuditError`].
@@ -139,15 +141,16 @@ fn finding(holds: bool) -> Finding {
 mod tests {
     use super::*;
 
-    /// What the paper says, line by line: the slips, the conditions, what is not covered, and that the rest
-    /// agrees, whatever the seed.
+    /// The audit finds the slips, conditions and uncovered statements listed here and agrees with all other
+    /// lines, whatever the seed.
     #[test]
     fn the_findings_are_these() {
         use Finding::{Conditional, Disagree, NotCovered};
         for seed in [1, 2, 99] {
             let audit = audit(seed).expect("computed");
             let agree = audit.lines.iter().filter(|l| l.finding == Finding::Agree).map(|l| l.place.as_str());
-            let equations = "(1) (2) (3) (6) (8) (9) (10) (11) (12) (13) (14) (15) (16) (17) (18) (19) (20) (22) (24) (25) (27) (28)";
+            let equations = "(1) (2) (3) (6) (8) (9) (10) (11) (12) (13) (14) (15) (16) (17) (18) (19) (20) \
+                (22) (24) (25) (27) (28)";
             let claims = [["section 2.2"; 4].as_slice(), &["section 3.3"; 5], &["conclusion 2"]].concat();
             assert_eq!(
                 agree.collect::<Vec<_>>(),
@@ -185,7 +188,7 @@ mod tests {
         }
     }
 
-    /// Every numbered equation has a line that judges it, in order.
+    /// Every numbered equation has a line that judges it, in the paper's order.
     #[test]
     fn no_equation_is_left_out() {
         let audit = audit(3).expect("computed");
@@ -194,8 +197,8 @@ mod tests {
         assert_eq!(numbers.collect::<Vec<_>>(), (1..=28).collect::<Vec<_>>());
     }
 
-    /// What the reasons say in numbers, by hand: wN psi_y(0) at 28.2 degrees, the fewest positions of the
-    /// reference verdicts, the accuracy orders, the mounting of the paper.
+    /// Numbers in the reasons equal those computed by hand: wN psi_y(0) at 28.2 degrees, the fewest positions
+    /// of the reference verdicts, the accuracy orders, the mounting of the paper.
     #[test]
     fn the_reasons_say_these_numbers() {
         let audit = audit(1).expect("computed");

@@ -1,8 +1,8 @@
-//! What section 3.3 says of its figures, judged by the filter under the conditions of section 3.1.
+//! Statements of section 3.3 about its figures, judged by the filter under the conditions of section 3.1.
 //!
-//! The filter is linear, so its error without noise is the mean of its errors over all noise: offsets are
-//! read from such a run, made with the gains for the noise of the paper; sigma says how far one run lies from
-//! it.
+//! The filter is linear, so its error without noise is the mean of its errors over all noise. Offsets are
+//! read from such a run, made with the gains for the noise of the paper. Sigma is the scatter of one run
+//! about it.
 
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
@@ -15,14 +15,14 @@ use crate::simulation::conditions::Conditions;
 use crate::simulation::record::{Record, RunStart, Series, run};
 use crate::simulation::{Plan, SimulationError, simulate};
 
-/// An estimate is at the truth where error and sigma are within this part of the true value at the start.
+/// Relative limit, by the true value at the start, for error and sigma of an estimate that has converged.
 const WITHIN: f64 = 0.01;
-/// A value agrees with what is said of it within this part.
+/// Relative tolerance for a value that the paper states as approximate.
 const ABOUT: f64 = 0.1;
-/// Quickly: within this part of a segment.
+/// Fraction of a segment within which an estimate must converge to count as quick.
 const QUICK: f64 = 0.1;
 
-/// The conditions of section 3.1, with the program's own where it gives none.
+/// Conditions of section 3.1; those that the paper does not state are the program's own.
 fn conditions() -> Conditions {
     Conditions { propagation: Propagation::Rk4, ..Conditions::default() }
 }
@@ -31,13 +31,13 @@ fn scheme(carry: Carry) -> Scheme {
     Scheme { carry, ..positions(&PAPER) }
 }
 
-/// A run of the filter; of [`Mean::of`] the one without noise in truth and samples.
-struct Mean {
+/// Run of the filter; [`MeanRun::of`] makes it without noise in truth and samples.
+struct MeanRun {
     plan: Plan,
     record: Record,
 }
 
-impl Mean {
+impl MeanRun {
     fn of(carry: Carry, seed: u64) -> Result<Self, SimulationError> {
         let conditions = conditions();
         let plan = Plan::new(&scheme(carry), &conditions)?;
@@ -55,7 +55,7 @@ impl Mean {
         Some((&self.record.traces.series[i], self.record.traces.scales[i]))
     }
 
-    /// The samples of a segment.
+    /// Indices of the samples of a segment.
     fn samples(&self, segment: usize) -> std::ops::Range<usize> {
         let position = &self.record.traces.position;
         let first = position.iter().position(|p| *p == segment).unwrap_or(position.len());
@@ -63,8 +63,8 @@ impl Mean {
         first..end
     }
 
-    /// How many seconds into a segment error and sigma of `name` are within 1 % of its true value at the
-    /// start, and stay so.
+    /// Time within a segment, in s, from which error and sigma of `name` stay within 1 % of its true value at
+    /// the start; `None` if they do not.
     fn settled(&self, name: &str, segment: usize) -> Option<f64> {
         let (series, _) = self.series(name)?;
         let within = WITHIN * series.truth[0].abs();
@@ -81,7 +81,7 @@ impl Mean {
         self.settled(name, segment).is_some_and(|t| t <= QUICK * s.dt * s.steps as f64)
     }
 
-    /// Estimate minus truth of a sample in shown units.
+    /// Estimate minus truth of a sample, in the shown unit of `name`.
     fn error(&self, name: &str, sample: usize) -> f64 {
         self.series(name).map_or(f64::NAN, |(s, scale)| (s.estimate[sample] - s.truth[sample]) / scale)
     }
@@ -94,7 +94,7 @@ impl Mean {
         self.series(name).map_or(f64::NAN, |(s, scale)| s.sigma[sample] / scale)
     }
 
-    /// The times at which they settle in a segment.
+    /// Times within a segment at which the estimates of `names` settle, in words.
     fn times(&self, names: &[&str], segment: usize) -> String {
         let one = |name: &&str| match self.settled(name, segment) {
             Some(t) => format!("{name} after {t} s"),
@@ -107,9 +107,9 @@ impl Mean {
 fn is_about(found: f64, expected: f64) -> bool {
     (found - expected).abs() <= ABOUT * expected.abs()
 }
-/// Section 3.3.
+/// Lines about section 3.3.
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
-    let means = Carry::ALL.map(|carry| Mean::of(carry, seed));
+    let means = Carry::ALL.map(|carry| MeanRun::of(carry, seed));
     let degrees = Carry::ALL.map(|carry| Judged::of(scheme(carry), seed));
     let ([platform, inertial, reset], [p, i, r]) = (means, degrees);
     let carries = [(platform?, p?), (inertial?, i?), (reset?, r?)];
@@ -147,8 +147,9 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
     Ok(out)
 }
 
-/// Whether the mean error of psi_y is about -psi_y(0) in the second half of a segment.
-fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
+/// True if the mean error of psi_y is about -psi_y(0) in the second half of a segment, with the reason in
+/// words.
+fn psi_y(mean: &MeanRun, segment: usize) -> (bool, String) {
     let samples = mean.samples(segment);
     let (first, last) = (samples.start, samples.end.saturating_sub(1));
     let start = -mean.error("psi_y", 0);
@@ -157,14 +158,15 @@ fn psi_y(mean: &Mean, segment: usize) -> (bool, String) {
     let moved = mean.truth("psi_y", last) - mean.truth("psi_y", first);
     let spread = (sigma * sigma - start * start).max(0.0).sqrt();
     let reason = format!(
-        "mean error of psi_y at the end {:.4} deg with psi_y(0) = {start} deg while the truth moves by {moved:.2} deg; of one run sigma is {sigma:.3} deg, \
+        "mean error of psi_y at the end {:.4} deg with psi_y(0) = {start} deg while the truth moves by \
+         {moved:.2} deg; of one run sigma is {sigma:.3} deg, \
          {spread:.3} deg without that of psi_y(0)",
         mean.error("psi_y", last)
     );
     (holds, reason)
 }
 
-/// Agrees if it holds under every carry, under a condition if under some.
+/// Finding from the outcomes under the three carries: conditional if they differ.
 fn under(holds: [bool; 3]) -> Finding {
     match holds {
         [true, true, true] => Finding::Agree,
@@ -173,11 +175,11 @@ fn under(holds: [bool; 3]) -> Finding {
     }
 }
 
-type Carries = [(Mean, Judged); 3];
+type Carries = [(MeanRun, Judged); 3];
 
-/// A phrase for each carry.
-fn each(carries: &Carries, phrase: impl Fn(&Mean, &Judged) -> String) -> String {
-    let one = |(carry, (mean, judged)): (Carry, &(Mean, Judged))| {
+/// Phrases of all carries, joined.
+fn each(carries: &Carries, phrase: impl Fn(&MeanRun, &Judged) -> String) -> String {
+    let one = |(carry, (mean, judged)): (Carry, &(MeanRun, Judged))| {
         format!("{}, {carry} carry", phrase(mean, judged))
     };
     Carry::ALL.into_iter().zip(carries).map(one).collect::<Vec<_>>().join("; ")
@@ -185,7 +187,7 @@ fn each(carries: &Carries, phrase: impl Fn(&Mean, &Judged) -> String) -> String 
 
 fn fast(carries: &Carries) -> Line {
     let names = ["D_FX", "D_SX", "D_SZ"];
-    let holds = |(mean, judged): &(Mean, Judged)| {
+    let holds = |(mean, judged): &(MeanRun, Judged)| {
         names.iter().all(|n| judged.degree(n).is_some() && mean.quick(n, 1))
     };
     let lost = |judged: &Judged| -> String {
@@ -209,15 +211,16 @@ fn offset(carries: &Carries) -> Line {
     let start = (-mean.error("psi_y", 0)).to_radians();
     let dph = |rate: f64| rate.to_degrees() * 3600.0;
     let expected = -dph(mean.plan.point.w_n) * start;
-    let end = |mean: &Mean| mean.error("D_FZ", mean.record.traces.time.len() - 1);
-    let holds = |(mean, _): &(Mean, Judged)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
+    let end = |mean: &MeanRun| mean.error("D_FZ", mean.record.traces.time.len() - 1);
+    let holds = |(mean, _): &(MeanRun, Judged)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
     let last = mean.record.traces.time.len() - 1;
     line(
         "section 3.3",
         "in segment 2 D_FZ quickly converges but stays off by about omega_ie psi_y(0)",
         under(carries.each_ref().map(holds)),
         format!(
-            "mean error at the end: {}; -wN psi_y(0) is {expected:.5} deg/h, with the whole earth rate {:.5}; of one run sigma is {:.3} deg/h under \
+            "mean error at the end: {}; -wN psi_y(0) is {expected:.5} deg/h, with the whole earth rate \
+             {:.5}; of one run sigma is {:.3} deg/h under \
              platform carry",
             each(carries, |mean, _| format!("{:.5} deg/h", end(mean))),
             -dph(W_IE) * start,
@@ -228,12 +231,12 @@ fn offset(carries: &Carries) -> Line {
 
 fn slow(carries: &Carries) -> Line {
     let (slow, fast) = (["D_FY", "D_IY"], ["D_FX", "D_FZ", "D_SX", "D_SZ"]);
-    let later = |mean: &Mean, [s, f]: [&str; 2]| {
+    let later = |mean: &MeanRun, [s, f]: [&str; 2]| {
         let time = |n: &str| mean.settled(n, 1).unwrap_or(f64::INFINITY);
         let last = mean.record.traces.time.len() - 1;
         time(s) > time(f) && mean.sigma(s, last) > mean.sigma(f, last)
     };
-    let holds = |(mean, judged): &(Mean, Judged)| {
+    let holds = |(mean, judged): &(MeanRun, Judged)| {
         let better = fast.iter().all(|f| judged.degree(f).is_none_or(|k| k < 2));
         better && slow.iter().all(|s| judged.degree(s) == Some(2) && fast.iter().all(|f| later(mean, [s, f])))
     };
@@ -245,10 +248,12 @@ fn slow(carries: &Carries) -> Line {
     let every = [&fast[..], &slow[..]].concat();
     line(
         "section 3.3",
-        "D_FY and D_IY converge more slowly and less accurately than D_FX, D_FZ, D_SX, D_SZ, as eps_y has the worse degree",
+        "D_FY and D_IY converge more slowly and less accurately than D_FX, D_FZ, D_SX, D_SZ, as eps_y has \
+         the worse degree",
         under(carries.each_ref().map(holds)),
         format!(
-            "so under each carry: {}. Under platform carry within 1 %: {}; sigma at the end in deg/h: {}; degrees of these: {}",
+            "so under each carry: {}. Under platform carry within 1 %: {}; sigma at the end in deg/h: {}; \
+             degrees of these: {}",
             Carry::ALL
                 .into_iter()
                 .zip(carries)
@@ -262,10 +267,10 @@ fn slow(carries: &Carries) -> Line {
     )
 }
 
-/// What one run with noise says of the model that is simulated.
-fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
+/// Consistency of one run with noise, by an exact truth and by the linear one.
+fn whole(mean: &MeanRun, seed: u64) -> Result<Line, SimulationError> {
     let linear = simulate(&scheme(Carry::Platform), &conditions(), seed)?.0;
-    // the filter of the paper, which is linear
+    // the filter of the paper is linear
     let exact = Conditions { truth: Truth::Exact, filter: Some(FilterKind::Linear), ..conditions() };
     let exact = simulate(&scheme(Carry::Platform), &exact, seed)?.0;
     let d_fy = exact.quantities.iter().find(|q| q.name == "D_FY").map_or(f64::NAN, |q| q.error);
@@ -284,9 +289,12 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
         "the simulation confirms the analysis",
         finding,
         format!(
-            "for the linear model: one run with noise is {} with it (mean NIS {:.2}, NEES {:.1} of {} unknowns). |psi| reaches {:.1} deg, and (6) leaves \
-             out {:.3} g, the noise of Z being {:e} g; with an exact truth the run is {}, D_FY off by {:.1} deg/h. Chosen where section 3.1 says nothing: \
-             latitude {} deg, psi(0) {} deg, prior sigma of psi {:.1} deg, of D_F {:.1} deg/h, of the other D {:.1} deg/h/g; platform carry, p1 and p2 1000 s each without a pause, seed {seed}",
+            "for the linear model: one run with noise is {} with it (mean NIS {:.2}, NEES {:.1} of {} \
+             unknowns). |psi| reaches {:.1} deg, and (6) leaves \
+             out {:.3} g, the noise of Z being {:e} g; with an exact truth the run is {}, D_FY off by {:.1} \
+             deg/h. Chosen where section 3.1 says nothing: \
+             latitude {} deg, psi(0) {} deg, prior sigma of psi {:.1} deg, of D_F {:.1} deg/h, of the other \
+             D {:.1} deg/h/g; platform carry, p1 and p2 1000 s each without a pause, seed {seed}",
             word(consistent),
             linear.consistency.nis,
             linear.consistency.nees,
@@ -309,22 +317,22 @@ fn whole(mean: &Mean, seed: u64) -> Result<Line, SimulationError> {
 mod tests {
     use super::*;
 
-    /// The run without noise is the mean of runs with it: their average lies within four of its standard
+    /// The run without noise is the mean of runs with noise: their average lies within four of its standard
     /// deviations, and the average of another carry does not.
     #[test]
     fn the_error_without_noise_is_the_mean() {
         const RUNS: u64 = 40;
-        let mean = Mean::of(Carry::Platform, 1).expect("a run");
-        let other = Mean::of(Carry::Inertial, 1).expect("a run");
+        let mean = MeanRun::of(Carry::Platform, 1).expect("a run");
+        let other = MeanRun::of(Carry::Inertial, 1).expect("a run");
         let conditions = conditions();
         let plan = Plan::new(&scheme(Carry::Platform), &conditions).expect("a plan");
         let start = RunStart::new(&plan, &conditions).expect("a start");
         let prediction =
             Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], 1).expect("predicted");
-        let runs: Vec<Mean> = (0..RUNS)
+        let runs: Vec<MeanRun> = (0..RUNS)
             .map(|seed| {
                 let record = run(&plan, &conditions, &start, &prediction, seed).expect("a run");
-                Mean { plan: plan.clone(), record }
+                MeanRun { plan: plan.clone(), record }
             })
             .collect();
         for sample in [10, 100, 101, 150, 200] {
@@ -342,11 +350,11 @@ mod tests {
         }
     }
 
-    /// When an estimate has settled, looked at sample by sample.
+    /// The time at which an estimate has settled, checked sample by sample.
     #[test]
     fn settled_means_from_then_on() {
         for carry in [Carry::Platform, Carry::Inertial] {
-            let mean = Mean::of(carry, 1).expect("a run");
+            let mean = MeanRun::of(carry, 1).expect("a run");
             let traces = &mean.record.traces;
             for (i, name) in traces.names.iter().enumerate() {
                 let truth = traces.series[i].truth[0] / traces.scales[i];
@@ -360,8 +368,8 @@ mod tests {
                     assert_eq!(mean.settled(name, segment), expected, "{carry}: {name} {segment}");
                 }
             }
-            // and by hand: noise of Z of one sample is 0.6 % of psi(0), a first-order coefficient is not told
-            // in segment 1
+            // and by hand: noise of Z of one sample is 0.6 % of psi(0); segment 1 does not determine a
+            // first-order coefficient
             assert_eq!((mean.settled("psi_x", 0), mean.settled("D_FX", 0)), (Some(10.0), None));
         }
     }

@@ -1,4 +1,4 @@
-//! Schemes side by side: plain data.
+//! Comparison of schemes as plain data.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::Turn;

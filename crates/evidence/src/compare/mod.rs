@@ -1,5 +1,5 @@
-//! Schemes side by side, for design reviews: verdicts, predicted accuracy, what each position is for, what
-//! the assumptions are worth.
+//! Comparison of schemes for design reviews: verdicts, predicted accuracy, contribution of each position, and
+//! sensitivity to the assumptions.
 
 pub(crate) mod answer;
 
@@ -10,8 +10,7 @@ use std::collections::BTreeMap;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::requirements::{Claim, Miss};
 use crate::simulation::answer::MeasurementReport;
@@ -27,19 +26,18 @@ const LATITUDES: [&str; 7] = ["0", "15", "30", "45", "60", "75", "90"];
 /// Factors on the dwells.
 const DWELLS: [f64; 2] = [0.5, 2.0];
 
-/// A scheme to be compared, with its name and conditions.
+/// Scheme to compare, with its name and conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Its name in the comparison.
+    /// Name of the scheme in the comparison.
     pub name: String,
-    /// The scheme.
+    /// Scheme to compare.
     pub scheme: Scheme,
-    /// Its conditions; requirements are the requirements.
+    /// Conditions of the scheme, with its requirements.
     pub conditions: Conditions,
 }
 
-/// Refuses, before anything is computed, a scheme that is too large under one of the carries that are looked
-/// at.
+/// Checks, before anything is computed, that a scheme is small enough under all carries.
 ///
 /// # Errors
 /// [`SimulationError::ComparedUnknowns`].
@@ -51,7 +49,7 @@ pub fn comparable(scheme: &Scheme) -> Result<(), SimulationError> {
 /// Compares schemes.
 ///
 /// # Errors
-/// The name of the scheme that cannot be judged, and why.
+/// Name of the scheme that cannot be judged, and the reason.
 pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, SimulationError)> {
     for e in entries {
         comparable(&e.scheme).map_err(|error| (e.name.clone(), error))?;
@@ -67,7 +65,7 @@ pub fn compare(entries: &[Entry], seed: u64) -> Result<Comparison, (String, Simu
     })
 }
 
-/// What differs between schemes besides positions, dwells and slews.
+/// Differences between schemes besides positions, dwells and slews.
 fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     let Some((first, others)) = schemes.split_first() else { return Vec::new() };
     // psi of every position counts as psi
@@ -90,9 +88,9 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }
 
-/// Every unknown with its predicted standard deviation in deg, deg/h, deg/h/g at the end, by the conditions
-/// that are stated, with a bench its total uncertainty; `None` where neither samples nor stated priors bound
-/// it.
+/// Predicted standard deviations of all unknowns at the end, in deg, deg/h, deg/h/g, under the stated
+/// conditions; with a bench their total uncertainties. `None` where neither samples nor stated priors bound
+/// the unknown.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -105,14 +103,14 @@ pub fn predicted(
     Ok(judged.plan.platform.names().iter().cloned().zip(judged.totals.iter().copied()).collect())
 }
 
-/// The accuracy of a scheme under conditions of which those count that concern its unknowns: other carries
-/// and fewer positions have others.
+/// Accuracy of a scheme under those conditions that concern its unknowns: other carries and fewer positions
+/// have other unknowns.
 fn judged(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Attained, SimulationError> {
     Bench::check(&conditions.bench, scheme.positions.len(), scheme.rotates())?;
     Attained::new(scheme, &conditions.within(&Platform::new(scheme.clone())?), seed)
 }
 
-/// The rank with dwell and the number of unknowns.
+/// Rank with dwell, and number of unknowns.
 fn rank(of: &Attained) -> [usize; 2] {
     [of.prediction.rank, of.prediction.unknowns.len()]
 }
@@ -130,7 +128,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
     conditions.concern(&judged.plan.platform)?;
     let drop_one = drop_one(scheme, conditions, &judged, seed)?;
     let mut quantities = quantities(&judged, conditions, &drop_one)?;
-    // drifts that nobody states, or that no run can have, say nothing of the scheme
+    // drifts that are not stated, or beyond what a run admits, give no validity
     let states_drifts = !conditions.stated_values().is_empty();
     let own = match states_drifts.then(|| at_own_drifts(&judged.plan, conditions)) {
         None => None,
@@ -206,15 +204,15 @@ fn quantities(
     Ok(judged.prediction.unknowns.iter().enumerate().map(of_unknown).collect())
 }
 
-/// Per position and coefficient: the length of its column of `eps^n = C E D` or of the error of the
-/// accelerometers at a position, its root mean square over the arc of a rotating segment (the columns of C
-/// are orthonormal, so this is the product of components of g, f, or of the earth rate).
+/// Excitation per position and coefficient: the length of the coefficient's column of `eps^n = C E D`, or of
+/// the error of the accelerometers. Over the arc of a rotating segment it is the root mean square. The
+/// columns of C are orthonormal, so the length is the product of components of g, f, or of the earth rate.
 fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
     let (plan, platform) = (&judged.plan, &judged.plan.platform);
     let squares = |c: &Matrix3<f64>| -> Vec<f64> {
         let rows = plan.drift_rows(c, None);
         let seen = platform.errors().accelerometer_rows(&Float, c);
-        // the rate of a torquer in that of the earth
+        // torquers: rates in units of the earth rate
         let unit = |t: &ErrorTerm| if t.source == Source::Rate { W_IE } else { 1.0 };
         let square = |(d, t): (usize, &ErrorTerm)| -> f64 {
             rows.iter().chain(&seen).map(|r| (r[d] / unit(t)).powi(2)).sum()
@@ -237,8 +235,8 @@ fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
     platform.scheme().positions.iter().enumerate().map(of).collect()
 }
 
-/// Points in [0, 1] with weights for a mean over an arc (rad): Gauss and Legendre's three on parts of five
-/// degrees, which is exact to 1e-10 for the squares of second-order terms.
+/// Points in [0, 1] with weights for a mean over an arc (rad): three-point Gauss-Legendre rules on intervals
+/// of at most five degrees, exact to 1e-10 for the squares of second-order terms.
 fn quadrature(arc: f64) -> Vec<(f64, f64)> {
     const PART: f64 = std::f64::consts::PI / 36.0;
     const MOST: f64 = 10_000.0;
@@ -251,7 +249,7 @@ fn quadrature(arc: f64) -> Vec<(f64, f64)> {
     (0..parts as usize).flat_map(of).collect()
 }
 
-/// The scheme without each of its positions in turn.
+/// Comparison of the scheme without each of its positions in turn.
 fn drop_one(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -266,7 +264,6 @@ fn drop_one(
         let unknown = |c: usize| &of.prediction.unknowns[c];
         c.is_some_and(|c| unknown(c).status == Status::Observable || unknown(c).determined)
     };
-    let parts = interrupt::parts();
     let without = |i: usize| {
         let position = scheme.positions[i].name.clone();
         let own = Conditions { bench: Bench::without(&conditions.bench, i), ..conditions.clone() };
@@ -278,10 +275,10 @@ fn drop_one(
         let requirements = judged.requirements(conditions)?;
         Ok(DropOne { position, lost, worst: judged.worst_of(&|_| true), requirements })
     };
-    (0..scheme.positions.len()).into_par_iter().map(|i| parts.part(|| without(i))).collect()
+    parallel::try_map(scheme.positions.len(), without)
 }
 
-/// The worst sigma at other latitudes, dwells and carries.
+/// Worst sigmas at other latitudes, dwells and carries.
 fn sensitivity(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -303,16 +300,16 @@ fn sensitivity(
         let other = under(scheme, conditions, carry);
         others.extend(other.map(|(other, still)| (format!("{carry} carry{without}"), other, still)));
     }
-    let of = |(condition, scheme, conditions): (String, Scheme, Conditions)| {
-        let judged = judged(&scheme, &conditions, seed)?;
+    let of = |i: usize| {
+        let (condition, scheme, conditions) = &others[i];
+        let judged = judged(scheme, conditions, seed)?;
         let worst_determined = judged.worst_of(&|name| determined.contains(name));
         Ok(Sensitivity {
-            condition,
+            condition: condition.clone(),
             rank: rank(&judged),
             worst: judged.worst_of(&|_| true),
             worst_determined,
         })
     };
-    let parts = interrupt::parts();
-    others.into_par_iter().map(|other| parts.part(|| of(other))).collect()
+    parallel::try_map(others.len(), of)
 }

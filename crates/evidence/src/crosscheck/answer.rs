@@ -1,4 +1,4 @@
-//! The evidence for and against the exact verdicts: plain data.
+//! Evidence for and against the exact verdicts, as plain data.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::Carry;
@@ -88,12 +88,12 @@ pub enum Agreement {
 }
 
 impl Agreement {
-    /// Of what was measured.
+    /// Agreement from the outcome of a comparison.
     pub(crate) fn of(agrees: bool) -> Self {
         if agrees { Self::Agrees } else { Self::Disagrees }
     }
 
-    /// True if it is for or against the verdict.
+    /// True if the evidence is for or against the verdict.
     pub fn is_resolved(self) -> bool {
         matches!(self, Self::Agrees | Self::Disagrees)
     }
@@ -152,13 +152,13 @@ pub struct Check {
 }
 
 impl Check {
-    /// What was measured is held against the prediction by `agrees`; what was not is not tested.
+    /// Check of a measured value by `agrees`; not tested without a measured value.
     pub(crate) fn new(predicted: f64, measured: Option<f64>, agrees: impl Fn(f64) -> bool) -> Self {
         let outcome = measured.map_or(Agreement::NotTested, |x| Agreement::of(agrees(x)));
         Self { predicted, measured, outcome }
     }
 
-    /// True if something was measured that disagrees.
+    /// True if a measured value disagrees with the prediction.
     pub fn fails(&self) -> bool {
         self.outcome == Agreement::Disagrees
     }
@@ -174,7 +174,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Counts over slopes, each with whether the verdict says an order.
+    /// Counts over slopes; the flag is true where the verdict has an order.
     pub(crate) fn count<'a>(slopes: impl Iterator<Item = (&'a Check, bool)>) -> Self {
         let said: Vec<&Check> = slopes.filter(|(_, said)| *said).map(|(slope, _)| slope).collect();
         Self { measured: said.iter().filter(|c| c.outcome.is_resolved()).count(), of: said.len() }

@@ -1,5 +1,5 @@
-//! The model that verdicts and linear filter share, against equations that are written a second time: those
-//! of direction cosines, linearised at zero. A sign that is wrong in (2), (6) or in the carry shows here.
+//! Comparison of the model that verdicts and linear filter share with equations written a second time: those
+//! of direction cosines, linearised at zero. A wrong sign in (2), (6) or in the carry shows here.
 
 use obsdeg_ekf::{Measurement, Motion, Update};
 
@@ -10,15 +10,15 @@ use crate::simulation::extended::Extended;
 use crate::simulation::plan::Plan;
 use crate::simulation::state::PlatformState;
 
-/// Relative difference that is rounding and the order of the integration.
+/// Largest relative difference that rounding and the order of the integration cause.
 const LIMIT: f64 = 1e-7;
 
-/// The largest difference of Phi and H of any step, each column in units of its largest entry; `None` where
-/// the unknowns are the drift itself, for which there are no such equations, and where torquer errors act in
-/// turns at once, which full attitudes do not have.
+/// Largest difference of Phi and H over all steps, each column in units of its largest entry. `None` where
+/// the unknowns are the drift itself, which has no such equations. `None` also where torquer errors act in
+/// instantaneous turns, which full attitudes do not have.
 ///
 /// # Errors
-/// [`SimulationError::Filter`] when a number is none.
+/// [`SimulationError::Filter`] for a number that is not finite.
 pub(super) fn difference(
     plan: &Plan,
     conditions: &Conditions,
@@ -36,7 +36,7 @@ pub(super) fn difference(
         let motion = filter.motion(segment);
         let phi = motion.advance(0.0, plan.segments[segment].dt, &mut zero.clone())?.0.matrix();
         let linear = stage.transition.matrix();
-        // biases of gyros are no part of the verdicts
+        // the verdicts do not include the biases of gyros
         for j in 0..plan.unknowns() {
             let scale = linear.column(j).amax().max(phi.column(j).amax());
             add((phi.column(j) - linear.column(j)).amax() / scale);
@@ -63,7 +63,7 @@ mod tests {
 
     use super::*;
 
-    /// Every sign of the blocks and of the outputs is held: one after the other is changed.
+    /// Every changed sign of the blocks and of the outputs is detected, one after the other.
     #[test]
     fn a_sign_that_is_wrong_shows() {
         let attitudes = || ["10,25,40", "130,-50,70"].map(|a| parse_attitude(a).expect("an attitude"));

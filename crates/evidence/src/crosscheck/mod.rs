@@ -1,9 +1,10 @@
-//! The exact verdicts against a filter: two independent paths, item by item.
+//! Cross-check of the exact verdicts with a filter: two independent paths, item by item.
 //!
-//! a. the slope of sigma against the dwell is -(accuracy order + 1/2); b. a larger prior leaves what is
-//! observable as it is; the directions that Z does not see are those of the information; c. the filter's
-//! covariance is the inverse information; d. errors and innovations are what the filter believes; e.
-//! predicted and measured orders rank alike; f. filters that are wrong on purpose are found out.
+//! Evidence a: the slope of sigma against the dwell is -(accuracy order + 1/2). b: a larger prior does not
+//! change the sigmas of observable functionals, and the unobservable directions are those of the information
+//! matrix. c: the filter's covariance is the inverse information. d: errors and innovations match the
+//! filter's covariances. e: predicted and measured orders rank alike. f: deliberately wrong filters are
+//! detected.
 
 pub(crate) mod answer;
 mod asymptotics;
@@ -27,7 +28,7 @@ use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_ekf::{Form, SquareRootInformation};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, each_row};
@@ -40,10 +41,10 @@ use asymptotics::method;
 use structure::{last_covariance, still, structure};
 use summary::{disagreements, misfits, outcomes, unresolved};
 
-/// Relative difference of covariances that is rounding; P itself holds half the digits of its root.
+/// Largest relative difference of covariances that rounding causes; P itself has half the digits of its root.
 const COVARIANCE_LIMITS: [(Form, &str, f64); 2] =
     [(Form::Ud, "UD form", 1e-6), (Form::Joseph, "Joseph form", 1e-4)];
-/// What an analysis says and nothing here is held against.
+/// Statements of an analysis that the cross-check does not test.
 const NOT_TESTED: [&str; 7] = [
     "solving expressions (the analysis verifies them by substitution) and formulas of Z",
     "that the coefficients printed are exact: numbers are held against samples, to seven digits",
@@ -51,27 +52,28 @@ const NOT_TESTED: [&str; 7] = [
     "the conditions on angles under which verdicts change",
     "verdicts under the other carries, at other latitudes and angles: a cross-check of those schemes does that",
     "that the bound on the probability of a wrong verdict is right",
-    "that the equations of the paper, their signs and axes, are those of the platform: they are written here several times, as the paper has them",
+    "that the equations of the paper, their signs and axes, are those of the platform: they are written here \
+     several times, as the paper has them",
 ];
-/// What is left of a column of unit length that others explain.
+/// Length of the unexplained rest of a unit column below which the other columns explain it.
 const UNEXPLAINED: f64 = 1e-7;
-/// A filter that is off by less may agree with its data.
+/// Smallest change of a control, in deg, that must show: a filter with a smaller one may agree with its data.
 const OFF_DEG: f64 = 1.0;
-/// Runs of a control that fewer have not found out.
+/// Number of runs of a control that [`CONTROL_RUNS`] runs have not detected.
 const MANY_RUNS: usize = 2000;
-/// Most numbers of the samples of a control that are looked at.
+/// Largest product of samples and unknowns of a control for which [`must_show`] computes an answer.
 const MOST_NUMBERS: usize = 4_000_000;
-/// Runs of a control.
+/// Number of runs of a control.
 const CONTROL_RUNS: usize = 16;
 
-/// How the filter is made to differ from the truth.
+/// Deliberate difference of the filter from the truth.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FilterChange {
-    /// Another carry.
+    /// Carry of the filter; `None`: that of the truth.
     pub carry: Option<Carry>,
-    /// Another latitude.
+    /// Latitude of the filter; `None`: that of the truth.
     pub latitude: Option<Latitude>,
-    /// A position (its index) that the filter does not know of: it believes the platform stays where it was.
+    /// Index of a position unknown to the filter, which assumes that the platform stays where it was.
     pub dropped: Option<usize>,
 }
 
@@ -106,14 +108,14 @@ impl FilterChange {
     }
 }
 
-/// What is to be checked, and how.
+/// Options of a cross-check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CrossCheckOptions {
-    /// Monte Carlo runs.
+    /// Number of Monte Carlo runs.
     pub runs: usize,
     /// Seed of all random choices.
     pub seed: u64,
-    /// A filter that is wrong on purpose.
+    /// Deliberate error of the filter.
     pub filter: FilterChange,
 }
 
@@ -124,11 +126,11 @@ impl Default for CrossCheckOptions {
     }
 }
 
-/// Holds the exact verdicts on `scheme` against a filter. `progress` hears how many of the
-/// runs are done and says whether to go on.
+/// Compares the exact verdicts on `scheme` with a filter. `progress` gets the number of finished runs and
+/// returns false to stop.
 ///
 /// # Errors
-/// [`SimulationError`]; `Interrupted` when `progress` wants no more.
+/// [`SimulationError`]; `Interrupted` when `progress` returns false.
 pub fn crosscheck(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -141,11 +143,11 @@ pub fn crosscheck(
     against(&prediction, &truth, scheme, conditions, options, progress)
 }
 
-/// Holds `prediction`, whatever says so, on `scheme` against a filter, as [`crosscheck`] does with that of
-/// the exact engine.
+/// Compares `prediction` on `scheme` with a filter, as [`crosscheck`] does with the prediction of the exact
+/// engine.
 ///
 /// # Errors
-/// [`SimulationError`]; `Interrupted` when `progress` wants no more.
+/// [`SimulationError`]; `Interrupted` when `progress` returns false.
 pub fn crosscheck_against(
     prediction: &Prediction,
     scheme: &Scheme,
@@ -157,7 +159,7 @@ pub fn crosscheck_against(
     against(prediction, &truth, scheme, conditions, options, progress)
 }
 
-/// The plan of what is true.
+/// Plan of the truth.
 fn truth(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -269,18 +271,20 @@ fn against(
     Ok(out)
 }
 
-/// When evidence b, c and f of doubles is not resolvable, in words.
+/// Conditions under which evidence b, c and f in doubles is not resolvable, in words.
 fn filter_method() -> String {
     format!(
-        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits say that the diffuse prior is \
-         too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding may make a tenth of the limit; f: where \
+        "b: by many digits first, then in doubles; what fails in doubles is not resolvable where many digits \
+         say that the diffuse prior is \
+         too narrow to show it, or that moving the numbers of the model by 2^{} hides it; c: where rounding \
+         may make a tenth of the limit; f: where \
          the filter is off by less than {OFF_DEG} deg, \
          or where what it cannot explain of the truths drawn need not show in {MANY_RUNS} runs",
         resolution::ROUNDING
     )
 }
 
-/// Evidence c.
+/// Evidence c: differences of the filter's covariances from the inverse information.
 fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Difference>, SimulationError> {
     let still = still(conditions);
     let plan = Plan::new(scheme, &still)?;
@@ -299,8 +303,8 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
         // NaN stays
         let difference =
             (0..n * n).map(relative).fold(0.0, |a: f64, b| if b <= a || a.is_nan() { a } else { b });
-        // the digits of P that rounding takes, step by step, are those of the largest variance, the prior's,
-        // beside the smallest
+        // P loses, step by step, the digits by which the largest variance, that of the prior, exceeds the
+        // smallest
         let coarse = form == Form::Joseph && wider * f64::EPSILON * steps as f64 > limit / 10.0;
         let outcome = match difference <= limit {
             true => Agreement::Agrees,
@@ -317,15 +321,15 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
     Ok(out)
 }
 
-/// Evidence e: the predicted accuracy orders against those read off the slopes, unobservable last; against
-/// the `errors` of runs.
+/// Evidence e: rank correlation of the predicted accuracy orders with those of the slopes (unobservable
+/// last), and with the `errors` of runs.
 fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f64]) -> Ranking {
     const LAST: i64 = 1000;
     let unknowns = prediction.unknowns.iter();
     let at_end: Vec<i64> = unknowns.map(|u| u.order_at_end.map_or(LAST, |d| d as i64)).collect();
-    // ranks: errors within a tenth are alike
+    // ranks: logarithms of the errors in bins of 0.2
     let found: Vec<i64> = errors.iter().map(|e| (e.ln() / 0.2).round() as i64).collect();
-    // an order that no slope shows has no rank
+    // an order without a resolved slope has no rank
     let ranked = || quantities.iter().filter(|q| q.slope.outcome.is_resolved());
     let predicted: Vec<i64> = ranked().map(|q| q.accuracy_order.map_or(LAST, |d| d as i64)).collect();
     let order = |slope: f64| if slope < -0.25 { (-slope - 0.5).round() as i64 } else { LAST };
@@ -338,9 +342,9 @@ fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f
     }
 }
 
-/// Evidence f: filters with another carry, at another latitude, without a position, against the truth of the
-/// linear model: what large drifts do to a linear filter would hide the rest. Repositioning is instantaneous,
-/// since a filter that does not know of a position does not know of a slew either.
+/// Evidence f: filters with another carry, at another latitude, or without a position, against the truth of
+/// the linear model. An exact truth with large drifts would add errors that hide these. Repositioning is
+/// instantaneous: a filter that does not know a position does not know its slew either.
 fn controls(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -356,8 +360,8 @@ fn controls(
     let far = elsewhere.map_or(0.0, |l| (l.degrees() - latitude).abs());
     let apart = |i: usize, j: usize| angle_deg(&truth.attitudes[i], &truth.attitudes[j]);
     let positions = 1..scheme.positions.len();
-    // platform and inertial carry differ by how the platform has turned; dropped is what is farthest from
-    // where it was
+    // platform and inertial carry differ by the turn of the platform; the dropped position is the one
+    // farthest from the position before it
     let turned = positions.clone().map(|i| apart(0, i)).fold(0.0, f64::max);
     let farthest = positions.map(|i| (i, apart(i - 1, i))).max_by(|a, b| a.1.total_cmp(&b.1));
     let changes = [
@@ -367,10 +371,11 @@ fn controls(
         farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
     ];
     let changes: Vec<(FilterChange, f64)> = changes.into_iter().flatten().collect();
-    let counted = changes.par_iter().map(|(change, _)| -> Result<(usize, usize), SimulationError> {
+    let counted = parallel::map(changes.len(), |i| -> Result<(usize, usize), SimulationError> {
+        let change = &changes[i].0;
         let filter_scheme = change.apply(scheme);
         let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
-        // what a wrong filter's numbers do not resolve is no check of it
+        // an outcome that the numbers of a wrong filter do not resolve is no check of it
         match structure(&truth, prediction, &filter_scheme, &filter_conditions) {
             Ok(structure) => {
                 let counts = structure.counts();
@@ -380,13 +385,12 @@ fn controls(
             Err(e) => Err(e),
         }
     });
-    let counted: Vec<_> = counted.collect();
     let mut out = Vec::new();
     for ((change, off_deg), counts) in changes.iter().zip(counted) {
         let filter_scheme = change.apply(scheme);
         let filter_conditions = conditions.within(&Platform::new(filter_scheme.clone())?);
         let filter = Plan::new(&filter_scheme, &filter_conditions)?;
-        // a repeated position, say: the change changes nothing
+        // the change has no effect, for instance at a repeated position
         if filter.stages == truth.stages {
             continue;
         }
@@ -417,12 +421,12 @@ fn controls(
     Ok(out)
 }
 
-/// Whether the innovations of a wrong filter must show it in [`MANY_RUNS`]: by what of the truths that are
-/// drawn no state of the filter explains, without samples of it drowned in random drift.
+/// True if the innovations of a wrong filter must reveal it in [`MANY_RUNS`]: by the part of the drawn truths
+/// that no state of the filter explains, unless random drift hides the samples.
 fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<bool, SimulationError> {
     let samples: usize = truth.stages.iter().map(|s| s.steps * s.outputs.len()).sum();
     let many = samples * truth.unknowns().max(filter.unknowns()) > MOST_NUMBERS;
-    // sensors that wander besides may hide more
+    // random drift or bias instability of the sensors may hide more
     let wander =
         conditions.gyro_noise != GyroNoise::default() || conditions.accelerometer_instability_ug > 0.0;
     if many || wander {
@@ -439,7 +443,7 @@ fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<boo
     let drawn = RunStart::new(truth, conditions)?.sigma;
     let mut signal = rows(truth)?;
     signal.column_iter_mut().zip(&drawn).for_each(|(mut c, sigma)| c *= *sigma);
-    // an orthonormal basis of what the filter explains, twice as Gram-Schmidt loses digits once
+    // orthonormal basis of the columns that the filter explains, twice since Gram-Schmidt loses digits once
     let mut explained: Vec<DVector<f64>> = Vec::new();
     for column in rows(filter)?.column_iter() {
         let length = column.norm();
@@ -457,7 +461,7 @@ fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<boo
             column.axpy(-part, b, 1.0);
         }
     }
-    // psi walks: its variance grows step by step, beside that of a sample
+    // psi is a random walk: its variance grows step by step, beside that of a sample
     let finest = truth.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r).fold(f64::MAX, f64::min);
     let walked: f64 = truth
         .segments
@@ -470,13 +474,13 @@ fn must_show(truth: &Plan, filter: &Plan, conditions: &Conditions) -> Result<boo
     Ok(excess > 5.0 * (2.0 * samples as f64 / MANY_RUNS as f64).sqrt())
 }
 
-/// The angle of the turn from one attitude to another, in degrees.
+/// Angle of the turn from one attitude to another, in degrees.
 fn angle_deg(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     let trace: f64 = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| a[i][j] * b[i][j]).sum();
     ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-/// The band of the mean of `count` chi-square variables of `dof` degrees of freedom, 95 %.
+/// Band of the mean of `count` chi-square variables of `dof` degrees of freedom, at 95 % confidence.
 pub fn mean_band(dof: usize, count: usize) -> (f64, f64) {
     chi_square_band(dof as f64, count as f64, obsdeg_ekf::consistency::CONFIDENCE)
 }

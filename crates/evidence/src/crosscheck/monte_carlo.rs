@@ -1,16 +1,15 @@
-//! Evidence d: many runs. Linear truths are drawn from the prior. An exact truth is that of the scheme's own
-//! drifts, whatever the filter, and initial estimates are drawn about it, so that the errors are those that
-//! the prior says and the drifts those of the platform. Of the linear filter the covariance pass runs once,
-//! and a run is a truth and a state pass. Runs are summed in a fixed order, so that the result does not
-//! depend on the number of threads.
+//! Evidence d: Monte Carlo runs. Linear truths are drawn from the prior. An exact truth has the scheme's own
+//! drifts for every filter. Initial estimates are drawn about it, so that the errors have the covariance of
+//! the prior and the drifts are those of the platform. The linear filter makes its covariance pass once; each
+//! run is a truth and a state pass. Runs are summed in a fixed order, so that the result does not depend on
+//! the number of threads.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, Form, Gains, Manifold, Update};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::answer::{HistoryPoint, Statistic};
 use crate::simulation::SimulationError;
@@ -23,29 +22,29 @@ use crate::simulation::record::{RunStart, choose, first_steps, largest_psi, samp
 use crate::simulation::state::PlatformState;
 use crate::simulation::truth::{Noise, TruthModel, check_drifts};
 
-/// Times at which NEES is taken.
+/// Number of times at which NEES is taken.
 const CHECKPOINTS: usize = 20;
-/// Lags of the autocorrelation.
+/// Largest lag of the autocorrelation, in samples.
 const LAGS: usize = 10;
-/// Runs that one task does, and tasks between two reports of progress.
+/// Runs per task, then tasks between two progress reports.
 const CHUNK: usize = 8;
 const BATCH: usize = 32;
 
-/// A filter and what it is run against.
+/// Filter and truth of a Monte Carlo experiment.
 pub struct Experiment<'a> {
-    /// The filter's model.
+    /// Model of the filter.
     pub filter: &'a Plan,
-    /// The truth's model: the same timeline.
+    /// Model of the truth, on the same timeline.
     pub truth: &'a Plan,
-    /// Conditions of both.
+    /// Conditions of filter and truth.
     pub conditions: &'a Conditions,
-    /// A basis of the directions that Z does not see (SI units), if all of them are known.
+    /// Basis of the directions unobservable from Z (SI units); `None` unless all of them are known.
     pub null_space: Option<&'a [Vec<(usize, f64)>]>,
-    /// Seed of all streams.
+    /// Seed of all random streams.
     pub seed: u64,
 }
 
-/// Sums over runs.
+/// Sums over the runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Totals {
     /// Number of runs.
@@ -60,10 +59,10 @@ pub struct Totals {
     lagged: [f64; LAGS + 1],
     /// Largest `|psi|` of all runs.
     pub largest_psi: f64,
-    /// Runs whose linearisations did not settle, or that ended in numbers that are none.
+    /// Number of runs whose linearisation did not converge, or that ended in numbers that are not finite.
     pub unsettled: usize,
-    /// Sums of the squares of the errors at the end, in units of the prior, per unknown; empty where the
-    /// filter is linear.
+    /// Sums of the squared errors at the end, in units of the prior sigma, per unknown; empty for the linear
+    /// filter.
     pub errors: Vec<f64>,
 }
 
@@ -103,24 +102,24 @@ impl Totals {
     }
 }
 
-/// What all runs share: gains and the factors of the covariance at the checkpoints.
+/// Data common to all runs: gains, and factors of the covariance at the checkpoints.
 pub struct Prepared<'a> {
     experiment: Experiment<'a>,
     gains: Gains,
     start: RunStart,
     truth_start: RunStart,
-    /// Numbers of the steps after which NEES is taken; the last is the end.
+    /// Numbers of the steps after which NEES is taken; the last one ends the run.
     checkpoints: Vec<usize>,
     nees: Vec<Nees>,
-    /// Of the observable subspace at the end: its basis (n x r) and the factor.
+    /// Observable subspace at the end: its basis (n x r), and the factor of its covariance.
     observable: Option<(DMatrix<f64>, Nees)>,
     first_step: Vec<usize>,
-    /// Which filter runs.
+    /// Kind of the filter that runs.
     kind: FilterKind,
 }
 
 impl<'a> Prepared<'a> {
-    /// Runs the covariance pass.
+    /// Prepares an experiment: runs the covariance pass.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -137,7 +136,7 @@ impl<'a> Prepared<'a> {
         let unknowns = experiment.truth.unknowns();
         let first = unknowns - experiment.truth.platform.coefficients();
         let drawn = truth_start.estimate.iter().zip(&truth_start.sigma).take(unknowns).skip(first);
-        // six sigma
+        // bound of six sigma
         let drawn: Vec<f64> = drawn.map(|(mean, sigma)| mean.abs() + 6.0 * sigma).collect();
         check_drifts(experiment.truth, conditions, experiment.truth.drift_bound(&drawn))?;
         let total: usize = filter.segments.iter().map(|s| s.steps).sum();
@@ -150,7 +149,7 @@ impl<'a> Prepared<'a> {
             }
         })?;
         let nees = covariances.iter().map(Nees::of_covariance).collect::<Result<_, _>>()?;
-        // what the outputs do not see at small angles they may see at large ones
+        // outputs may determine at large angles what they do not at small ones
         let null_space = experiment.null_space.filter(|_| same && kind == FilterKind::Linear);
         let basis = null_space.map(|null| observable_basis(&start.sigma, null));
         let observable = match (covariances.last(), basis) {
@@ -169,15 +168,15 @@ impl<'a> Prepared<'a> {
         self.experiment.filter.platform.names() == self.experiment.truth.platform.names()
     }
 
-    /// `runs` runs in parallel; `progress` hears how many are done and says whether to go on.
+    /// Sums over `runs` runs in parallel; `progress` gets the number of finished runs and returns false to
+    /// stop.
     pub fn run(&self, runs: usize, progress: &dyn Fn(usize) -> bool) -> Totals {
         let mut totals = Totals::none(self.checkpoints.len());
-        let parts = interrupt::parts();
         for batch in (0..runs).step_by(CHUNK * BATCH) {
             let end = runs.min(batch + CHUNK * BATCH);
             let starts: Vec<usize> = (batch..end).step_by(CHUNK).collect();
-            let of = |&first: &usize| parts.part(|| self.chunk(first, end.min(first + CHUNK)));
-            let chunks: Vec<Totals> = starts.par_iter().map(of).collect();
+            let of = |i: usize| self.chunk(starts[i], end.min(starts[i] + CHUNK));
+            let chunks: Vec<Totals> = parallel::map(starts.len(), of);
             for chunk in &chunks {
                 totals.add(chunk);
             }
@@ -188,19 +187,19 @@ impl<'a> Prepared<'a> {
         totals
     }
 
-    /// Which filter runs.
+    /// Kind of the filter that runs.
     pub fn filter(&self) -> FilterKind {
         self.kind
     }
 
-    /// True if runs have the scheme's own truth, from initial estimates about it: an exact truth, and a
-    /// filter of its unknowns. Others have truths drawn about the initial estimate.
+    /// True if runs start from the scheme's own truth, with initial estimates drawn about it: for an exact
+    /// truth and a filter of its unknowns. Otherwise truths are drawn about the initial estimate.
     pub fn is_about_the_truth(&self) -> bool {
         self.experiment.conditions.truth == Truth::Exact && self.comparable()
     }
 
-    /// The truth of a run, whose biases are drawn while everything else is what the scheme says, and an
-    /// initial estimate about it.
+    /// Draws the truth of a run and an initial estimate about it: biases are random, all other true values
+    /// are those of the scheme.
     fn draw_about_the_truth(&self, noise: &mut Noise, truth: &mut [f64], estimate: &mut [f64]) {
         let unknowns = self.experiment.truth.unknowns();
         truth.copy_from_slice(&self.truth_start.truth);
@@ -211,12 +210,12 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// The runs `from..to`, one after the other.
+    /// Sums over the runs `from..to`, one after the other.
     pub fn chunk(&self, from: usize, to: usize) -> Totals {
         if self.kind == FilterKind::Linear { self.linear(from, to) } else { self.exact(from, to) }
     }
 
-    /// The runs `from..to` of a filter with full attitudes.
+    /// Sums over the runs `from..to` of a filter with full attitudes.
     fn exact(&self, from: usize, to: usize) -> Totals {
         let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
@@ -232,7 +231,7 @@ impl<'a> Prepared<'a> {
             truth.reset(&from_truth);
             let (mut states, mut taken) = (Vec::with_capacity(self.checkpoints.len()), 0);
             sample(&mut truth, plan, &mut noise, &mut z, |x| {
-                // the first is the start
+                // the first sample is the start
                 if taken > 0 && self.checkpoints.get(states.len()) == Some(&(taken - 1)) {
                     states.push(PlatformState::of_unknowns(x, constants));
                 }
@@ -262,7 +261,7 @@ impl<'a> Prepared<'a> {
             let settled = ended.as_ref().is_ok_and(|e| e.converged);
             totals.unsettled += usize::from(!settled);
             if ended.is_err() {
-                // no run is left out
+                // a failed run counts, with NaN
                 nis.fill(f64::NAN);
                 nees.fill(f64::NAN);
                 error.fill(f64::NAN);
@@ -278,7 +277,7 @@ impl<'a> Prepared<'a> {
         totals
     }
 
-    /// The runs `from..to` of the linear filter.
+    /// Sums over the runs `from..to` of the linear filter.
     fn linear(&self, from: usize, to: usize) -> Totals {
         let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
@@ -316,7 +315,7 @@ impl<'a> Prepared<'a> {
                     if self.checkpoints[next] == step {
                         if comparable {
                             let truth = truth.borrow();
-                            // a truth without biases has none
+                            // a truth without biases has zeros in their place
                             let true_x = truth.x().iter().chain(std::iter::repeat(&0.0));
                             for ((e, a), b) in error.iter_mut().zip(x).zip(true_x) {
                                 *e = a - b;
@@ -343,7 +342,7 @@ impl<'a> Prepared<'a> {
         totals
     }
 
-    /// Samples of Z per run.
+    /// Number of samples of Z per run.
     fn samples(&self) -> usize {
         self.gains.updates() / self.experiment.filter.components.len()
     }
@@ -371,7 +370,7 @@ impl<'a> Prepared<'a> {
         out
     }
 
-    /// The probability of autocorrelations as large as those found, for white innovations.
+    /// Probability of autocorrelations at least as large as those found, for white innovations.
     pub fn whiteness(&self, totals: &Totals) -> f64 {
         let sequences = totals.runs * self.experiment.filter.components.len();
         // a short run has no products at long lags
@@ -383,10 +382,10 @@ impl<'a> Prepared<'a> {
         obsdeg_ekf::consistency::ljung_box_of_sequences(&correlations, self.samples(), sequences)
     }
 
-    /// Averages over time.
+    /// Averages over the runs, by time.
     pub fn history(&self, totals: &Totals) -> Vec<HistoryPoint> {
         let plan = self.experiment.filter;
-        // samples up to every step
+        // number of samples up to every step
         let (mut time, mut seen, mut count) = (Vec::new(), Vec::new(), 0);
         for (segment, stage) in plan.segments.iter().zip(&plan.stages) {
             for i in 1..=segment.steps {
@@ -411,10 +410,10 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Which filter is held against the truth: the one that a single run would have.
+/// Kind of the filter that is compared with the truth: the one that a single run would use.
 fn kind(experiment: &Experiment<'_>, same: bool) -> Result<FilterKind, SimulationError> {
     let Experiment { filter, truth, conditions, seed, .. } = experiment;
-    // a filter that is wrong on purpose is wrong in its linear model
+    // a deliberately wrong filter is wrong in its linear model
     if conditions.truth != Truth::Exact || !same || filter.stages != truth.stages {
         return Ok(FilterKind::Linear);
     }

@@ -1,5 +1,5 @@
-//! What evidence b must show in a filter of doubles, by many digits: whether the filter's prior is wide
-//! enough for it, and the rounding of doubles small enough.
+//! Resolution of evidence b by a filter in doubles, computed in high precision: width of the filter's prior
+//! and effect of rounding.
 
 use std::cell::OnceCell;
 
@@ -7,54 +7,55 @@ use obsdeg_core::model::slew::W_IE;
 use obsdeg_exact::SplitMix64;
 
 use super::asymptotics::functional;
-use super::precise::{Digits, Functional, Information, Model, Posterior};
+use super::precise::{Digits, Functional, Model, Posterior, SampleInformation};
 use crate::prediction::Combination;
 use crate::simulation::conditions::is_rate;
 use crate::simulation::{Conditions, Plan};
 
-/// Bits of this evaluation: information of 1e30 of a prior, and what cancels in it.
+/// Bits of this evaluation: enough for information of 1e30 of a prior, and for the cancellation in it.
 const BITS: usize = 512;
-/// By how much rounding may move a number of a model of doubles, whose largest are about one: 2^-46 is 64
-/// units of the last place, for some hundreds of steps of the filter.
+/// Binary logarithm of the change that rounding makes to a number of a model of doubles, whose largest are
+/// about one. 2^-46 is 64 units of the last place, for some hundreds of steps of the filter.
 pub(super) const ROUNDING: i32 = -46;
-/// Models that are rounded at random.
+/// Number of models with randomly rounded numbers.
 const DRAWS: usize = 2;
-/// The factor between the two priors of evidence b.
+/// Factor between the two priors of evidence b.
 const WIDER: f64 = 10.0;
-/// How far a number of the filter may be from that by many digits to be called the same, relative.
+/// Relative difference from the value in high precision up to which a number of the filter counts as the
+/// same.
 const SAME: f64 = 0.01;
-/// How far the value by many digits may be from what a prior without bounds shows, a fifth of the tolerance
-/// of what is measured in doubles: of an inflation, relative, and of a correlation.
+/// Largest difference of a value in high precision from that of an infinitely wide prior: relative for an
+/// inflation, absolute for a correlation. It is a fifth of the tolerance for values measured in doubles.
 const CLOSE: [f64; 2] = [2e-3, 2e-4];
 
-/// A model with both priors of evidence b.
-struct Filtered {
+/// Covariances of a model with both priors of evidence b.
+struct PosteriorPair {
     prior: Posterior,
     wider: Posterior,
 }
 
-impl Filtered {
+impl PosteriorPair {
     fn inflation(&self, functional: &Functional) -> f64 {
         self.wider.sigma(functional) / self.prior.sigma(functional)
     }
 }
 
-/// The filter's covariance at the end by many digits, computed where it is asked for.
+/// Covariance of the filter at the end in high precision, computed on demand.
 pub(super) struct Resolution<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
     /// Standard deviations of the prior, in SI units.
     prior: &'a [f64],
-    /// The model in many digits; `None` where these do not give it, here and below.
+    /// Model in high precision; `None` where it cannot be computed, here and below.
     model: OnceCell<Option<Model>>,
-    /// The filter of the model.
-    exact: OnceCell<Option<Filtered>>,
-    /// Filters of the model with rounded numbers.
-    rounded: OnceCell<Option<Vec<Filtered>>>,
+    /// Filter of the model.
+    exact: OnceCell<Option<PosteriorPair>>,
+    /// Filters of the model with randomly rounded numbers.
+    rounded: OnceCell<Option<Vec<PosteriorPair>>>,
 }
 
 impl<'a> Resolution<'a> {
-    /// Of the filter of `plan` with a prior of these standard deviations.
+    /// Resolution for the filter of `plan` with a prior of these standard deviations.
     pub(super) fn new(plan: &'a Plan, conditions: &'a Conditions, prior: &'a [f64]) -> Self {
         Self {
             plan,
@@ -78,26 +79,26 @@ impl<'a> Resolution<'a> {
         self.model.get_or_init(compute).as_ref()
     }
 
-    /// The filter of a model, at the times of its samples.
-    fn filtered(&self, model: &Model) -> Option<Filtered> {
+    /// Filter of a model, at the times of its samples.
+    fn filtered(&self, model: &Model) -> Option<PosteriorPair> {
         let conditions = self.conditions;
         let dwell_s = self.plan.segments.first().map(|s| s.dt * s.steps as f64)?;
         let samples: Vec<usize> = self.plan.segments.iter().map(|s| s.steps).collect();
         let noise = [conditions.accelerometer_noise_g, conditions.azimuth_noise_deg.to_radians()];
-        let information = Information::of_filter(model, dwell_s * W_IE, &samples, noise);
+        let information = SampleInformation::of_filter(model, dwell_s * W_IE, &samples, noise);
         let prior = |factor: f64| -> Vec<f64> {
             let unit = |c: usize| if self.is_psi(c) { 1.0 } else { W_IE };
             self.prior.iter().enumerate().map(|(c, s)| s * factor / unit(c)).collect()
         };
         let at = |factor: f64| Posterior::new(&information, &prior(factor));
-        Some(Filtered { prior: at(1.0)?, wider: at(WIDER)? })
+        Some(PosteriorPair { prior: at(1.0)?, wider: at(WIDER)? })
     }
 
-    fn exact(&self) -> Option<&Filtered> {
+    fn exact(&self) -> Option<&PosteriorPair> {
         self.exact.get_or_init(|| self.filtered(self.model()?)).as_ref()
     }
 
-    fn rounded(&self) -> Option<&[Filtered]> {
+    fn rounded(&self) -> Option<&[PosteriorPair]> {
         let compute = || {
             let (own, mut rng) = (self.model()?, SplitMix64::new(1));
             let rounded: Vec<Model> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
@@ -106,9 +107,15 @@ impl<'a> Resolution<'a> {
         self.rounded.get_or_init(compute).as_deref()
     }
 
-    /// Why doubles, which show `measured`, may show something else than `limit`, to which a prior without
-    /// bounds leads by many digits; `None` where they must show it. `of` is what is shown.
-    fn why(&self, limit: f64, measured: f64, close: f64, of: &dyn Fn(&Filtered) -> f64) -> Option<String> {
+    /// Reason why doubles, which show `measured`, need not show `limit`, the value of an infinitely wide
+    /// prior; `None` where they must show it. `of` computes the value from a model.
+    fn why(
+        &self,
+        limit: f64,
+        measured: f64,
+        close: f64,
+        of: &dyn Fn(&PosteriorPair) -> f64,
+    ) -> Option<String> {
         const UNKNOWN: &str = "many digits do not tell what the filter must show";
         let close = |x: f64| (x - limit).abs() <= close * limit;
         let Some(exact) = self.exact().map(of) else { return Some(UNKNOWN.into()) };
@@ -120,7 +127,8 @@ impl<'a> Resolution<'a> {
                 "the filter in doubles shows neither"
             };
             return Some(format!(
-                "by many digits {exact:.4} at the diffuse prior of this evidence (the program's own, whatever --prior says), which is too narrow to show \
+                "by many digits {exact:.4} at the diffuse prior of this evidence (the program's own, \
+                 whatever --prior says), which is too narrow to show \
                  {limit:.0}; {doubles}"
             ));
         }
@@ -131,16 +139,16 @@ impl<'a> Resolution<'a> {
         ))
     }
 
-    /// Why the prior inflation of a combination of the filter's unknowns, which is `measured`, may be another
-    /// than that of what is determined, or is not.
+    /// Reason why `measured`, the prior inflation of a combination of the filter's unknowns, may differ from
+    /// its limit; `determined` says which limit it has.
     pub(super) fn inflation(&self, terms: &Combination, determined: bool, measured: f64) -> Option<String> {
         let f = functional(Digits { bits: BITS }, &|c| self.is_psi(c), terms, false);
         let limit = if determined { 1.0 } else { WIDER };
         self.why(limit, measured, CLOSE[0], &|filtered| filtered.inflation(&f))
     }
 
-    /// Why the correlation of two unknowns, with the sign that it must have, may be another than one;
-    /// `measured` is that of the filter, with this sign.
+    /// Reason why the correlation of two unknowns, times its expected sign, may differ from one; `measured`
+    /// is that of the filter, with this sign.
     pub(super) fn correlation(&self, pair: [usize; 2], sign: f64, measured: f64) -> Option<String> {
         let unit = |c: usize| functional(Digits { bits: BITS }, &|c| self.is_psi(c), &[(c, 1.0)], false);
         let [a, b] = pair.map(unit);

@@ -1,34 +1,36 @@
-//! When evidence agrees with a verdict: one set of rules for platforms and for any system.
+//! Conditions under which evidence agrees with a verdict: one set of rules for platforms and any other
+//! system.
 
 use std::ops::RangeInclusive;
 
 use super::answer::{Agreement, Check, Count};
 
-/// How far a measured slope may be from the predicted one.
+/// Largest difference of a measured slope from the predicted one, dimensionless.
 pub(crate) const SLOPE_TOLERANCE: f64 = 0.1;
 
-/// The factors on sigma, when a prior is ten times as loose, of what is determined and of what is not: 1 and
-/// 10 in the limit.
-pub(crate) struct Inflation {
+/// Bands of the factor on sigma for a prior ten times as loose: for a determined quantity (1 in the limit)
+/// and for an undetermined one (10 in the limit).
+pub(crate) struct InflationBands {
     pub(crate) determined: RangeInclusive<f64>,
     pub(crate) open: RangeInclusive<f64>,
 }
 
-/// Of a linear filter, whose prior is so diffuse that the limit is reached.
-pub(crate) const LINEAR: Inflation = Inflation { determined: 0.99..=1.01, open: 9.0..=11.0 };
-/// Of a system linearised along its run, whose prior is a multiple of that of its file.
-pub(crate) const LINEARISED: Inflation = Inflation { determined: 0.0..=1.5, open: 5.0..=f64::INFINITY };
+/// Bands for a linear filter, whose prior is so diffuse that the limit is reached.
+pub(crate) const LINEAR: InflationBands = InflationBands { determined: 0.99..=1.01, open: 9.0..=11.0 };
+/// Bands for a system linearised along its run, whose prior is a multiple of that of its file.
+pub(crate) const LINEARISED: InflationBands =
+    InflationBands { determined: 0.0..=1.5, open: 5.0..=f64::INFINITY };
 
-impl Inflation {
-    /// The check of a measured factor.
+impl InflationBands {
+    /// Check of a measured factor.
     pub(crate) fn check(&self, determined: bool, measured: Option<f64>) -> Check {
         let (expected, band) = if determined { (1.0, &self.determined) } else { (10.0, &self.open) };
         Check::new(expected, measured, |x| band.contains(&x))
     }
 }
 
-/// The log-log slope of sigma against time of what has an order, -(order + 1/2); without one nothing is
-/// learnt: sigma stays, or grows as what nobody sees moves it.
+/// Check of the log-log slope of sigma against time: -(order + 1/2) for a quantity with an order. Without an
+/// order sigma stays, or grows as an unobservable quantity drives it.
 pub(crate) fn slope(order: Option<usize>, measured: Option<f64>) -> Check {
     let predicted = order.map_or(0.0, |d| -(d as f64 + 0.5));
     Check::new(predicted, measured, |x| match order {
@@ -37,8 +39,8 @@ pub(crate) fn slope(order: Option<usize>, measured: Option<f64>) -> Check {
     })
 }
 
-/// The number of directions that are not seen: predicted, and singular values (largest first) below `unseen`
-/// times the largest.
+/// Check of the number of unobservable directions: the predicted one against the number of singular values
+/// (largest first) of at most `unseen` times the largest.
 pub(crate) fn defect(predicted: usize, values: &[f64], unseen: f64) -> Count {
     let largest = values.first().copied().unwrap_or(1.0);
     let measured = values.iter().filter(|s| **s <= unseen * largest).count();
@@ -61,10 +63,11 @@ mod tests {
             [0.0, 0.5, -0.1, -0.5].map(|x| passes(None, Some(x))),
             [Agrees, Agrees, Agrees, Disagrees]
         );
-        // what is no number agrees with nothing; what was not measured is neither
+        // NaN agrees with no prediction; a missing measurement neither agrees nor disagrees
         assert_eq!([passes(Some(2), Some(f64::NAN)), passes(None, Some(f64::NAN))], [Disagrees; 2]);
         assert_eq!([passes(Some(2), None), passes(None, None)], [NotTested; 2]);
-        let inflated = |rules: &Inflation, determined, x| rules.check(determined, Some(x)).outcome == Agrees;
+        let inflated =
+            |rules: &InflationBands, determined, x| rules.check(determined, Some(x)).outcome == Agrees;
         assert_eq!([1.0, 1.02, 9.5].map(|x| inflated(&LINEAR, true, x)), [true, false, false]);
         assert_eq!([10.0, 8.9, 1.0].map(|x| inflated(&LINEAR, false, x)), [true, false, false]);
         assert_eq!([1.4, 1.6, f64::NAN].map(|x| inflated(&LINEARISED, true, x)), [true, false, false]);

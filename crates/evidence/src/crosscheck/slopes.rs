@@ -1,4 +1,4 @@
-//! Sigma against the dwell at dwells of a platform, for the plot.
+//! Sigma against the dwell, at the dwells of a platform, for the plot.
 
 use obsdeg_core::model::{Dwell, Scheme, SchemeError};
 use obsdeg_ekf::SquareRootInformation;
@@ -8,23 +8,23 @@ use crate::simulation::batch::{batch, diffuse_prior};
 use crate::simulation::conditions::Conditions;
 use crate::simulation::plan::Plan;
 
-/// The dwells that are shown, in s.
+/// Dwells of the plot, in s.
 const SHOWN: [f64; 11] = [2.0, 3.56, 6.32, 11.2, 20.0, 63.2, 200.0, 632.0, 1120.0, 2000.0, 6320.0];
-/// The dwell whose measurements say how wide the prior is.
+/// Dwell, in s, whose measurements set the width of the prior.
 const PRIOR_AT: f64 = 20.0;
-/// Samples per position: the noise of a sample is scaled so that its density stays.
+/// Number of samples per position: the noise of a sample is scaled so that its density stays.
 const SAMPLES: f64 = 50.0;
 
-/// Sigma of some functionals against the dwell.
+/// Sigmas of functionals against the dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Slopes {
-    /// The dwells of the first position, ascending, in s.
+    /// Dwells of the first position, ascending, in s.
     pub dwells: Vec<f64>,
-    /// Of every functional: sigma at every dwell, SI units.
+    /// Sigmas by functional, then by dwell, in SI units.
     pub sigmas: Vec<Vec<f64>>,
 }
 
-/// Sigma of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior.
+/// Sigmas of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior.
 /// Dwells that doubles do not resolve are left out.
 pub(crate) fn slopes(scheme: &Scheme, conditions: &Conditions, functionals: &[Vec<(usize, f64)>]) -> Slopes {
     let plan = |dwell: f64| -> Result<Plan, SimulationError> {
@@ -47,7 +47,7 @@ pub(crate) fn slopes(scheme: &Scheme, conditions: &Conditions, functionals: &[Ve
     out
 }
 
-/// The scheme with its first position lasting `dwell`, the others in proportion.
+/// Scheme with its first position lasting `dwell`, the others in proportion.
 fn scaled(scheme: &Scheme, conditions: &Conditions, dwell: f64) -> Result<(Scheme, Conditions), SchemeError> {
     let seconds = |d: Option<Dwell>| d.map_or(conditions.dwell_s, Dwell::seconds);
     let factor = scheme.positions.first().map_or(1.0, |p| dwell / seconds(p.dwell));

@@ -1,18 +1,18 @@
-//! Evidence a for what is no number: ranks, null space, combinations and partners, against what samples show
-//! as the dwell goes to zero.
+//! Evidence a for ranks, null space, combinations and partners, against the samples as the dwell goes to
+//! zero.
 
 use obsdeg_core::degree::Status;
 
 use super::answer::{Agreement, Partners, SpaceCheck};
 use super::asymptotics::{Asymptotics, ROUNDED, functional};
-use super::precise::{Digits, Seen, add_up};
+use super::precise::{Digits, ObservableDirections, add_up};
 use crate::prediction::{Combination, Prediction};
 
-/// Pivots of rows and columns of unit size above the first are there, below the second are rounding of
-/// doubles.
+/// Bounds of a pivot of rows and columns of unit size: a pivot above the first is non-zero, one below the
+/// second is rounding of doubles.
 const CLEAR: [f64; 2] = [1e-7, 1e-12];
 
-/// The checks of what derivatives determine as a whole; `is_psi` says which unknowns are no drifts.
+/// Checks of the spaces that derivatives determine; `is_psi` is true for unknowns that are not drifts.
 pub(super) fn spaces(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,
@@ -34,13 +34,13 @@ pub(super) fn spaces(
     ]
 }
 
-/// Orders at which nothing is added at the end do not count.
+/// True if two rank profiles are equal up to trailing orders that add nothing.
 fn same_profile(predicted: &[usize], measured: &[usize]) -> bool {
     let at = |p: &[usize], k: usize| p.get(k).or(p.last()).copied().unwrap_or(0);
     (0..predicted.len().max(measured.len())).all(|k| at(predicted, k) == at(measured, k))
 }
 
-/// The null space: so many vectors as are not seen, independent, each seen by nothing.
+/// Check of the null space: number of vectors, their independence, and that no sample observes them.
 fn null_space(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,
@@ -77,11 +77,15 @@ fn null_space(
     out
 }
 
-/// Number of vectors that nothing of what is seen moves.
-fn count_unseen(seen: &Seen, vectors: &[Combination], is_psi: &dyn Fn(usize) -> bool) -> usize {
+/// Number of vectors that change no observable direction.
+fn count_unseen(
+    seen: &ObservableDirections,
+    vectors: &[Combination],
+    is_psi: &dyn Fn(usize) -> bool,
+) -> usize {
     let (free, rows) = seen.reduced();
     let unseen = |v: &&Combination| {
-        // a change of drift in units of the earth rate
+        // change of drift in units of the earth rate
         let v = functional(seen.digits(), &|c| is_psi(c), v, true);
         let entry = |c: usize| v.iter().filter(move |(d, _)| *d == c).map(|(_, x)| x);
         let alone = |c: usize| entry(c).map(|x| (None, x)).collect::<Vec<_>>();
@@ -93,8 +97,8 @@ fn count_unseen(seen: &Seen, vectors: &[Combination], is_psi: &dyn Fn(usize) -> 
     vectors.iter().filter(unseen).count()
 }
 
-/// The directions that are not seen with dwells either: as many as `hidden`, independent, each seen by
-/// nothing; `partial` where others are known to be there.
+/// Check of the directions that are unobservable with dwells too: `hidden` of them, independent, none
+/// affecting a sample. `partial` is true where more directions than those listed are known to exist.
 pub(super) fn with_dwells(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,
@@ -127,8 +131,8 @@ pub(super) fn with_dwells(
     }
 }
 
-/// The combinations: with the unknowns of degree up to k they span what is seen with k derivatives, and each
-/// adds a direction to those before it.
+/// Check of the combinations: with the unknowns of degree up to k they span the directions observable with k
+/// derivatives. Each combination adds a direction to those before it.
 fn combinations(
     prediction: &Prediction,
     shown: Option<&Asymptotics>,
@@ -190,8 +194,8 @@ fn combinations(
     out
 }
 
-/// Entries at some columns, drifts in units of the earth rate: of a change of the unknowns, or of a
-/// functional.
+/// Entries at some columns of a functional, or of a change of the unknowns, with drifts in units of the earth
+/// rate.
 fn dense(
     terms: &[(usize, f64)],
     columns: &[usize],
@@ -205,7 +209,7 @@ fn dense(
     columns.iter().map(entry).collect()
 }
 
-/// The rank of rows, by elimination with the largest pivot; `None` where a pivot is neither there nor
+/// Rank of rows, by elimination with the largest pivot; `None` where a pivot is neither clearly non-zero nor
 /// rounding.
 fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
     let size = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0f64, |m, x| m.max(x.abs()));
@@ -241,10 +245,10 @@ fn rank(mut rows: Vec<Vec<f64>>) -> Option<usize> {
     }
 }
 
-/// Of every unknown those that share a direction with it that is not seen and holds no shorter one. These are
-/// the connected parts of the graph that joins a pivot to the free unknowns which move it, whatever the
-/// pivots are.
-pub(super) fn partners(seen: &Seen) -> Vec<Vec<usize>> {
+/// Partners of every unknown: the unknowns in a common unobservable direction that has no shorter one within
+/// it. They are the connected components of the graph of pivots and the free unknowns in their rows; the
+/// components do not depend on the choice of the pivots.
+pub(super) fn partners(seen: &ObservableDirections) -> Vec<Vec<usize>> {
     let n = seen.excited.len();
     let (free, rows) = seen.reduced();
     let mut part: Vec<usize> = (0..n).collect();
@@ -257,7 +261,7 @@ pub(super) fn partners(seen: &Seen) -> Vec<Vec<usize>> {
     (0..n).map(|c| (0..n).filter(|&d| d != c && part[d] == part[c]).collect()).collect()
 }
 
-/// The partners of an unknown, by name.
+/// Check of the partners of an unknown, by name.
 pub(super) fn named(predicted: &[usize], measured: Option<&[usize]>, names: &[String]) -> Partners {
     let words = |list: &[usize]| list.iter().map(|&c| names[c].clone()).collect::<Vec<_>>();
     let sorted = |list: &[usize]| {

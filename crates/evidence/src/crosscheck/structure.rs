@@ -1,15 +1,17 @@
-//! Evidence a and b: what the filter's model can tell apart, against what the exact verdicts say of it.
+//! Evidence a and b: observable and unobservable directions of the filter's model, compared with the exact
+//! verdicts.
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
+use obsdeg_exact::parallel;
 
 use super::answer::{
     Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
 };
-use super::asymptotics::{Asymptotics, Course, Question, asymptotics, samples};
+use super::asymptotics::{Asymptotics, DwellSlope, SlopeRequest, asymptotics, samples};
 use super::precise::Between;
 use super::resolution::{ROUNDING, Resolution};
 use super::slopes::{self, slopes};
@@ -20,12 +22,12 @@ use crate::simulation::conditions::{is_rate, shown_unit, si_per_shown};
 use crate::simulation::record::RunStart;
 use crate::simulation::{Conditions, Plan, SimulationError};
 
-/// What of a column is rounding, relative to the longest of its kind.
+/// Relative rounding tolerance of a column, by the longest column of its kind.
 const NOTHING: f64 = 1e-14;
-/// What counts as not seen, relative to the best seen direction.
+/// Singular value below which a direction counts as unobservable, relative to the largest.
 const UNSEEN: f64 = 1e-10;
 
-/// Evidence a and b: what the filter's model can tell apart.
+/// Evidence a and b, with the outcomes of their checks.
 pub(super) struct Structure {
     pub(super) quantities: Vec<QuantityEvidence>,
     pub(super) spaces: Vec<SpaceCheck>,
@@ -33,11 +35,11 @@ pub(super) struct Structure {
     pub(super) defect: Count,
     pub(super) slopes: Vec<SlopeCurve>,
     pub(super) correlation: Correlation,
-    /// Why evidence b is not resolvable, one reason for each check of it that is not.
+    /// Reasons why checks of evidence b are not resolvable, one for each.
     pub(super) unresolved: Vec<String>,
 }
 
-/// The outcomes of evidence a and b.
+/// Outcomes of evidence a and b.
 pub(super) fn outcomes(
     quantities: &[QuantityEvidence],
     spaces: &[SpaceCheck],
@@ -55,13 +57,14 @@ pub(super) fn outcomes(
 }
 
 impl Structure {
-    /// How its checks came out.
+    /// Counts of the outcomes of its checks.
     pub(super) fn counts(&self) -> Counts {
         Counts::of(outcomes(&self.quantities, &self.spaces, &self.null_space, &self.defect))
     }
 }
 
-/// Repositioning is instantaneous here, as in the exact verdicts: a slew moves psi by drifts of its own.
+/// Structure of the filter's model. Repositioning is instantaneous here, as in the exact verdicts, since a
+/// slew moves psi by drifts of its own.
 pub(super) fn structure(
     truth: &Plan,
     prediction: &Prediction,
@@ -73,7 +76,7 @@ pub(super) fn structure(
     let names = names(truth, prediction);
     let functionals = functionals(truth, &filter, prediction);
     let known: Vec<Combination> = functionals.iter().flatten().cloned().collect();
-    let shown = Shown::of(&filter, truth, &functionals);
+    let shown = DwellLimit::of(&filter, truth, &functionals);
     let inflation = inflation(&filter, &known)?;
     let resolution = Resolution::new(&filter, conditions, &inflation.prior);
     let (mut null_space, defect) = null_evidence(truth, &filter, prediction, &shown, &inflation.correlation)?;
@@ -83,12 +86,12 @@ pub(super) fn structure(
     let mut unresolved = Vec::new();
     let present = quantities.iter_mut().zip(&functionals).filter_map(|(q, f)| Some((q, f.as_ref()?)));
     for (i, (q, terms)) in present.enumerate() {
-        unresolved.extend(decide_inflation(q, terms, shown.courses(i)[2], &resolution));
+        unresolved.extend(decide_inflation(q, terms, shown.dwell_slopes(i)[2], &resolution));
     }
     unresolved.extend(null_space.iter_mut().filter_map(decide_seen));
     unresolved.extend(null_space.iter_mut().filter_map(|v| decide_correlation(v, &resolution)));
     let null_space = null_space.into_iter().map(|v| v.evidence).collect();
-    // at a pole drift moves psi that nobody sees, and directions without numbers are not listed
+    // at a pole unobservable drift moves psi, and directions without numbers are not listed
     let pole = truth.platform.scheme().latitude.is_some_and(Latitude::is_pole);
     let partial = pole || prediction.unseen_by_derivatives.is_none();
     let hidden = shown.rank().map(|rank| filter.unknowns() - rank);
@@ -111,19 +114,19 @@ pub(super) fn structure(
     })
 }
 
-/// The prior inflation of a quantity, by many digits first: whether the samples determine it is what its
-/// slope at the end shows. What the filter in doubles shows counts where many digits say that it must show
-/// it. The reason, where it is not resolvable.
+/// Decides the prior inflation of a quantity, by high precision first: its slope at the end shows whether the
+/// samples determine it. The value of the filter in doubles counts only where high precision says that it
+/// must show. Returns the reason where the check is not resolvable.
 fn decide_inflation(
     q: &mut QuantityEvidence,
     terms: &Combination,
-    at_end: Option<Course>,
+    at_end: Option<DwellSlope>,
     resolution: &Resolution<'_>,
 ) -> Option<String> {
     let determined = match at_end.filter(|_| q.slope_at_end.outcome.is_resolved()) {
-        Some(Course::Slope(_)) => Some(true),
-        Some(Course::Unseen) => Some(false),
-        Some(Course::Bends) | None => None,
+        Some(DwellSlope::Slope(_)) => Some(true),
+        Some(DwellSlope::Unseen) => Some(false),
+        Some(DwellSlope::Bends) | None => None,
     };
     let said = q.inflation.predicted == 1.0;
     if determined.is_some_and(|determined| determined != said) {
@@ -139,8 +142,8 @@ fn decide_inflation(
     Some(format!("{}: prior inflation {measured:.3}: {why}", q.name))
 }
 
-/// That a filter in doubles sees a direction counts where rounding does not show as much of it; the reason,
-/// where it is not resolvable.
+/// Decides whether a filter in doubles observes a direction: its value counts where rounding cannot cause as
+/// much. Returns the reason where the check is not resolvable.
 fn decide_seen(v: &mut Direction) -> Option<String> {
     let NullEvidence { direction, seen, .. } = &mut v.evidence;
     let measured = seen.measured.filter(|x| seen.fails() && *x <= v.rounding)?;
@@ -151,8 +154,8 @@ fn decide_seen(v: &mut Direction) -> Option<String> {
     ))
 }
 
-/// The correlation along a direction counts where many digits say that the filter must show it; the reason,
-/// where it is not resolvable.
+/// Decides the correlation along a direction: its value counts where high precision says that the filter must
+/// show it. Returns the reason where the check is not resolvable.
 fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<String> {
     let NullEvidence { direction, correlation, .. } = &mut v.evidence;
     let check = correlation.as_mut().filter(|c| c.fails())?;
@@ -162,40 +165,40 @@ fn decide_correlation(v: &mut Direction, resolution: &Resolution<'_>) -> Option<
     Some(format!("{direction}: correlation {measured:.6}: {why}"))
 }
 
-/// What samples show as the dwell goes to zero.
-struct Shown {
-    /// Of every functional of the filter: psi handed on as it was at the start of a position.
+/// Behaviour of the samples as the dwell goes to zero.
+struct DwellLimit {
+    /// Slopes by derivatives: psi is handed on as it was at the start of a position.
     derivatives: Option<Asymptotics>,
-    /// With dwells: first with psi of the start, then with psi of the end. `None` where psi is not handed on,
-    /// and both are the same.
+    /// Slopes with dwells: first with psi of the start, then with psi of the end. The outer `None` marks
+    /// cases without carried psi, in which both equal the slopes by derivatives.
     dwells: Option<Option<Asymptotics>>,
 }
 
-impl Shown {
+impl DwellLimit {
     fn of(filter: &Plan, truth: &Plan, functionals: &[Option<Combination>]) -> Self {
         let scheme = filter.platform.scheme();
         let units = filter.platform.units();
         let is_psi = |c: usize| !is_rate(units[c]);
-        let questions = |at_end: bool| {
-            // the coefficients of unknowns are exact, those of combinations doubles
+        let requests = |at_end: bool| {
+            // coefficients of unknowns are exact, those of combinations are doubles
             let present = functionals.iter().enumerate().filter_map(|(i, f)| Some((i, f.clone()?)));
-            present.map(move |(i, terms)| Question { terms, exact: i < truth.unknowns(), at_end })
+            present.map(move |(i, terms)| SlopeRequest { terms, exact: i < truth.unknowns(), at_end })
         };
-        let start: Vec<Question> = questions(false).collect();
+        let start: Vec<SlopeRequest> = requests(false).collect();
         let alone = scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift;
-        let both = || -> Vec<Question> { questions(false).chain(questions(true)).collect() };
+        let both = || -> Vec<SlopeRequest> { requests(false).chain(requests(true)).collect() };
         let samples = samples(scheme);
-        let (derivatives, dwells) = rayon::join(
+        let (derivatives, dwells) = parallel::join(
             || asymptotics(&samples, Between::Nothing, &is_psi, &start),
             || (!alone).then(|| asymptotics(&samples, Between::Dwell, &is_psi, &both())),
         );
         Self { derivatives, dwells }
     }
 
-    /// Of the functional of this number: the courses by derivatives, with dwells, and with dwells at the end.
-    fn courses(&self, i: usize) -> [Option<Course>; 3] {
-        let by_derivatives = self.derivatives.as_ref().map(|a| a.courses[i]);
-        let dwells = |a: &Asymptotics, half: usize| a.courses[half * (a.courses.len() / 2) + i];
+    /// Slopes of the functional with index `i`: by derivatives, with dwells, and with dwells at the end.
+    fn dwell_slopes(&self, i: usize) -> [Option<DwellSlope>; 3] {
+        let by_derivatives = self.derivatives.as_ref().map(|a| a.dwell_slopes[i]);
+        let dwells = |a: &Asymptotics, half: usize| a.dwell_slopes[half * (a.dwell_slopes.len() / 2) + i];
         match &self.dwells {
             None => [by_derivatives; 3],
             Some(found) => {
@@ -205,25 +208,25 @@ impl Shown {
         }
     }
 
-    /// What is seen with dwells.
+    /// Behaviour with dwells.
     fn with_dwells(&self) -> Option<&Asymptotics> {
         self.dwells.as_ref().unwrap_or(&self.derivatives).as_ref()
     }
 
-    /// The rank with dwells.
+    /// Rank with dwells.
     fn rank(&self) -> Option<usize> {
         Some(self.with_dwells()?.seen.rank())
     }
 }
 
-/// The check of an order against a course; what bends, or is not told from rounding, is neither for nor
-/// against.
-fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check {
-    let measured = match course {
-        Some(Course::Slope(s)) => Some(s),
-        // whatever prior there is, sigma stays that of it
-        Some(Course::Unseen) => Some(0.0),
-        Some(Course::Bends) | None => None,
+/// Check of an order against a slope; it is not resolvable if the slope is not settled or cannot be separated
+/// from rounding.
+fn slope(order: Option<usize>, modelled: bool, dwell_slope: Option<DwellSlope>) -> Check {
+    let measured = match dwell_slope {
+        Some(DwellSlope::Slope(s)) => Some(s),
+        // sigma stays that of the prior, whatever the prior is
+        Some(DwellSlope::Unseen) => Some(0.0),
+        Some(DwellSlope::Bends) | None => None,
     };
     let mut check = rules::slope(order, measured);
     if modelled && measured.is_none() {
@@ -232,18 +235,19 @@ fn slope(order: Option<usize>, modelled: bool, course: Option<Course>) -> Check 
     check
 }
 
-/// Without drift noise and slews.
+/// Conditions without drift noise and slews.
 pub(super) fn still(conditions: &Conditions) -> Conditions {
     Conditions { slews: false, ..conditions.clone().without_drift_noise() }
 }
 
-/// Unknowns, then combinations.
+/// Names of the unknowns, then expressions of the combinations.
 fn names(plan: &Plan, prediction: &Prediction) -> Vec<String> {
     let combinations = prediction.combinations.iter().map(|c| c.expression.clone());
     plan.platform.names().iter().cloned().chain(combinations).collect()
 }
 
-/// Each of them as a functional of the filter's unknowns; `None` when the filter does not have them.
+/// Unknowns and combinations as functionals of the filter's unknowns; `None` for one that the filter does not
+/// have.
 fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Option<Combination>> {
     let index = |c: usize| {
         let name = &truth.platform.names()[c];
@@ -256,17 +260,17 @@ fn functionals(truth: &Plan, filter: &Plan, prediction: &Prediction) -> Vec<Opti
         .collect()
 }
 
-/// Evidence b.
-struct Inflation {
-    /// Of every functional: the factor on sigma.
+/// Evidence b: factors on sigma when the prior is ten times as wide.
+struct InflationFactors {
+    /// Factor on sigma of each functional, dimensionless.
     ratios: Vec<f64>,
-    /// Correlation under the diffuse prior.
+    /// Correlation matrix under the diffuse prior.
     correlation: DMatrix<f64>,
-    /// Standard deviations of that.
+    /// Standard deviations of the diffuse prior.
     prior: Vec<f64>,
 }
 
-fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, SimulationError> {
+fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<InflationFactors, SimulationError> {
     let prior = diffuse_prior(plan)?;
     let end = |factor: f64| {
         let sigma = prior.iter().map(|s| s * factor).collect();
@@ -278,7 +282,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<Inflation, Simu
     let n = plan.unknowns();
     let sigma = small.sigmas();
     let small = small.matrix();
-    Ok(Inflation {
+    Ok(InflationFactors {
         prior,
         ratios,
         correlation: DMatrix::from_fn(n, n, |i, j| small[(i, j)] / (sigma[i] * sigma[j])),
@@ -298,7 +302,7 @@ fn quantities(
     names: &[String],
     prediction: &Prediction,
     functionals: &[Option<Combination>],
-    shown: &Shown,
+    shown: &DwellLimit,
     ratios: &[f64],
 ) -> Vec<QuantityEvidence> {
     let n = truth.unknowns();
@@ -319,14 +323,14 @@ fn quantities(
         .enumerate()
         .map(|(c, ((name, (status, degree, orders, at_end)), functional))| {
             let found = functional.as_ref().and_then(|f| Some((f, measured.next()?)));
-            let courses = found.map_or([None; 3], |(_, (i, _))| shown.courses(i));
+            let dwell_slopes = found.map_or([None; 3], |(_, (i, _))| shown.dwell_slopes(i));
             let modelled = functional.is_some();
             let status_measured = found.and_then(|(f, _)| {
                 let excited = f.iter().any(|(c, _)| seen.is_some_and(|s| s.excited[*c]));
-                match courses[0]? {
-                    Course::Slope(_) => Some(Status::Observable),
-                    Course::Unseen => Some(Status::of(None, excited)),
-                    Course::Bends => None,
+                match dwell_slopes[0]? {
+                    DwellSlope::Slope(_) => Some(Status::Observable),
+                    DwellSlope::Unseen => Some(Status::of(None, excited)),
+                    DwellSlope::Bends => None,
                 }
             });
             let status_outcome = match (modelled, status_measured) {
@@ -338,9 +342,9 @@ fn quantities(
                 let found = partners.as_ref().map(|p| p[c].as_slice());
                 spaces::named(&u.partners, found, truth.platform.names())
             };
-            // the coefficients of a combination are doubles, so that what is left of it below 2^-46 counts as
-            // rounding: so does what dwells add to it, a part as small as the dwell, and the slope is then
-            // that of the degree
+            // the coefficients of a combination are doubles, so a rest of it below 2^-46 counts as rounding;
+            // the contribution of the dwells, as small as the dwell, is then lost too, and the slope is that
+            // of the degree
             let rounded = |check: Check, order: Option<usize>| {
                 let hides = c >= n && degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
                 let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
@@ -355,39 +359,40 @@ fn quantities(
                 degree,
                 accuracy_order: orders[0],
                 modelled,
-                degree_slope: slope(degree, modelled, courses[0]),
+                degree_slope: slope(degree, modelled, dwell_slopes[0]),
                 status_measured,
                 status_outcome,
                 partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
-                slope: rounded(slope(orders[0], modelled, courses[1]), orders[0]),
-                slope_at_end: rounded(slope(orders[1], modelled, courses[2]), orders[1]),
+                slope: rounded(slope(orders[0], modelled, dwell_slopes[1]), orders[0]),
+                slope_at_end: rounded(slope(orders[1], modelled, dwell_slopes[2]), orders[1]),
                 inflation: rules::LINEAR.check(at_end, found.map(|(_, (_, ratio))| *ratio)),
             }
         })
         .collect()
 }
 
-/// A direction that Z does not see, as the verdicts say.
+/// Direction unobservable from Z by the verdicts.
 struct Direction {
     evidence: NullEvidence,
-    /// The two of its unknowns that are correlated least, and the sign of their correlation.
+    /// Its two unknowns of least correlation, and the sign of their correlation.
     weakest: Option<([usize; 2], f64)>,
-    /// The part of it that rounding of the model may show.
+    /// Largest part of the direction that rounding of the model may make observable, dimensionless.
     rounding: f64,
 }
 
-/// What Z does not see: the predicted null vectors against the information, and their number.
+/// Evidence on the unobservable directions: the predicted null vectors against the information, and their
+/// number.
 fn null_evidence(
     truth: &Plan,
     filter: &Plan,
     prediction: &Prediction,
-    shown: &Shown,
+    shown: &DwellLimit,
     correlation: &DMatrix<f64>,
 ) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();
     let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter; what cosines of right angles leave of a column is
-    // nothing
+    // columns of unit length, so that units do not matter; the rest that cosines of right angles leave of a
+    // column counts as zero
     let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
     let units = filter.platform.units();
     let largest_of = |unit: &str| {
@@ -406,7 +411,7 @@ fn null_evidence(
     let predicted = truth.unknowns() - prediction.rank;
     let defect = match shown.rank() {
         Some(rank) => Count { predicted, measured: n - rank, outcome: Agreement::of(predicted == n - rank) },
-        // doubles may lose what is hardly seen
+        // doubles may lose a hardly observable direction
         None => Count { outcome: Agreement::NotResolvable, ..rules::defect(predicted, &values, UNSEEN) },
     };
     let mut evidence = Vec::new();
@@ -422,7 +427,7 @@ fn null_evidence(
             }
             (&scaled * &v).norm() / (v.norm() * largest)
         });
-        // only where all null vectors are known is it known that no other shares its unknowns
+        // shared unknowns are known only where all null vectors are
         let shares = |other: &Combination| other.iter().any(|(c, _)| vector.iter().any(|(d, _)| c == d));
         let alone = prediction
             .whole_null_space()
@@ -450,7 +455,7 @@ fn null_evidence(
     Ok((evidence, defect))
 }
 
-/// A number in few digits.
+/// Number in few digits.
 fn short(x: f64) -> String {
     let text = format!("{x:.4e}");
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));

@@ -1,9 +1,9 @@
-//! How every check came out, in words.
+//! Outcomes of all checks, in words.
 
 use super::answer::{Agreement, Check, CrossCheck};
 use super::{rules, structure};
 
-/// Outcome of every check.
+/// Outcomes of all checks.
 pub(super) fn outcomes(c: &CrossCheck) -> impl Iterator<Item = Agreement> {
     let covariance = c.covariance.iter().map(|d| d.outcome);
     let statistics = c.monte_carlo.statistics.iter().map(|s| s.pass);
@@ -91,7 +91,7 @@ pub(super) fn disagreements(c: &CrossCheck) -> Vec<String> {
     out
 }
 
-/// Why checks are not resolvable, one reason for each; `filter` has those of evidence b.
+/// Reasons why checks are not resolvable, one for each; `filter` has those of evidence b.
 pub(super) fn unresolved(c: &CrossCheck, filter: Vec<String>) -> Vec<String> {
     let mut out = Vec::new();
     let open = |outcome: Agreement| outcome == Agreement::NotResolvable;
@@ -104,7 +104,8 @@ pub(super) fn unresolved(c: &CrossCheck, filter: Vec<String>) -> Vec<String> {
         for (check, of) in slopes.into_iter().filter(|(check, _)| open(check.outcome)) {
             out.push(match check.measured {
                 Some(x) => format!(
-                    "{}: {of} {x:.3} is that of its degree: the coefficients are doubles, whose rounding hides what dwells add",
+                    "{}: {of} {x:.3} is that of its degree: the coefficients are doubles, whose rounding \
+                     hides what dwells add",
                     q.name
                 ),
                 None => format!("{}: {of}: it does not settle, or is not told from rounding", q.name),

@@ -1,4 +1,4 @@
-//! The answer of one run: plain data.
+//! Answer of one run as plain data.
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
@@ -161,7 +161,7 @@ pub struct AccelerometerBias {
 }
 
 impl AccelerometerBias {
-    /// What the conditions say; none where it is zero.
+    /// Report of the bias instability of the accelerometers under the conditions; `None` where it is zero.
     pub fn of(conditions: &Conditions) -> Option<Self> {
         (conditions.accelerometer_instability_ug > 0.0).then_some(Self {
             instability_ug: conditions.accelerometer_instability_ug,
@@ -211,7 +211,7 @@ pub struct MeasurementReport {
 }
 
 impl MeasurementReport {
-    /// Of `scheme` under `conditions`.
+    /// Report on `scheme` under `conditions`.
     pub fn new(scheme: &Scheme, conditions: &Conditions) -> Self {
         Self {
             latitude_deg: latitude_of(scheme).map_or(0.0, |l| l.degrees()),
@@ -231,7 +231,7 @@ impl MeasurementReport {
     }
 }
 
-/// Keys of the conditions of a prediction that nobody states.
+/// Keys of the conditions of a prediction that are not stated.
 pub(super) fn chosen(scheme: &Scheme, conditions: &Conditions) -> Vec<String> {
     let stated = conditions.states();
     let needs_dwell = scheme.positions.iter().any(|p| p.dwell.is_none());
@@ -365,8 +365,8 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The outcome for an unknown that samples determine or not, with its sigma at the start and at the end;
-    /// `required` with the uncertainty that it is about: sigma at the end, and what a bench adds.
+    /// Outcome for an unknown, from its sigmas at the start and at the end. `required` comes with the
+    /// uncertainty that it limits: sigma at the end, and the contribution of a bench.
     pub(crate) fn of(
         determined: bool,
         filter: FilterKind,
@@ -393,7 +393,7 @@ impl Outcome {
         }
     }
 
-    /// Why it meets no requirement, whatever sigma is.
+    /// Reason why the unknown meets no requirement, whatever its sigma; `None` if it can.
     pub(crate) fn miss(self) -> Option<Miss> {
         match self {
             Self::Reached | Self::Converging | Self::Determined => None,

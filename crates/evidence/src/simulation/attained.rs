@@ -1,10 +1,8 @@
-//! The accuracy that a scheme attains at its end by what is stated: the one figure that requirements are held
-//! against.
+//! Accuracy that a scheme attains at its end under the stated conditions: the one figure for requirements.
 //!
-//! All samples count with the noise, the random drift and the biases that are stated, and nothing is known
-//! beforehand but the priors that are stated. Coefficients are constants; psi is that of the end of the
-//! scheme, with which the platform is used (under reset carry that of the end of each position, since each
-//! has a psi of its own).
+//! All samples count, with the stated noise, random drift and biases. The only prior knowledge is that of the
+//! stated priors. Coefficients are constants. psi is that of the end of the scheme, with which the platform
+//! is used. Under reset carry each position has a psi of its own, that of its end.
 
 use nalgebra::{DMatrix, RowDVector};
 use obsdeg_core::model::{OmittedModel, Scheme};
@@ -24,50 +22,50 @@ use crate::requirements::{Claim, Miss, Requirements, Worst};
 use crate::simulation::omitted::bench::Bench;
 use crate::simulation::omitted::weights::{self, Influence};
 
-/// Factor by which a second diffuse prior is narrower: an unknown whose sigma it narrows is bounded by
-/// nothing else.
+/// Factor by which a second diffuse prior is narrower. If it narrows the sigma of an unknown, only the prior
+/// bounds that unknown.
 const NARROWER: f64 = 100.0;
-/// Largest ratio of the sigmas by both for an unknown that samples and stated priors bound.
+/// Largest ratio of the sigmas under both priors for an unknown that samples and stated priors bound.
 const BOUNDED: f64 = 1.05;
 
-/// The accuracy of a scheme at its end.
+/// Accuracy of a scheme at its end.
 #[derive(Debug, Clone)]
 pub struct Attained {
-    /// The scheme in numbers, without random drift that nobody states.
+    /// Plan of the scheme, without random drift that is not stated.
     pub plan: Plan,
-    /// The exact verdicts.
+    /// Exact verdicts on the scheme.
     pub prediction: Prediction,
     /// Sigma of every unknown in its shown unit (deg, deg/h, ...); `None` where neither samples nor stated
-    /// priors bound it.
+    /// priors bound the unknown.
     pub sigmas: Vec<Option<f64>>,
-    /// Total uncertainty of every unknown in its shown unit: sigma, and what the errors of the bench add.
-    /// Sigma where no bench is stated.
+    /// Total uncertainty of every unknown in its shown unit: sigma and the contribution of the errors of the
+    /// bench. It equals sigma where no bench is stated.
     pub totals: Vec<Option<f64>>,
     /// True for an unknown that the samples do not determine and stated priors bound.
     pub by_prior: Vec<bool>,
-    known: Known,
-    /// Standard deviations of the unknowns beforehand, in SI units: stated, or so wide that they say nothing.
+    known: EndCovariance,
+    /// Prior standard deviations of the unknowns, in SI units: stated, or so wide that they do not matter.
     prior: Vec<f64>,
-    /// Rows of what is known beforehand with its covariance (m x n, SI units).
+    /// Rows of information known beforehand with its covariance (m x n, SI units).
     rows: DMatrix<f64>,
-    /// True if random drift, biases or such rows make a filter of it.
+    /// True if random drift, biases or such rows require a filter.
     noisy: bool,
     /// Changes of the estimates by one sigma of every error of the bench (n x errors, SI units); no columns
-    /// without.
+    /// without a bench.
     contributions: DMatrix<f64>,
 }
 
-/// Covariance of the unknowns at the end in SI units, as a root: what is not bounded has huge variances,
-/// which cancel in a determined combination of such unknowns only before they are squared.
+/// Covariance of the unknowns at the end in SI units, as a root. An unbounded unknown has a huge variance; in
+/// a determined combination of such unknowns these cancel before squaring only.
 #[derive(Debug, Clone)]
-enum Known {
+enum EndCovariance {
     /// A root of the covariance (n x n).
     Root(DMatrix<f64>),
     /// The covariance of a filter as `U diag(d) U^T`; biases behind the unknowns.
     Filter(Covariance),
 }
 
-impl Known {
+impl EndCovariance {
     /// Variance of a combination of unknowns, `(unknown, coefficient)`.
     fn variance(&self, terms: &[(usize, f64)]) -> Result<f64, EkfError> {
         match self {
@@ -81,7 +79,7 @@ impl Known {
 }
 
 impl Attained {
-    /// The accuracy of `scheme` by what `conditions` state.
+    /// Accuracy of `scheme` under the stated `conditions`.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -112,7 +110,7 @@ impl Attained {
         let prior = |narrower: f64| -> Vec<f64> {
             stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect()
         };
-        let with = |narrower: f64| -> Result<Known, SimulationError> {
+        let with = |narrower: f64| -> Result<EndCovariance, SimulationError> {
             let sigma = prior(narrower);
             if noisy { filtered(&plan, sigma, &rows) } else { by_information(&plan, sigma) }
         };
@@ -143,7 +141,7 @@ impl Attained {
         Ok(out)
     }
 
-    /// Total uncertainties with the bench of `conditions`.
+    /// Computes the total uncertainties with the bench of `conditions`.
     fn add_bench(&mut self, conditions: &Conditions) -> Result<(), SimulationError> {
         let model = OmittedModel::new(&self.plan.platform);
         let bench = Bench::of(&conditions.bench, &model)?;
@@ -160,7 +158,7 @@ impl Attained {
         Ok(())
     }
 
-    /// Changes of the estimates by what the scheme does not estimate, by the weights of the sigmas.
+    /// Influence of omitted errors on the estimates, by the weights of the sigmas.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -172,23 +170,23 @@ impl Attained {
         }
     }
 
-    /// Sigma of a combination of unknowns, `(unknown, coefficient)` in SI units, in SI units.
+    /// Sigma, in SI units, of a combination of unknowns, `(unknown, coefficient)` in SI units.
     ///
     /// # Errors
-    /// [`EkfError`] for a coefficient that is not finite, or of no unknown.
+    /// [`EkfError`] for a coefficient that is not finite, or an index beyond the unknowns.
     pub fn sigma_of(&self, terms: &[(usize, f64)]) -> Result<f64, EkfError> {
         Ok(self.known.variance(terms)?.max(0.0).sqrt())
     }
 
-    /// True if an error that is not estimated has a size in the stated bench.
+    /// True if the stated bench has a size for an omitted error.
     pub fn has_bench(&self) -> bool {
         self.contributions.ncols() > 0
     }
 
-    /// Covariance of some unknowns in SI units, in their order, with the errors of a stated bench.
+    /// Covariance of some unknowns in SI units, in the given order, with the errors of a stated bench.
     ///
     /// # Errors
-    /// [`EkfError`] for what is no unknown.
+    /// [`EkfError`] for an index beyond the unknowns.
     pub fn covariance_of(&self, unknowns: &[usize]) -> Result<DMatrix<f64>, EkfError> {
         let n = unknowns.len();
         let mut out = DMatrix::zeros(n, n);
@@ -206,7 +204,7 @@ impl Attained {
     /// are left out.
     ///
     /// # Errors
-    /// [`SimulationError::UnknownName`] for a requirement on what no scheme has.
+    /// [`SimulationError::UnknownName`] for a requirement on a name that no scheme has.
     pub fn requirements(&self, conditions: &Conditions) -> Result<Requirements, SimulationError> {
         let conditions = conditions.within(&self.plan.platform);
         let required = resolve(REQUIRED, &self.plan.platform, &conditions.requirements, f64::NAN)?;
@@ -223,8 +221,8 @@ impl Attained {
         Ok(out)
     }
 
-    /// The largest sigma (total uncertainty with a bench) of a drift coefficient that counts, if all of these
-    /// have one: other coefficients have other units.
+    /// Largest sigma (total uncertainty with a bench) of the drift coefficients that satisfy `counts`; `None`
+    /// if one of these has none. Other coefficients have other units and do not count.
     pub fn worst_of(&self, counts: &dyn Fn(&String) -> bool) -> Option<Worst> {
         let (units, names) = (self.plan.platform.units(), self.plan.platform.names());
         let mut worst: Option<Worst> = None;
@@ -238,15 +236,15 @@ impl Attained {
     }
 }
 
-/// Root of the sum of squares of what every column of `contributions` (unknowns x errors) adds to a
+/// Root sum of squares of the contributions of the columns of `contributions` (unknowns x errors) to a
 /// combination of unknowns, `(unknown, coefficient)`.
 pub(crate) fn added_to(contributions: &DMatrix<f64>, terms: &[(usize, f64)]) -> f64 {
     let change = |e: usize| terms.iter().map(|(c, k)| k * contributions[(*c, e)]).sum::<f64>();
     (0..contributions.ncols()).map(|e| change(e).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Changes of the estimates of the filter of a run by one sigma of every error of the bench (unknowns x
-/// errors, SI units), by its own gains at small angles; no columns without a bench.
+/// Changes of the estimates of a run's filter by one sigma of every error of the bench (unknowns x errors, SI
+/// units), by its own gains at small angles; no columns without a bench.
 pub(crate) fn run_contributions(
     plan: &Plan,
     conditions: &Conditions,
@@ -273,19 +271,19 @@ fn stated_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<Option<f64>>
     Ok(sigmas.iter().zip(units).map(|(s, unit)| s.is_finite().then(|| s * scale(unit))).collect())
 }
 
-/// Covariance at the end by the information of all samples: nothing is random but the noise of the samples.
-fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<Known, SimulationError> {
+/// Covariance at the end by the information of all samples, with white noise of the samples only.
+fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<EndCovariance, SimulationError> {
     let Batch { information, to_end } = batch(plan, SquareRootInformation::prior(&prior)?)?;
     let root = information.inverse_root()?;
     let n = root.nrows();
-    // sums in the same order on every machine: no product that uses whatever the processor has
+    // sums in the same order on every machine: no product whose instructions depend on the processor
     let entry = |i: usize, j: usize| (0..n).map(|k| to_end[(i, k)] * root[(k, j)]).sum::<f64>();
-    Ok(Known::Root(DMatrix::from_fn(n, n, entry)))
+    Ok(EndCovariance::Root(DMatrix::from_fn(n, n, entry)))
 }
 
 /// Covariance at the end of a filter, with random drift and biases.
-fn filtered(plan: &Plan, sigma: Vec<f64>, rows: &DMatrix<f64>) -> Result<Known, SimulationError> {
-    Ok(Known::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma, rows)?)?))
+fn filtered(plan: &Plan, sigma: Vec<f64>, rows: &DMatrix<f64>) -> Result<EndCovariance, SimulationError> {
+    Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma, rows)?)?))
 }
 
 /// Covariance of a filter at its start, biases behind the unknowns; `rows` are known beforehand.

@@ -1,4 +1,4 @@
-//! The information of all measurements of a plan on the unknowns at its start.
+//! Information of all measurements of a plan on the unknowns at its start.
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
@@ -7,30 +7,30 @@ use obsdeg_exact::interrupt;
 use super::conditions::is_rate;
 use super::plan::Plan;
 
-/// How many times wider a prior that says nothing is than what the measurements alone say of one unknown, the
-/// others known: wide against all that can be determined, and far enough from 1e16 that rounding does not
-/// look like information.
+/// Ratio of a diffuse prior to the sigma of one unknown by the measurements alone, all others known. It is
+/// wide against all that can be determined, and far enough from 1e16 that rounding does not look like
+/// information.
 const WIDER_PSI: f64 = 1e12;
-/// The same for drifts. They enter with the dwell, which in a sweep grows to hundreds of times that at which
-/// the prior was taken.
+/// Ratio of a diffuse prior for drifts. Drifts enter with the dwell, which in a sweep grows to hundreds of
+/// times that of the prior.
 const WIDER_DRIFT: f64 = 1e10;
-/// Rows that are added at a time.
+/// Number of rows that are added at a time.
 const ROWS: usize = 4096;
 
-/// The root of the information on the initial unknowns, and the transition from start to end.
+/// Root of the information on the initial unknowns, and the transition from start to end.
 #[derive(Debug, Clone)]
 pub struct Batch {
-    /// Without prior, unless one was given.
+    /// Information on the initial unknowns, without a prior unless one was given.
     pub information: SquareRootInformation,
-    /// `Phi(end, start)` (n x n).
+    /// Transition `Phi(end, start)` (n x n).
     pub to_end: DMatrix<f64>,
 }
 
-/// Adds all measurements of `plan` to `information`, as functionals of the initial unknowns; process noise is
-/// left out, and so are the biases.
+/// Adds all measurements of `plan` to `information`, as functionals of the initial unknowns. Process noise
+/// and biases are left out.
 ///
 /// # Errors
-/// [`EkfError`] when a number is not finite.
+/// [`EkfError`] for a number that is not finite.
 pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batch, EkfError> {
     let n = plan.unknowns();
     let most = ROWS.max(4 * n);
@@ -50,8 +50,8 @@ pub fn batch(plan: &Plan, mut information: SquareRootInformation) -> Result<Batc
     Ok(Batch { information, to_end })
 }
 
-/// All measurements of `plan` in units of their noise as functionals of the initial unknowns, one after the
-/// other; the transition from start to end.
+/// Passes all measurements of `plan`, in units of their noise, to `sink` one after the other, as functionals
+/// of the initial unknowns. Returns the transition from start to end.
 pub(crate) fn each_row(
     plan: &Plan,
     mut sink: impl FnMut(&mut dyn Iterator<Item = f64>) -> Result<(), EkfError>,
@@ -77,24 +77,25 @@ pub(crate) fn each_row(
     Ok(to_now.resize_vertically(n, 0.0))
 }
 
-/// Standard deviations that say nothing beside the measurements of `plan`: in units of what these say, so
-/// that noise, steps and dwells do not matter.
+/// Standard deviations of a diffuse prior, so wide that the measurements of `plan` outweigh it. They scale
+/// with the sigmas by the measurements, so that noise, steps and dwells do not matter.
 ///
 /// # Errors
-/// [`EkfError`] when a number is not finite.
+/// [`EkfError`] for a number that is not finite.
 pub fn diffuse_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
     Ok(wider(plan, &information, WIDER_PSI, WIDER_DRIFT))
 }
 
-/// Standard deviations so many times wider than what `information` says of the best known drift, and of the
-/// best known of the others (psi, and what is no rate), all others known.
+/// Standard deviations of a wide prior. For drifts they are `drift` times the sigma of the best known drift
+/// by `information`. For psi, and all other unknowns that are no rates, they are `psi` times that of the best
+/// known one. Each of these sigmas takes all other unknowns as known.
 pub(crate) fn wider(plan: &Plan, information: &SquareRootInformation, psi: f64, drift: f64) -> Vec<f64> {
     let units = plan.platform.units();
     let sigma = |psi: bool, wider: f64| {
         let own = information.root().column_iter().zip(units).filter(|(_, u)| is_rate(u) != psi);
         let largest = own.map(|(column, _)| column.norm()).fold(0.0, f64::max);
-        // nothing is measured of any: any prior will do
+        // without measurements any prior will do
         if largest > 0.0 { wider / largest } else { wider }
     };
     let (psi, drift) = (sigma(true, psi), sigma(false, drift));

@@ -1,4 +1,4 @@
-//! The same scheme under the other carries: what the assumption about repositioning is worth.
+//! Comparison of a scheme under the other carries: effect of the assumption about repositioning.
 
 use obsdeg_core::model::{Carry, Platform, Scheme};
 use schemars::JsonSchema;
@@ -29,14 +29,14 @@ pub struct OtherCarry {
     pub not_judged: Option<String>,
 }
 
-/// A scheme and its conditions under another carry; `None` where torquer errors act on turns that the scheme
-/// does not state.
+/// Scheme and conditions under another carry; `None` where torquer errors act on turns that the scheme does
+/// not state.
 pub(crate) fn under(scheme: &Scheme, conditions: &Conditions, carry: Carry) -> Option<(Scheme, Conditions)> {
     let other = Scheme { carry, ..scheme.clone() };
     other.paths().is_ok().then(|| (other, Conditions { slews: false, ..conditions.clone() }))
 }
 
-/// The scheme under every carry but its own.
+/// Comparison of the scheme under every carry but its own.
 ///
 /// # Errors
 /// [`SimulationError`].

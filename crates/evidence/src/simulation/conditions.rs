@@ -1,4 +1,4 @@
-//! The conditions of a run: noise, steps, true values, priors. All in the units of the report.
+//! Conditions of a run: noise, steps, true values, priors; all in the units of the report.
 
 use std::collections::BTreeMap;
 
@@ -14,74 +14,75 @@ use super::datasheet::GyroNoise;
 use super::error::SimulationError;
 use crate::requirements::Basis;
 
-/// Everything that a run needs besides the scheme.
+/// Conditions of a run: everything that it needs besides the scheme.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditions {
-    /// How the truth is generated.
+    /// Model of the truth.
     pub truth: Truth,
-    /// Filter that is asked for; `None`: the linear one while its model holds, the iterated one where it does
-    /// not.
+    /// Requested filter; `None`: the linear one where its model holds, the iterated one elsewhere.
     pub filter: Option<FilterKind>,
     /// Largest step, in s; a position is divided into equal steps.
     pub step_s: f64,
-    /// Dwell of positions that do not say theirs, in s.
+    /// Dwell of positions that state none, in s.
     pub dwell_s: f64,
-    /// Rate of the rotations between positions in deg/s; `None`: instantaneous, unless the position says
-    /// otherwise.
+    /// Rate of the rotations between positions, in deg/s; `None`: instantaneous, unless the position states a
+    /// rate.
     pub slew_rate_deg_s: Option<f64>,
-    /// False: every position is reached at once, whatever it says.
+    /// True if positions may be reached by slews; false: every position is reached instantaneously.
     pub slews: bool,
     /// White noise of the observation per sample and axis, in g.
     pub accelerometer_noise_g: f64,
-    /// Bias instability of the accelerometers, in ug: the coefficient B, as of gyros; 0: none.
+    /// Bias instability of the accelerometers, in ug: the coefficient B, as for gyros; 0: none.
     pub accelerometer_instability_ug: f64,
-    /// Correlation time in s of the Gauss-Markov process that stands for it.
+    /// Correlation time, in s, of the Gauss-Markov process that models the bias instability of the
+    /// accelerometers.
     pub accelerometer_correlation_s: f64,
     /// Noise of a measured azimuth per sample, in deg.
     pub azimuth_noise_deg: f64,
-    /// Random drift.
+    /// Random drift of the gyros.
     pub drift_noise: DriftNoise,
-    /// The step in s for which it was given: a bias of one step has another density with other steps.
+    /// Step of the stated drift noise, in s: a bias held for one step has another density with other steps.
     pub drift_noise_step_s: f64,
-    /// What the datasheet of the gyros says besides.
+    /// Further noise of the gyros by their datasheet.
     pub gyro_noise: GyroNoise,
-    /// How the filter is propagated.
+    /// Propagation of the filter.
     pub propagation: Propagation,
-    /// True values, later ones override.
+    /// True values; later ones override earlier ones.
     pub values: Vec<Assignment>,
-    /// Factor on the true drift coefficients and their priors.
+    /// Factor on the true drift coefficients and their priors, dimensionless.
     pub drift_scale: f64,
-    /// Initial estimates.
+    /// Initial estimates; later ones override earlier ones.
     pub estimates: Vec<Assignment>,
-    /// Initial standard deviations.
+    /// Initial standard deviations; later ones override earlier ones.
     pub priors: Vec<Assignment>,
-    /// The largest standard deviations allowed: those that are stated, since the program has none of its own.
+    /// Largest standard deviations allowed, as stated: the program has none of its own.
     pub requirements: Vec<Assignment>,
-    /// Sizes (one sigma) of errors that are not estimated, in their units: none counts unless it is stated.
+    /// Sizes (one sigma) of errors that are not estimated, in their units; an error without a stated size
+    /// does not count.
     pub bench: Vec<Assignment>,
-    /// Conditions that a file or an option states, whatever their values are: see [`Self::states`].
+    /// Conditions that a file or an option states, whatever their values: see [`Self::states`].
     pub stated: Stated,
 }
 
-/// Conditions that a file or an option states. What it leaves out is chosen by the program, is named by every
-/// answer, and (random drift, priors, true values) counts in runs only.
+/// Conditions that a file or an option states. The program chooses the others and every answer names them;
+/// chosen random drift, priors and true values count in runs only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stated {
-    /// Largest step between samples.
+    /// True if the largest step between samples is stated.
     pub step: bool,
-    /// Dwell of positions that do not say theirs.
+    /// True if the dwell of positions without one is stated.
     pub dwell: bool,
-    /// White noise of the accelerometers.
+    /// True if the white noise of the accelerometers is stated.
     pub accelerometer_noise: bool,
-    /// Noise of a measured azimuth.
+    /// True if the noise of a measured azimuth is stated.
     pub azimuth_noise: bool,
-    /// Random drift, `drift_noise` or an angle random walk of the gyros.
+    /// True if random drift is stated: `drift_noise` or an angle random walk of the gyros.
     pub drift_noise: bool,
-    /// Model of the truth.
+    /// True if the model of the truth is stated.
     pub truth: bool,
 }
 
-/// The latitude of a scheme that names none, in degrees (the paper's is not given).
+/// Latitude of a scheme that states none, in degrees (the paper does not give its own).
 pub(crate) const DEFAULT_LATITUDE: &str = "28.2";
 
 fn assign(name: &str, value: f64) -> Assignment {
@@ -89,7 +90,8 @@ fn assign(name: &str, value: f64) -> Assignment {
 }
 
 impl Default for Conditions {
-    /// The paper's run; what it does not give (prior, latitude) is chosen here. Nothing is required.
+    /// Conditions of the paper's run. Its prior and latitude, which the paper does not give, are chosen here.
+    /// No requirements.
     fn default() -> Self {
         let first_order = |value| ["D_I", "D_O", "D_S"].map(|name| assign(name, value));
         let drift = [("D_FX", 11.0), ("D_FY", 12.0), ("D_FZ", 13.0)].map(|(n, v)| assign(n, v));
@@ -140,8 +142,8 @@ impl Default for Conditions {
     }
 }
 
-/// Families before single unknowns, so that these are what they say in whatever order they are given; of
-/// equal names the last counts.
+/// Assignments with families before single unknowns, so that single values hold in whatever order they are
+/// given. Among equal names the last one counts.
 pub fn general_first(mut given: Vec<Assignment>) -> Vec<Assignment> {
     given.sort_by_key(|a| a.name.len());
     given
@@ -152,7 +154,7 @@ fn by_family(given: &BTreeMap<String, f64>) -> Vec<Assignment> {
 }
 
 impl Conditions {
-    /// Overrides what `settings` gives.
+    /// Overrides conditions by those that `settings` states.
     pub fn apply(&mut self, settings: &Settings) {
         fn set<T: Copy>(slot: &mut T, value: Option<T>) {
             if let Some(value) = value {
@@ -169,7 +171,7 @@ impl Conditions {
         stated.truth |= settings.truth.is_some();
         set(&mut self.truth, settings.truth);
         self.filter = settings.filter.or(self.filter);
-        // a filter with full attitudes is that of a platform that has them
+        // a filter with full attitudes is for a platform that has them
         if !stated.truth {
             self.truth = if self.has_full_attitudes() { Truth::Exact } else { Self::default().truth };
         }
@@ -188,7 +190,7 @@ impl Conditions {
         set(&mut gyros.rate_random_walk_dph_sqrt_h, settings.rate_random_walk_dph_sqrt_h);
         set(&mut gyros.bias_instability_dph, settings.bias_instability_dph);
         set(&mut gyros.correlation_time_s, settings.correlation_time_s);
-        // an angle random walk says what there is of white drift
+        // an angle random walk states the white drift
         if settings.angle_random_walk_deg_sqrt_h.is_some() && settings.drift_noise.is_none() {
             self.drift_noise = DriftNoise::OneStep(0.0);
         }
@@ -204,7 +206,7 @@ impl Conditions {
         }
     }
 
-    /// The conditions of a scheme: the paper's, with what the scheme gives.
+    /// Conditions of a scheme: those of the paper, with those that the scheme states.
     pub fn of(scheme: &Scheme) -> Self {
         let mut out = Self::default();
         out.apply(&scheme.simulation);
@@ -213,12 +215,12 @@ impl Conditions {
         out
     }
 
-    /// The priors that a file or an option states: all but those of the program.
+    /// Priors that a file or an option states, without those of the program.
     pub fn stated_priors(&self) -> &[Assignment] {
         self.priors.strip_prefix(&Self::default().priors[..]).unwrap_or(&self.priors)
     }
 
-    /// The true values that a file or an option states: all but those of the paper.
+    /// True values that a file or an option states, without those of the paper.
     pub fn stated_values(&self) -> &[Assignment] {
         self.values.strip_prefix(&Self::default().values[..]).unwrap_or(&self.values)
     }
@@ -228,7 +230,8 @@ impl Conditions {
         if self.stated_priors().is_empty() { Basis::Predicted } else { Basis::PredictedWithPrior }
     }
 
-    /// `psi 0.05, D_F 20`: the priors that are stated, each in the unit of its unknown; `None` where none is.
+    /// Stated priors in words, such as `psi 0.05, D_F 20`, each in the unit of its unknown; `None` where none
+    /// is stated.
     pub fn stated_prior_in_words(&self) -> Option<String> {
         let scale = match self.drift_scale {
             1.0 => String::new(),
@@ -239,8 +242,8 @@ impl Conditions {
         (!listed.is_empty()).then(|| format!("{}{scale}", listed.join(", ")))
     }
 
-    /// `K0 20, latitude 10`: the sizes of the bench, each in the unit of its error, and which sizes give way
-    /// to a family that is stated later; `None` where none is stated.
+    /// Sizes of the bench in words, such as `K0 20, latitude 10`, each in the unit of its error, with the
+    /// sizes that a family stated later overrides; `None` where none is stated.
     pub fn bench_in_words(&self) -> Option<String> {
         // of two sizes of the same error the later one counts
         let counts = |i: &usize| {
@@ -261,12 +264,12 @@ impl Conditions {
         (!listed.is_empty()).then(|| format!("{}{gone}", listed.join(", ")))
     }
 
-    /// The random drift with its unit; `None` where there is none.
+    /// Random drift with its unit, in words; `None` where there is none.
     pub fn drift_noise_in_words(&self) -> Option<String> {
         (self.drift_noise.amount() > 0.0).then(|| self.drift_noise.to_string())
     }
 
-    /// The conditions that are stated; what differs from the program's own values is.
+    /// Conditions that are stated; a value other than the program's own counts as stated.
     pub fn states(&self) -> Stated {
         let own = Self::default();
         let Stated { step, dwell, accelerometer_noise, azimuth_noise, drift_noise, truth } = self.stated;
@@ -281,12 +284,12 @@ impl Conditions {
         }
     }
 
-    /// True if the filter that is asked for has full attitudes.
+    /// True if the requested filter has full attitudes.
     pub fn has_full_attitudes(&self) -> bool {
         self.filter.is_some_and(|filter| filter != FilterKind::Linear)
     }
 
-    /// Checks that the truth of a run is one that the filter can follow.
+    /// Checks that the requested filter can follow the truth of a run.
     ///
     /// # Errors
     /// [`SimulationError::LinearTruth`].
@@ -299,21 +302,21 @@ impl Conditions {
         }
     }
 
-    /// The conditions that requirements are judged by: random drift that nobody states is none. (Priors that
-    /// nobody states do not count either: see [`Self::stated_priors`].)
+    /// Conditions that requirements are judged by: without random drift that is not stated. (Priors that are
+    /// not stated do not count either: see [`Self::stated_priors`].)
     pub fn as_stated(&self) -> Self {
         let drift_noise = if self.states().drift_noise { self.drift_noise } else { DriftNoise::OneStep(0.0) };
         Self { drift_noise, ..self.clone() }
     }
 
-    /// The rate in deg/s at which a position is reached; `None`: at once.
+    /// Rate at which a position is reached, in deg/s; `None`: instantaneously.
     pub fn slew_rate(&self, position: &Position) -> Option<f64> {
         let own = position.slew.as_ref().and_then(|s| s.rate_deg_s);
         own.or(self.slew_rate_deg_s).filter(|_| self.slews)
     }
 
-    /// The same without random drift of any kind, and without bias instability of the accelerometers: Z has
-    /// white noise.
+    /// Conditions without random drift of any kind, and without bias instability of the accelerometers: the
+    /// noise of Z is white.
     pub fn without_drift_noise(self) -> Self {
         Self {
             drift_noise: DriftNoise::OneStep(0.0),
@@ -323,16 +326,16 @@ impl Conditions {
         }
     }
 
-    /// The accelerometers in g, without their white noise.
+    /// Noise of the accelerometers in g, without their white noise.
     pub fn accelerometer(&self) -> SensorNoise {
         let correlation = self.accelerometer_correlation_s;
         SensorNoise::accelerometer(0.0, 0.0, self.accelerometer_instability_ug, correlation)
     }
 
-    /// Checks what the types do not: every number is in its range.
+    /// Checks that every number is in its range.
     ///
     /// # Errors
-    /// [`SimulationError::Range`] naming the offender.
+    /// [`SimulationError::Range`] with the name of the number.
     pub fn validate(&self) -> Result<(), SimulationError> {
         let single = [
             ("step_s", self.step_s, ranges::STEP_S),
@@ -363,7 +366,7 @@ impl Conditions {
         Ok(())
     }
 
-    /// Every list of assignments, in words, with the range of its numbers.
+    /// Lists of assignments with their names and the ranges of their numbers.
     fn lists(&self) -> [(&'static str, &[Assignment], Range); 4] {
         [
             (TRUE_VALUE, &self.values, ranges::VALUE),
@@ -373,7 +376,7 @@ impl Conditions {
         ]
     }
 
-    /// The same without assignments to single unknowns that `platform` does not have: for another carry, or
+    /// Conditions without assignments to single unknowns that `platform` does not have, for another carry or
     /// other positions.
     pub(crate) fn within(&self, platform: &Platform) -> Self {
         let kept = |list: &[Assignment]| -> Vec<Assignment> {
@@ -403,26 +406,25 @@ impl Conditions {
     }
 }
 
-/// A true value in words.
+/// Name of a true value in messages.
 pub(crate) const TRUE_VALUE: &str = "true value";
-/// An initial estimate in words.
+/// Name of an initial estimate in messages.
 pub(crate) const ESTIMATE: &str = "initial estimate";
-/// A prior standard deviation in words.
+/// Name of a prior standard deviation in messages.
 pub const PRIOR: &str = "prior sigma";
-/// A requirement in words.
+/// Name of a requirement in messages.
 pub(crate) const REQUIRED: &str = "required sigma";
 
-/// The latitude of a scheme, or the default.
+/// Latitude of a scheme, or the default.
 pub fn latitude_of(scheme: &Scheme) -> Option<Latitude> {
     scheme.latitude.or_else(|| DEFAULT_LATITUDE.parse().ok())
 }
 
-/// One number per unknown of `platform`, in the unit of the unknown (psi in deg): `default` where nothing is
-/// assigned.
+/// Values of the unknowns of `platform`, each in its unit (psi in deg): `default` where nothing is assigned.
 ///
 /// # Errors
-/// [`SimulationError::UnknownName`] for an assignment that concerns nothing; a family that the scheme does
-/// not have is accepted when the gyro model has it.
+/// [`SimulationError::UnknownName`] for an assignment that concerns no unknown. A family that the scheme does
+/// not have is accepted if the gyro model has it.
 pub fn resolve(
     what: &'static str,
     platform: &Platform,
@@ -449,7 +451,7 @@ pub fn resolve(
     Ok(out)
 }
 
-/// Largest sigma allowed of every unknown in its shown unit; `None` where nothing is required.
+/// Largest sigmas allowed, by unknown, in the shown units; `None` where nothing is required.
 ///
 /// # Errors
 /// [`SimulationError::UnknownName`], as [`resolve`].
@@ -461,7 +463,7 @@ pub fn required_sigmas(
     Ok(required.into_iter().map(|r| Some(r).filter(|r| !r.is_nan())).collect())
 }
 
-/// The unit in which an unknown is given and reported: degrees for psi.
+/// Unit in which an unknown is given and reported: deg for psi.
 pub fn shown_unit(unit: &str) -> &str {
     if unit == "rad" { "deg" } else { unit }
 }
@@ -471,8 +473,8 @@ pub fn is_rate(unit: &str) -> bool {
     unit.starts_with("deg/h")
 }
 
-/// Units of the equations per shown unit of an unknown: rad per deg, rad/s per deg/h, 1 per ppm, rad per
-/// arcsec, g per ug.
+/// Factor from the shown unit of an unknown to SI: rad per deg, rad/s per deg/h, 1 per ppm, rad per arcsec, g
+/// per ug.
 pub fn si_per_shown(unit: &str) -> f64 {
     match unit {
         "rad" => 1f64.to_radians(),

@@ -1,4 +1,4 @@
-//! Whether a run is credible: innovations and errors against what the filter believes of them.
+//! Consistency of a run: innovations and errors compared with the covariances of the filter.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
@@ -6,11 +6,11 @@ use obsdeg_ekf::{Covariance, EkfError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// An error beyond so many sigma is none that the filter believes in.
+/// Largest error of a credible estimate, in sigma.
 pub(crate) const CREDIBLE: f64 = 4.0;
-/// A right filter leaves the bands that decide with one part in a thousand.
+/// Probability with which a consistent filter stays inside the bands that decide.
 const STRICT: f64 = 0.999;
-/// Most lags of the autocorrelation.
+/// Largest lag of the autocorrelation, in samples.
 const LAGS: usize = 20;
 
 /// Statistical evidence against a run.
@@ -62,28 +62,28 @@ pub struct Consistency {
     pub consistent: bool,
 }
 
-/// What a run leaves to be judged.
+/// Results of a run that its consistency is judged by.
 pub(crate) struct Outcomes<'a> {
     /// Whitened innovations, one per output and sampled step.
     pub whitened: &'a [f64],
     pub outputs: usize,
     /// Estimate minus truth of all states of the filter, in its units (shape n).
     pub error: Vec<f64>,
-    /// What it believes of that.
+    /// Covariance of the error, by the filter.
     pub covariance: &'a Covariance,
-    /// Name and error over sigma of what is reported.
+    /// Names of the reported quantities, with their errors over sigma.
     pub normalised: Vec<(&'a str, f64)>,
-    /// Columns T (shape n x k) of which T' error is what constraints leave free; `None`: all of it.
+    /// Columns T (shape n x k): T' error is the part that constraints leave free; `None`: the whole error.
     pub free: Option<DMatrix<f64>>,
-    /// Directions with a sigma below this part of the unknowns' own are left out of the NEES.
+    /// Smallest sigma of a direction that counts in the NEES, relative to the unknowns' own sigmas.
     pub resolution: f64,
 }
 
 impl Consistency {
-    /// Judges a run.
+    /// Judges the consistency of a run.
     ///
     /// # Errors
-    /// [`EkfError`] when the covariance is not positive definite.
+    /// [`EkfError`] for a covariance that is not positive definite.
     pub(crate) fn of(mut run: Outcomes<'_>) -> Result<Self, EkfError> {
         let (states, outputs) = (run.error.len(), run.outputs as f64);
         let samples = run.whitened.len() / run.outputs;
@@ -106,7 +106,7 @@ impl Consistency {
                 let one: Vec<f64> = run.whitened.iter().skip(j).step_by(run.outputs).copied().collect();
                 ljung_box(&autocorrelation(&one, lags), one.len())
             })
-            // a number that is none stays one
+            // NaN stays NaN
             .fold(1.0, |least: f64, p| if p.is_nan() { p } else { least.min(p) });
         let nis_wide_band = chi_square_band(outputs, count, STRICT);
         let (_, nees_limit) = chi_square_band(n as f64, 1.0, STRICT);
@@ -118,7 +118,7 @@ impl Consistency {
             (Doubt::Nis, !(nis_wide_band.0..=nis_wide_band.1).contains(&nis)),
             (Doubt::Nees, nees > nees_limit),
             (Doubt::Error, !beyond.is_empty()),
-            // of the smallest over the outputs
+            // smallest probability over the outputs
             (Doubt::Correlated, whiteness * outputs < 1.0 - STRICT),
         ];
         let doubts: Vec<Doubt> = found.into_iter().filter(|(_, there)| *there).map(|(d, _)| d).collect();
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use crate::simulation::truth::Noise;
 
-    /// A run of two outputs and two states, with errors given in sigma.
+    /// Consistency of a run of two outputs and two states, with errors given in sigma.
     fn judged(whitened: &[f64], error: [f64; 2]) -> Consistency {
         let p = Covariance::new("P", &DMatrix::identity(2, 2), Form::Ud).expect("a covariance");
         let run = Outcomes {
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(judged(&right, [2.8, 2.8]).doubts, [Doubt::Nees]);
         assert_eq!(judged(&right, [0.0, 4.1]).doubts, [Doubt::Nees, Doubt::Error]);
         assert_eq!(judged(&right, [0.0, 4.1]).beyond, ["b"]);
-        // no error at all is no doubt, neither is a small one
+        // neither a zero error nor a small one is a doubt
         assert_eq!(judged(&right, [0.0, 0.0]).doubts, []);
         for factor in [0.8, 1.2] {
             let scaled: Vec<f64> = right.iter().map(|x| x * factor).collect();
@@ -194,8 +194,8 @@ mod tests {
         assert!(!judged(&broken, [0.0, 0.0]).consistent);
     }
 
-    /// Right runs are doubted as often as the bands say: of 2000 NIS 2, NEES 1, errors 0.2. Ljung and Box's
-    /// statistic has a heavier tail than its chi-square with 200 samples: more than 2.
+    /// Consistent runs are doubted as often as the bands say: of 2000 NIS 2, NEES 1, errors 0.2. The
+    /// statistic of Ljung and Box has a heavier tail than its chi-square with 200 samples: more than 2.
     #[test]
     fn right_runs_are_consistent() {
         let mut rng = SplitMix64::new(11);

@@ -1,19 +1,18 @@
-//! How a run bends over what its measurements leave open.
+//! Curvature of a run over directions that its measurements do not determine.
 //!
-//! A linearised run puts a flat normal distribution where the likely starts lie along something bent: over
-//! the spread of an unknown that is hardly seen, second-order terms shift what is known far better. So the
-//! terms of second order are made unknowns of their own. With a likely start `x0 + sum_i s_i xi_i`, the xi
-//! independent and of variance one, a run is
-//!
+//! A linearised run has a flat normal distribution where the likely starts lie along a curved set. Over the
+//! spread of a hardly determined unknown, second-order terms shift estimates that are known far better. The
+//! terms of second order therefore become unknowns of their own. With a likely start `x0 + sum_i s_i xi_i`,
+//! the xi independent and of variance one, a run is
 //! ```text
 //! y = y0 + sum_i y_i xi_i + 1/2 sum_i y_ii + 1/2 sum_i y_ii (xi_i^2 - 1) + sum_(i<j) y_ij xi_i xi_j
 //! ```
 //!
 //! where `xi_i^2 - 1` (variance 2) and `xi_i xi_j` (variance 1) correlate with no xi and not with each other:
-//! to second moments they are further unknowns with a known prior. Few combinations of them can be told from
-//! nothing; these are columns. The mean and the covariance of such a model are those of the bent distribution
-//! to this order (a linear regression over the likely starts instead of a tangent: Garcia-Fernandez,
-//! Svensson, Morelande, Sarkka 2015, doi:10.1109/TSP.2015.2454485).
+//! to second moments they are further unknowns with a known prior. Only a few of their combinations exceed
+//! the noise; these become columns. The mean and the covariance of such a model are those of the curved
+//! distribution to this order (a linear regression over the likely starts instead of a tangent:
+//! Garcia-Fernandez, Svensson, Morelande, Sarkka 2015, doi:10.1109/TSP.2015.2454485).
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Stage};
@@ -22,26 +21,27 @@ use super::extended::Extended;
 use super::state::PlatformState;
 use super::trajectory::Trajectory;
 
-/// Most directions that bend: their products are columns.
+/// Largest number of directions with curvature: their products are columns.
 const MOST_DIRECTIONS: usize = 6;
-/// A direction may bend the run when the square of what it turns the platform by, and a column counts when
-/// its outputs, are more than this part of what all samples could tell from nothing.
+/// Threshold in sigmas of all samples. A direction counts if the square of the angle by which it turns the
+/// platform exceeds it; a column counts if its outputs do.
 const SEEN: f64 = 0.1;
 
-/// The second-order terms of a run, over the likely starts.
-pub(super) struct Curvature {
-    /// Per output of the run (row): what the mean run has more than the run of the mean, then the columns.
+/// Second-order terms of a run, over the likely starts.
+pub(super) struct SecondOrderTerms {
+    /// Outputs of the run by row: first the mean run minus the run of the mean, then the columns.
     outputs: DMatrix<f64>,
-    /// The same per state of every step, in local coordinates.
+    /// States of every step in local coordinates, with the same columns.
     states: DMatrix<f64>,
 }
 
-impl Curvature {
-    /// That of the run linearised in `stages` along the trajectory `at` from `x0`, when the start has the
-    /// covariance `p` (n x n) and had the standard deviations `prior`; `None` where nothing bends.
+impl SecondOrderTerms {
+    /// Curvature of the run linearised in `stages` along the trajectory `at` from `x0`. The start has the
+    /// covariance `p` (n x n) and had the standard deviations `prior`. `None` where the curvature is
+    /// negligible.
     ///
     /// # Errors
-    /// [`EkfError`] when a trajectory ends in numbers that are none.
+    /// [`EkfError`] for a trajectory that ends in numbers that are not finite.
     pub(super) fn new(
         filter: &Extended<'_>,
         x0: &PlatformState,
@@ -50,7 +50,7 @@ impl Curvature {
         prior: &[f64],
     ) -> Result<Option<Self>, EkfError> {
         let per_step = at.outputs.len() / stages.len().max(1);
-        // of outputs that nobody reads nothing is known
+        // an output that is not measured has no weight
         let weight = |row: usize| {
             stages[row / per_step].outputs.get(row % per_step).map_or(0.0, |o| o.r.sqrt().recip())
         };
@@ -85,7 +85,7 @@ impl Curvature {
         if columns.is_empty() {
             return Ok(None);
         }
-        // the combinations that all samples could tell from nothing
+        // combinations that all samples could distinguish from zero
         let m = columns.len();
         let product = |a: &[f64], b: &[f64]| -> f64 {
             weights.iter().zip(a.iter().zip(b)).map(|(w, (a, b))| w * w * a * b).sum()
@@ -105,17 +105,17 @@ impl Curvature {
         }))
     }
 
-    /// How many columns there are.
+    /// Number of columns.
     fn columns(&self) -> usize {
         self.outputs.ncols() - 1
     }
 
-    /// What the mean run has more in an output.
+    /// Difference of the mean run from the run of the mean, in one output.
     pub(super) fn mean_output(&self, row: usize) -> f64 {
         self.outputs[(row, 0)]
     }
 
-    /// The prior with its own unknowns behind.
+    /// Prior covariance extended by the unknowns of the curvature.
     pub(super) fn prior(&self, p0: &DMatrix<f64>) -> DMatrix<f64> {
         let n = p0.nrows();
         let mut out = DMatrix::identity(n + self.columns(), n + self.columns());
@@ -123,7 +123,7 @@ impl Curvature {
         out
     }
 
-    /// Gives the steps of a run its own unknowns.
+    /// Extends the steps of a run by the unknowns of the curvature.
     pub(super) fn widen(&self, stages: &mut [Stage]) {
         let per_step = self.outputs.nrows() / stages.len().max(1);
         for (step, stage) in stages.iter_mut().enumerate() {
@@ -136,10 +136,10 @@ impl Curvature {
         }
     }
 
-    /// The local coordinates after a step and their covariance, of both parts together.
+    /// Local coordinates after a step and their covariance, with the contribution of the curvature.
     ///
     /// # Errors
-    /// [`EkfError::NotPositiveDefinite`] where rounding has eaten it.
+    /// [`EkfError::NotPositiveDefinite`] where rounding destroys the covariance.
     pub(super) fn of_state(
         &self,
         step: usize,
@@ -156,8 +156,8 @@ impl Curvature {
     }
 }
 
-/// The directions of the likely starts, each as far as one standard deviation, that turn the platform by
-/// angles whose square is more than `least`; the widest first.
+/// Directions of the likely starts, each one standard deviation long, that turn the platform by angles whose
+/// square exceeds `least`; the widest first.
 fn directions(
     stages: &[Stage],
     p: &DMatrix<f64>,
@@ -166,7 +166,7 @@ fn directions(
     least: f64,
 ) -> Vec<Vec<f64>> {
     let n = prior.len();
-    // beside the prior rounding is rounding
+    // in units of the prior, so that rounding counts as rounding
     let spread = DMatrix::from_fn(n, n, |i, j| p[(i, j)] / (prior[i] * prior[j])).symmetric_eigen();
     let direction = |k: usize| -> Vec<f64> {
         let root = spread.eigenvalues[k].max(0.0).sqrt();

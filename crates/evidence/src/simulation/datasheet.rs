@@ -1,4 +1,4 @@
-//! Random drift of the gyros by their datasheet, as it is stated.
+//! Random drift of the gyros by their datasheet.
 
 use obsdeg_core::model::{GYROS, PerGyro, ranges};
 use obsdeg_ekf::SensorNoise;
@@ -42,7 +42,7 @@ impl GyroNoise {
         ]
     }
 
-    /// True if there is none.
+    /// True if the datasheet states no noise.
     pub fn is_none(&self) -> bool {
         self.lists().iter().all(|(_, x)| x.is_none())
     }
@@ -50,7 +50,7 @@ impl GyroNoise {
     /// Checks that every number is in its range.
     ///
     /// # Errors
-    /// [`SimulationError::Range`] naming the offender.
+    /// [`SimulationError::Range`] with the name of the number.
     pub(crate) fn validate(&self) -> Result<(), SimulationError> {
         for (what, x) in self.lists() {
             x.check(what)?;
@@ -58,7 +58,7 @@ impl GyroNoise {
         Ok(ranges::CORRELATION_S.check("correlation_time_s", self.correlation_time_s)?)
     }
 
-    /// The gyros X, Y, Z in SI units.
+    /// Noise of the gyros X, Y, Z in SI units.
     pub fn sensors(&self) -> [SensorNoise; GYROS.len()] {
         let [angle, rate, bias] = self.lists().map(|(_, x)| x.0);
         std::array::from_fn(|g| SensorNoise::gyro(angle[g], rate[g], bias[g], self.correlation_time_s))

@@ -1,4 +1,4 @@
-//! Why a scheme cannot be simulated.
+//! Errors of a simulation.
 
 use obsdeg_core::model::{Carry, SchemeError};
 use obsdeg_ekf::EkfError;
@@ -6,66 +6,70 @@ use obsdeg_ekf::EkfError;
 use super::limits::MAX_UNKNOWNS;
 use crate::prediction::PredictionError;
 
-/// Why a scheme cannot be simulated.
+/// Reason why a scheme cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// A generic angle has no number.
     #[error("the angle `{name}` is generic; expected numbers for a simulation")]
     GenericAngle {
-        /// Its name.
+        /// Name of the angle.
         name: String,
     },
-    /// Slews carry psi^n.
+    /// Slews of finite duration carry psi^n: another carry is impossible.
     #[error(
-        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or no slew rate)"
+        "slews of finite duration carry psi in geographic axes; found {carry} carry, expected inertial (or \
+         no slew rate)"
     )]
     SlewCarry {
-        /// The carry found.
+        /// Carry that was found.
         carry: Carry,
     },
-    /// The turn of a slew ends elsewhere.
+    /// The turn of a slew does not lead to its position.
     #[error(
         "the slew to `{name}` does not lead there: expected an axis and angle that turn the position before into it"
     )]
     SlewMisses {
-        /// The position.
+        /// Name of the position.
         name: String,
     },
-    /// A filter that does not know of a position knows of no slew to it.
+    /// A filter that does not know a position does not know a slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,
     /// The only position cannot be dropped.
     #[error("the only position cannot be dropped; expected a scheme of at least two positions")]
     DroppedOnly,
-    /// Whoever asked wanted no more.
+    /// The caller stopped the work.
     #[error("interrupted before the runs were done")]
     Interrupted,
-    /// The accuracy orders of a rotation are not known.
+    /// Accuracy orders of a rotation are not computed.
     #[error("the cross-check takes positions; found a rotating segment")]
     CrosscheckRotation,
-    /// The exact truth turns an attitude by coefficients.
+    /// The exact truth needs coefficients, not the drift itself.
     #[error("exact truth needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     ExactDrift,
     /// A truth of small angles is no motion of a platform.
     #[error(
-        "the {filter} filter has full attitudes, and a linear truth is the small-angle model itself, which no platform follows: expected \
+        "the {filter} filter has full attitudes, and a linear truth is the small-angle model itself, which \
+         no platform follows: expected \
          truth = \"exact\" (or none stated) with this filter, or filter = \"linear\""
     )]
     LinearTruth {
-        /// The filter, in a word.
+        /// Name of the filter.
         filter: &'static str,
     },
-    /// A filter that leaves out a position or a carry is looked at in its linear model.
+    /// A filter with another carry or without a position must be linear.
     #[error(
-        "a filter that is wrong on purpose (another carry, a position left out) is the linear one; found the {filter} filter"
+        "a filter that is wrong on purpose (another carry, a position left out) is the linear one; found the \
+         {filter} filter"
     )]
     WrongOnPurpose {
-        /// The filter, in a word.
+        /// Name of the filter.
         filter: &'static str,
     },
-    /// Full attitudes have no turns at once.
+    /// Full attitudes have no instantaneous turns.
     #[error(
-        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew rate (slew_rate_deg_s, --slew-rate), \
+        "full attitudes with unknown torquer errors (GS, GM, GM3) need turns that take time; expected a slew \
+         rate (slew_rate_deg_s, --slew-rate), \
          or filter = \"linear\" and truth = \"linear\""
     )]
     TorquedAtOnce,
@@ -75,7 +79,7 @@ pub enum SimulationError {
         /// Number of unknowns.
         found: usize,
     },
-    /// Too many unknowns under a carry that is looked at for comparison.
+    /// Too many unknowns under another carry of a comparison.
     #[error("{found} unknowns under reset carry, which is compared too; expected at most {}", MAX_UNKNOWNS)]
     ComparedUnknowns {
         /// Number of unknowns.
@@ -84,17 +88,17 @@ pub enum SimulationError {
     /// Too many steps.
     #[error("{found} {what}; expected at most {most} (take longer steps)")]
     TooManySteps {
-        /// Their number.
+        /// Number found.
         found: String,
-        /// What is counted.
+        /// Name of the counted quantity.
         what: &'static str,
-        /// The most.
+        /// Largest number allowed.
         most: usize,
     },
-    /// Numbers that are admitted, but that doubles cannot tell apart.
+    /// Numbers within their ranges that doubles do not resolve.
     #[error("not resolvable in double precision: {what}")]
     Unresolvable {
-        /// What is not.
+        /// Quantity that cannot be resolved.
         what: String,
     },
     /// A covariance that is known beforehand and that says nothing here.
@@ -108,23 +112,23 @@ pub enum SimulationError {
     /// A condition beyond its range.
     #[error(transparent)]
     Range(#[from] obsdeg_core::model::ranges::RangeError),
-    /// A value for something that the scheme does not have.
+    /// A value for an unknown that the scheme does not have.
     #[error("{what} for `{found}`: no such unknown; {known}")]
     UnknownName {
-        /// Which list.
+        /// Name of the list of assignments.
         what: &'static str,
-        /// The name found.
+        /// Name that was found.
         found: String,
-        /// What was expected.
+        /// Names that were expected.
         known: String,
     },
     /// A size for an error that no scheme has.
     #[error(transparent)]
     Bench(#[from] crate::simulation::omitted::bench::BenchError),
-    /// The scheme itself.
+    /// Error of the scheme itself.
     #[error(transparent)]
     Scheme(#[from] SchemeError),
-    /// No exact verdicts.
+    /// Exact verdicts are not available.
     #[error(transparent)]
     Prediction(#[from] PredictionError),
     /// The filter refuses a number.
@@ -133,7 +137,7 @@ pub enum SimulationError {
 }
 
 impl SimulationError {
-    /// True if admitted numbers went beyond what doubles resolve.
+    /// True if numbers within their ranges go beyond what doubles resolve.
     pub fn is_numeric(&self) -> bool {
         match self {
             Self::Unresolvable { .. } => true,

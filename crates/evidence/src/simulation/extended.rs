@@ -1,20 +1,20 @@
-//! The extended filter of a platform: its state is the attitude itself, its dynamics those of direction
-//! cosines, and its Jacobians are taken at the estimate. Nothing here is the linear model (6), (8): equations
-//! are written anew.
+//! Extended filter of a platform: its state is the attitude itself, its dynamics are those of direction
+//! cosines, and its Jacobians are taken at the estimate. Its equations are written independently of the
+//! linear model (6), (8).
 //!
 //! `E = C_p^n C_n^c = exp([psi^n x])` obeys `E' = [(E omega - omega + eps^n) x] E`, with
 //! `eps^n = C_p^n eps^p(g^p)` and `g^p = C_n^p g^n`, and the output is `Z^n = g^n - E^T g^n`. The error is
 //! `delta` with `E_true = exp([delta x]) E`, so
 //!
 //! ```text
-//! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD        Gamma = d eps^p / d g^p,  N D = eps^n
-//! dZ^n   = -E^T [g^n x] delta + C_c^n (M(f^p) dK - A C_n^p [g^n x] delta)        A = d a^p / d f^p,  M K = a^p,  f^p = -C_n^p g^n
+//! delta' = -omega x delta + C_p^n Gamma C_n^p [g^n x] delta + N dD
+//! dZ^n   = -E^T [g^n x] delta + C_c^n (M(f^p) dK - A C_n^p [g^n x] delta)
+//! Gamma = d eps^p / d g^p,  N D = eps^n,  A = d a^p / d f^p,  M K = a^p,  f^p = -C_n^p g^n
 //! ```
 //!
-//! with the error `a^p` of the accelerometers and the torqued rate among what `eps^p` is a function of,
-//!
-//! which at `E = 1`, `D = 0` is the linear model (`[g^n x] delta` is what g gains in platform axes that turn
-//! by `delta`).
+//! with the error `a^p` of the accelerometers, and `eps^p` a function of the torqued rate too. At `E = 1`,
+//! `D = 0` these are the equations of the linear model (`[g^n x] delta` is the change of g in platform axes
+//! that turn by `delta`).
 
 use std::borrow::Cow;
 
@@ -36,17 +36,17 @@ use super::start::RunStart;
 use super::state::{PlatformState, inverse_left_jacobian, orthonormal};
 use super::truth::drift_turn;
 
-/// The drift `eps^p` (rad/s), or the error of the accelerometers (g), in platform axes.
+/// Drift `eps^p` (rad/s), or error of the accelerometers (g), in platform axes.
 struct Errors {
-    /// All of it.
+    /// Sum over all terms.
     sum: [f64; 3],
-    /// Its derivative by `g^p`, or by the specific force.
+    /// Derivative of the sum by `g^p`, or by the specific force.
     slope: Matrix3<f64>,
 }
 
-/// Of the constants `d` where what they are functions of is as `of` says (platform axes; nothing: they have
-/// no part in it), each times its weight; the derivative is by the source `by`, and `by_d` becomes what each
-/// adds to its platform axis per unit: `(axis, value)`.
+/// Errors of the constants `d`, each times its weight. `of` gives the argument of a source in platform axes;
+/// `None` switches the source off. The derivative is by the source `by`. `by_d` becomes the contribution of
+/// each constant to its platform axis per unit: `(axis, value)`.
 fn errors<'a>(
     terms: &[ErrorTerm],
     weights: &[f64],
@@ -81,58 +81,58 @@ fn errors<'a>(
     out
 }
 
-/// What drifts may turn a platform by in one step, in rad: far beyond what any run is good for.
+/// Largest turn by drifts in one step, in rad: far beyond the validity of any run.
 const MOST_TURN: f64 = 100.0;
 
-/// `E` and how the local coordinates have moved since the start of the step: three rows, psi (3) and D (m) at
-/// the start, or none where nobody asks.
+/// Attitude `E` and the derivative of the local coordinates by those at the start of the step: three rows, by
+/// psi (3) and D (m), or none if they are not requested.
 #[derive(Clone)]
-struct Moving {
+struct AttitudeMotion {
     e: Matrix3<f64>,
     rows: Vec<f64>,
 }
 
-/// Tilt of the platform in one step: where it is, and where an error of the attitude goes.
+/// Tilt of the platform in one step, and the propagation of an error of the attitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tilt {
-    /// `E = C_p^n C_n^c` at the start of the step.
+    /// Tilt `E = C_p^n C_n^c` at the start of the step.
     pub from: Matrix3<f64>,
-    /// `E` at its end.
+    /// Tilt `E` at the end of the step.
     pub to: Matrix3<f64>,
-    /// Error `delta` (rad, in n) at the end by that at the start: `E_true = exp([delta x]) E`.
+    /// Transition of the error `delta` (rad, in n) over the step: `E_true = exp([delta x]) E`.
     pub transition: Matrix3<f64>,
 }
 
-/// One step of a segment as the extended filter sees it.
+/// Motion of one step of a segment in the extended filter.
 pub struct PlatformMotion<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
-    /// How the constants of the state enter the drift.
+    /// Terms by which the constants of the state enter the drift.
     terms: &'a [ErrorTerm],
     segment: usize,
-    /// `psi^n` of psi in the axes of the unknowns.
+    /// Matrix from psi in the axes of the unknowns to `psi^n`.
     to_n: &'a Matrix3<f64>,
-    /// The psi that moves.
+    /// Index of the psi that moves.
     block: usize,
 }
 
 impl PlatformMotion<'_> {
-    /// What is left of each constant, on average over a step of `dt`: all of a coefficient, less of a bias
-    /// that fades.
+    /// Mean remaining fraction of each constant over a step of `dt`: one for a coefficient, less for a
+    /// decaying bias.
     fn weights(&self, dt: f64) -> Vec<f64> {
         let mean = |x: f64| if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x };
         let fading = self.plan.biases.iter().map(|b| mean(b.process.decay * dt));
         vec![1.0; self.plan.platform.coefficients()].into_iter().chain(fading).collect()
     }
 
-    /// The slope of `moving` at `t` of the segment.
+    /// Time derivative of `moving` at time `t` of the segment.
     fn slope(
         &self,
         t: f64,
-        moving: &Moving,
+        moving: &AttitudeMotion,
         [d, weights]: [&[f64]; 2],
         by_d: &mut Vec<(usize, f64)>,
-    ) -> Moving {
+    ) -> AttitudeMotion {
         let (e, earth) = (&moving.e, self.plan.earth_rate());
         let computed = self.plan.attitude(self.segment, t);
         let c = times(e, &computed);
@@ -161,13 +161,13 @@ impl PlatformMotion<'_> {
                 *x += c[i][axis] * value;
             }
         }
-        Moving { e: times(&cross(&rate), e), rows }
+        AttitudeMotion { e: times(&cross(&rate), e), rows }
     }
 }
 
 impl PlatformMotion<'_> {
-    /// `C_c^n` at the end of a step, the errors of the accelerometers there, and what each constant adds to
-    /// its platform axis.
+    /// Attitude `C_c^n` at the end of a step, the errors of the accelerometers there, and the contribution of
+    /// each constant to its platform axis.
     fn accelerometers(
         &self,
         e: &Matrix3<f64>,
@@ -186,14 +186,14 @@ impl PlatformMotion<'_> {
         (c, found, by_k)
     }
 
-    /// Number of the attitude of a state that moves in this segment, from 0.
+    /// Index of the attitude that moves in this segment, from 0.
     pub fn block(&self) -> usize {
         self.block
     }
 
-    /// Psi (rad, in the axes of the unknowns) of the smallest turn of the platform at which gravity is `seen`
-    /// (any length, in n): `E^T g^n = seen`, so that `Z^n = g^n - seen`. None where `seen` points straight
-    /// up.
+    /// Psi (rad, in the axes of the unknowns) of the smallest turn of the platform after which gravity is
+    /// `seen` (any length, in n): `E^T g^n = seen`, so that `Z^n = g^n - seen`. `None` where `seen` points
+    /// straight up.
     pub fn levelled(&self, seen: &[f64; 3]) -> Option<[f64; 3]> {
         let across = apply(&cross(seen), &G_N);
         let sine = across.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -205,22 +205,22 @@ impl PlatformMotion<'_> {
         Some(apply(&transpose(self.to_n), &across.map(|x| x * angle / sine)))
     }
 
-    /// What the segment is to a linear model.
+    /// Stage of the linear model for this segment.
     pub(super) fn stage(&self) -> &Stage {
         &self.plan.stages[self.segment]
     }
 
-    /// Moves `x` on by `dt`, and nothing else.
+    /// Moves `x` by `dt`, without derivatives.
     ///
     /// # Errors
-    /// As [`Motion::advance`].
+    /// See [`Motion::advance`].
     pub fn carry(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<(), EkfError> {
         self.integrate(t, dt, x, Vec::new())?;
         self.fade(dt, x);
         Ok(())
     }
 
-    /// Biases of `x` fade over `dt`.
+    /// Decay of the biases of `x` over `dt`.
     fn fade(&self, dt: f64, x: &mut PlatformState) {
         let behind = x.constants.len() - self.plan.biases.len();
         for (bias, x) in self.plan.biases.iter().zip(&mut x.constants[behind..]) {
@@ -228,15 +228,15 @@ impl PlatformMotion<'_> {
         }
     }
 
-    /// `E = C_p^n C_n^c` of `x`.
+    /// Tilt `E = C_p^n C_n^c` of `x`.
     fn tilted(&self, x: &PlatformState) -> Matrix3<f64> {
         times(self.to_n, &times(&x.attitudes[self.block], &transpose(self.to_n)))
     }
 
-    /// Moves `x` on by `dt`, and says how the platform is tilted meanwhile.
+    /// Moves `x` by `dt` and returns the tilt of the platform.
     ///
     /// # Errors
-    /// As [`Motion::advance`].
+    /// See [`Motion::advance`].
     pub fn tilt(&self, t: f64, dt: f64, x: &mut PlatformState) -> Result<Tilt, EkfError> {
         let (from, width) = (self.tilted(x), 3 + x.constants.len());
         let mut moved = vec![0.0; 3 * width];
@@ -247,8 +247,8 @@ impl PlatformMotion<'_> {
         Ok(Tilt { from, to: self.tilted(x), transition })
     }
 
-    /// Turns the psi of `x` that moves by `dt`, and the `rows` of local coordinates with it (in n, as
-    /// [`Moving`] has them).
+    /// Turns the psi of `x` that moves by `dt`, and with it the `rows` of local coordinates (in n, as in
+    /// [`AttitudeMotion`]).
     fn integrate(
         &self,
         t: f64,
@@ -259,7 +259,7 @@ impl PlatformMotion<'_> {
         let (p, d) = (self.to_n, &x.constants[..]);
         let weights = self.weights(dt);
         let back = transpose(p);
-        let mut now = Moving { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
+        let mut now = AttitudeMotion { e: times(p, &times(&x.attitudes[self.block], &back)), rows };
         let kick = self.conditions.drift_noise.held_rad_s(dt.abs());
         let (coefficients, biases) = d.split_at(self.plan.platform.coefficients());
         let random = self.plan.drift_biases().map(|(k, _)| biases[k].abs()).sum::<f64>();
@@ -274,18 +274,18 @@ impl PlatformMotion<'_> {
             self.plan.substeps(self.segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let h = dt / substeps as f64;
         let mut by_d = Vec::with_capacity(d.len());
-        let add = |y: &mut Moving, k: &Moving, h: f64| {
+        let add = |y: &mut AttitudeMotion, k: &AttitudeMotion, h: f64| {
             y.e.iter_mut().flatten().zip(k.e.iter().flatten()).for_each(|(x, k)| *x += h * k);
             y.rows.iter_mut().zip(&k.rows).for_each(|(x, k)| *x += h * k);
         };
-        let moved = |y: &Moving, k: &Moving, h: f64| {
+        let moved = |y: &AttitudeMotion, k: &AttitudeMotion, h: f64| {
             let mut out = y.clone();
             add(&mut out, k, h);
             out
         };
         for i in 0..substeps {
             let t = t + i as f64 * h;
-            let mut slope = |t: f64, y: &Moving| self.slope(t, y, [d, &weights], &mut by_d);
+            let mut slope = |t: f64, y: &AttitudeMotion| self.slope(t, y, [d, &weights], &mut by_d);
             let k1 = slope(t, &now);
             let k2 = slope(t + h / 2.0, &moved(&now, &k1, h / 2.0));
             let k3 = slope(t + h / 2.0, &moved(&now, &k2, h / 2.0));
@@ -324,7 +324,7 @@ impl Motion<PlatformState> for PlatformMotion<'_> {
             (0..x.constants.len()).for_each(|k| row[first + k] = entry(3 + k));
         }
         let mut active: Vec<usize> = (3 * self.block..3 * self.block + 3).collect();
-        // biases fade
+        // decaying biases
         let behind = n - self.plan.biases.len();
         for (k, bias) in self.plan.biases.iter().enumerate().filter(|(_, b)| b.process.decay > 0.0) {
             let left = (-bias.process.decay * dt).exp();
@@ -386,32 +386,32 @@ impl Measurement<PlatformState> for PlatformMotion<'_> {
     }
 }
 
-/// The extended filter of a plan, ready to be run.
+/// Extended filter of a plan, ready to run.
 pub struct Extended<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
-    /// Of every position: `psi^n` of psi in the axes of the unknowns, and which psi it is.
+    /// Matrix from psi in the axes of the unknowns to `psi^n`, and index of the psi, by position.
     carried: Vec<(Matrix3<f64>, usize)>,
-    /// How the constants of the state enter the drift and Z: coefficients, then biases.
+    /// Terms by which the constants of the state enter the drift and Z: coefficients, then biases.
     terms: Vec<ErrorTerm>,
     update: Update,
 }
 
-/// What a filter says after its last step.
+/// Result of a filter after its last step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ended {
-    /// The estimate.
+pub struct FilterResult {
+    /// Estimate at the end.
     pub x: PlatformState,
-    /// The covariance of its local coordinates.
+    /// Covariance of the local coordinates of the estimate.
     pub covariance: Covariance,
-    /// Linearisations of the whole run: 1 of a filter that goes through it once.
+    /// Number of linearisations of the whole run: 1 for a filter that makes one pass.
     pub passes: usize,
-    /// True if they settled.
+    /// True if the linearisations converged.
     pub converged: bool,
 }
 
 impl<'a> Extended<'a> {
-    /// The filter of `plan`; `update` says how often a single update is iterated.
+    /// Extended filter of `plan`; `update` sets the iterations of a single update.
     ///
     /// # Errors
     /// [`SimulationError::ExactDrift`] unless the unknowns are coefficients.
@@ -425,11 +425,11 @@ impl<'a> Extended<'a> {
         let mut carried: Vec<(Matrix3<f64>, usize)> = Vec::with_capacity(plan.attitudes.len());
         for (i, c) in plan.attitudes.iter().enumerate() {
             carried.push(match (carried.last(), plan.platform.scheme().carry) {
-                // psi^c goes on
+                // psi^c continues
                 (Some((before, _)), Carry::Platform) => {
                     (times(c, &times(&transpose(&plan.ends[i - 1]), before)), 0)
                 }
-                // psi^n goes on
+                // psi^n continues
                 (Some((before, _)), Carry::Inertial) => (*before, 0),
                 (None, _) | (_, Carry::Reset) => (*c, i),
             });
@@ -445,7 +445,7 @@ impl<'a> Extended<'a> {
         Ok(Self { plan, conditions, carried, terms, update })
     }
 
-    /// The motion of a segment.
+    /// Motion of a segment.
     pub fn motion(&self, segment: usize) -> PlatformMotion<'_> {
         let (to_n, block) = &self.carried[self.plan.segments[segment].position];
         PlatformMotion {
@@ -458,23 +458,23 @@ impl<'a> Extended<'a> {
         }
     }
 
-    /// The plan.
+    /// Plan of the filter.
     pub(super) fn plan(&self) -> &'a Plan {
         self.plan
     }
 
-    /// Runs it from `start` over the measurements `z`: of every step as many as there are outputs, those of
-    /// slews unused. `on_step` sees the number of every step, the estimate, the covariance of its local
+    /// Runs the filter from `start` over the measurements `z`, one per output and step; those of slews are
+    /// not used. `on_step` gets the number of every step, the estimate, the covariance of its local
     /// coordinates and the whitened innovations.
     ///
     /// # Errors
-    /// [`EkfError`] when a number is none, or `z` is of another run.
+    /// [`EkfError`] for a number that is not finite, or if `z` belongs to another run.
     pub fn run(
         &self,
         start: &RunStart,
         z: &[f64],
         mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
-    ) -> Result<Ended, EkfError> {
+    ) -> Result<FilterResult, EkfError> {
         let plan = self.plan;
         let outputs = plan.components.len();
         check_measurements(plan, z)?;
@@ -498,11 +498,11 @@ impl<'a> Extended<'a> {
             }
         }
         let (x, covariance) = (filter.x().clone(), filter.covariance().clone());
-        Ok(Ended { x, covariance, passes: 1, converged: true })
+        Ok(FilterResult { x, covariance, passes: 1, converged: true })
     }
 }
 
-/// Refuses measurements that are not those of the steps of `plan`.
+/// Checks that the measurements belong to the steps of `plan`.
 pub(super) fn check_measurements(plan: &Plan, z: &[f64]) -> Result<(), EkfError> {
     let (steps, outputs) = (plan.segments.iter().map(|s| s.steps).sum::<usize>(), plan.components.len());
     if z.len() == steps * outputs {
@@ -525,13 +525,14 @@ mod tests {
     use super::*;
     use crate::simulation::truth::{Noise, TruthModel};
 
-    /// Three positions, the middle one turning, with terms of every order; slews where `slew` says so.
+    /// Plan of three positions, the middle one rotating, with terms of every order, and slews if `slew` has a
+    /// rate.
     fn plan((carry, slew, azimuth, terms): (Carry, Option<f64>, bool, &str)) -> (Plan, Conditions) {
         let attitudes =
             ["10,25,40", "130,-50,70", "-95,33,-160"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry, measured_azimuth: azimuth, ..Scheme::of_angles(attitudes) };
         scheme.unknowns = terms.parse().expect("terms");
-        // torquer errors need turns that are exact
+        // torquer errors need exact turns
         scheme.path = (terms != GYROS).then_some(Path::Gimbals);
         if terms == GYROS {
             scheme.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
@@ -566,7 +567,7 @@ mod tests {
         plan.platform.units().iter().map(|u| next(if *u == "rad" { psi } else { drift })).collect()
     }
 
-    /// Phi and H are the derivatives of motion and output, far from zero, at every kind of segment.
+    /// Phi and H are the derivatives of motion and output, far from zero, for every kind of segment.
     #[test]
     fn jacobians_are_derivatives() {
         let mut rng = SplitMix64::new(3);
@@ -606,8 +607,8 @@ mod tests {
         }
     }
 
-    /// At zero the Jacobians are those of the linear model of the verdicts, which shares no line with them:
-    /// (1)-(6) and the carries a second time.
+    /// At zero the Jacobians equal those of the linear model of the verdicts, which has its own code for
+    /// (1)-(6) and the carries.
     #[test]
     fn at_zero_it_is_the_linear_model() {
         for case in CASES {
@@ -633,7 +634,7 @@ mod tests {
         }
     }
 
-    /// Its motion and output are those of the exact truth, step by step, for large drifts.
+    /// Motion and output equal those of the exact truth, step by step, for large drifts.
     #[test]
     fn it_goes_with_the_exact_truth() {
         let mut rng = SplitMix64::new(5);
@@ -658,7 +659,7 @@ mod tests {
                     }
                 }
             }
-            // with fewer drifts psi stays about what it was
+            // with fewer drifts psi stays about constant
             assert!(truth.largest_psi > if case.3 == GYROS { 0.03 } else { 0.01 }, "something moved");
         }
     }

@@ -1,15 +1,14 @@
-//! The noise floor: how well a coefficient can be known at all under random drift, and the dwell beyond which
-//! longer is no better.
+//! Noise floor: the smallest sigma of a coefficient under random drift, and the dwell beyond which longer
+//! dwells do not help.
 //!
 //! All dwells of a scheme are multiplied by a factor, from 1/16 to 256 in steps of sqrt 2 as far as dwells
-//! are admitted (on average); for each the covariance of the filter runs once, with noise of Z, random drift
-//! and biases as in a run but without a prior (that is, with one that says nothing). The least sigma of a
-//! coefficient over these dwells is its floor; the dwell beyond which longer is no better is the shortest at
-//! which sigma is within 5 % of it. A coefficient whose sigma gets there only in the last two octaves still
-//! falls, and has no floor in this range; one that is there at the shortest dwell may have its least at a
-//! shorter one. Within a long position samples are taken together, of the same density of noise: twice as
-//! many after every 20 steps, from its start and from its end, for it is there that what a walk forgets is
-//! seen.
+//! are admitted (on average). For each factor the covariance of the filter runs once, with noise of Z, random
+//! drift and biases as in a run, but with a diffuse prior. The least sigma of a coefficient over these dwells
+//! is its floor. The dwell beyond which longer dwells do not help is the shortest one with a sigma within 5 %
+//! of the floor. A coefficient whose sigma comes that close only in the last two octaves still falls, and has
+//! no floor in this range. One that is there at the shortest dwell may have its least sigma at a shorter one.
+//! Within a long position samples are merged at constant noise density: twice as many after every 20 steps,
+//! from its start and from its end, since the walk erases information in between.
 //!
 //! # One position in closed form
 //! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`,
@@ -17,9 +16,9 @@
 //! `R = sigma_Z^2 dt` of u. With an unknown psi(0) and D, and `b(0) = 0`, D is the rate at the start; by time
 //! reversal it is as well known as `D + b` at the end.
 //!
-//! - Exact observations, R = 0: D is seen through `psi'`, with white noise of density N^2. The Riccati
+//! - Exact observations, R = 0: D is observed through `psi'`, with white noise of density N^2. The Riccati
 //!   equation `p' = K^2 - p^2/N^2` from p(0) = infinity has `sigma^2 = K N coth(K T/N)`: the floor is
-//!   `sqrt(K N)`, and it is within 5 % at `T = 1.530 N/K`, where `coth = 1.05^2`.
+//!   `sqrt(K N)`, and sigma is within 5 % of it at `T = 1.530 N/K`, where `coth = 1.05^2`.
 //! - No angle random walk, N = 0: with `P = U V^-1` the Riccati equation is `U' = F U + Q V`,
 //!   `V' = H^T U/R - F^T V`, U(0) = 1, V(0) = 0. In units of `1/lambda = (R/K^2)^(1/4)` every entry obeys
 //!   `y'''' = -y`, so with `a = lambda T/sqrt 2`
@@ -32,8 +31,7 @@ use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
 use obsdeg_ekf::linear::last_covariance;
 use obsdeg_ekf::{Form, SquareRootInformation};
-use obsdeg_exact::interrupt;
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -45,15 +43,15 @@ use super::plan::Plan;
 use super::start::RunStart;
 use crate::prediction::Prediction;
 
-/// Factors on the dwells as powers of sqrt 2.
+/// Exponents of the factors on the dwells, as powers of sqrt 2.
 const FACTORS: std::ops::RangeInclusive<i32> = -8..=16;
-/// Steps of one length.
+/// Number of steps of one length at either end of a dwell.
 const STEPS: usize = 20;
-/// How many times wider a prior that says nothing is than what is said of the best known unknown.
+/// Ratio of a diffuse prior to the sigma of the best known unknown.
 const WIDTH: f64 = 1e10;
-/// How far above the floor sigma counts as there.
+/// Ratio to the floor up to which a sigma counts as having reached it.
 const WITHIN: f64 = 1.05;
-/// What gets there later than this part of the longest dwell still falls.
+/// Largest fraction of the longest dwell at which sigma may reach the floor; beyond it sigma still falls.
 const SETTLED: f64 = 0.25;
 
 /// Noise floor: the least sigmas of coefficients under random drift, however long the dwells.
@@ -101,7 +99,7 @@ pub enum Reached {
     StillFalls,
 }
 
-/// The noise floor of a scheme, if its gyros have noise of their own.
+/// Noise floor of a scheme; `None` if its gyros have no noise of their own.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -116,9 +114,8 @@ pub fn noise_floor(
     let mean = mean_dwell(scheme, conditions);
     let factors = FACTORS.map(|k| 2f64.powf(f64::from(k) / 2.0));
     let factors: Vec<f64> = factors.filter(|f| *f == 1.0 || ranges::DWELL_S.admits(f * mean)).collect();
-    let parts = interrupt::parts();
-    let curve = |&f: &f64| parts.part(|| sigmas_without_prior(scheme, conditions, f));
-    let curves: Vec<Vec<f64>> = factors.par_iter().map(curve).collect::<Result<_, _>>()?;
+    let curve = |i: usize| sigmas_without_prior(scheme, conditions, factors[i]);
+    let curves: Vec<Vec<f64>> = parallel::try_map(factors.len(), curve)?;
     let plan = Plan::new(scheme, conditions)?;
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let of = |c: usize| {
@@ -143,26 +140,26 @@ pub fn noise_floor(
     }))
 }
 
-/// The least sigma of a curve of (dwell, sigma), and the shortest dwell within 5 % of it.
+/// Least sigma of a curve of (dwell, sigma), how it is reached, and the shortest dwell within 5 % of it.
 fn least(curve: &[(f64, f64)]) -> (f64, Reached, f64) {
     let least = curve.iter().map(|p| p.1).fold(f64::MAX, f64::min);
     let limit = WITHIN * least;
     let longest = curve.last().map_or(0.0, |p| p.0);
     let reached = curve.iter().position(|p| p.1 <= limit).unwrap_or(0);
     let Some(before) = reached.checked_sub(1) else { return (least, Reached::AtTheShortest, curve[0].0) };
-    // between two dwells along a power of the dwell
+    // power law between two dwells
     let ((t0, s0), (t1, s1)) = (curve[before], curve[reached]);
     let dwell = t0 * (t1 / t0).powf((limit / s0).ln() / (s1 / s0).ln());
     (least, if dwell <= SETTLED * longest { Reached::Within } else { Reached::StillFalls }, dwell)
 }
 
-/// The mean dwell of the positions, in s.
+/// Mean dwell of the positions, in s.
 fn mean_dwell(scheme: &Scheme, conditions: &Conditions) -> f64 {
     let dwells = scheme.positions.iter().map(|p| p.dwell.map_or(conditions.dwell_s, |d| d.seconds()));
     dwells.sum::<f64>() / scheme.positions.len() as f64
 }
 
-/// Sigma of every unknown at the end of a run with all dwells times `factor`, with all noise and without a
+/// Sigma of every unknown at the end of a run with all dwells times `factor`, with all noise and a diffuse
 /// prior, in SI units (shape n).
 ///
 /// # Errors
@@ -175,12 +172,12 @@ pub fn sigmas_without_prior(
     let scaled = scheme.with_dwells(conditions.dwell_s, factor)?;
     let density = conditions.drift_noise.density_deg_sqrt_h(conditions.step_s);
     let drift_noise = DriftNoise::RandomWalk(density);
-    // one step a position, then parts
+    // one step per position, which is then divided into parts
     let whole = Conditions { step_s: f64::MAX, drift_noise, ..conditions.clone() };
     let plan = Plan::derived(&scaled, &whole)?;
     let mut plan = plan.in_steps(&whole, |s| parts(s.steps as f64 * s.dt, conditions.step_s))?;
     for (stage, segment) in plan.stages.iter_mut().zip(&plan.segments) {
-        // the samples of one longer step, taken together
+        // samples of one longer step are merged
         let dwell = scaled.positions[segment.position].dwell.map_or(segment.dt, |d| d.seconds());
         for output in &mut stage.outputs {
             output.r *= own_step(dwell, conditions.step_s) / segment.dt;
@@ -194,11 +191,11 @@ pub fn sigmas_without_prior(
     Ok(last)
 }
 
-/// Standard deviations that say nothing beside the samples of `plan` under random drift (shape n): what the
-/// samples say is worth no more than the random drift of the run lets it be.
+/// Standard deviations of a prior that is diffuse beside the samples of `plan` under random drift (shape n).
+/// The factor grows with the random drift of the run, which weakens the samples.
 ///
 /// # Errors
-/// [`SimulationError::Filter`] when a number is not finite.
+/// [`SimulationError::Filter`] for a number that is not finite.
 pub(super) fn wide_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<f64>, SimulationError> {
     let information = batch(plan, SquareRootInformation::none(plan.unknowns()))?.information;
     let duration = plan.duration_s();
@@ -208,12 +205,12 @@ pub(super) fn wide_prior(plan: &Plan, conditions: &Conditions) -> Result<Vec<f64
     Ok(wider(plan, &information, width, width))
 }
 
-/// The equal steps of at most `step` that a dwell is divided into, in s.
+/// Length, in s, of the equal steps of at most `step` that a dwell is divided into.
 fn own_step(dwell: f64, step: f64) -> f64 {
     dwell / (dwell / step - 1e-9).ceil().max(1.0)
 }
 
-/// Parts of a dwell: so many steps of so many s, twice as long from part to part, from both ends.
+/// Parts of a dwell as (number of steps, step in s): the step doubles from part to part, from both ends.
 fn parts(dwell: f64, step: f64) -> Vec<(usize, f64)> {
     let (mut dt, mut left) = (own_step(dwell, step), dwell);
     let mut ends = Vec::new();
@@ -243,7 +240,7 @@ mod tests {
             assert!((total / dwell - 1.0).abs() < 1e-12, "{dwell} {step}: {total}");
             let steps: usize = parts.iter().map(|p| p.0).sum();
             assert!(steps <= 2500, "{dwell} {step}: {steps}");
-            // at its ends it is sampled as ever, and nowhere by much more than the distance from them
+            // at its ends it has the usual step, and nowhere a step much longer than the distance from them
             assert_eq!(parts[0].1, own_step(dwell, step));
             let mut t = 0.0f64;
             for (n, dt) in &parts {
@@ -263,7 +260,7 @@ mod tests {
         let dwells = (0..10).map(|k| 2f64.powi(k));
         let curve =
             |f: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> { dwells.clone().map(|t| (t, f(t))).collect() };
-        // a power goes on; what rises again has its least in between
+        // a power law still falls; a curve that rises again has its least value in between
         assert_eq!(least(&curve(&|t| 1.0 / t)).1, Reached::StillFalls);
         let (found, reached, dwell) = least(&curve(&|t| if t < 8.0 { 8.0 / t } else { t / 8.0 }));
         assert_eq!((found, reached), (1.0, Reached::Within));

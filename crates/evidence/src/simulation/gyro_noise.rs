@@ -1,11 +1,11 @@
-//! Random drift of the gyros by their datasheet: angle random walk as white drift, rate random walk and bias
-//! instability as states behind the unknowns, in the filter and in the truth alike; and the bias instability
-//! of the accelerometers, which is noise of Z that is not white.
+//! Random drift of the gyros by their datasheet. Angle random walk is white drift; rate random walk and bias
+//! instability are states behind the unknowns, in the filter and in the truth alike. The bias instability of
+//! the accelerometers is coloured noise of Z.
 //!
-//! The drift of a gyro is `D_F + b_K + b_B` about its input axis, with g-sensitive terms as ever. `b_K' = w`,
-//! `b_K(0) = 0`, is the rate random walk, `b_B' = -b_B/T + w` the bias instability: so every D is a constant,
-//! and D_F is the bias at the *start* of the run, but for what of `b_B` is there. A coefficient is not what
-//! the bias is at the end.
+//! The drift of a gyro is `D_F + b_K + b_B` about its input axis, plus the g-sensitive terms. `b_K' = w`,
+//! `b_K(0) = 0`, is the rate random walk, `b_B' = -b_B/T + w` the bias instability. Every D is therefore a
+//! constant, and D_F is the bias at the *start* of the run, apart from the initial `b_B`. A coefficient is
+//! not the bias at the end.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::apply;
@@ -19,19 +19,20 @@ use super::noise::Noise;
 use super::plan::{Plan, SegmentKind};
 
 impl Plan {
-    /// The input axis of a gyro in platform axes.
+    /// Input axis of a gyro in platform axes.
     fn input_axis(&self, gyro: usize) -> [f64; 3] {
         self.platform.scheme().geometry.gyros()[gyro].I.vector().map(f64::from)
     }
 
-    /// True if sensors have biases that go on, or gyros white drift of their own.
+    /// True if sensors have bias states, or gyros white drift of their own.
     pub(super) fn is_noisy(&self) -> bool {
         !self.biases.is_empty() || self.gyros.iter().any(|g| g.white > 0.0)
     }
 
-    /// `(Phi, Q)` of psi (in the axes of the unknowns) and the biases over a step of a segment (3 + m
-    /// states), by the noise of the gyros: exact at a position; while the platform turns, in parts of at most
-    /// 0.02 rad with the attitude of their middle.
+    /// Transition and noise covariance `(Phi, Q)` over a step of a segment, by the noise of the gyros. Their
+    /// states are psi (in the axes of the unknowns) and the m biases, 3 + m in all. The matrices are exact at
+    /// a position. While the platform turns, the step is divided into parts of at most 0.02 rad with the
+    /// attitude of their middle.
     pub(super) fn bias_step(&self, segment: usize) -> Result<Step, SimulationError> {
         let s = &self.segments[segment];
         let n = 3 + self.biases.len();
@@ -59,7 +60,7 @@ impl Plan {
         Ok((&to_psi * phi * to_psi.transpose(), (&q + q.transpose()) / 2.0))
     }
 
-    /// F and the density Q of psi^n and the biases at the attitude `C_c^n`.
+    /// Dynamics F and noise density Q of psi^n and the biases at the attitude `C_c^n`.
     fn bias_model(&self, attitude: &Matrix3<f64>) -> Step {
         let n = 3 + self.biases.len();
         let (mut f, mut q) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
@@ -87,20 +88,20 @@ impl Plan {
         (f, q)
     }
 
-    /// Standard deviations of the biases at the start. A filter takes positive ones: a random walk, which
-    /// starts at none, has a millionth of what the shortest step makes of it.
+    /// Standard deviations of the biases at the start. A filter needs positive ones: a random walk, which
+    /// starts at zero, gets a millionth of its standard deviation after the shortest step.
     pub fn bias_sigmas(&self) -> Vec<f64> {
         let shortest = self.segments.iter().map(|s| s.dt).fold(f64::MAX, f64::min);
         let sigma = |b: &Bias| b.process.variance.max(1e-12 * b.process.density * shortest).sqrt();
         self.biases.iter().map(sigma).collect()
     }
 
-    /// The biases that are drifts.
+    /// Biases that are drifts of gyros, with their indices.
     pub(super) fn drift_biases(&self) -> impl Iterator<Item = (usize, &Bias)> {
         self.biases.iter().enumerate().filter(|(_, b)| matches!(b.sensor, Sensor::Gyro(_)))
     }
 
-    /// The biases that are errors of accelerometers, with the platform axis of each.
+    /// Biases that are errors of accelerometers, with their indices and platform axes.
     pub(super) fn accelerometer_biases(&self) -> impl Iterator<Item = (usize, usize, &Bias)> {
         self.biases.iter().enumerate().filter_map(|(k, b)| match b.sensor {
             Sensor::Accelerometer(axis) => Some((k, axis, b)),
@@ -108,7 +109,8 @@ impl Plan {
         })
     }
 
-    /// A bound, six sigma, on what biases and white drift of all gyros turn in a step, as a rate: rad/s.
+    /// Bound (six sigma) on the rate of the biases and white drift of all gyros over a step of `dt`, in
+    /// rad/s.
     pub(super) fn random_rate(&self, dt: f64) -> f64 {
         let walked =
             |b: &Bias| if b.process.decay > 0.0 { 0.0 } else { b.process.density * self.duration_s() };
@@ -118,32 +120,32 @@ impl Plan {
     }
 }
 
-/// The gyros of an exact truth, drawn part by part of a step: angle and biases of each together.
+/// Gyros of an exact truth, drawn part by part of a step: angle and biases of each together.
 #[derive(Debug, Clone)]
 pub(super) struct Gyros {
     h: f64,
-    /// Per gyro: Phi, and the root of Q, of its angle and its biases.
+    /// Transition and root of the noise covariance, `(Phi, root of Q)`, of angle and biases, by gyro.
     steps: Vec<Step>,
 }
 
 impl Gyros {
-    /// For parts of `h` s.
+    /// Gyros for parts of `h` s.
     pub(super) fn new(plan: &Plan, h: f64) -> Self {
         let of = |gyro: &SensorNoise| {
             let (f, q) = gyro.model();
-            // what is not finite ends the run
+            // NaN ends the run
             let refused = |_| (f.map(|_| f64::NAN), q.map(|_| f64::NAN));
             discretised(&f, &q, h).map_or_else(refused, |(phi, q)| (phi, root(&q)))
         };
         Self { h, steps: plan.gyros.iter().map(of).collect() }
     }
 
-    /// True if it is for parts of `h` s.
+    /// True if the gyros are for parts of `h` s.
     pub(super) fn is_for(&self, h: f64) -> bool {
         self.h == h
     }
 
-    /// Draws one part: the biases go on, and the mean drift over it is added to `drift`, in platform axes
+    /// Draws one part: advances the biases and adds the mean drift over the part to `drift`, in platform axes
     /// (rad/s).
     pub(super) fn draw(&self, plan: &Plan, biases: &mut [f64], noise: &mut Noise, drift: &mut [f64; 3]) {
         let mut first = 0;

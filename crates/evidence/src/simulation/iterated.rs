@@ -1,13 +1,12 @@
-//! The filter that is linearised again along the whole run: Gauss and Newton for its most probable start,
-//! then the mean about it.
+//! Iterated filter, linearised along the whole run: Gauss-Newton for the most probable start, then the mean
+//! about it.
 //!
-//! A filter that goes through a run once linearises every step where the estimate was then, before the drifts
-//! were known; later steps cannot mend that, and iterating single updates cannot either, since it is the
-//! motion between them that is bent. So the run is linearised along one trajectory of the nonlinear
-//! equations, filtered with its process noise as a linear model, and what all measurements say of its start
-//! (`linear::smoothed_start`) moves the trajectory, until the estimate at the end stays (Bell 1994,
-//! doi:10.1137/0804035). Where what is left open bends the run, a last pass takes that into the estimate and
-//! its covariance (`curvature`).
+//! A single pass linearises every step at the estimate of that time, before the drifts are known. Later steps
+//! cannot correct this, and neither can iterated updates, since the motion between updates is nonlinear. The
+//! run is therefore linearised along one trajectory of the nonlinear equations and filtered with its process
+//! noise as a linear model. The smoothed start (`linear::smoothed_start`) moves the trajectory, until the
+//! estimate at the end stays (Bell 1994, doi:10.1137/0804035). Where undetermined directions curve the run, a
+//! last pass corrects the estimate and its covariance (`curvature`).
 
 use std::borrow::Cow;
 
@@ -16,49 +15,48 @@ use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Update};
 
 use super::conditions::Conditions;
-use super::curvature::Curvature;
+use super::curvature::SecondOrderTerms;
 use super::error::SimulationError;
-use super::extended::{Ended, Extended, check_measurements};
+use super::extended::{Extended, FilterResult, check_measurements};
 use super::plan::Plan;
 use super::start::RunStart;
 use super::state::PlatformState;
-use super::trajectory::{Along, Trajectory};
+use super::trajectory::{LinearisedRun, Trajectory};
 use super::validity::Validity;
 
-/// Most steps of a run that is iterated: each has a model of its own.
+/// Most steps of an iterated run: each step has a model of its own.
 pub(crate) const MAX_ITERATED_STEPS: usize = 100_000;
 /// Most linearisations of the run.
 const PASSES: usize = 40;
-/// The run has settled when the estimate at its end moves by less than this, in standard deviations of any
-/// combination.
+/// Convergence limit: largest change of the estimate at the end, in standard deviations of any combination.
 const SETTLED: f64 = 0.01;
-/// Squared innovations of this many times their number are poor.
+/// Ratio of the sum of squared innovations to their number above which a fit is poor.
 const POOR: f64 = 2.0;
-/// Halvings of a step that leads away.
+/// Most halvings of a step that increases the misfit.
 const HALVINGS: usize = 12;
-/// A step leads away when the sum of the squared innovations grows by more than this part of it, and this.
+/// Largest increase of the sum of squared innovations by an accepted step: relative part, and absolute part.
 const AWAY: (f64, f64) = (0.02, 10.0);
 
-/// What a pass over the run made of it.
+/// Result of a pass over the run.
 struct Pass {
     ended: (PlatformState, Covariance),
-    /// What the run says of its start, as a correction of `x0`.
+    /// Smoothed start of the run, as a correction of `x0`.
     start: SmoothedStart,
-    /// The sum of the squared whitened innovations.
+    /// Sum of the squared whitened innovations.
     misfit: f64,
 }
 
-/// One pass along the trajectory from `x0`, which bends as `curvature` says, over the steps that `z` is of.
+/// One pass along the trajectory from `x0`, with the curvature `curvature`, over the steps of `z`.
 fn pass(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     x0: &PlatformState,
-    curvature: Option<&Curvature>,
+    curvature: Option<&SecondOrderTerms>,
     mut on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
 ) -> Result<Pass, EkfError> {
     let (n, m) = (x0.dimension(), filter.plan().components.len());
-    let Along { mut stages, at } = Along::new(filter, z.len() / m, x0.clone())?;
+    let LinearisedRun { mut stages, at } = LinearisedRun::new(filter, z.len() / m, x0.clone())?;
     let mut p0 = start.variances();
     let mut from = start.state(filter.plan()).local(x0);
     if let Some(c) = curvature {
@@ -101,7 +99,7 @@ fn pass(
     Ok(Pass { ended, start, misfit: whitened.iter().map(|w| w * w).sum() })
 }
 
-/// Where the trajectory starts that ends at `x`.
+/// Start of the trajectory that ends at `x`.
 fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, EkfError> {
     for (segment, s) in filter.plan().segments.iter().enumerate().rev() {
         let motion = filter.motion(segment);
@@ -112,30 +110,30 @@ fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, Ek
     Ok(x)
 }
 
-/// Where the iteration ended.
-struct Settled {
-    /// The start of the trajectory.
+/// Result of the iteration.
+struct IterationResult {
+    /// Start of the trajectory.
     x0: PlatformState,
     passes: usize,
     converged: bool,
-    /// The sum of the squared whitened innovations.
+    /// Sum of the squared whitened innovations.
     misfit: f64,
 }
 
-impl Settled {
-    /// True if it is to be preferred: one that settled, then one that fits.
+impl IterationResult {
+    /// True if it is preferable: a converged one first, then the one with the smaller misfit.
     fn is_better_than(&self, other: &Self) -> bool {
         (self.converged, -self.misfit) > (other.converged, -other.misfit)
     }
 }
 
-/// Linearises along the trajectory from `x0` again and again until the estimate at its end stays.
+/// Linearises along the trajectory from `x0` until the estimate at its end stays.
 fn settle(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     mut x0: PlatformState,
-) -> Result<Settled, EkfError> {
+) -> Result<IterationResult, EkfError> {
     let mut best = pass(filter, start, z, &x0, None, |_, _, _, _| {})?;
     let (mut passes, mut converged) = (1, false);
     while passes < PASSES && !converged {
@@ -145,7 +143,7 @@ fn settle(
             let mut x = x0.clone();
             x.retract(&step);
             passes += 1;
-            // a trajectory far off may end in numbers that are none
+            // a trajectory far off may end in numbers that are not finite
             let next = pass(filter, start, z, &x, None, |_, _, _, _| {}).ok();
             found = next.filter(|n| n.misfit <= best.misfit * (1.0 + AWAY.0) + AWAY.1).map(|n| (x, n));
             if found.is_some() {
@@ -158,12 +156,12 @@ fn settle(
         converged = Nees::of_covariance(&next.ended.1)?.of(&mut moved)? <= SETTLED * SETTLED;
         (x0, best) = (x, next);
     }
-    Ok(Settled { x0, passes, converged, misfit: best.misfit })
+    Ok(IterationResult { x0, passes, converged, misfit: best.misfit })
 }
 
-/// Settles on the first eighth of the run, from there on the first quarter, and so on: a trajectory that is
-/// known for a while is near enough to be known for longer.
-fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<Settled, EkfError> {
+/// Converges on the first eighth of the run, then from there on the first quarter, and so on: each trajectory
+/// starts close enough for twice the duration.
+fn settle_in_stages(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<IterationResult, EkfError> {
     let outputs = filter.plan().components.len();
     let mut x0 = start.state(filter.plan());
     let mut passes = 0;
@@ -174,53 +172,53 @@ fn settle_by_and_by(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Resul
         x0 = settled.x0;
     }
     let settled = settle(filter, start, z, x0)?;
-    Ok(Settled { passes: passes + settled.passes, ..settled })
+    Ok(IterationResult { passes: passes + settled.passes, ..settled })
 }
 
-/// Runs `filter` over the measurements `z` as [`Extended::run`] does, and then again along the trajectory
-/// that it found, until that stays. Where it does not, or fits poorly, longer and longer parts of the run are
-/// tried from the initial estimate too.
+/// Runs `filter` over the measurements `z` as [`Extended::run`] does, then again along the trajectory found,
+/// until it stays. If it does not converge, or fits poorly, longer and longer parts of the run are tried from
+/// the initial estimate too.
 ///
 /// # Errors
-/// [`EkfError`] when a number is none, or `z` is of another run.
+/// [`EkfError`] for a number that is not finite, or if `z` belongs to another run.
 pub fn iterated(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
-) -> Result<Ended, EkfError> {
+) -> Result<FilterResult, EkfError> {
     check_measurements(filter.plan(), z)?;
     let samples: usize = filter.plan().stages.iter().map(|s| s.steps * s.outputs.len()).sum();
-    let poor = |s: &Settled| !s.converged || s.misfit > POOR * samples as f64;
+    let poor = |s: &IterationResult| !s.converged || s.misfit > POOR * samples as f64;
     let once = filter.run(start, z, |_, _, _, _| {}).and_then(|once| back(filter, once.x));
     let mut found = once.and_then(|x| settle(filter, start, z, x));
     if found.as_ref().map_or(true, poor) {
-        let other = settle_by_and_by(filter, start, z);
+        let other = settle_in_stages(filter, start, z);
         found = match (found, other) {
             (Ok(a), Ok(b)) => {
                 let passes = a.passes + b.passes;
-                Ok(Settled { passes, ..if b.is_better_than(&a) { b } else { a } })
+                Ok(IterationResult { passes, ..if b.is_better_than(&a) { b } else { a } })
             }
             (Ok(a), Err(_)) | (Err(_), Ok(a)) => Ok(a),
             (Err(e), Err(_)) => Err(e),
         };
     }
-    let Settled { mut x0, passes, converged, .. } = found?;
+    let IterationResult { mut x0, passes, converged, .. } = found?;
     let curvature = if converged { bent(filter, start, z, &mut x0)? } else { None };
     let (x, covariance) = pass(filter, start, z, &x0, curvature.as_ref(), on_step)?.ended;
-    Ok(Ended { x, covariance, passes, converged })
+    Ok(FilterResult { x, covariance, passes, converged })
 }
 
-/// How the run bends about its most probable start `x0`, which becomes the mean of the likely ones.
+/// Curvature of the run about its most probable start `x0`, which becomes the mean of the likely starts.
 fn bent(
     filter: &Extended<'_>,
     start: &RunStart,
     z: &[f64],
     x0: &mut PlatformState,
-) -> Result<Option<Curvature>, EkfError> {
-    let Along { stages, at } = Along::new(filter, usize::MAX, x0.clone())?;
+) -> Result<Option<SecondOrderTerms>, EkfError> {
+    let LinearisedRun { stages, at } = LinearisedRun::new(filter, usize::MAX, x0.clone())?;
     let p = pass(filter, start, z, x0, None, |_, _, _, _| {})?.start.covariance;
-    let curvature = Curvature::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
+    let curvature = SecondOrderTerms::new(filter, x0, (&stages, &at), &p, &start.sigma)?;
     if let Some(c) = &curvature {
         x0.retract(&pass(filter, start, z, x0, Some(c), |_, _, _, _| {})?.start.correction);
     }
@@ -228,12 +226,12 @@ fn bent(
 }
 
 /// Validity of the small-angle model, and standard deviations at the end (SI units, by state), of a run at
-/// the drifts that `conditions` say, by equations of full attitudes linearised along it: with the prior,
+/// the drifts in `conditions`. Equations of full attitudes are linearised along the run, with the prior and
 /// without noise of the drift. `None` where the unknowns are the drift itself, where torquer errors act in
-/// turns at once, or for a run of too many steps.
+/// instantaneous turns, or for a run of too many steps.
 ///
 /// # Errors
-/// [`SimulationError`] for conditions that cannot be, and numbers that are none.
+/// [`SimulationError`] for invalid conditions, and numbers that are not finite.
 pub(crate) fn at_own_drifts(
     plan: &Plan,
     conditions: &Conditions,
@@ -252,7 +250,7 @@ pub(crate) fn at_own_drifts(
         x[..x.len() - plan.constants()].chunks_exact(3).map(length).fold(0.0, f64::max)
     };
     let largest = at.states.iter().map(psi).fold(0.0, f64::max);
-    // measured without noise, and known before as well as it will be
+    // noise-free measurements, and an initial estimate equal to the truth
     let known = RunStart { estimate: start.truth.clone(), ..start.clone() };
     let curvature = bent(&filter, &known, &at.outputs, &mut x0)?;
     let ended = pass(&filter, &known, &at.outputs, &x0, curvature.as_ref(), |_, _, _, _| {})?.ended;

@@ -1,4 +1,4 @@
-//! A torquing scheme run through the filter: one run against one truth, and what it says.
+//! Torquing scheme run through the filter: one run against one truth, and its results.
 
 pub(crate) mod answer;
 pub(crate) mod attained;
@@ -43,7 +43,7 @@ pub use conditions::{
 pub use consistency::{Consistency, Doubt};
 pub use datasheet::GyroNoise;
 pub use error::SimulationError;
-pub use extended::{Ended, Extended, PlatformMotion, Tilt};
+pub use extended::{Extended, FilterResult, PlatformMotion, Tilt};
 pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
 pub use iterated::iterated;
 pub use known::KnownCovariance;

@@ -1,4 +1,5 @@
-//! A scheme in numbers: the timeline of positions and slews, and the linear model of each as filter stages.
+//! Plan of a scheme in numbers: the timeline of positions and slews, and a filter stage with the linear model
+//! of each.
 
 use std::borrow::Cow;
 
@@ -20,10 +21,10 @@ use super::limits::{MAX_INTEGRATION, MAX_NUMBERS, MAX_STEPS, MAX_TURNING_STEPS, 
 /// Largest turn of one integration step, in rad.
 const MAX_TURN: f64 = 0.02;
 
-/// A count that has been found in floating point, so that nothing overflows.
+/// Count from a floating-point number, checked before conversion so that nothing overflows.
 ///
 /// # Errors
-/// [`SimulationError::TooManySteps`] above `most`, and for what is no number.
+/// [`SimulationError::TooManySteps`] above `most`, and for NaN.
 fn counted(what: &'static str, found: f64, most: usize) -> Result<usize, SimulationError> {
     if found <= most as f64 {
         return Ok(found as usize);
@@ -32,16 +33,16 @@ fn counted(what: &'static str, found: f64, most: usize) -> Result<usize, Simulat
     Err(SimulationError::TooManySteps { found, what, most })
 }
 
-/// The equal steps of at most `step_s` that a dwell is divided into.
+/// Number of equal steps of at most `step_s` that a dwell is divided into.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].
 pub fn steps(dwell_s: f64, step_s: f64) -> Result<usize, SimulationError> {
-    // a hair less, so that 1000 s in steps of 10 s are 100
+    // a small margin, so that 1000 s in steps of 10 s are 100 steps
     counted("steps", (dwell_s / step_s - 1e-9).ceil().max(1.0), MAX_STEPS)
 }
 
-/// Integration steps for a turn of so many rad.
+/// Number of integration steps for a turn of `turn` rad.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].
@@ -49,55 +50,55 @@ pub(super) fn integration_steps(turn: f64) -> Result<usize, SimulationError> {
     counted("integration steps", (turn / MAX_TURN).ceil().max(1.0), MAX_INTEGRATION)
 }
 
-/// What a part of the timeline is.
+/// Kind of a segment of the timeline.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SegmentKind {
-    /// A position, tracked; Z is sampled at the end of every step.
+    /// Position that tracks the geographic frame; Z is sampled at the end of every step.
     Dwell,
-    /// A turn to the position; Z is not used.
+    /// Slew to the position; Z is not used.
     Slew(Slew),
-    /// A step of a rotating segment; Z is sampled at its end.
+    /// Step of a rotating segment; Z is sampled at its end.
     Rotation(Slew),
 }
 
-/// A part of the timeline.
+/// Segment of the timeline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
-    /// The position: where it is spent, or where the slew goes.
+    /// Index of the position in which the segment is spent, or to which the slew leads.
     pub position: usize,
-    /// Position or slew.
+    /// Kind: position, slew or rotation.
     pub kind: SegmentKind,
-    /// Start in s.
+    /// Start of the segment, in s.
     pub start_s: f64,
     /// Number of steps.
     pub steps: usize,
-    /// Length of a step in s.
+    /// Length of a step, in s.
     pub dt: f64,
 }
 
-/// A scheme and its conditions in SI units, ready to be run.
+/// Scheme and conditions in SI units, ready to run.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// The platform.
+    /// Platform of the scheme.
     pub platform: Platform,
-    /// Rates and attitudes.
+    /// Rates and attitudes in numbers.
     pub point: Point<Float>,
-    /// `C_c^n` at the start of every position.
+    /// Attitude `C_c^n` at the start of every position.
     pub attitudes: Vec<Matrix3<f64>>,
-    /// `C_c^n` at the end of every position.
+    /// Attitude `C_c^n` at the end of every position.
     pub ends: Vec<Matrix3<f64>>,
-    /// `S_i` at the start of every position. What torquer errors leave in psi^n in turns at once is in it,
-    /// and not in psi.
+    /// Map `S_i` at the start of every position. The contribution of torquer errors to psi^n in instantaneous
+    /// turns belongs to the map, not to psi.
     pub blocks: Vec<Block<f64>>,
-    /// Positions and slews in order.
+    /// Positions and slews in order of time.
     pub segments: Vec<Segment>,
-    /// The filter's model of every segment.
+    /// Linear model of the filter, by segment.
     pub stages: Vec<Stage>,
     /// Random errors of the gyros X, Y, Z, in rad/s.
     pub gyros: [SensorNoise; 3],
-    /// What of them, and of the accelerometers, is a state, behind the unknowns.
+    /// Bias states of gyros and accelerometers, behind the unknowns.
     pub biases: Vec<Bias>,
-    /// Of every segment: the lower triangular root of the noise of a step on its psi states (rad) and the
+    /// Lower triangular root, by segment, of the noise covariance of a step on its psi states (rad) and the
     /// biases (rad/s, g).
     pub noise_roots: Vec<DMatrix<f64>>,
     /// Components of Z that are used (1, 3, with errors of the accelerometers 2, and [`AZIMUTH`]).
@@ -105,21 +106,21 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan of `scheme`; a scheme without latitude is put at the default.
+    /// Plan of `scheme`; a scheme without latitude gets the default latitude.
     ///
     /// # Errors
-    /// [`SimulationError`] for what cannot be run: generic angles, slews without inertial carry, too many
-    /// unknowns or steps, conditions that are not positive.
+    /// [`SimulationError`] for generic angles, slews without inertial carry, too many unknowns or steps, and
+    /// conditions that are not positive.
     pub fn new(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
         conditions.validate()?;
         Self::derived(scheme, conditions)
     }
 
-    /// The plan of a scheme and conditions that were made from admitted ones: their numbers may lie beyond
-    /// what is admitted.
+    /// Plan of a scheme and conditions derived from admitted ones: their numbers may lie beyond the admitted
+    /// ranges.
     ///
     /// # Errors
-    /// [`SimulationError`], as [`Self::new`].
+    /// [`SimulationError`], see [`Self::new`].
     pub fn derived(scheme: &Scheme, conditions: &Conditions) -> Result<Self, SimulationError> {
         let scheme = Scheme { latitude: latitude_of(scheme), ..scheme.clone() };
         if let Some(name) = scheme.generic_names().first() {
@@ -137,7 +138,7 @@ impl Plan {
         }
         let point = point_of(&platform, conditions);
         let stations = scheme.stations();
-        // the attitude at the first station of every position, and at the last
+        // stations at the start and at the end of every position
         let bounds: Vec<(usize, usize)> = (0..scheme.positions.len())
             .filter_map(|p| {
                 let of = |s: &Station<'_>| s.index == p;
@@ -169,18 +170,17 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The filter's model of every segment.
+    /// Computes the linear model of every segment.
     fn model(&mut self, conditions: &Conditions) -> Result<(), SimulationError> {
         let models = (0..self.segments.len()).map(|i| self.stage(i, conditions));
         (self.stages, self.noise_roots) = models.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         Ok(())
     }
 
-    /// The same with other steps: every segment at a position in parts of so many steps of so many s, as
-    /// `parts` divides it.
+    /// Plan with other steps: `parts` divides every segment at a position into (number of steps, step in s).
     ///
     /// # Errors
-    /// [`SimulationError`], as [`Self::new`].
+    /// [`SimulationError`], see [`Self::new`].
     pub fn in_steps(
         mut self,
         conditions: &Conditions,
@@ -212,27 +212,27 @@ impl Plan {
         Ok(self)
     }
 
-    /// The number of unknowns.
+    /// Number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.platform.names().len()
     }
 
-    /// The number of states of its filter: the unknowns, then the biases.
+    /// Number of states of the filter: the unknowns, then the biases.
     pub fn states(&self) -> usize {
         self.unknowns() + self.biases.len()
     }
 
-    /// The number of states that are no psi: coefficients and biases.
+    /// Number of states other than psi: coefficients and biases.
     pub fn constants(&self) -> usize {
         self.platform.coefficients() + self.biases.len()
     }
 
-    /// The total time in s.
+    /// Total time, in s.
     pub fn duration_s(&self) -> f64 {
         self.segments.last().map_or(0.0, |s| s.start_s + s.dt * s.steps as f64)
     }
 
-    /// The slews: the position that each leads to, and how it turns.
+    /// Slews: index of the position that each leads to, and its turn.
     pub fn slews(&self) -> impl Iterator<Item = (usize, Turn)> {
         self.segments.iter().filter_map(|s| match &s.kind {
             SegmentKind::Slew(slew) => Some((s.position, slew.turn())),
@@ -240,19 +240,19 @@ impl Plan {
         })
     }
 
-    /// The psi states of a segment: the first three columns of its block.
+    /// Psi states of a segment: the first three columns of its block.
     pub fn psi_columns(&self, segment: usize) -> &[usize] {
         &self.blocks[self.segments[segment].position].columns[..3]
     }
 
-    /// `psi^n` of the unknowns `x` at a segment's position (during a slew: psi^n is carried).
+    /// Vector `psi^n` of the unknowns `x` at a segment's position (during a slew psi^n is carried).
     pub fn psi_n(&self, segment: usize, x: &[f64]) -> [f64; 3] {
         let block = &self.blocks[self.segments[segment].position];
         let row = |r: usize| block.rows[r].iter().zip(&block.columns).map(|(a, &c)| a * x[c]).sum();
         std::array::from_fn(row)
     }
 
-    /// The standard deviation of a component of Z (in g), or of the azimuth (in rad).
+    /// Standard deviation of a component of Z (in g), or of the azimuth (in rad).
     pub fn output_sigma(component: usize, conditions: &Conditions) -> f64 {
         if component == AZIMUTH {
             conditions.azimuth_noise_deg.to_radians()
@@ -261,7 +261,7 @@ impl Plan {
         }
     }
 
-    /// The rows of Z at the end of a step of a segment (one per component), as functionals of the unknowns.
+    /// Rows of Z at the end of a step of a segment (one per component), as functionals of the unknowns.
     pub(crate) fn output_rows(&self, segment: usize) -> Vec<Vec<(usize, f64)>> {
         let s = &self.segments[segment];
         let mut block = Cow::Borrowed(&self.blocks[s.position]);
@@ -307,7 +307,7 @@ impl Plan {
             }
             SegmentKind::Slew(_) => {
                 let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi;
-                // the noise of a slew: that of as many steps as it would have
+                // noise of a slew: that of the steps of a position of the same duration
                 let dt = conditions.step_s.min(s.dt);
                 let held = conditions.drift_noise.held_rad_s(dt);
                 let q = self.held_noise(block, dt, held).map(|row| row.map(|x| x * s.dt / dt));
@@ -359,7 +359,8 @@ impl Plan {
         Ok((stage, root(&q)))
     }
 
-    /// Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by `S_i`.
+    /// Transition Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by
+    /// `S_i`.
     fn exponential(&self, block: &Block<f64>, dt: f64) -> DMatrix<f64> {
         let (turned, held) = earth_step(self.point.w_n, self.point.w_u, dt);
         let n = self.unknowns();
@@ -380,7 +381,7 @@ impl Plan {
         phi
     }
 
-    /// The covariance on psi of a drift of standard deviation `held` (rad/s) held over `dt`.
+    /// Covariance of psi from a drift of standard deviation `held` (rad/s) held over `dt`.
     fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
         let (_, b) = earth_step(self.point.w_n, self.point.w_u, dt);
         let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
@@ -389,9 +390,9 @@ impl Plan {
     }
 }
 
-/// psi after `dt` s by psi before (`exp(W dt)`, W the rate of the earth in rad/s) and by a constant drift
-/// meanwhile (the integral of `exp(W t)`, in s): Rodrigues' formula. A plan of a record has one for every
-/// bin: buffers of matrix products between what is kept of each would leave the memory full of holes.
+/// Psi after `dt` s by psi before (`exp(W dt)`, W the rate of the earth in rad/s) and by a constant drift
+/// (the integral of `exp(W t)`, in s), by Rodrigues' formula. A plan of a record calls it for every bin;
+/// buffers of matrix products, allocated between the results that stay, would fragment the memory.
 fn earth_step(w_n: f64, w_u: f64, dt: f64) -> (Matrix3<f64>, Matrix3<f64>) {
     let f = local_dynamics(&Float, &w_n, &w_u);
     let w: Matrix3<f64> = std::array::from_fn(|i| std::array::from_fn(|j| f[i][j] * dt));
@@ -414,13 +415,13 @@ fn earth_step(w_n: f64, w_u: f64, dt: f64) -> (Matrix3<f64>, Matrix3<f64>) {
     (of(first, second), of(second, third).map(|row| row.map(|x| x * dt)))
 }
 
-/// Rates, attitudes and turns at once of a scheme with a latitude and without generic angles.
+/// Rates, attitudes and instantaneous turns of a scheme with a latitude and without generic angles.
 fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
     let scheme = platform.scheme();
     let (c, s) =
         scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
     let mut point = Point::in_floats(platform, W_IE * c, W_IE * s);
-    // turns that take time are integrated
+    // turns of finite duration are integrated instead
     for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
         if conditions.slew_rate(station.position).is_some() {
             turns.clear();
@@ -429,7 +430,7 @@ fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
     point
 }
 
-/// The turns to a position at a rate in rad/s: one, or one of each gimbal.
+/// Turns to a position at a rate in rad/s: one turn, or one of each gimbal.
 fn slews(
     scheme: &Scheme,
     position: usize,
@@ -457,7 +458,7 @@ fn slews(
     Ok(slew.map_err(|_| misses())?.into_iter().collect())
 }
 
-/// The positions and slews in order; what there would be too much of is refused before it is made.
+/// Segments of positions and slews in order; numbers of steps are checked before they are made.
 fn timeline(
     scheme: &Scheme,
     conditions: &Conditions,
@@ -512,16 +513,16 @@ fn timeline(
     Ok(segments)
 }
 
-/// The linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.
+/// Linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.
 pub struct PlatformProcess<'a> {
-    /// The plan.
+    /// Plan of the scheme.
     pub plan: &'a Plan,
-    /// The segment, whose time starts at 0.
+    /// Index of the segment, whose time starts at 0.
     pub segment: usize,
 }
 
 impl PlatformProcess<'_> {
-    /// The rows of `psi'` in the axes of psi (3 x n).
+    /// Rows of `psi'` in the axes of psi (3 x n).
     fn rows(&self, t: f64) -> [Vec<f64>; 3] {
         let plan = self.plan;
         let segment = &plan.segments[self.segment];
@@ -573,29 +574,28 @@ impl Process for PlatformProcess<'_> {
         out
     }
 
-    /// None: random drift is held over a step and enters as its covariance.
+    /// Zero: random drift is held over a step and enters as its covariance.
     fn noise(&self, _: f64) -> DMatrix<f64> {
         DMatrix::zeros(self.plan.unknowns(), self.plan.unknowns())
     }
 }
 
-/// `g^n` in g.
+/// Gravity `g^n`, in g.
 pub(super) const G_N: [f64; 3] = [0.0, -1.0, 0.0];
 
 impl Plan {
-    /// The rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate at which a
-    /// slew turns (rad/s).
+    /// Rows of `eps^n` at an attitude: torquers act with the earth rate, and with the rate of a slew (rad/s).
     pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         self.platform.errors().drift_rows(&Float, c, || self.torqued_rate(c, slew))
     }
 
-    /// The rate with which the gyros are torqued where `C_c^n` is `c`, in the axes of c (rad/s).
+    /// Rate at which the gyros are torqued at the attitude `c`, in the axes of c (rad/s).
     pub(crate) fn torqued_rate(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [f64; 3] {
         let earth = earth_rate_in(&Float, c, &self.point.w_n, &self.point.w_u);
         std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]))
     }
 
-    /// How a segment turns the platform, if it does.
+    /// Slew of a segment; `None` if the platform does not turn.
     pub(super) fn turns(&self, segment: usize) -> Option<&Slew> {
         match &self.segments[segment].kind {
             SegmentKind::Dwell => None,
@@ -603,12 +603,12 @@ impl Plan {
         }
     }
 
-    /// True if torquer errors act in turns at once: full attitudes have no such turns.
+    /// True if torquer errors act in instantaneous turns, which full attitudes do not have.
     pub fn torqued_at_once(&self) -> bool {
         self.point.turns.iter().any(|turns| !turns.is_empty())
     }
 
-    /// A bound on the rate at which coefficients turn the platform, in rad/s: g is one at most, and torquers
+    /// Bound on the rate at which coefficients turn the platform, in rad/s: g is one at most, and torquers
     /// have the earth rate and that of the fastest turn.
     pub(crate) fn drift_bound(&self, coefficients: &[f64]) -> f64 {
         let fastest = (0..self.segments.len()).filter_map(|i| self.turns(i)).map(|s| s.turned(1.0));
@@ -621,7 +621,8 @@ impl Plan {
         self.platform.error_terms().iter().zip(coefficients).map(of).sum()
     }
 
-    /// What the accelerometers add to `Z^n` where `C_c^n` is `c` and the specific force in their axes is `f`.
+    /// Contribution of the accelerometers to `Z^n` at the attitude `c`, with the specific force `f` in their
+    /// axes.
     pub(super) fn accelerometer_error(
         &self,
         c: &Matrix3<f64>,
@@ -632,12 +633,12 @@ impl Plan {
         apply(c, &rows.map(|row| row.iter().zip(coefficients).map(|(a, k)| a * k).sum()))
     }
 
-    /// `omega_ie^n` in rad/s.
+    /// Earth rate `omega_ie^n`, in rad/s.
     pub fn earth_rate(&self) -> [f64; 3] {
         [self.point.w_n, self.point.w_u, 0.0]
     }
 
-    /// The computed attitude `C_c^n` at time `t` of a segment.
+    /// Computed attitude `C_c^n` at time `t` of a segment.
     pub(super) fn attitude(&self, segment: usize, t: f64) -> Matrix3<f64> {
         let s = &self.segments[segment];
         match &s.kind {
@@ -646,15 +647,15 @@ impl Plan {
         }
     }
 
-    /// Integration steps per step of a segment: psi turns with the earth rate, and the platform with what is
-    /// commanded.
+    /// Number of integration steps per step of a segment: psi turns with the earth rate, and the platform
+    /// with the commanded rate.
     pub(crate) fn substeps(&self, segment: usize) -> usize {
         let s = &self.segments[segment];
         let turn = match &s.kind {
             SegmentKind::Dwell => W_IE * s.dt,
             SegmentKind::Slew(slew) | SegmentKind::Rotation(slew) => slew.turned(s.dt),
         };
-        // the timeline has counted them
+        // the timeline has checked their number
         integration_steps(turn).unwrap_or(MAX_INTEGRATION)
     }
 
@@ -669,7 +670,7 @@ mod tests {
     use super::*;
     use obsdeg_ekf::integrate::van_loan;
 
-    /// Against the exponential of the whole dynamics, from steps of microseconds to five days.
+    /// Comparison with the exponential of the whole dynamics, from steps of microseconds to five days.
     #[test]
     fn earth_steps_are_exponentials() {
         let (w_n, w_u) = (W_IE * 0.8, W_IE * 0.6);

@@ -1,4 +1,4 @@
-//! One run: truth, filter, and everything that is plotted of it.
+//! One run: truth, filter, and the time series for plots.
 
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
@@ -7,7 +7,7 @@ use obsdeg_ekf::{Covariance, Form, Manifold, Update};
 use super::answer::{FilterReason, FilterReport};
 use super::conditions::{Conditions, shown_unit, si_per_shown};
 use super::error::SimulationError;
-use super::extended::{Ended, Extended};
+use super::extended::{Extended, FilterResult};
 use super::iterated::{MAX_ITERATED_STEPS, iterated};
 use super::noise::Noise;
 use super::plan::Plan;
@@ -17,77 +17,77 @@ use super::truth::{TruthModel, check_drifts};
 use super::validity::Validity;
 use crate::prediction::Prediction;
 
-/// One unknown or combination over time, in SI units, from t = 0.
+/// Unknown or combination over time, in SI units, from t = 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
-    /// The truth.
+    /// True values.
     pub truth: Vec<f64>,
-    /// The estimate.
+    /// Estimates.
     pub estimate: Vec<f64>,
-    /// Its standard deviation.
+    /// Standard deviations of the estimates.
     pub sigma: Vec<f64>,
 }
 
-/// What is plotted of a run, sample by sample.
+/// Time series of a run for plots, sample by sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Traces {
     /// Names of the series: unknowns, then combinations.
     pub names: Vec<String>,
-    /// The units in which they are shown.
+    /// Units in which the series are shown.
     pub units: Vec<String>,
-    /// What a series is divided by to be shown.
+    /// Divisors from SI to the shown units, by series.
     pub scales: Vec<f64>,
-    /// Whether samples determine what a series shows; otherwise it is known from the prior only.
+    /// True for each series that samples determine; false if only the prior does.
     pub determined: Vec<bool>,
-    /// The unit of the time; empty when none is given.
+    /// Unit of the time; empty when none is given.
     pub time_unit: String,
-    /// The times, from 0.
+    /// Times, from 0, in the unit of the time.
     pub time: Vec<f64>,
-    /// The position or segment of every sample.
+    /// Index of the position or segment, by sample.
     pub position: Vec<usize>,
-    /// One per name.
+    /// Series, by name.
     pub series: Vec<Series>,
-    /// The same of a linear filter on the same measurements, where another filter is shown.
+    /// Series of a linear filter on the same measurements, where another filter is shown.
     pub linear: Option<Vec<Series>>,
 }
 
-/// A run, sample by sample.
+/// Run, sample by sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Truth, estimate and sigma of everything.
+    /// Truth, estimate and sigma of all quantities.
     pub traces: Traces,
     /// Whitened innovations, one per output and sampled step.
     pub whitened: Vec<f64>,
-    /// The covariance at the end.
+    /// Covariance at the end.
     pub last_covariance: Covariance,
-    /// Estimate minus truth of all its states at the end.
+    /// Estimate minus truth of all states of the filter at the end.
     pub last_error: Vec<f64>,
-    /// Which filter it was.
+    /// Filter of the run.
     pub filter: FilterReport,
-    /// Whether the small-angle model holds for the truth.
+    /// Validity of the small-angle model for the truth.
     pub validity: Validity,
 }
 
-/// What a run records: unknowns, then combinations, as functionals of the unknowns.
-struct Recorded<'a> {
-    /// The number of unknowns.
+/// Quantities that a run records: unknowns, then combinations, as functionals of the unknowns.
+struct RecordedQuantities<'a> {
+    /// Number of unknowns.
     unknowns: usize,
     combinations: Vec<&'a [(usize, f64)]>,
 }
 
-impl Recorded<'_> {
+impl RecordedQuantities<'_> {
     fn len(&self) -> usize {
         self.unknowns + self.combinations.len()
     }
 
-    /// All values at the state `x`.
+    /// Values of all quantities at the state `x`.
     fn values<'b>(&'b self, x: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
         let combination = |c: &&[(usize, f64)]| c.iter().map(|&(j, k)| k * x[j]).sum();
         x[..self.unknowns].iter().copied().chain(self.combinations.iter().map(combination))
     }
 
-    /// All standard deviations; `local` makes a functional of the unknowns one of what the covariance is of,
-    /// where that is another.
+    /// Standard deviations of all quantities. `local` turns a functional of the unknowns into one of the
+    /// local coordinates of the covariance, or returns `None` where both are the same.
     fn sigmas(
         &self,
         p: &Covariance,
@@ -107,20 +107,20 @@ impl Recorded<'_> {
     }
 }
 
-/// A truth and what is measured of it.
-pub(crate) struct Sampled {
-    /// Per quantity that is recorded: its values, from t = 0.
+/// Truth of a run and its measurements.
+pub(crate) struct SampledTruth {
+    /// True values by recorded quantity, from t = 0.
     truth: Vec<Vec<f64>>,
-    /// Measurements: of every step as many as there are components; zero where none is taken.
+    /// Measurements, one per step and component; zero where none is taken.
     pub(crate) z: Vec<f64>,
-    /// The true states at the end.
+    /// True states at the end.
     pub(crate) end: Vec<f64>,
     /// Largest `|psi|`, in rad.
     pub(crate) largest_psi: f64,
 }
 
-/// The truth that starts from the states `x`, measured over the whole of `plan`; `record` sees the states
-/// from t = 0.
+/// Samples the truth that starts from the states `x` over the whole of `plan`; `record` gets the states from
+/// t = 0.
 pub(crate) fn sample(
     truth: &mut TruthModel<'_>,
     plan: &Plan,
@@ -146,9 +146,9 @@ fn sampled(
     plan: &Plan,
     conditions: &Conditions,
     start: &RunStart,
-    recorded: &Recorded<'_>,
+    recorded: &RecordedQuantities<'_>,
     seed: u64,
-) -> Result<Sampled, SimulationError> {
+) -> Result<SampledTruth, SimulationError> {
     let n = plan.unknowns();
     let first = n - plan.platform.coefficients();
     check_drifts(plan, conditions, plan.drift_bound(&start.truth[first..n]))?;
@@ -162,44 +162,44 @@ fn sampled(
     sample(&mut truth, plan, &mut noise, &mut z, |x| {
         values.iter_mut().zip(recorded.values(x)).for_each(|(v, x)| v.push(x));
     });
-    Ok(Sampled { truth: values, z, end: truth.x().to_vec(), largest_psi: truth.largest_psi })
+    Ok(SampledTruth { truth: values, z, end: truth.x().to_vec(), largest_psi: truth.largest_psi })
 }
 
-/// The largest `|psi|` of the run of `seed`, in rad.
+/// Largest `|psi|` of the run of `seed`, in rad.
 ///
 /// # Errors
-/// As [`run`].
+/// See [`run`].
 pub(crate) fn largest_psi(
     plan: &Plan,
     conditions: &Conditions,
     start: &RunStart,
     seed: u64,
 ) -> Result<f64, SimulationError> {
-    let nothing = Recorded { unknowns: 0, combinations: Vec::new() };
+    let nothing = RecordedQuantities { unknowns: 0, combinations: Vec::new() };
     Ok(sampled(plan, conditions, start, &nothing, seed)?.largest_psi)
 }
 
-/// A filter's run over some measurements.
-struct Filtered {
-    /// Per quantity, from t = 0.
+/// Results of a filter on some measurements.
+struct FilterSeries {
+    /// Estimates by quantity, from t = 0.
     estimate: Vec<Vec<f64>>,
-    /// Its standard deviation.
+    /// Standard deviations by quantity, from t = 0.
     sigma: Vec<Vec<f64>>,
     whitened: Vec<f64>,
     covariance: Covariance,
     /// Estimate minus truth at the end, in the coordinates of the covariance.
     error: Vec<f64>,
-    /// Linearisations, and whether they settled.
+    /// Number of linearisations, and true if they converged.
     passes: (usize, bool),
 }
 
-/// The linear filter: its gains, and then its state.
+/// Results of the linear filter: its gains first, then its state.
 fn linear(
     plan: &Plan,
     start: &RunStart,
-    sampled: &Sampled,
-    recorded: &Recorded<'_>,
-) -> Result<Filtered, SimulationError> {
+    sampled: &SampledTruth,
+    recorded: &RecordedQuantities<'_>,
+) -> Result<FilterSeries, SimulationError> {
     let prior = start.covariance(Form::Ud)?;
     let mut sigma = vec![Vec::new(); recorded.len()];
     let mut push = |p: &Covariance| {
@@ -227,25 +227,25 @@ fn linear(
         whitened.extend_from_slice(innovations);
     })?;
     let error = x.iter().zip(&sampled.end).map(|(a, b)| a - b).collect();
-    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (1, true) })
+    Ok(FilterSeries { estimate, sigma, whitened, covariance, error, passes: (1, true) })
 }
 
-/// The extended filter, once or iterated.
+/// Results of the extended filter, in one pass or iterated.
 fn extended(
     plan: &Plan,
     conditions: &Conditions,
     start: &RunStart,
-    sampled: &Sampled,
-    recorded: &Recorded<'_>,
+    sampled: &SampledTruth,
+    recorded: &RecordedQuantities<'_>,
     again: bool,
-) -> Result<Filtered, SimulationError> {
+) -> Result<FilterSeries, SimulationError> {
     let filter = Extended::new(plan, conditions, Update::default())?;
     let (mut estimate, mut sigma) = (vec![Vec::new(); recorded.len()], vec![Vec::new(); recorded.len()]);
     let mut push = |state: &PlatformState, p: &Covariance| {
         let x = state.unknowns();
         estimate.iter_mut().zip(recorded.values(&x)).for_each(|(e, x)| e.push(x));
         let psi = plan.states() - plan.constants();
-        // coefficients are local coordinates as they are
+        // coefficients are their own local coordinates
         let local = |i: usize, c: &[(usize, f64)]| (i < psi || c.len() > 1).then(|| state.functional(c));
         sigma.iter_mut().zip(recorded.sigmas(p, local)).for_each(|(s, now)| s.push(now));
     };
@@ -262,17 +262,17 @@ fn extended(
     };
     let truth = PlatformState::of_unknowns(&sampled.end, plan.constants());
     let error = truth.local(&ended.x).iter().map(|x| -x).collect();
-    let Ended { covariance, passes, converged, .. } = ended;
-    Ok(Filtered { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
+    let FilterResult { covariance, passes, converged, .. } = ended;
+    Ok(FilterSeries { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
 }
 
-/// Runs the filter of `plan` against one truth; its biases are drawn. Which filter, the conditions say, or
-/// whether the small-angle model holds; where it is not the linear one, that goes along on the same
-/// measurements.
+/// Runs the filter of `plan` against one truth with randomly drawn biases. The conditions select the filter,
+/// or the validity of the small-angle model does. Where it is not the linear one, the linear filter also runs
+/// on the same measurements.
 ///
 /// # Errors
 /// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact
-/// truth that turns too fast, [`SimulationError::Unresolvable`] when something is not finite.
+/// truth that turns too fast, [`SimulationError::Unresolvable`] for a number that is not finite.
 pub fn run(
     plan: &Plan,
     conditions: &Conditions,
@@ -281,7 +281,7 @@ pub fn run(
     seed: u64,
 ) -> Result<Record, SimulationError> {
     let n = plan.unknowns();
-    let recorded = Recorded {
+    let recorded = RecordedQuantities {
         unknowns: n,
         combinations: prediction.combinations.iter().map(|c| &c.terms[..]).collect(),
     };
@@ -322,11 +322,11 @@ pub fn run(
         let what = "the run of the filter ends in numbers that are none".into();
         return Err(SimulationError::Unresolvable { what });
     }
-    let series = |filtered: Filtered| -> Vec<Series> {
+    let series = |filtered: FilterSeries| -> Vec<Series> {
         let both = filtered.estimate.into_iter().zip(filtered.sigma).zip(&sampled.truth);
         both.map(|((estimate, sigma), truth)| Series { truth: truth.clone(), estimate, sigma }).collect()
     };
-    // what the linear filter would have made of it
+    // results of the linear filter for comparison
     if kind != FilterKind::Linear {
         traces.linear = Some(series(linear(plan, start, &sampled, &recorded)?));
     }
@@ -347,7 +347,7 @@ pub fn run(
     })
 }
 
-/// Which filter runs, and why.
+/// Filter of the run, and the reason of the choice.
 pub(crate) fn choose(
     plan: &Plan,
     conditions: &Conditions,
@@ -368,8 +368,8 @@ pub(crate) fn choose(
     }
 }
 
-/// True if sigmas of a filter are right at this truth: one that is linearised along the whole run, or whose
-/// model is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
+/// True if the sigmas of a filter are right at this truth: it is linearised along the whole run, or its model
+/// is that of the truth. An extended filter is linearised within its prior too: `psi_prior` in rad.
 fn trusted(kind: FilterKind, conditions: &Conditions, validity: &Validity, psi_prior: f64) -> bool {
     match kind {
         FilterKind::Linear => validity.holds || conditions.truth == Truth::Linear,
@@ -386,7 +386,7 @@ fn psi_prior(plan: &Plan, start: &RunStart) -> f64 {
     psi.map(|(_, sigma)| *sigma).fold(0.0, f64::max)
 }
 
-/// The number of the first step of every segment.
+/// Number of the first step of every segment.
 pub(crate) fn first_steps(plan: &Plan) -> Vec<usize> {
     let starts = plan.segments.iter().scan(0, |next, s| {
         let first = *next;

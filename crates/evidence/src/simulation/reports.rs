@@ -1,4 +1,4 @@
-//! The conditions and the timeline of a run as they are reported.
+//! Conditions and timeline of a run, as reported.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::settings::{Assignment, DriftNoise, concerns};
@@ -7,11 +7,11 @@ use super::answer::{AccelerometerBias, ConditionsReport, TimelineReport, chosen}
 use super::conditions::Conditions;
 use super::plan::{Plan, SegmentKind};
 
-/// The conditions as they are reported.
+/// Conditions of a run, as reported.
 pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
     let noise = conditions.drift_noise;
     let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
-    // a slew takes as many steps as a position would
+    // a slew takes as many steps as a position of its duration
     let steps = plan.segments.iter().map(|s| match s.kind {
         SegmentKind::Slew(_) => s.dt.min(conditions.step_s),
         _ => s.dt,
@@ -39,7 +39,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
     }
 }
 
-/// Keys of the conditions of a run that nobody states.
+/// Keys of the conditions of a run that are not stated.
 fn chosen_for_run(scheme: &Scheme, unknowns: &[String], conditions: &Conditions) -> Vec<String> {
     let mut out = chosen(scheme, conditions);
     let some_left = |stated: &[Assignment]| {
@@ -58,7 +58,7 @@ fn chosen_for_run(scheme: &Scheme, unknowns: &[String], conditions: &Conditions)
     out
 }
 
-/// The timeline as it is reported.
+/// Timeline of a plan, as reported.
 pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     let positions = &plan.platform.scheme().positions;
     let mut out: Vec<TimelineReport> = Vec::new();

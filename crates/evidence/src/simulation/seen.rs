@@ -1,5 +1,6 @@
-//! What the samples of a plan with slews determine. No exact verdict covers a platform that turns between
-//! positions, so this is decided in floating point, by what a wider prior does to the standard deviations.
+//! Unknowns that the samples of a plan with slews determine. No exact verdict covers a platform that turns
+//! between positions, so this is decided in floating point, by the effect of a wider prior on the standard
+//! deviations.
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::{EkfError, SquareRootInformation};
@@ -9,25 +10,25 @@ use super::error::SimulationError;
 use super::plan::Plan;
 use crate::prediction::Prediction;
 
-/// Two priors that say nothing, so many times wider than what the samples say of the best known unknown: far
-/// from 1e16, where rounding looks like information.
+/// Ratios of two diffuse priors to the sigma of the best known unknown: far from 1e16, where rounding looks
+/// like information.
 const WIDTHS: [f64; 2] = [1e11, 1e13];
-/// What the wider of these may do to a standard deviation that comes of the samples alone.
+/// Largest factor of the wider of these on a standard deviation that the samples alone determine.
 const ALONE: f64 = 1.05;
-/// How many times wider the prior of a run is made.
+/// Factor by which the prior of a run is widened.
 const WIDER: f64 = 10.0;
-/// What that does to a standard deviation that comes of the prior only, nearly.
+/// Factor of that widening from which a standard deviation counts as determined by the prior only.
 const MOSTLY: f64 = 9.0;
 
 /// Inverse roots of the information of all samples with either prior: of the unknowns at the start, and at
 /// the end.
-struct Seen {
+struct PriorRoots {
     start: [DMatrix<f64>; 2],
     end: [DMatrix<f64>; 2],
 }
 
-impl Seen {
-    /// With the priors that `priors` makes of the information.
+impl PriorRoots {
+    /// Roots with the two priors that `priors` computes from the information.
     fn of(
         plan: &Plan,
         priors: impl FnOnce(&SquareRootInformation) -> [Vec<f64>; 2],
@@ -45,7 +46,7 @@ impl Seen {
     }
 }
 
-/// True if the wider prior leaves the standard deviation of a combination, but for a factor.
+/// True if the wider prior raises the standard deviation of a combination by `factor` at most.
 fn determined(roots: &[DMatrix<f64>; 2], terms: &[(usize, f64)], factor: f64) -> bool {
     let sigma = |root: &DMatrix<f64>| {
         let zero = nalgebra::RowDVector::zeros(root.ncols());
@@ -55,12 +56,12 @@ fn determined(roots: &[DMatrix<f64>; 2], terms: &[(usize, f64)], factor: f64) ->
     wide <= factor * narrow
 }
 
-/// The exact prediction; where slews take time, what samples determine is what `seen` says.
+/// Exact prediction; with slews of finite duration, `seen` decides on the determined unknowns.
 fn with_slews(
     plan: &Plan,
     seed: u64,
     factor: f64,
-    seen: impl FnOnce() -> Result<Seen, EkfError>,
+    seen: impl FnOnce() -> Result<PriorRoots, EkfError>,
 ) -> Result<Prediction, SimulationError> {
     let mut out = Prediction::new(&plan.platform, [plan.point.w_n, plan.point.w_u], seed)?;
     if plan.slews().next().is_none() {
@@ -77,10 +78,11 @@ fn with_slews(
     Ok(out)
 }
 
-/// Standard deviations that say nothing beside the samples of `plan`, as they are decided about here.
+/// Standard deviations of a prior that is diffuse beside the samples of `plan`, as in the decisions of this
+/// module.
 ///
 /// # Errors
-/// [`EkfError`] when a number is not finite.
+/// [`EkfError`] for a number that is not finite.
 pub fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     if plan.slews().next().is_none() {
         return diffuse_prior(plan);
@@ -89,21 +91,22 @@ pub fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     Ok(wider(plan, &information, WIDTHS[0], WIDTHS[0]))
 }
 
-/// The prediction for `plan` without a prior: with slews, what the samples alone determine.
+/// Prediction for `plan` without a prior: with slews, an unknown is determined if the samples alone determine
+/// it.
 ///
 /// # Errors
 /// [`SimulationError`].
 pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
     let wide = |information: &SquareRootInformation| WIDTHS.map(|w| wider(plan, information, w, w));
-    with_slews(plan, seed, ALONE, || Seen::of(plan, wide))
+    with_slews(plan, seed, ALONE, || PriorRoots::of(plan, wide))
 }
 
-/// The prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a
-/// prior ten times wider widens its standard deviation (nearly) as much.
+/// Prediction for a run of `plan` with a prior: with slews, an unknown counts as determined unless a prior
+/// ten times wider widens its standard deviation (nearly) as much.
 ///
 /// # Errors
 /// [`SimulationError`].
 pub fn predict_run(plan: &Plan, prior: &[f64], seed: u64) -> Result<Prediction, SimulationError> {
     let wide = [1.0, WIDER].map(|w| prior.iter().map(|s| s * w).collect());
-    with_slews(plan, seed, MOSTLY, || Seen::of(plan, |_| wide))
+    with_slews(plan, seed, MOSTLY, || PriorRoots::of(plan, |_| wide))
 }

@@ -1,4 +1,4 @@
-//! Verdicts on a scheme with the sensitivities of its estimates to errors that it does not estimate.
+//! Verdicts on a scheme, with the sensitivities of its estimates to errors that it does not estimate.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::Scheme;
@@ -32,8 +32,8 @@ pub struct Sensitivities {
     pub effects: OmittedEffects,
 }
 
-/// Sensitivities of the estimates of `scheme` to everything that it does not estimate, by the record that its
-/// predicted sigmas rest on.
+/// Sensitivities of the estimates of `scheme` to everything that it does not estimate, by the record of its
+/// predicted sigmas.
 ///
 /// # Errors
 /// [`SimulationError`].

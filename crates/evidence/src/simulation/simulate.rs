@@ -1,4 +1,4 @@
-//! A scheme simulated once: the run, and its summary.
+//! Simulation of a scheme: one run, and its summary.
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
@@ -23,7 +23,7 @@ use crate::prediction::{PredictedCombination, Prediction};
 use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
 use crate::simulation::omitted::omitted_effects;
 
-/// Simulates `scheme` once: the summary and the time series.
+/// Simulates one run of `scheme`: the summary and the time series.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -116,9 +116,9 @@ fn run_requirements(
 ) -> Result<RunRequirements, SimulationError> {
     let units = plan.platform.units();
     let claims = quantities.iter().enumerate().map(|(c, q)| {
-        // the truth of the run has none of the errors of the bench: they are added to its sigma
+        // the truth of the run has no errors of the bench: their contribution is added to its sigma
         let total = q.sigma.hypot(added_to(bench, &[(c, 1.0)]) / si_per_shown(units[c]));
-        // what a stated prior bounds counts, as in the prediction
+        // an unknown that a stated prior bounds counts, as in the prediction
         let sigma = match q.outcome.miss() {
             Some(Miss::NotObservable) if q.predicted_sigma.is_some() => Ok(total),
             Some(why) => Err(why),
@@ -147,8 +147,9 @@ fn run_requirements(
     })
 }
 
-/// The estimate of series `i` at the end; `verdict` is the exact one with whether samples determine it, the
-/// last are the required and the predicted sigma, and what a bench adds to sigma.
+/// Estimate of series `i` at the end. `verdict` is the exact one, with a flag that is true if samples
+/// determine the quantity. The last arguments are the required and the predicted sigma, and the contribution
+/// of a bench to sigma.
 fn estimate(
     name: &str,
     unit: &str,
@@ -168,7 +169,8 @@ fn estimate(
     });
     let error = estimate - truth;
     let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
-    // from when on sigma meets it to the end; what the bench adds is known there alone
+    // first time from which sigma meets the requirement to the end; the contribution of the bench is known at
+    // the end only
     let total = sigma.hypot(bench);
     let reached = required_sigma.and_then(|r| {
         let missed = series.sigma.iter().rposition(|s| !meets(s / scale, r));
@@ -196,7 +198,7 @@ fn estimate(
             determined,
             record.filter.kind,
             error_over_sigma,
-            // what the linear filter knows of it without samples is no gain of large angles
+            // a smaller sigma of the linear filter without samples is no effect of large angles
             [linear.filter(|_| !determined).map_or(prior_sigma, |l| l.sigma.min(prior_sigma)), sigma],
             required_sigma.map(|r| (r, total)),
         ),

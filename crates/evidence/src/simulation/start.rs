@@ -1,4 +1,4 @@
-//! The start of a run: truth, estimate and prior of every state.
+//! Start of a run: truth, estimate and prior of every state.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Truth;
@@ -9,22 +9,22 @@ use super::error::SimulationError;
 use super::plan::Plan;
 use super::state::PlatformState;
 
-/// Where a run starts, in SI units (shape n each: the unknowns, then the biases).
+/// Start of a run in SI units (shape n each: the unknowns, then the biases).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunStart {
-    /// The true unknowns.
+    /// True values.
     pub truth: Vec<f64>,
-    /// The initial estimate.
+    /// Initial estimates.
     pub estimate: Vec<f64>,
-    /// Its standard deviations.
+    /// Standard deviations of the initial estimates.
     pub sigma: Vec<f64>,
 }
 
 impl RunStart {
-    /// What the conditions say for the unknowns of `plan`.
+    /// Start of the unknowns of `plan` by the conditions.
     ///
     /// # Errors
-    /// [`SimulationError`] for unknown names, and exact truth without coefficients.
+    /// [`SimulationError`] for unknown names, and for an exact truth without coefficients.
     pub fn new(plan: &Plan, conditions: &Conditions) -> Result<Self, SimulationError> {
         if conditions.truth == Truth::Exact && !plan.has_coefficients() {
             return Err(SimulationError::ExactDrift);
@@ -48,7 +48,7 @@ impl RunStart {
         Ok(out)
     }
 
-    /// The initial covariance.
+    /// Initial covariance.
     ///
     /// # Errors
     /// [`SimulationError::Filter`].
@@ -56,12 +56,12 @@ impl RunStart {
         Ok(Covariance::new("P0", &self.variances(), form)?)
     }
 
-    /// The initial variances (n x n, diagonal).
+    /// Initial variances (n x n, diagonal).
     pub(super) fn variances(&self) -> DMatrix<f64> {
         DMatrix::from_diagonal(&DVector::from_iterator(self.sigma.len(), self.sigma.iter().map(|s| s * s)))
     }
 
-    /// The initial estimate as the state of a filter that carries attitudes.
+    /// Initial estimate as the state of a filter with full attitudes.
     pub(super) fn state(&self, plan: &Plan) -> PlatformState {
         PlatformState::of_unknowns(&self.estimate, plan.constants())
     }

@@ -1,5 +1,4 @@
-//! The state of a filter that carries attitudes: as many local coordinates as there are unknowns, in their
-//! order.
+//! State of a filter with full attitudes; its local coordinates are those of the unknowns, in their order.
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::{cross, rotation, rotation_vector, times, transpose};
@@ -15,38 +14,39 @@ pub struct PlatformState {
 }
 
 impl PlatformState {
-    /// The state whose unknowns are `x` (SI units), the last `constants` of which are no psi.
+    /// State with the unknowns `x` (SI units), of which the last `constants` are not psi.
     pub fn of_unknowns(x: &[f64], constants: usize) -> Self {
         let (psi, d) = x.split_at(x.len() - constants);
         let attitudes = psi.chunks_exact(3).map(|v| rotation(&[v[0], v[1], v[2]])).collect();
         Self { attitudes, constants: d.to_vec() }
     }
 
-    /// The number of its attitudes.
+    /// Number of attitudes.
     pub fn attitudes(&self) -> usize {
         self.attitudes.len()
     }
 
-    /// The unknowns, psi as rotation vectors.
+    /// Unknowns of the state, psi as rotation vectors.
     pub fn unknowns(&self) -> Vec<f64> {
         self.attitudes.iter().flat_map(rotation_vector).chain(self.constants.iter().copied()).collect()
     }
 
-    /// The same with attitude number `block` at the rotation vector `psi` (rad, in the axes of its unknowns).
+    /// State with the attitude of index `block` at the rotation vector `psi` (rad, in the axes of its
+    /// unknowns).
     #[must_use]
     pub fn with_psi(mut self, block: usize, psi: &[f64; 3]) -> Self {
         self.attitudes[block] = rotation(psi);
         self
     }
 
-    /// The same with attitude number `block` of `other`.
+    /// State with the attitude of index `block` of `other`.
     #[must_use]
     pub fn with_attitude_of(mut self, block: usize, other: &Self) -> Self {
         self.attitudes[block] = other.attitudes[block];
         self
     }
 
-    /// The functional `c` of the unknowns as one of the local coordinates (of psi: by the derivative of the
+    /// Functional `c` of the unknowns as one of the local coordinates (of psi: by the derivative of the
     /// rotation vector).
     pub fn functional(&self, c: &[(usize, f64)]) -> Vec<(usize, f64)> {
         let first = 3 * self.attitudes.len();
@@ -107,7 +107,7 @@ impl Manifold for PlatformState {
     }
 }
 
-/// `integral of exp(s [v x])` over s in 0..1: what a change of v turns by on the left.
+/// Left Jacobian: integral of `exp(s [v x])` over s in 0..1, the rotation on the left per change of v.
 fn left_jacobian(v: &[f64; 3]) -> Matrix3<f64> {
     let a2: f64 = v.iter().map(|x| x * x).sum();
     let a = a2.sqrt();
@@ -120,7 +120,7 @@ fn left_jacobian(v: &[f64; 3]) -> Matrix3<f64> {
     series(v, c, s)
 }
 
-/// Its inverse.
+/// Inverse of the left Jacobian.
 pub(super) fn inverse_left_jacobian(v: &[f64; 3]) -> Matrix3<f64> {
     let a2: f64 = v.iter().map(|x| x * x).sum();
     let a = a2.sqrt();
@@ -129,7 +129,7 @@ pub(super) fn inverse_left_jacobian(v: &[f64; 3]) -> Matrix3<f64> {
     series(v, -0.5, s)
 }
 
-/// `1 + first [v x] + second [v x]^2`.
+/// Matrix `1 + first [v x] + second [v x]^2`.
 fn series(v: &[f64; 3], first: f64, second: f64) -> Matrix3<f64> {
     let k = cross(v);
     let k2 = times(&k, &k);
@@ -138,7 +138,7 @@ fn series(v: &[f64; 3], first: f64, second: f64) -> Matrix3<f64> {
     })
 }
 
-/// Back onto the rotations: `E (3 - E^T E)/2`.
+/// Rotation next to an almost orthonormal matrix: `E (3 - E^T E)/2`.
 pub(super) fn orthonormal(e: &Matrix3<f64>) -> Matrix3<f64> {
     let square = times(&transpose(e), e);
     let correction: Matrix3<f64> = std::array::from_fn(|i| {
@@ -153,7 +153,7 @@ mod tests {
 
     use super::*;
 
-    /// A number in -scale..scale.
+    /// Random number in -scale..scale.
     fn random(rng: &mut SplitMix64, scale: f64) -> f64 {
         scale * (2.0 * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 1.0)
     }
@@ -166,8 +166,8 @@ mod tests {
         a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
     }
 
-    /// Two attitudes and three constants: what is retracted is found again, the transport is the derivative
-    /// of the coordinates about the new state, and a functional the derivative of the unknowns.
+    /// Two attitudes and three constants: local coordinates invert the retraction, the transport is their
+    /// derivative about the new state, and a functional the derivative of the unknowns.
     #[test]
     fn a_manifold() {
         let mut rng = SplitMix64::new(7);

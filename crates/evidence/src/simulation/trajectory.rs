@@ -1,4 +1,4 @@
-//! A run without noise, and the run linearised along it.
+//! Noise-free run, and the run linearised along it.
 
 use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage};
 use obsdeg_exact::interrupt;
@@ -6,17 +6,17 @@ use obsdeg_exact::interrupt;
 use super::extended::{Extended, PlatformMotion};
 use super::state::PlatformState;
 
-/// A run without noise.
+/// Run without noise.
 pub(super) struct Trajectory {
-    /// Its outputs, as many per step as there are.
+    /// Outputs, by step and component.
     pub outputs: Vec<f64>,
-    /// Its states after the steps.
+    /// States after the steps.
     pub states: Vec<PlatformState>,
 }
 
 impl Trajectory {
-    /// From `x`, of at most so many steps. `on_step` hears the segment, the time within it, how long the step
-    /// is, and the state to be moved by it.
+    /// Moves from `x` through at most `most` steps. `on_step` gets the segment, the time within it, the
+    /// length of the step, and the state, which it moves.
     fn through(
         filter: &Extended<'_>,
         most: usize,
@@ -36,22 +36,22 @@ impl Trajectory {
         Ok(out)
     }
 
-    /// From `x`.
+    /// Noise-free run from `x`.
     pub(super) fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
         Self::through(filter, usize::MAX, x, |motion, t, dt, x| motion.carry(t, dt, x))
     }
 }
 
-/// A run linearised along one trajectory.
-pub(super) struct Along {
-    /// One per step.
+/// Run linearised along one trajectory.
+pub(super) struct LinearisedRun {
+    /// Linearised stages, one per step.
     pub stages: Vec<Stage>,
-    /// Where it is linearised.
+    /// Trajectory of the linearisation.
     pub at: Trajectory,
 }
 
-impl Along {
-    /// Along the trajectory that starts from `x`, of at most so many steps.
+impl LinearisedRun {
+    /// Linearisation along the trajectory from `x`, of at most `most` steps.
     pub(super) fn new(filter: &Extended<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
         let mut stages = Vec::new();
         let at = Trajectory::through(filter, most, x, |motion, t, dt, x| {

@@ -1,4 +1,4 @@
-//! The truth: the linear model itself, or direction cosines.
+//! Truth of a run: the linear model itself, or direction cosines.
 
 use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::slew::{W_IE, apply, cross, rotation, rotation_vector, times, transpose};
@@ -13,14 +13,14 @@ pub(crate) use super::noise::Noise;
 use super::plan::{G_N, Plan, SegmentKind, integration_steps};
 use super::state::orthonormal;
 
-/// How far true and computed platform turn apart in `dt`, at most, by drifts of so many rad/s, in rad: g is
-/// one at most.
+/// Bound on the angle, in rad, between true and computed platform after `dt` at a drift of `drifts` rad/s; g
+/// is one at most.
 pub(super) fn drift_turn(drifts: f64, dt: f64) -> f64 {
     (drifts + W_IE) * dt.abs()
 }
 
-/// Refuses an exact truth whose drifts take too many integration steps, and one with torquer errors in turns
-/// at once: `drifts` bounds the rate that the coefficients make, in rad/s.
+/// Checks that an exact truth needs few enough integration steps and has no torquer errors in instantaneous
+/// turns. `drifts` bounds the rate of the coefficients, in rad/s.
 ///
 /// # Errors
 /// [`SimulationError::TooManySteps`].
@@ -33,34 +33,34 @@ pub(crate) fn check_drifts(plan: &Plan, conditions: &Conditions, drifts: f64) ->
     }
     let mut turn = 0.0;
     for s in &plan.segments {
-        // the random drift of a step: six sigma of three axes
+        // random drift of a step: six sigma of three axes
         let kick = 11.0 * conditions.drift_noise.held_rad_s(s.dt) + plan.random_rate(s.dt);
         turn += drift_turn(drifts + kick, s.dt) * s.steps as f64;
     }
     integration_steps(turn).map(|_| ())
 }
 
-/// A truth that is stepped in time with the filter.
+/// Truth that is stepped in time with the filter.
 #[derive(Debug, Clone)]
 pub struct TruthModel<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
-    /// The true unknowns, psi of now.
+    /// True unknowns with the current psi, and biases.
     x: Vec<f64>,
     scratch: Vec<f64>,
     kick: Vec<f64>,
     /// Standard deviations of the components of Z.
     sigmas: Vec<f64>,
-    /// The gyros of the exact truth, for the parts of the last step.
+    /// Gyros of the exact truth, for the parts of the last step.
     gyros: Option<Gyros>,
-    /// `E = C_p^n C_n^c = exp([psi^n x])` and the segment it belongs to, for the exact truth.
+    /// Tilt `E = C_p^n C_n^c = exp([psi^n x])` of the exact truth, and its segment.
     exact: Option<(Matrix3<f64>, usize)>,
     /// Largest `|psi|` so far, in rad.
     pub largest_psi: f64,
 }
 
 impl<'a> TruthModel<'a> {
-    /// The truth that starts from the unknowns and biases `x` (shape n, SI).
+    /// Truth that starts from the unknowns and biases `x` (shape n, SI).
     pub fn new(plan: &'a Plan, conditions: &'a Conditions, x: Vec<f64>) -> Self {
         let sigmas = plan.components.iter().map(|&c| Plan::output_sigma(c, conditions)).collect();
         let mut out = Self {
@@ -78,7 +78,7 @@ impl<'a> TruthModel<'a> {
         out
     }
 
-    /// Starts again from other unknowns.
+    /// Restarts the truth from other unknowns.
     pub fn reset(&mut self, x: &[f64]) {
         self.x.copy_from_slice(x);
         self.restart();
@@ -92,7 +92,7 @@ impl<'a> TruthModel<'a> {
         self.watch(0);
     }
 
-    /// The true unknowns, psi of now, and biases.
+    /// True unknowns with the current psi, and biases.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
@@ -102,7 +102,7 @@ impl<'a> TruthModel<'a> {
         self.largest_psi = self.largest_psi.max(length);
     }
 
-    /// One step of a segment; `z` is filled for a dwell (shape m). `step` counts within the segment.
+    /// Moves by one step of a segment and fills `z` for a dwell (shape m). `step` counts within the segment.
     pub fn step(&mut self, segment: usize, step: usize, noise: &mut Noise, z: &mut [f64]) {
         interrupt::check();
         if self.exact.is_some() {
@@ -139,12 +139,12 @@ impl<'a> TruthModel<'a> {
         if plan.segments[before].position != s.position {
             e = self.repositioned(&e, before, segment);
         }
-        // the drift noise, in platform axes: held for one step, of which a slew has several
+        // drift noise in platform axes: held for one step; a slew has several such steps
         let (parts, held) = self.held(segment);
         let mut kick = [0; 3].map(|_| held * noise.normal());
         let kicked = kick.iter().map(|x| x * x).sum::<f64>().sqrt();
         let drifts = plan.drift_bound(self.coefficients());
-        // as many as have been counted before the run
+        // at most the number checked before the run
         let turn = drift_turn(drifts + kicked + plan.random_rate(s.dt), s.dt);
         let substeps = plan.substeps(segment).max(integration_steps(turn).unwrap_or(MAX_INTEGRATION));
         let of_part = substeps.div_ceil(parts);
@@ -171,8 +171,8 @@ impl<'a> TruthModel<'a> {
         for (k, &column) in block.columns[..3].iter().enumerate() {
             self.x[column] = (0..3).map(|r| block.rows[r][k] * psi_n[r]).sum();
         }
-        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n; what the
-        // accelerometers add
+        // Z^n = C_c^n (f^p + g^c) = g^n - C_c^n g^p, with f^p = -g^p and g^p = C_n^c E^T g^n, plus the error
+        // of the accelerometers
         let seen = apply(&transpose(&e), &G_N);
         let c = plan.attitude(segment, (step + 1) as f64 * s.dt);
         let force = apply(&transpose(&c), &seen).map(|x| -x);
@@ -187,8 +187,9 @@ impl<'a> TruthModel<'a> {
         }
     }
 
-    /// How many draws of the drift noise a step of a segment has, and how large they are: as many steps as a
-    /// slew would have, each with its share of the angle that the filter allows for.
+    /// Number of draws of the drift noise within a step of a segment, and their standard deviation in rad/s:
+    /// a slew has as many draws as a position of its duration has steps, each with its share of the angle
+    /// that the filter assumes.
     fn held(&self, segment: usize) -> (usize, f64) {
         let s = &self.plan.segments[segment];
         if !matches!(s.kind, SegmentKind::Slew(_)) {
@@ -199,13 +200,13 @@ impl<'a> TruthModel<'a> {
         (parts as usize, self.conditions.drift_noise.held_rad_s(dt) * (dt * parts / s.dt).sqrt())
     }
 
-    /// E after an instantaneous change of position, or the same before a slew.
+    /// Tilt E after an instantaneous change of position, or the unchanged one before a slew.
     fn repositioned(&self, e: &Matrix3<f64>, before: usize, segment: usize) -> Matrix3<f64> {
         let plan = self.plan;
         match plan.platform.scheme().carry {
-            // the platform turns by what is commanded, in its own axes
+            // the platform turns by the commanded angle, in its own axes
             Carry::Inertial => *e,
-            // C_c^p goes on
+            // C_c^p continues
             Carry::Platform => {
                 let (old, new) = (plan.segments[before].position, plan.segments[segment].position);
                 let turn = times(&plan.attitudes[new], &transpose(&plan.ends[old]));
@@ -215,7 +216,7 @@ impl<'a> TruthModel<'a> {
         }
     }
 
-    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n: the platform turns at the
+    /// One step of `E' = [(E omega_ie + eps + kick - omega_ie) x] E` in n. The platform turns at the
     /// commanded rate in its own axes, plus its drift; the commanded rate itself drops out.
     fn runge_kutta(&self, segment: usize, t: f64, h: f64, e: &Matrix3<f64>, kick: &[f64; 3]) -> Matrix3<f64> {
         let earth = self.plan.earth_rate();
@@ -238,13 +239,13 @@ impl<'a> TruthModel<'a> {
         orthonormal(&next)
     }
 
-    /// `eps^n = C_p^n E(g^p) D` at the true attitude; torquers have the rate that is commanded.
+    /// Drift `eps^n = C_p^n E(g^p) D` at the true attitude; torquers have the commanded rate.
     fn drift_n(&self, c: &Matrix3<f64>, rate: impl FnOnce() -> [f64; 3]) -> [f64; 3] {
         let rows = self.plan.platform.errors().drift_rows(&Float, c, rate);
         std::array::from_fn(|r| rows[r].iter().zip(self.coefficients()).map(|(a, d)| a * d).sum())
     }
 
-    /// The true coefficients.
+    /// True coefficients.
     fn coefficients(&self) -> &[f64] {
         let n = self.plan.unknowns();
         &self.x[n - self.plan.platform.coefficients()..n]

@@ -26,11 +26,10 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// The figures that decide it, for a run from the true states `start` in which `|psi|` reached `psi`
-    /// (rad).
+    /// Validity of a run from the true states `start`, in which `|psi|` reached `psi` (rad).
     ///
     /// # Errors
-    /// [`SimulationError::UnknownName`] for a requirement on what the scheme does not have.
+    /// [`SimulationError::UnknownName`] for a requirement on an unknown that the scheme does not have.
     pub fn of(
         plan: &Plan,
         conditions: &Conditions,

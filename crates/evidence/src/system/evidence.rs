@@ -1,4 +1,5 @@
-//! Exact verdicts on any system against the information of its samples, linearised along the true run.
+//! Comparison of the exact verdicts on any system with the information of its samples, linearised along the
+//! true run.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::{Status, Verdict};
@@ -13,31 +14,31 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::numeric::{FilterState, Numeric};
-use super::run::{RunError, Setup};
+use super::run::{RunError, RunNumbers};
 use crate::crosscheck::answer::{Agreement, Check, Count, Counts, Measured};
 use crate::crosscheck::rules::{self, SLOPE_TOLERANCE};
 
 /// Name and version of the JSON layout.
 pub(crate) const SCHEMA: &str = "obsdeg.system-evidence/1";
-/// Samples of a horizon.
+/// Number of samples of a segment within a horizon.
 const SAMPLES: usize = 60;
-/// Runge-Kutta steps between two samples.
+/// Number of Runge-Kutta steps between two samples.
 const SUBSTEPS: usize = 2;
-/// The prior of the inflation, as a multiple of that of the file; then ten times as loose.
+/// Factor on the prior of the file for the inflation; the second prior is ten times as loose.
 const DIFFUSE: f64 = 1e3;
-/// A horizon is this much shorter than the one before.
+/// Ratio of two consecutive horizons.
 const SHORTER: f64 = 1.5;
-/// Horizons that are tried.
+/// Number of horizons that are tried.
 const HORIZONS: i32 = 45;
-/// Singular values (columns of unit length) above this are seen, below the next are not.
+/// Relative singular values (columns of unit length): above the first a direction is observable, below the
+/// second it is not.
 const SEEN: f64 = 1e-9;
 const UNSEEN: f64 = 1e-12;
-/// What moves no output by more than this part of the outputs themselves, over the width of its prior, is
-/// rounding.
+/// Relative effect on the outputs, over the width of the prior, below which an unknown counts as rounding.
 const ROUNDING: f64 = 1e-13;
-/// Where samples leave more than this part of the diffuse prior, its inflation says nothing.
+/// Ratio of sigma to the diffuse prior above which the inflation is not resolvable.
 const LEFT: f64 = 0.01;
-/// How many slopes in a row must settle, and how much rounding changes them.
+/// Number of consecutive slopes that must settle, and the change of a slope that rounding may cause.
 const SETTLED: usize = 4;
 const JITTER: f64 = 0.005;
 
@@ -110,10 +111,10 @@ pub struct SymmetryEvidence {
     pub seen: Check,
 }
 
-/// The rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start,
-/// and those of the constraints, each of which weighs as much as the best sample; and the size of all
-/// outputs, over their noise.
-fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
+/// Rows of all samples until `horizon` of every experiment, as derivatives by the unknowns at the start, and
+/// rows of the constraints, each weighted like the best sample. The second value is the size of all outputs,
+/// over their noise.
+fn rows(setup: &RunNumbers<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError> {
     let numeric = &setup.numeric;
     let n = numeric.states.len();
     let segments = numeric.segments();
@@ -173,8 +174,7 @@ fn rows(setup: &Setup<'_>, horizon: f64) -> Result<(DMatrix<f64>, f64), RunError
     }
 }
 
-/// Rows for unknowns only (states whose start is known have none), with columns of unit length:
-/// `(rows, lengths)`.
+/// Rows for unknowns only (states of known start have none), with columns of unit length: `(rows, lengths)`.
 fn scaled(rows: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, Vec<f64>) {
     let picked = rows.select_columns(columns);
     let norms: Vec<f64> =
@@ -183,8 +183,8 @@ fn scaled(rows: &DMatrix<f64>, columns: &[usize]) -> (DMatrix<f64>, Vec<f64>) {
     (m, norms)
 }
 
-/// Sigma of every unknown from what is seen: `sum (V_ij / s_j)^2` over the first `rank` singular values;
-/// `None` when rounding and what is seen cannot be told apart.
+/// Sigma of every unknown from the observable directions: `sum (V_ij / s_j)^2` over the first `rank` singular
+/// values. `None` when these cannot be separated from rounding.
 fn sigmas(rows: &DMatrix<f64>, columns: &[usize], rank: usize) -> Result<Option<Vec<f64>>, EkfError> {
     let (m, norms) = scaled(rows, columns);
     let square = m.qr().r();
@@ -200,7 +200,7 @@ fn sigmas(rows: &DMatrix<f64>, columns: &[usize], rank: usize) -> Result<Option<
     Ok(Some((0..columns.len()).map(of).collect()))
 }
 
-/// The place of an unknown of the exact verdict among the states of the filter.
+/// Index of an unknown of the exact verdict among the states of the filter.
 fn place(numeric: &Numeric<'_>, u: &Unknown) -> Option<usize> {
     let experiment = u.experiment.unwrap_or(0);
     let state = match u.role {
@@ -212,7 +212,7 @@ fn place(numeric: &Numeric<'_>, u: &Unknown) -> Option<usize> {
     numeric.states.iter().position(|s| *s == state)
 }
 
-/// Holds the exact verdicts on a model against the information of its samples.
+/// Compares the exact verdicts on a model with the information of its samples.
 ///
 /// # Errors
 /// [`RunError`].
@@ -220,7 +220,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let found = symmetries(model, &compiled, &judged, seed)?;
-    let setup = Setup::new(model, &compiled)?;
+    let setup = RunNumbers::new(model, &compiled)?;
     let unknowns = &judged.layout.unknowns;
     let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
     if columns.len() != unknowns.len() {
@@ -236,10 +236,11 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     for (&c, _) in columns.iter().zip(&rounded).filter(|(_, rounded)| **rounded) {
         whole.column_mut(c).fill(0.0);
     }
-    // beyond the bound a derivative may see what no verdict speaks of
+    // a derivative beyond the bound may determine an unknown that no verdict covers
     let open = judged.rests_on_bound;
     let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
-    // with jumps, dwell may see earlier what derivatives see late: slopes are those of accuracy orders then
+    // with jumps, dwell may determine early what only late derivatives do: slopes then follow the accuracy
+    // orders
     let slopes =
         if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == StateStart::Unknown) {
             slopes(&setup, &columns, rank)?
@@ -257,7 +258,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
             if inflation.fails() && (faint || status == Status::NotSeen) {
                 inflation.outcome = Agreement::NotResolvable;
             }
-            // of what has no degree nothing is measured that could be learnt
+            // without a degree no slope is expected
             let measured = slopes[c].filter(|_| degree.is_some());
             SystemQuantityEvidence {
                 name: u.name.clone(),
@@ -274,14 +275,14 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let vanish = |limit: f64| values.iter().filter(|s| **s <= limit * largest).count();
     let (hidden, unseen) = (vanish(UNSEEN), vanish(SEEN));
     let mut defect = rules::defect(unknowns.len() - rank, &values, SEEN);
-    // observable, and too little of it to be told from rounding
+    // number of observable unknowns too weak to be separated from rounding
     let faint = (0..columns.len()).filter(|&c| rounded[c] && quantities[c].degree.is_some()).count();
     if (hidden.saturating_sub(faint)..=unseen).contains(&defect.predicted)
         && defect.predicted != defect.measured
     {
         defect.outcome = Agreement::NotResolvable;
     }
-    // at values at which an observable unknown is not seen, a direction more vanishes
+    // at values that hide an observable unknown, one more direction vanishes
     let blurred =
         quantities.iter().any(|q| q.degree.is_some() && q.inflation.outcome == Agreement::NotResolvable);
     if defect.measured > defect.predicted && blurred {
@@ -302,7 +303,7 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
                 *x *= norm;
             }
             let seen = (&m * &v).norm() / (v.norm() * largest);
-            // the derivatives are integrated by Runge-Kutta: what a symmetry leaves alone, its error does not
+            // the derivatives are integrated by Runge-Kutta, whose error respects a symmetry
             let mut seen = Check::new(0.0, Some(seen), |x| x <= 1e-6);
             if open && seen.fails() {
                 seen.outcome = Agreement::NotResolvable;
@@ -338,7 +339,7 @@ fn quotient((p, q): (i64, i64)) -> f64 {
     p as f64 / q as f64
 }
 
-/// A symmetry at the truth.
+/// Direction of a symmetry at the truth.
 fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f64> {
     let mut v = DVector::zeros(columns.len());
     for &(c, k) in &s.scaling {
@@ -350,8 +351,8 @@ fn direction(s: &Symmetry, truth: &DVector<f64>, columns: &[usize]) -> DVector<f
     v
 }
 
-/// A direction that is polynomial in unknowns and known constants, at the truth.
-fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[usize]) -> DVector<f64> {
+/// Direction that is polynomial in unknowns and known constants, at the truth.
+fn polynomial_direction(d: &PolynomialDirection, setup: &RunNumbers<'_>, columns: &[usize]) -> DVector<f64> {
     let mut v = DVector::zeros(columns.len());
     let factor = |&j: &usize| match columns.get(j) {
         Some(&state) => setup.truth[state],
@@ -363,9 +364,13 @@ fn polynomial_direction(d: &PolynomialDirection, setup: &Setup<'_>, columns: &[u
     v
 }
 
-/// The factor on sigma of every unknown at the start when a diffuse prior is ten times as loose, and the part
-/// of the first that is left.
-fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Result<Vec<(f64, f64)>, EkfError> {
+/// Factors by unknown: on its sigma at the start when a diffuse prior is ten times as loose, and sigma over
+/// the first prior.
+fn inflation(
+    setup: &RunNumbers<'_>,
+    rows: &DMatrix<f64>,
+    columns: &[usize],
+) -> Result<Vec<(f64, f64)>, EkfError> {
     let picked = rows.select_columns(columns);
     let sigmas = |factor: f64| {
         let prior: Vec<f64> = columns.iter().map(|&c| setup.prior[c] * factor).collect();
@@ -378,8 +383,8 @@ fn inflation(setup: &Setup<'_>, rows: &DMatrix<f64>, columns: &[usize]) -> Resul
     Ok(large.iter().zip(&small).zip(prior).map(|((l, s), prior)| (l / s, s / prior)).collect())
 }
 
-/// What slopes at shorter and shorter horizons settle at: the last one, if the last of them change little and
-/// less and less. Two that agree are no sign of it: slopes that go up and down meet.
+/// Limit of the slopes at shorter and shorter horizons: the last one, if the last of them change little and
+/// less and less. Two equal slopes are not enough, since rising and falling slopes may cross.
 fn settled(slopes: &[f64]) -> Option<f64> {
     let last = slopes.last_chunk::<SETTLED>()?;
     let changes: Vec<f64> = last.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
@@ -389,9 +394,9 @@ fn settled(slopes: &[f64]) -> Option<f64> {
     (less && little).then_some(last[SETTLED - 1])
 }
 
-/// The slope of every unknown at the shortest horizon at which rounding is out of sight, where those before
-/// it settle there.
-fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
+/// Slope of every unknown at the shortest horizon without visible rounding; `None` where the slopes before it
+/// do not settle.
+fn slopes(setup: &RunNumbers<'_>, columns: &[usize], rank: usize) -> Result<Vec<Option<f64>>, RunError> {
     let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
     for j in 0..HORIZONS {
         let horizon = setup.duration * SHORTER.powi(-j);
@@ -404,7 +409,7 @@ fn slopes(setup: &Setup<'_>, columns: &[usize], rank: usize) -> Result<Vec<Optio
     }
     let slope = |c: usize, k: usize| {
         let ((t1, s1), (t2, s2)) = (&seen[k], &seen[k + 1]);
-        // the number of samples stays; at a fixed density it would grow with the horizon
+        // the number of samples is constant; at a fixed density it would grow with the horizon
         (s1[c] / s2[c]).ln() / (t1 / t2).ln() - 0.5
     };
     Ok((0..columns.len())
@@ -420,7 +425,7 @@ mod tests {
     fn what_settles() {
         assert_eq!(settled(&[-4.0, -4.351, -4.403, -4.436, -4.458]), Some(-4.458));
         assert_eq!(settled(&[-0.5; 4]), Some(-0.5));
-        // too few; two that meet by chance; a drift at a steady pace; growing changes; rounding
+        // too few; two that agree by chance; a drift at a steady pace; growing changes; rounding
         for open in [
             &[-0.5; 3][..],
             &[-7.2, -1.6, -1.25, -1.27],

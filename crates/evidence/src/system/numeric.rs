@@ -1,4 +1,4 @@
-//! The same graph in floating point: right-hand sides, outputs and their Jacobians, for a filter.
+//! Graph of a model in floating point: right-hand sides, outputs and their Jacobians, for a filter.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Measurement, Process};
@@ -6,54 +6,54 @@ use obsdeg_ekf::{Measurement, Process};
 use obsdeg_core::language::{Expression, evaluate_f64};
 use obsdeg_core::system::{Compiled, KnownInput, ModelError, Named, Op, Role, SystemModel};
 
-/// A state of the filter; what belongs to an experiment says to which.
+/// State of the filter, with the experiment that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "said above")]
 pub enum FilterState {
     /// State i of the model.
     State { experiment: usize, i: usize },
-    /// Parameter i.
+    /// Parameter i of the model.
     Parameter(usize),
-    /// A derivative of unknown input i.
+    /// Derivative of unknown input i.
     Input { experiment: usize, i: usize, derivative: usize },
 }
 
-/// A model with numbers for what is known: states of the filter are the states of the model and the
-/// derivatives of its unknown inputs, of every experiment, and its parameters. The parts of its timeline are
-/// the segments of the first experiment, then those of the next.
+/// Model with numbers for all known quantities. The states of the filter are the states of the model and the
+/// derivatives of its unknown inputs, by experiment, and its parameters. The parts of its timeline are the
+/// segments of the first experiment, then those of the next.
 #[derive(Debug, Clone)]
 pub struct Numeric<'a> {
     compiled: &'a Compiled,
-    /// The states of the filter.
+    /// States of the filter.
     pub states: Vec<FilterState>,
-    /// Their names.
+    /// Names of the states.
     pub names: Vec<String>,
-    /// Known inputs as functions of time, of every experiment.
+    /// Known inputs as functions of time, by experiment.
     inputs: Vec<Vec<Option<Expression>>>,
-    /// Known constants, of every part.
+    /// Known constants, by part.
     constants: Vec<Vec<f64>>,
-    /// Known inputs that are held at a value, whatever the time.
+    /// Known inputs with held values, whatever the time.
     held: Vec<Option<f64>>,
     /// Time of the model at which a run begins.
     origin: f64,
-    /// The state of the filter that a slot is, of every experiment.
+    /// Index of the filter state of each slot, by experiment.
     columns: Vec<Vec<Option<usize>>>,
 }
 
 impl<'a> Numeric<'a> {
-    /// Numbers for `model`: known inputs that are generic as functions of `t`, generic constants as numbers,
-    /// from `[simulation]`.
+    /// Numbers for `model`: generic known inputs as functions of `t` and generic constants as numbers, from
+    /// `[simulation]`.
     ///
     /// # Errors
-    /// [`ModelError`] naming what has no number, and for arbitrary unknown inputs.
+    /// [`ModelError`] for a quantity without a number, and for arbitrary unknown inputs.
     pub fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
         Self::with_inputs(model, compiled, &[])
     }
 
-    /// The same with known inputs that [`Self::hold`] gives values: `given` are their indices.
+    /// Numbers for `model`, whose known inputs with the indices `given` get values by [`Self::hold`].
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// See [`Self::new`].
     pub fn with_inputs(
         model: &SystemModel,
         compiled: &'a Compiled,
@@ -111,22 +111,22 @@ impl<'a> Numeric<'a> {
         self.held[input] = Some(value);
     }
 
-    /// A known constant in the first segment.
+    /// Value of a known constant in the first segment.
     pub fn constant(&self, k: usize) -> f64 {
         self.constants[0][k]
     }
 
-    /// The number of experiments.
+    /// Number of experiments.
     pub fn experiments(&self) -> usize {
         self.columns.len()
     }
 
-    /// The number of segments of an experiment.
+    /// Number of segments of an experiment.
     pub fn segments(&self) -> usize {
         self.constants.len() / self.experiments()
     }
 
-    /// The values of all nodes at a time of a part.
+    /// Values of all nodes at a time of a part.
     fn values(&self, part: usize, t: f64, x: &[f64]) -> Vec<f64> {
         let t = t + self.origin;
         let dag = &self.compiled.dag;
@@ -159,7 +159,7 @@ impl<'a> Numeric<'a> {
         values
     }
 
-    /// The derivatives of all nodes by the states of the filter, node by node, from their values in a part.
+    /// Derivatives of all nodes by the states of the filter, node by node, from their values in a part.
     fn duals(&self, part: usize, values: &[f64]) -> Vec<f64> {
         let dag = &self.compiled.dag;
         let n = self.states.len();
@@ -169,7 +169,7 @@ impl<'a> Numeric<'a> {
             let (before, rest) = duals.split_at_mut(i * n);
             let row = &mut rest[..n];
             let mut add = |a: usize, factor: f64| {
-                // what depends on nothing has no derivative, where that of its function is infinite too
+                // a constant argument has no derivative, even where that of its function is infinite
                 let others = before[a * n..(a + 1) * n].iter().filter(|_| factor != 0.0);
                 for (x, y) in row.iter_mut().zip(others).filter(|(_, y)| **y != 0.0) {
                     *x += factor * y;
@@ -204,17 +204,17 @@ impl<'a> Numeric<'a> {
         duals
     }
 
-    /// The rates of a part as a process without noise.
+    /// Rates of a part as a process without noise.
     pub fn process(&self, part: usize) -> SystemProcess<'_> {
         SystemProcess { numeric: self, part }
     }
 
-    /// The outputs with the standard deviations of their noise.
+    /// Outputs of a part with the standard deviations of their noise.
     pub fn measurement<'b>(&'b self, part: usize, sigmas: &'b [f64]) -> SystemMeasurement<'b> {
         SystemMeasurement { numeric: self, part, sigmas }
     }
 
-    /// The states behind the jump into a part, and their derivatives by those before.
+    /// States after the jump into a part, and their derivatives by those before.
     pub fn carry(&self, part: usize, t: f64, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.states.len();
         let (mut after, mut jacobian) = (x.clone(), DMatrix::identity(n, n));
@@ -233,7 +233,7 @@ impl<'a> Numeric<'a> {
         (after, jacobian)
     }
 
-    /// The starts of states that are given by formulas, from the other values.
+    /// Sets the starts of states that are given by formulas, from the other values.
     pub fn set_known_starts(&self, x: &mut DVector<f64>) {
         for experiment in 0..self.experiments() {
             let values = self.values(experiment * self.segments(), 0.0, x.as_slice());
@@ -246,8 +246,8 @@ impl<'a> Numeric<'a> {
         }
     }
 
-    /// The values of the combinations that the model asks for, of the unknowns at the start of the first
-    /// experiment, and their derivatives by the states of the filter, a row each.
+    /// Values of the requested combinations, of the unknowns at the start of the first experiment, and their
+    /// derivatives by the states of the filter, one row each.
     pub fn combinations(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
         let (nodes, n) = (&self.compiled.combinations, self.states.len());
         let values = self.values(0, 0.0, x.as_slice());
@@ -256,8 +256,8 @@ impl<'a> Numeric<'a> {
         (nodes.iter().map(|&node| values[node]).collect(), rows)
     }
 
-    /// The values of the constraints at the start of every experiment, which should be zero, and their
-    /// derivatives by the states of the filter, a row each.
+    /// Values of the constraints at the start of every experiment, which should be zero, and their
+    /// derivatives by the states of the filter, one row each.
     pub fn constraints(&self, x: &DVector<f64>) -> (Vec<f64>, DMatrix<f64>) {
         let nodes = &self.compiled.constraints;
         let n = self.states.len();
@@ -277,8 +277,7 @@ impl<'a> Numeric<'a> {
     }
 }
 
-/// The known inputs of an experiment as functions of time; `None` for those whose value is a node of the
-/// graph.
+/// Known inputs of an experiment as functions of time; `None` for those whose value is a node of the graph.
 fn inputs_of(
     model: &SystemModel,
     experiment: usize,
@@ -301,7 +300,7 @@ fn inputs_of(
     model.known_inputs.iter().enumerate().map(of).collect()
 }
 
-/// The known constants of every segment of an experiment.
+/// Known constants of every segment of an experiment.
 fn constants_of(model: &SystemModel, experiment: usize) -> Result<Vec<Vec<f64>>, ModelError> {
     let place = |name: &str| model.constants.iter().position(|c| c.0.name == name);
     let mut whole: Vec<f64> = Vec::new();
@@ -335,7 +334,7 @@ fn constants_of(model: &SystemModel, experiment: usize) -> Result<Vec<Vec<f64>>,
     Ok(out)
 }
 
-/// The dynamics of a part: parameters and what belongs to other experiments stay, the derivatives of an
+/// Dynamics of a part: parameters and states of other experiments are constant, and the derivatives of an
 /// unknown input integrate each other.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemProcess<'a> {
@@ -344,7 +343,7 @@ pub struct SystemProcess<'a> {
 }
 
 impl SystemProcess<'_> {
-    /// The rows of states of this experiment, with the nodes of their rates.
+    /// Rows of the states of this experiment, with the nodes of their rates.
     fn moving(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let own = self.part / self.numeric.segments();
         let rates = self.numeric.compiled.rates(own);
@@ -354,8 +353,8 @@ impl SystemProcess<'_> {
         })
     }
 
-    /// The filter states that are derivatives of an unknown input of this experiment, with the place of the
-    /// next derivative.
+    /// Filter states that are derivatives of an unknown input of this experiment, with the index of the next
+    /// derivative.
     fn chained(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let states = &self.numeric.states;
         let own = self.part / self.numeric.segments();
@@ -406,7 +405,7 @@ impl Process for SystemProcess<'_> {
     }
 }
 
-/// The outputs of a part.
+/// Outputs of a part.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemMeasurement<'a> {
     numeric: &'a Numeric<'a>,

@@ -1,4 +1,4 @@
-//! One run of the extended Kalman filter on any system, against a truth from the same equations.
+//! Run of the extended Kalman filter on any system, against a truth from the same equations.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
@@ -23,19 +23,20 @@ use crate::simulation::truth::Noise;
 pub(crate) const SCHEMA: &str = "obsdeg.system-run/1";
 /// Most samples of a run.
 const MAX_SAMPLES: f64 = 1e6;
-/// Runge-Kutta steps between two samples.
+/// Number of Runge-Kutta steps between two samples.
 const SUBSTEPS: usize = 4;
-/// The standard deviation of a known start, as a part of its value (of 1 for zero): a covariance needs one.
+/// Standard deviation of a known start, relative to its value (absolute for zero): a covariance needs one.
 const KNOWN: f64 = 1e-9;
 
-/// How far true values may miss a constraint, as a part of the terms in it.
+/// Largest violation of a constraint by true values, relative to its terms.
 const HELD: f64 = 1e-9;
-/// What is left of a standard deviation where a constraint leaves nothing: a factorisation needs some.
+/// Relative standard deviation along a direction that constraints determine: a factorisation needs a positive
+/// one.
 const SINGULAR: f64 = 1e-7;
-/// Draws from the prior for what is left of a constraint beyond its differential.
+/// Number of draws from the prior for the uncertainty of a constraint beyond its differential.
 const DRAWS: usize = 64;
-/// What a run linearised at its estimates says of a direction below this part of the unknowns' sigmas is less
-/// than what linearising and rounding leave there.
+/// Relative sigma of a direction, by the unknowns' sigmas, below which errors of linearisation and rounding
+/// dominate a run linearised at its estimates.
 const RESOLUTION: f64 = 1e-6;
 
 /// Simulated run of a system with an extended Kalman filter.
@@ -96,32 +97,32 @@ pub struct SystemEstimate {
 }
 
 impl SystemEstimate {
-    /// True if the exact verdict is that the outputs determine it; false also where no order up to the bound
-    /// does.
+    /// True if by the exact verdict the outputs determine the quantity; false also where no order up to the
+    /// bound does.
     pub fn is_determined(&self) -> bool {
         is_determined(self.status)
     }
 }
 
-/// A start that is known is no unknown.
+/// True for a known start too, which is no unknown.
 fn is_determined(status: Option<Status>) -> bool {
     status.is_none_or(|s| s == Status::Observable)
 }
 
-/// Why there is no run.
+/// Reason why there is no run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RunError {
-    /// The model.
+    /// Error of the model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The filter met a number that is none.
+    /// The filter met a number that is not finite.
     #[error("the filter stopped after {time} of {duration}: {error}")]
     Filter {
-        /// How far it came.
+        /// Time that the filter reached.
         time: f64,
-        /// How far it should have come.
+        /// Duration of the run.
         duration: f64,
-        /// Why it stopped.
+        /// Error of the filter.
         error: EkfError,
     },
 }
@@ -159,7 +160,8 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
         }
         if rows.row(k).iter().all(|g| *g == 0.0) {
             let text = &model.constraints[k % model.constraints.len()].text;
-            let message = "its gradient vanishes at the values under [simulation.values], so that a filter cannot hold it; \
+            let message = "its gradient vanishes at the values under [simulation.values], so that a filter \
+                cannot hold it; \
                            expected values at which it does not";
             return Err(missing(&format!("the constraint {text}"), message));
         }
@@ -174,20 +176,20 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     Ok((truth, sigmas))
 }
 
-/// Everything that a run needs, in numbers.
+/// Numbers of a run.
 #[derive(Debug, Clone)]
-pub(super) struct Setup<'a> {
+pub(super) struct RunNumbers<'a> {
     pub(super) numeric: Numeric<'a>,
-    /// The true states of the filter at the start, and the standard deviations of their first estimates.
+    /// True states of the filter at the start, and the standard deviations of their first estimates.
     pub(super) truth: DVector<f64>,
     pub(super) prior: Vec<f64>,
-    /// Of the noise of every output.
+    /// Standard deviations of the noise, by output.
     pub(super) sigmas: Vec<f64>,
     pub(super) duration: f64,
     pub(super) step: f64,
 }
 
-impl<'a> Setup<'a> {
+impl<'a> RunNumbers<'a> {
     pub(super) fn new(model: &SystemModel, compiled: &'a Compiled) -> Result<Self, ModelError> {
         let numeric = Numeric::new(model, compiled)?;
         let nominal = &model.simulation;
@@ -204,8 +206,8 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// An initial error drawn from the prior given that the constraints hold, and its covariance. A constraint is
-/// bent: what is left of it along its tangent space, as draws show, is its uncertainty.
+/// Initial error drawn from the prior under the constraints, and its covariance. Constraints are nonlinear:
+/// their residuals along the tangent space, found by draws, are their uncertainties.
 fn initial_error(
     numeric: &Numeric<'_>,
     truth: &DVector<f64>,
@@ -215,14 +217,14 @@ fn initial_error(
     let n = truth.len();
     let diagonal = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
     let (residuals, rows) = numeric.constraints(truth);
-    // each constraint in turn: its gain, with uncertainties `r` of all of them
+    // gains of the constraints, one after the other, with the uncertainties `r`
     let condition = |r: &[f64]| {
         let (mut p, mut gains) = (diagonal.clone(), Vec::new());
         for (k, r) in r.iter().enumerate() {
             let g = rows.row(k).transpose();
             let pg = &p * &g;
             let s = g.dot(&pg) + r;
-            // one that repeats another leaves nothing to be known
+            // a redundant constraint determines nothing more
             if s > KNOWN * KNOWN * g.component_mul(&g).dot(&diagonal.diagonal()) {
                 p -= &pg * pg.transpose() / s;
                 gains.push((&pg / s, g));
@@ -254,8 +256,8 @@ fn initial_error(
     (draw(&gains, noise), p)
 }
 
-/// Directions in which the unknowns are free where constraints hold them, to first order: carried on with the
-/// motion, in units of the priors.
+/// Directions in which constraints leave the unknowns free, to first order; they move with the states, in
+/// units of the priors.
 struct Tangent {
     /// Orthonormal columns, n x k.
     basis: DMatrix<f64>,
@@ -263,7 +265,7 @@ struct Tangent {
 }
 
 impl Tangent {
-    /// At the start; `None` for a model without constraints.
+    /// Tangent space at the start; `None` for a model without constraints.
     fn new(numeric: &Numeric<'_>, truth: &DVector<f64>, prior: &[f64]) -> Option<Self> {
         let (_, rows) = numeric.constraints(truth);
         let prior = DVector::from_column_slice(prior);
@@ -271,7 +273,7 @@ impl Tangent {
         for row in rows.row_iter() {
             let row = row.transpose().component_mul(&prior);
             let free = basis.transpose() * &row;
-            // one that repeats another holds nothing more
+            // a redundant constraint removes no direction
             if free.norm() > KNOWN * row.norm() {
                 basis = complement(&basis, &free);
             }
@@ -279,21 +281,21 @@ impl Tangent {
         (basis.ncols() < prior.len()).then_some(Self { basis, prior })
     }
 
-    /// Behind a motion with these derivatives.
+    /// Moves the directions by a transition with the derivatives `phi`.
     fn carry(&mut self, phi: &DMatrix<f64>) {
         let n = self.prior.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| phi[(i, j)] * self.prior[j] / self.prior[i]);
         self.basis = (scaled * &self.basis).qr().q();
     }
 
-    /// The columns by which an error in the units of the filter is read along the free directions.
+    /// Columns that project an error in the units of the filter onto the free directions.
     fn columns(&self) -> DMatrix<f64> {
         DMatrix::from_fn(self.prior.len(), self.basis.ncols(), |i, j| self.basis[(i, j)] / self.prior[i])
     }
 }
 
-/// Orthonormal columns of the span of `basis` that are orthogonal to `basis * direction`: a reflection that
-/// turns the direction into the first axis, without that axis.
+/// Orthonormal columns of the span of `basis` that are orthogonal to `basis * direction`: a reflection turns
+/// the direction into the first axis, which is left out.
 fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     let mut v = direction / direction.norm();
     v[0] += v[0].signum();
@@ -303,14 +305,14 @@ fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
 }
 
 /// Runs the filter of `model`: the truth starts at the values of its file, the estimate at an error drawn
-/// from the prior, random numbers come from `seed`.
+/// from the prior, and `seed` sets the random numbers.
 ///
 /// # Errors
 /// [`RunError`].
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
-    let Setup { numeric, mut truth, prior, sigmas, duration, step } = Setup::new(model, &compiled)?;
+    let RunNumbers { numeric, mut truth, prior, sigmas, duration, step } = RunNumbers::new(model, &compiled)?;
     let segments = numeric.segments();
     let parts = segments * numeric.experiments();
     let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
@@ -347,7 +349,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
     record(0.0, 0, &truth, &filter);
     let mut whitened = Vec::new();
     for part in 0..parts {
-        // the time of an experiment is its own
+        // every experiment has its own time
         let begin = (part % segments) as f64 * samples * dt;
         let before = (part / segments) as f64 * duration;
         let (behind, _) = numeric.carry(part, begin, &truth);
@@ -437,7 +439,7 @@ fn estimates(
         let error_over_sigma = if error == 0.0 { 0.0 } else { error / sigma };
         let size = series.truth.first().map_or(1.0, |x| if *x == 0.0 { 1.0 } else { x.abs() });
         let status = verdict.map(|v| v.status);
-        // what no derivative up to the bound shows a run may show
+        // a run may determine a quantity that no derivative up to the bound does
         let determined = is_determined(status) || status == Some(Status::NotSeen);
         SystemEstimate {
             name: name.clone(),
@@ -454,7 +456,7 @@ fn estimates(
                 determined,
                 FilterKind::Linear,
                 error_over_sigma,
-                // a start that is known, or that constraints hold, is no prior of the end
+                // a known start, or a constrained one, is no prior of the end
                 [if prior_sigma <= 100.0 * KNOWN * size { f64::INFINITY } else { prior_sigma }, sigma],
                 None,
             ),

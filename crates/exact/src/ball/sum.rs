@@ -1,12 +1,13 @@
-//! Sums of products of balls, rounded once.
+//! Sums of products of balls, rounded once at the end.
 
 use super::{Ball, FAR, SLACK, exact_tail, power, product, shifted_right, subtract_from};
 
-/// `sum a_i b_i` over balls: digits in two's complement above one last place, that of the largest term so
-/// far.
+/// Sum `sum a_i b_i` over balls: digits in two's complement above one last place, that of the largest
+/// term so far.
 ///
-/// Terms are neither normalised nor rounded one by one, which is most of what a sum of balls costs. The
-/// result holds what [`Ball::mul`] and [`Ball::add`] would have to hold.
+/// Terms are neither normalised nor rounded one by one, which is most of the cost of a sum of balls.
+/// The result contains every number that single operations by [`Ball::mul`] and [`Ball::add`] must
+/// contain.
 ///
 /// ```
 /// use obsdeg_exact::{Ball, BallSum};
@@ -20,13 +21,13 @@ use super::{Ball, FAR, SLACK, exact_tail, power, product, shifted_right, subtrac
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BallSum<const N: usize> {
-    /// Every term is below `2^top`; a unit of the last place is `2^(top - 64 N)`.
+    /// Exponent: every term is below `2^top`; a unit of the last place is `2^(top - 64 N)`.
     top: i64,
-    /// What is above the digits, and the sign.
+    /// Digits above `2^top`, and the sign.
     head: i64,
-    /// Least limb first.
+    /// Limbs, least first.
     digits: [u64; N],
-    /// In units of the last place.
+    /// Error in units of the last place.
     error: f64,
 }
 
@@ -43,13 +44,13 @@ impl<const N: usize> BallSum<N> {
             }
             return;
         }
-        // a power of two, one above all
+        // a power of two, above all one
         if x.mantissa[N - 1] == 1 << 63 && x.error == 0.0 && x.mantissa[..N - 1].iter().all(|d| *d == 0) {
             let (negative, exponent) = (x.negative != y.negative, x.exponent + y.exponent - 1);
             return self.add_digits(negative, exponent, &y.mantissa, y.error);
         }
         let exponent = x.exponent + y.exponent;
-        // the error of one, as a part of 2^exponent, times that of the other: in parts that doubles hold
+        // the product of both errors, as fractions of 2^exponent, in factors that doubles can hold
         let part = power(-Ball::<N>::BITS / 4);
         let both = ((x.error * part) * (y.error * part)) * part * part;
         let error = x.fraction() * y.error + y.fraction() * x.error + both;
@@ -57,7 +58,7 @@ impl<const N: usize> BallSum<N> {
             return self.widen(x.bound_log2() + y.bound_log2());
         }
         let (digits, next) = product(&x.mantissa, &y.mantissa);
-        // what lies below the last place, and what the product left out there
+        // the digits below the last place, and what the product left out there
         let rounded = if error == 0.0 && next == 0 { exact_tail(&x.mantissa, &y.mantissa) } else { 2.0 };
         self.add_digits(x.negative != y.negative, exponent, &digits, error + rounded);
     }
@@ -79,7 +80,7 @@ impl<const N: usize> BallSum<N> {
         }
         let apart = self.top - exponent;
         if apart >= Ball::<N>::BITS || exponent as f64 > FAR {
-            // only its size counts
+            // digits far below the last place: only their size counts
             let off = (exponent - Ball::<N>::BITS) as f64 + error.log2();
             return self.widen((exponent as f64).max(off) + 1.0);
         }
@@ -103,14 +104,14 @@ impl<const N: usize> BallSum<N> {
             return;
         }
         let place = log2.clamp(-FAR, FAR).ceil() as i64 + Ball::<N>::BITS;
-        // what lies far below the error is of no use, and doubles hold errors of so many units only
+        // digits far below the error are useless, and the error must stay in the range of doubles
         if place - self.top > 512 {
             self.rise(place);
         }
         self.error = (self.error + power(place - self.top).max(f64::MIN_POSITIVE)) * SLACK;
     }
 
-    /// Another last place, further up.
+    /// Raises the last place.
     #[cold]
     fn rise(&mut self, top: i64) {
         let apart = top - self.top;
@@ -137,7 +138,7 @@ impl<const N: usize> BallSum<N> {
         self.error = (self.error + f64::from(lost)) * SLACK;
     }
 
-    /// What the sum is.
+    /// The value of the sum.
     pub fn ball(&self) -> Ball<N> {
         let mut mantissa = self.digits;
         let (negative, mut head) = (self.head < 0, self.head as u64);
@@ -161,8 +162,8 @@ impl<const N: usize> BallSum<N> {
     }
 }
 
-/// Adds digits, or takes them off, that are shifted to the right by less than 64 bits; the carry of the sum,
-/// of the complement if they are taken off.
+/// Adds digits shifted to the right by less than 64 bits, or subtracts them if `negative`. Returns the
+/// carry of the sum, for a subtraction that of the complement.
 #[inline(always)]
 fn add_shifted<const N: usize>(sum: &mut [u64; N], digits: &[u64; N], bits: i64, negative: bool) -> bool {
     let (mask, mut carry) = (0u64.wrapping_sub(u64::from(negative)), negative);
@@ -187,8 +188,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
-        /// Whatever the true numbers are, the sum of their products is held, at every step, and not much
-        /// wider than by single operations.
+        /// For all true numbers, every partial sum contains the true sum, and is not much wider than by
+        /// single operations.
         #[test]
         fn sums_hold_the_true_ones(
             terms in prop::collection::vec((numbers(), numbers()), 0..6),
@@ -198,7 +199,7 @@ mod tests {
             let mut truth = BigRational::from_integer(0.into());
             let mut all: Vec<_> = terms.iter().map(|((a, x), (b, y))| (*a, *b, x * y)).collect();
             if backwards {
-                // what cancels
+                // cancelling terms
                 all.extend(all.clone().into_iter().rev().map(|(a, b, z)| (a.neg(), b, -z)));
             }
             for (a, b, z) in &all {
@@ -208,7 +209,7 @@ mod tests {
                 let ball = sum.ball();
                 prop_assert!(holds(&ball, &truth), "{ball:?} of {sum:?}");
                 prop_assert!(ball.is_zero() == holds(&ball, &BigRational::from_integer(0.into())));
-                // a unit of the largest term for every term more, at most
+                // at most a unit of the largest term for each further term
                 let largest = all.iter().map(|(a, b, _)| a.bound_log2() + b.bound_log2()).fold(f64::MIN, f64::max);
                 prop_assert!(ball.radius_log2() <= one_by_one.radius_log2().max(largest - 124.0) + 4.0);
             }

@@ -5,7 +5,7 @@ use obsdeg_core::solution::{Frame, Group, StationLabel, Term, group};
 
 use super::escape;
 
-/// Greek letters, by the names that they have in both notations.
+/// Greek letters, whose names are the same in both notations.
 pub(crate) const GREEK: [&str; 21] = [
     "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu",
     "nu", "xi", "pi", "rho", "sigma", "tau", "phi", "chi", "omega",
@@ -40,7 +40,7 @@ pub(crate) fn symbol(name: &str) -> String {
         Some(("eps", axis)) if dotted => format!("\\dot{{\\varepsilon}}_{{{axis}}}"),
         Some(("eps", axis)) => format!("\\varepsilon_{{{axis}}}"),
         Some(("D", rest)) => format!("D_{{{rest}}}"),
-        // of the axes X, Y, Z: a torquer, an accelerometer, and the error of all of them
+        // terms of the axes X, Y, Z: torquers, and misalignments of gyros and accelerometers
         Some((family @ ("GS" | "GM" | "M"), axes)) if sensors(axes) => {
             format!("\\mathit{{{family}}}_{{{axes}}}")
         }
@@ -54,7 +54,7 @@ pub(crate) fn symbol(name: &str) -> String {
             other => name_of_model(other),
         },
     };
-    // psi_x@1 is an unknown, eps_x^n@p1 a value at a station
+    // `psi_x@1` is an unknown, `eps_x^n@p1` a value at a station
     let position = match position {
         Some(p) if frame.is_empty() => format!("^{{({p})}}"),
         Some(p) => place(p),
@@ -94,8 +94,8 @@ fn name_of_model(name: &str) -> String {
     }
 }
 
-/// An expression in program notation as math: `*` becomes a thin space, every quotient a fraction, so that
-/// nothing hangs on which of two operations binds more; text as it is where it is no expression.
+/// LaTeX of an expression in program notation. `*` becomes a thin space and every quotient a fraction, so
+/// that no reader needs rules of precedence. A text that is no expression stays text.
 pub(crate) fn expression(text: &str) -> String {
     let mut reader = Reader { rest: text, depth: 0 };
     match reader.sum() {
@@ -104,10 +104,10 @@ pub(crate) fn expression(text: &str) -> String {
     }
 }
 
-/// A factor as LaTeX, and whether it is a sum in brackets.
+/// Factor as LaTeX.
 struct Factor {
     math: String,
-    /// The sum without its brackets.
+    /// The same without the brackets, if the factor is a sum in brackets.
     sum: Option<String>,
 }
 
@@ -117,7 +117,7 @@ impl Factor {
     }
 }
 
-/// Factors side by side; a sum that stands alone needs no brackets when `alone`.
+/// Factors side by side; with `alone`, a sum that is the only factor has no brackets.
 fn side_by_side(factors: &[Factor], alone: bool) -> String {
     match factors {
         [] => "1".into(),
@@ -138,14 +138,14 @@ fn side_by_side(factors: &[Factor], alone: bool) -> String {
     }
 }
 
-/// Recursive descent over an expression; `None` where there is none.
+/// Recursive descent over an expression; methods return `None` for text that is none.
 struct Reader<'a> {
     rest: &'a str,
     depth: usize,
 }
 
 impl Reader<'_> {
-    /// The next character that is no blank, without taking it.
+    /// The next character that is no blank, without consuming it.
     fn peek(&mut self) -> Option<char> {
         self.rest = self.rest.trim_start();
         self.rest.chars().next()
@@ -159,7 +159,7 @@ impl Reader<'_> {
         found
     }
 
-    /// The characters that satisfy `which`.
+    /// Consumes the characters that satisfy `which`.
     fn word(&mut self, which: impl Fn(char) -> bool) -> String {
         let end = self.rest.find(|c| !which(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
@@ -182,7 +182,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A product, and whether it is negative.
+    /// Product, and true if it is negative.
     fn product(&mut self) -> Option<(bool, String)> {
         let (mut negative, mut above, mut below) = (false, Vec::new(), Vec::new());
         let mut divides = false;
@@ -198,14 +198,14 @@ impl Reader<'_> {
                 above.push(factor)
             }
             divides = match self.peek() {
-                // ** is ^, and `power` has taken it
+                // `**` is `^`, which `power` has consumed
                 Some('*') => false,
                 Some('/') => true,
                 _ => break,
             };
             self.rest = &self.rest[1..];
         }
-        // the one of `1/x*y` is none
+        // the 1 of `1/x*y` is left out
         if above.len() > 1 {
             above.retain(|f| f.math != "1");
         }
@@ -231,7 +231,7 @@ impl Reader<'_> {
         let exponent = if minus { format!("-{exponent}") } else { exponent };
         let positive = exponent.chars().all(|c| c.is_ascii_digit());
         Some(Factor::of(match function {
-            // `f^{-1}` would be the inverse
+            // `f^{-1}` would mean the inverse function
             Some((name, argument)) if positive => format!("\\{name}^{{{exponent}}}({argument})"),
             Some(_) => format!("({})^{{{exponent}}}", base.math),
             None if base.sum.is_none() && base.math.contains(['^', '\\']) && !plain(&base.math) => {
@@ -241,7 +241,7 @@ impl Reader<'_> {
         }))
     }
 
-    /// A number, a name, a function or a bracket; of a function its command and argument too.
+    /// Number, name, function or bracket; for a function also its command and argument.
     fn primary(&mut self) -> Option<(Factor, Option<(&'static str, String)>)> {
         let c = self.peek()?;
         if c.is_ascii_digit() || c == '.' {
@@ -314,7 +314,7 @@ impl Reader<'_> {
         Some(format!("@{station}"))
     }
 
-    /// What stands in brackets.
+    /// Content of brackets.
     fn bracket(&mut self) -> Option<String> {
         self.depth += 1;
         let inside = self.depth <= MAX_DEPTH && self.take('(');
@@ -324,7 +324,7 @@ impl Reader<'_> {
     }
 }
 
-/// A derivative by time: dots above the letter, as far as there are two, then the order in brackets.
+/// Time derivative: up to two dots above the letter, then the order in brackets.
 fn dotted(math: &str, order: usize) -> String {
     let end = math.find(['_', '^']).filter(|_| !math.starts_with("\\mathit")).unwrap_or(math.len());
     let (letter, index) = math.split_at(end);
@@ -332,18 +332,18 @@ fn dotted(math: &str, order: usize) -> String {
         0 => math.into(),
         1 => format!("\\dot{{{letter}}}{index}"),
         2 => format!("\\ddot{{{letter}}}{index}"),
-        // what has an exponent has no second one
+        // a name with an exponent takes no second one
         _ if index.contains('^') => format!("{{{math}}}^{{({order})}}"),
         _ => format!("{math}^{{({order})}}"),
     }
 }
 
-/// True if an exponent can be set on it: a letter with an index at most.
+/// True if an exponent can follow: a letter, with an index at most.
 fn plain(math: &str) -> bool {
     !math.contains('^') && !["\\frac", "\\sqrt", "("].iter().any(|c| math.contains(c))
 }
 
-/// `Z_3''@p1` and the like.
+/// Output derivative at a station: `Z_3''@p1`.
 fn z(term: &Term, frame: Frame, stations: &[StationLabel]) -> String {
     let letter = match term.order {
         0 => "Z".to_string(),
@@ -382,7 +382,7 @@ pub(crate) fn left(name: &str, position: Option<&str>) -> String {
     format!("{letter}{}", position.map(place).unwrap_or_default())
 }
 
-/// Factors; empty for none.
+/// Product of factors; empty for none.
 fn product(factors: &[String]) -> String {
     if factors.is_empty() { String::new() } else { expression(&factors.join("*")) }
 }
@@ -425,8 +425,8 @@ pub(crate) fn solution(s: &Solution, frame: Frame, stations: &[StationLabel]) ->
     }
 }
 
-/// A solution from an answer's terms, each a coefficient in program notation, an observation (`Z3'`) and a
-/// station: those of one coefficient, but for the sign, in a bracket.
+/// LaTeX of a solution from the terms of an answer: coefficient in program notation, observation (`Z3'`),
+/// station. Terms of one coefficient, up to the sign, share a bracket.
 pub(crate) fn solution_of(terms: &[[&str; 3]]) -> String {
     let mut groups: Vec<(&str, Vec<(bool, String)>)> = Vec::new();
     for &[coefficient, observation, station] in terms {
@@ -455,7 +455,7 @@ pub(crate) fn solution_of(terms: &[[&str; 3]]) -> String {
     if out.is_empty() { "0".into() } else { out }
 }
 
-/// An expression as a factor: a sum in brackets.
+/// Expression as a factor: sums are put in brackets.
 fn factor(text: &str) -> String {
     let math = expression(text);
     if [" + ", " - "].iter().any(|sign| text.contains(sign)) { format!("({math})") } else { math }
@@ -468,7 +468,8 @@ mod tests {
     #[test]
     fn terms_of_one_coefficient_share_a_bracket() {
         let terms = [["-wU/2", "Z1", "p1"], ["wU/2", "Z1", "p2"], ["-1", "Z3''", "p1"], ["1", "Z3'", "p2"]];
-        let math = "-\\frac{\\omega_U}{2}\\,(Z_{1}(\\text{p1}) - Z_{1}(\\text{p2})) - \\ddot{Z}_{3}(\\text{p1}) + \\dot{Z}_{3}(\\text{p2})";
+        let math = "-\\frac{\\omega_U}{2}\\,(Z_{1}(\\text{p1}) - Z_{1}(\\text{p2})) - \
+                    \\ddot{Z}_{3}(\\text{p1}) + \\dot{Z}_{3}(\\text{p2})";
         assert_eq!(solution_of(&terms), math);
         assert_eq!(solution_of(&[["a - b", "Z1", "p1"]]), "(a - b)\\,Z_{1}(\\text{p1})");
         assert_eq!(solution_of(&[]), "0");
@@ -484,7 +485,7 @@ mod tests {
             ("sqrt(2)*cos(alpha)^2/4", "\\frac{\\sqrt{2}\\,\\cos^{2}(\\alpha)}{4}"),
             ("k21*gamma - V_max", "k_{\\mathit{21}}\\,\\gamma - V_{\\mathit{max}}"),
             ("sin(25 deg)", "\\sin(25^{\\circ})"),
-            // every quotient is a fraction, and what stands behind it is not under it
+            // every quotient is a fraction, and later factors are not under its line
             ("1/cos(25 deg)*wU/wN^2", "\\frac{\\omega_U}{\\cos(25^{\\circ})\\,\\omega_N^{2}}"),
             ("1/2/(a+b)*(c-d)", "\\frac{c - d}{2\\,(a + b)}"),
             ("1/(a+b)", "\\frac{1}{a + b}"),

@@ -1,9 +1,9 @@
-//! The LaTeX of our formulas as the typesetter's math. Only what `latex` writes is known; other commands
-//! become text.
+//! Formulas from LaTeX to the typesetter's notation. Only commands that `latex` writes are known; other
+//! commands become text.
 
 use crate::latex::{FUNCTIONS, GREEK};
 
-/// Other letters, operators and spaces.
+/// Letters, operators and spaces besides Greek letters and functions.
 const WORDS: [(&str, &str); 9] = [
     ("psi", "psi"),
     ("varepsilon", "epsilon"),
@@ -30,7 +30,7 @@ fn sequence(rest: &mut &str) -> String {
         if atom.is_empty() {
             continue;
         }
-        // what touches stays together: a prime, an index, an exponent
+        // primes, indices and exponents touch what they belong to
         let joins = matches!(c, '_' | '^' | '\'');
         if !out.is_empty() && !joins {
             out.push(' ');
@@ -60,14 +60,14 @@ fn atom(rest: &mut &str) -> String {
     }
 }
 
-/// The inside of a group whose brace is open.
+/// Content of a group whose brace has been read.
 fn group_body(rest: &mut &str) -> String {
     let body = sequence(rest);
     *rest = rest.strip_prefix('}').unwrap_or(rest);
     body
 }
 
-/// The text of a group, with nothing in it but letters.
+/// Text of a group of letters.
 fn plain(rest: &mut &str) -> String {
     let Some(inner) = rest.strip_prefix('{') else { return String::new() };
     // `\_` and `\textasciicircum{}` are the escapes of plain text

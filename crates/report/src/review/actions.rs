@@ -1,4 +1,4 @@
-//! What to do, by what was found: of a scheme, of a model, of a calibration.
+//! Recommended actions by the findings on a scheme, a model or a calibration.
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, Finding, PositionFit};
@@ -14,12 +14,12 @@ use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
 use crate::{omitted, resolve, stated, words};
 
-/// Advice where a run is not consistent.
+/// Advice for a run that is not consistent.
 const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsistent with the truth.";
-/// Advice where checks of the filter fail.
+/// Advice if checks of the filter fail.
 const FAILING: &str = "First explain the filter checks that fail (section Evidence by a filter).";
 
-/// What follows from what was found of a scheme, the gravest first.
+/// Actions for a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
     let mut out = Vec::new();
     let missed = |why: Miss| -> Vec<&str> {
@@ -52,8 +52,8 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     }
     if !s.simulation.validity.holds && !stated::drifts_by_default(&s.simulation.conditions) {
         out.push(
-            "Compensate known drifts before the run, or use a filter with full attitudes (`obsdeg simulate --truth exact` shows its sigmas): \
-             at these drifts the small-angle model does not hold."
+            "Compensate known drifts before the run, or use a filter with full attitudes (`obsdeg simulate \
+             --truth exact` shows its sigmas): at these drifts the small-angle model does not hold."
                 .into(),
         );
     }
@@ -71,20 +71,26 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         out.push(match (review.requirements.stated, met, &s.evidence) {
             (0, ..) => "State requirements: nothing says yet what is good enough.".into(),
             (_, false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
-            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no check fails.".into(),
-            (_, _, Err(_)) => "No action from what was computed: every requirement is met, by prediction and in the run. Evidence by a filter was not taken.".into(),
+            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no \
+                              check fails."
+                .into(),
+            (_, _, Err(_)) => {
+                "No action from what was computed: every requirement is met, by prediction and in the run. \
+                 Evidence by a filter was not taken."
+                    .into()
+            }
         });
     }
     out
 }
 
-/// True if the sigma of an unknown meets its requirement, whatever the bench adds.
+/// True if the sigma of an unknown alone meets its requirement.
 fn sigma_meets(review: &ComparedScheme, name: &str) -> bool {
     let own = review.quantities.iter().find(|q| q.name == name);
     own.and_then(|q| q.sigma.zip(q.requirement)).is_some_and(|(sigma, required)| sigma <= required)
 }
 
-/// Whether longer dwells meet what is too large.
+/// Advice on longer dwells for requirements that sigmas miss.
 fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     let required = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.requirement);
     let meets = |row: &[Option<f64>], name: &str| {
@@ -110,21 +116,23 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
                 format!(" Best change that was tried: {}.", omitted::advised(a))
             });
             format!(
-                "Change the positions, the bench or the requirements: for {names} sigma alone meets the requirement, the total with the bench does not.{tried}"
+                "Change the positions, the bench or the requirements: for {names} sigma alone meets the \
+                 requirement, the total with the bench does not.{tried}"
             )
         }
         None => {
             let most = s.dwells.x.last().copied().unwrap_or(1.0);
             let or_bench = if review.requirements.with_bench { ", the bench" } else { "" };
             format!(
-                "Change the positions, the noise of Z{or_bench} or the requirements: dwells up to {} times as long do not meet those of {names}.",
+                "Change the positions, the noise of Z{or_bench} or the requirements: dwells up to {} times \
+                 as long do not meet those of {names}.",
                 number(most)
             )
         }
     }
 }
 
-/// What follows from what was found of a model, the gravest first.
+/// Actions for a model, the gravest first.
 pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let a = &m.analysis;
     let named = |of: &dyn Fn(&&SystemQuantity) -> bool| -> Vec<&str> {
@@ -146,7 +154,8 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let several = named(&|q| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(k)) if k > 1));
     if !several.is_empty() {
         out.push(format!(
-            "Start near the truth, or add knowledge that distinguishes the solutions, for {}: the outputs allow several.",
+            "Start near the truth, or add knowledge that distinguishes the solutions, for {}: the outputs \
+             allow several.",
             words::names(several)
         ));
     }
@@ -172,12 +181,12 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     out
 }
 
-/// What follows from what was found of a calibration, the gravest first.
+/// Actions for a calibration, the gravest first.
 pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for f in &c.findings {
         let line = of_finding(c, f);
-        // of several positions or components the same
+        // several positions or components may give the same line
         if !out.contains(&line) {
             out.push(line);
         }
@@ -195,7 +204,8 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     let open = without(|u| u.left_open);
     if !open.is_empty() {
         out.push(format!(
-            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions, for {}: the record leaves them open at these drifts.",
+            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions, \
+             for {}: the record leaves them open at these drifts.",
             words::names(open)
         ));
     }
@@ -212,7 +222,7 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// What to do about positions that do not fit.
+/// Action for positions whose residuals do not fit.
 fn at_positions(c: &Calibration) -> String {
     let unfit: Vec<&PositionFit> = (c.findings.iter())
         .filter_map(|f| match f {
@@ -239,44 +249,63 @@ fn at_positions(c: &Calibration) -> String {
     format!("Look at the record at {names}: attitudes, labels, rest{without}.")
 }
 
-/// What to do about what speaks against a calibration.
+/// Action for one finding of a calibration.
 fn of_finding(c: &Calibration, f: &Finding) -> String {
     match f {
         Finding::Interrupted => "Run the same command again, to its end.".into(),
         Finding::NotSettled => {
-            "Look at units, labels and times of the record, and state first estimates near the truth ([simulation.estimates]).".into()
+            "Look at units, labels and times of the record, and state first estimates near the truth \
+             ([simulation.estimates])."
+                .into()
         }
         Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
             (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
-                "Correct the times of the record: its clock fits neither the scheme nor the earth rate. Drifts are wrong by the same part or more."
+                "Correct the times of the record: its clock fits neither the scheme nor the earth rate. \
+                 Drifts are wrong by the same part or more."
             }
             (_, Some(_)) => {
-                "Look at latitude, rate of turns and times of the record, and at errors that are no unknowns: its rates are not those of the scheme."
+                "Look at latitude, rate of turns and times of the record, and at errors that are no \
+                 unknowns: its rates are not those of the scheme."
             }
             (_, None) => {
-                "Compare the times of the record with those of its run: if its clock is wrong, drifts are wrong by the same part or more."
+                "Compare the times of the record with those of its run: if its clock is wrong, drifts are \
+                 wrong by the same part or more."
             }
         }
         .into(),
         Finding::Cells { column, .. } => format!(
-            "Look at column `{column}` of the record: state codes of missing values as `missing` under [record]. A stuck output is no measurement."
+            "Look at column `{column}` of the record: state codes of missing values as `missing` under \
+             [record]. A stuck output is no measurement."
         ),
         Finding::Force { .. } => {
-            "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the gravity of the place (--gravity, for forces in m/s^2).".into()
+            "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the \
+             gravity of the place (--gravity, for forces in m/s^2)."
+                .into()
         }
         Finding::Position { .. } => at_positions(c),
         Finding::Noise { .. } | Finding::Channel { .. } => {
-            "Estimate the noise (--estimate-noise), or use the rescaled sigmas instead of those of the assumed noise.".into()
+            "Estimate the noise (--estimate-noise), or use the rescaled sigmas instead of those of the \
+             assumed noise."
+                .into()
         }
         Finding::Correlated { .. } => {
-            "State noise with memory (--drift-noise, --bias-instability), or add an unknown for what drifts: sigmas of white noise are too small.".into()
+            "State noise with memory (--drift-noise, --bias-instability), or add an unknown for what drifts: \
+             sigmas of white noise are too small."
+                .into()
         }
-        Finding::Temperature { .. } => "Repeat the run at a steady temperature: the residuals follow it.".into(),
-        Finding::Outliers { .. } => "Check the noise of the record (--noise): too many of its samples are far off.".into(),
+        Finding::Temperature { .. } => {
+            "Repeat the run at a steady temperature: the residuals follow it.".into()
+        }
+        Finding::Outliers { .. } => "Check the noise of the record (--noise): too many of its samples are \
+                                     far off."
+            .into(),
         Finding::Repeatability { .. } => {
-            "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small.".into()
+            "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small."
+                .into()
         }
-        Finding::SecondPath { .. } => "Do not use the estimates: two ways to compute them do not agree.".into(),
+        Finding::SecondPath { .. } => {
+            "Do not use the estimates: two ways to compute them do not agree.".into()
+        }
         Finding::Suspect { errors, .. } => format!(
             "Estimate the error that the residuals show, or repair the bench: {} ({}).",
             errors.join(" and "),

@@ -1,4 +1,4 @@
-//! The part of a calibration in a review.
+//! Calibration as part of a review.
 
 use obsdeg_calibration::Calibration;
 
@@ -7,10 +7,10 @@ use crate::calibration::finding;
 use crate::calibration_figures::{
     allan_figure, estimate_figures, file_name, residual_figure, whiteness_figure,
 };
-use crate::document::{Block, Document, Drawing, Finding, Grade, Picture, Status};
+use crate::document::{Block, Document, Drawing, Grade, Picture, Status, StatusRow};
 use crate::figure::Figure;
 
-/// What a review has of a calibration: its answer, and its pictures; `id` begins their names.
+/// Section of a calibration: its answer and its pictures, whose names begin with `id`.
 pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     let Document { lead, blocks, .. } = c.document();
     let mut out: Vec<Block> = lead.into_iter().map(Block::Text).collect();
@@ -21,7 +21,11 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out.extend(estimate_figures(c).into_iter().enumerate().map(|(i, figure)| {
         Block::Picture(Picture {
             name: format!("{id}_estimates_{}", i + 1),
-            caption: format!("Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a requirement is stated", figure.title),
+            caption: format!(
+                "Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a \
+                 requirement is stated",
+                figure.title
+            ),
             drawing: Drawing::Still(figure.svg()),
         })
     }));
@@ -36,7 +40,8 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
         ));
         if s.allan.len() > 1 {
             let caption = format!(
-                "Allan deviation of the residuals of {what}{of}: white noise falls with the root of the cluster time; a rise is an error outside the model"
+                "Allan deviation of the residuals of {what}{of}: white noise falls with the root of the \
+                 cluster time; a rise is an error outside the model"
             );
             out.push(curves(name("allan"), caption, allan_figure(s)));
         }
@@ -52,9 +57,9 @@ pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
     out
 }
 
-/// The answers that a review begins with.
+/// Status of a calibration.
 pub(super) fn status(c: &Calibration, title: String) -> Status {
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     let all = c.quantities.len();
     let determined = c.quantities.iter().filter(|u| u.determined).count();
     let first = c.findings.first().map(|f| finding(f, &c.records));

@@ -1,5 +1,5 @@
-//! What a review begins with: every unknown in one picture, what to do, and of several schemes the comparison
-//! and the one to take.
+//! Beginning of a review: every unknown in one picture and the actions; for several schemes the comparison
+//! and the recommended scheme.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::SystemAnalysis;
@@ -9,14 +9,14 @@ use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
 use super::{joined, seconds};
-use crate::document::{Block, Cell, Finding, Grade, Status, left, number};
+use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
 use crate::rows::{Chart, Row};
 use crate::{compare, words};
 
-/// At most so many rows of a chart, which fit a page.
+/// Largest number of rows of a chart, so that it fits a page.
 const ROWS: usize = 48;
 
-/// Uncertainty that decides a requirement: with a bench the total, without one sigma.
+/// Uncertainty that requirements are compared with: the total with a bench, else sigma.
 fn deciding(q: &Quantity) -> Option<f64> {
     q.total.or(q.sigma)
 }
@@ -36,13 +36,13 @@ fn margin(q: &Quantity) -> (String, Grade) {
     }
 }
 
-/// A chart, and which of all rows it has.
+/// Picture of a chart; `all` is the number of rows before it was cut.
 fn chart(name: &str, caption: String, chart: Chart, all: usize) -> Block {
     let part = if all > ROWS { format!(" (the first {ROWS} of {all})") } else { String::new() };
     still(name, format!("{caption}{part}"), chart.svg())
 }
 
-/// Degree and margin of every unknown of a scheme, best first; degrees alone where nothing is required.
+/// Degree and margin of every unknown of a scheme, best first; degrees alone without requirements.
 pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Block {
     let all = &s.analysis.quantities;
     if review.requirements.stated == 0 {
@@ -71,11 +71,13 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
         series: Vec::new(),
         rows: s.analysis.quantities.iter().take(ROWS).map(row).collect(),
     };
-    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met by prediction, and a ring is missed".to_string();
+    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met \
+                   by prediction, and a ring is missed"
+        .to_string();
     chart(&format!("{id}_margins"), caption, picture, s.analysis.quantities.len())
 }
 
-/// Degrees, where there is nothing else to show.
+/// Chart of the degrees alone.
 fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count: usize, id: &str) -> Block {
     let row = |(name, status, degree): (&str, Exact, Option<usize>)| Row {
         name: name.into(),
@@ -107,8 +109,8 @@ pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> Block {
     degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id)
 }
 
-/// Whether schemes are held against each other under the same conditions.
-fn like_with_like(r: &DesignReview) -> Finding {
+/// Answer to the question whether the compared schemes have the same conditions.
+fn like_with_like(r: &DesignReview) -> StatusRow {
     let totals = || r.comparison.schemes.iter().map(|s| s.total_s);
     let (least, most) = totals().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
     let time = match least == most {
@@ -121,13 +123,13 @@ fn like_with_like(r: &DesignReview) -> Finding {
             (Grade::Limited, format!("the schemes differ in {}; {time}", r.comparison.differ.join(", ")))
         }
     };
-    Finding { what: "Like with like", grade, text }
+    StatusRow { what: "Like with like", grade, text }
 }
 
-/// The scheme to take, and why.
-fn recommended(r: &DesignReview) -> Finding {
+/// Recommended scheme, and the reason.
+fn recommended(r: &DesignReview) -> StatusRow {
     let (grade, text) = choice(r);
-    Finding { what: "Recommended", grade, text }
+    StatusRow { what: "Recommended", grade, text }
 }
 
 fn choice(r: &DesignReview) -> (Grade, String) {
@@ -158,7 +160,8 @@ fn choice(r: &DesignReview) -> (Grade, String) {
                 seconds(s.total_s)
             ),
             (n, k) => format!(
-                "of {n} that meet every requirement by prediction, {k} of them equally short, the one with the largest worst margin"
+                "of {n} that meet every requirement by prediction, {k} of them equally short, the one with \
+                 the largest worst margin"
             ),
         };
         let doubts = doubts(&r.schemes[best]);
@@ -178,7 +181,7 @@ fn choice(r: &DesignReview) -> (Grade, String) {
     )
 }
 
-/// What speaks against a scheme that meets its requirements by prediction.
+/// Reasons against a scheme that meets its requirements by prediction.
 fn doubts(s: &SchemeReview) -> String {
     let run = &s.simulation;
     let found = [
@@ -190,7 +193,7 @@ fn doubts(s: &SchemeReview) -> String {
     joined(found.into_iter().filter(|f| f.0).map(|f| f.1))
 }
 
-/// The comparison on one page: what to take, schemes as columns, sigmas as a picture.
+/// Comparison on one page: recommendation, schemes as columns, sigmas as a picture.
 pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview) {
     let title = format!("Comparison of {} schemes", r.schemes.len());
     blocks.push(Block::Status(vec![Status {
@@ -222,7 +225,7 @@ fn kept(r: &Requirements) -> String {
     }
 }
 
-/// Schemes as columns: what they take, and the margin of every unknown.
+/// Schemes as columns: carry, positions, total time, rank, requirements, and the margin of every unknown.
 fn matrix(schemes: &[ComparedScheme]) -> Block {
     let mut columns = vec![left("")];
     columns.extend(schemes.iter().map(|s| left(s.name.clone())));
@@ -264,7 +267,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
     Block::table(heading, columns, rows)
 }
 
-/// The sigma of every unknown in every scheme, with what is required where all require the same.
+/// Sigma of every unknown in every scheme, with the requirement if all schemes have the same.
 fn sigmas(schemes: &[ComparedScheme]) -> Block {
     let all = unknowns(schemes);
     let bench = schemes.iter().any(|s| s.conditions.bench.is_some());

@@ -1,11 +1,10 @@
-//! The part of a scheme with generic angles: what holds for almost all of them, and nothing that needs
-//! numbers.
+//! Part of a scheme with generic angles: verdicts that hold at almost all angles, without numbers.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::GenericReview;
 
 use super::{derivatives, pictures, section};
-use crate::document::{Block, Finding, Grade, Status};
+use crate::document::{Block, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
 /// `any alpha and gamma`.
@@ -22,20 +21,21 @@ fn verdict(g: &GenericReview) -> String {
         format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
     });
     format!(
-        "{} of {} unknowns are observable for {}{how}, but for angles on which verdicts change: those that were found are below. Without numbers for \
-         the angles there are no predicted sigmas, no requirements and no evidence by a filter.",
+        "{} of {} unknowns are observable for {}{how}, but for angles on which verdicts change: those that \
+         were found are below. Without numbers for the angles there are no predicted sigmas, no requirements \
+         and no evidence by a filter.",
         seen.len(),
         a.quantities.len(),
         any(g)
     )
 }
 
-/// The box of such a scheme.
+/// Status of a scheme with generic angles.
 pub(super) fn status(g: &GenericReview) -> Status {
     let a = &g.analysis;
     let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
     let grade = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     Status {
         title: g.name.clone(),
         rows: vec![
@@ -50,7 +50,7 @@ pub(super) fn status(g: &GenericReview) -> Status {
     }
 }
 
-/// Verdict, unknowns, positions.
+/// Part with verdict, unknowns and positions.
 pub(super) fn part(blocks: &mut Vec<Block>, g: &GenericReview, level: usize, id: &str) {
     let document = g.analysis.document();
     blocks.push(section(level, "Verdict"));

@@ -1,4 +1,4 @@
-//! The part of a model in a review.
+//! Model as part of a review.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
@@ -7,10 +7,10 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::{derivatives, is_list, pictures, section};
-use crate::document::{Block, Finding, Grade, Status};
+use crate::document::{Block, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
-/// The verdict on a model: what limits it, and what is determined.
+/// Verdict on a model: its limits, and the determined unknowns.
 fn verdict(m: &ModelReview) -> String {
     let a = &m.analysis;
     let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
@@ -47,7 +47,7 @@ fn verdict(m: &ModelReview) -> String {
     )
 }
 
-/// How much is known of the number of solutions of what is observable.
+/// Sentence on the numbers of solutions of observable unknowns.
 fn solutions(a: &SystemAnalysis) -> String {
     let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
     let one = |q: &&&SystemQuantity| {
@@ -63,7 +63,7 @@ fn solutions(a: &SystemAnalysis) -> String {
     }
 }
 
-/// Whether the information of a run agrees.
+/// Answer to the question whether the information of a run agrees with the verdicts.
 fn evidence(m: &ModelReview) -> (Grade, String) {
     match &m.evidence {
         Some(e) if e.passed && e.not_resolvable > 0 => {
@@ -75,7 +75,7 @@ fn evidence(m: &ModelReview) -> (Grade, String) {
     }
 }
 
-/// The run of the filter: whether it is credible.
+/// Answer to the question whether the run of the filter is credible.
 fn credible(m: &ModelReview) -> (Grade, String) {
     match m.run.as_ref().map(|r| &r.0.consistency) {
         None => (Grade::Open, "not run".into()),
@@ -84,17 +84,17 @@ fn credible(m: &ModelReview) -> (Grade, String) {
     }
 }
 
-/// Estimates of the run that say what the prior says.
+/// Unknowns whose estimate in the run equals the prior.
 fn by_prior(m: &ModelReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
     let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
-    // a start that is known rests on nothing else
+    // an unknown without a status is a known start, which rests on nothing else
     let never = |e: &SystemEstimate| matches!(e.status, Some(Exact::Inseparable | Exact::NotExcited));
     let unknown = estimates.filter(|e| e.status.is_some() && (never(e) || rests(e.outcome)));
     unknown.map(|e| e.name.as_str()).collect()
 }
 
-/// What limits the verdict.
+/// Limits of the verdict.
 fn limits(m: &ModelReview) -> Vec<String> {
     let mut out = Vec::new();
     match credible(m) {
@@ -118,11 +118,11 @@ fn limits(m: &ModelReview) -> Vec<String> {
     out
 }
 
-/// The box of a model.
+/// Status of a model.
 pub(super) fn status(m: &ModelReview) -> Status {
     let a = &m.analysis;
     let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
-    let row = |what, (grade, text)| Finding { what, grade, text };
+    let row = |what, (grade, text)| StatusRow { what, grade, text };
     let every = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
     let mut rows = vec![
         row("Observable", (every, format!("{seen} of {} unknowns: {}", a.quantities.len(), solutions(a)))),
@@ -136,7 +136,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     Status { title: a.name.clone(), rows, actions: super::actions::of_model(m) }
 }
 
-/// Verdict, unknowns, equations and evidence.
+/// Part with verdict, unknowns, equations and evidence.
 pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &str) {
     let a = &m.analysis;
     let document = a.document();

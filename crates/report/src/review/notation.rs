@@ -1,4 +1,4 @@
-//! What the symbols of a review mean, with the equations of the paper that have them.
+//! Symbols of a review, with the equations of the paper in which they occur.
 
 use std::collections::BTreeSet;
 
@@ -7,8 +7,8 @@ use obsdeg_design::review::DesignReview;
 
 use crate::document::{Block, left};
 
-/// The symbols of schemes: what stands for what, in which unit, and where the paper (J. NUDT 39(1), 2017,
-/// 1001-2486(2017)01-040-06) has it.
+/// Symbols of schemes: symbol, meaning, unit, and place in the paper (J. NUDT 39(1), 2017,
+/// 1001-2486(2017)01-040-06).
 const SCHEMES: [[&str; 4]; 15] = [
     [
         "n, c, p",
@@ -18,7 +18,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ],
     [
         "psi",
-        "misalignment of the computed platform from the true one; psi_x, psi_y, psi_z along the axes that the carry names",
+        "misalignment of the computed platform from the true one; psi_x, psi_y, psi_z along the axes that \
+         the carry names",
         "rad; deg in tables",
         "(1), (2)",
     ],
@@ -33,13 +34,15 @@ const SCHEMES: [[&str; 4]; 15] = [
     ["wN, wU", "earth rate to the North and up: w_ie cos and w_ie sin of the latitude", "rad/s", "(2)"],
     [
         "Z, Z', Z''",
-        "observation -[g^c x] psi and its derivatives by time; Z1, Z2, Z3 along x, y, z of n unless it is said otherwise; Z@p2: at position p2",
+        "observation -[g^c x] psi and its derivatives by time; Z1, Z2, Z3 along x, y, z of n unless it is \
+         said otherwise; Z@p2: at position p2",
         "g",
         "(6), (12)",
     ],
     [
         "degree",
-        "observable degree: the highest derivative of Z that a solution needs; 0 is best, every derivative amplifies noise",
+        "observable degree: the highest derivative of Z that a solution needs; 0 is best, every derivative \
+         amplifies noise",
         "-",
         "(13) to (18)",
     ],
@@ -64,7 +67,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ["not excited", "no derivative of Z changes with it at any of the positions", "-", "-"],
     [
         "sigma",
-        "standard deviation; predicted: by the information of all samples of Z, with the priors and the random drift that are stated",
+        "standard deviation; predicted: by the information of all samples of Z, with the priors and the \
+         random drift that are stated",
         "as the unknown",
         "-",
     ],
@@ -76,7 +80,8 @@ const SCHEMES: [[&str; 4]; 15] = [
     ],
     [
         "NEES, NIS",
-        "squares of errors and of innovations over what the filter believes of them: about their number where it is right",
+        "squares of errors and of innovations over what the filter believes of them: about their number \
+         where it is right",
         "-",
         "-",
     ],
@@ -113,7 +118,7 @@ fn carry(carry: Carry) -> [String; 4] {
     [name, means, "-", "-"].map(String::from)
 }
 
-/// Every symbol that the review may use.
+/// Table of the symbols that the review may use.
 pub(super) fn notation(r: &DesignReview) -> Block {
     let analyses = || r.schemes.iter().map(|s| &s.analysis).chain(r.generic.iter().map(|g| &g.analysis));
     let any_scheme = analyses().next().is_some();

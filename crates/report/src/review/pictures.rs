@@ -14,9 +14,9 @@ use crate::figure::{BLACK, BLUE, Figure, GREEN, Line, ORANGE, Stroke, heat, styl
 use crate::figures::{error_figure, file_name, history_figure, series_title, slope_figure};
 use crate::poses::{caption, panels};
 
-/// At most this many points a curve.
+/// Largest number of points of a curve.
 const POINTS: usize = 160;
-/// At most this many pictures of errors.
+/// Largest number of pictures of errors.
 const ERRORS: usize = 40;
 
 fn curves(name: &str, caption: impl Into<String>, figure: Figure) -> Block {
@@ -76,11 +76,11 @@ pub(super) fn model_staircase(a: &SystemAnalysis, name: &str) -> Block {
     curves(name, "Rank over the order of derivatives", stairs(&a.rank_profile, a.unknowns))
 }
 
-/// At most this many positions are drawn, so many in a picture.
+/// Largest number of positions drawn, and of positions in one picture.
 const POSES: usize = 96;
 const PANELS: usize = 12;
 
-/// The platform at every position.
+/// Pictures of the platform at every position.
 pub(super) fn poses(poses: &[Pose], latitude_deg: f64, by_default: bool, id: &str) -> Vec<Block> {
     let drawn = &poses[..poses.len().min(POSES)];
     let of = |(i, some): (usize, &[Pose])| {
@@ -125,7 +125,7 @@ pub(super) fn attitudes(s: &SchemeReview, name: &str) -> Block {
     )
 }
 
-/// How each coefficient moves the drift at each position.
+/// Map of the drift that each coefficient causes at each position.
 pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name: &str) -> Block {
     let rows: Vec<String> = coefficients.iter().map(|q| q.name.clone()).collect();
     let values =
@@ -133,12 +133,13 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
     let svg = heat("Excitation", &rows, positions, values, 0.0);
     map(
         name,
-        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 blank, 1 blue; a torquer by the earth rate)",
+        "Excitation map: how each coefficient moves the drift, or Z, at each position (0 blank, 1 blue; a \
+         torquer by the earth rate)",
         svg,
     )
 }
 
-/// One curve per unknown of a family, where it is observable.
+/// Curves of the observable unknowns in `of`, one each.
 fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Line> {
     let columns: Vec<usize> = (0..s.names.len()).filter(|&c| of.contains(&s.names[c])).collect();
     let curve = |(i, &c): (usize, &usize)| {
@@ -149,12 +150,12 @@ fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Line> {
     columns.iter().enumerate().map(curve).filter(|l| l.points.len() > 1).collect()
 }
 
-/// Coefficients that some latitude or dwell makes observable.
+/// Names of the drift coefficients of a sweep.
 fn drifts(s: &Sweep) -> Vec<String> {
     s.names.iter().filter(|n| n.starts_with("D_")).cloned().collect()
 }
 
-/// Quantity of the sweeps.
+/// Name of the quantity of the sweeps.
 fn predicted(s: &SchemeReview) -> &'static str {
     if s.simulation.requirements.with_bench { "total uncertainty with the bench" } else { "sigma" }
 }
@@ -173,7 +174,8 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
         ..Figure::default()
     };
     let caption = format!(
-        "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is not observable"
+        "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is \
+         not observable"
     );
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
@@ -207,15 +209,15 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
     ))
 }
 
-/// The range of positive curves with some air.
+/// Range of the positive values of curves with a margin; `None` without positive values.
 fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
     let values = lines.iter().flat_map(|l| l.points.iter().map(|p| p.1)).filter(|y| *y > 0.0);
     let (low, high) = values.fold((f64::MAX, 0.0f64), |(l, h), y| (l.min(y), h.max(y)));
     (high > 0.0).then_some((low / 1.5, high * 1.5))
 }
 
-/// Total time against the largest sigma: schemes at other dwells, and the front of what was found; nothing
-/// where no dwell determines anything.
+/// Total time against the largest sigma: schemes at other dwells, and the front of the found schemes; `None`
+/// if no dwell determines the unknowns.
 pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option<Block> {
     let mut lines = Vec::new();
     for (i, s) in schemes.iter().enumerate() {
@@ -224,7 +226,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         let worst = s.dwells.worst(&s.alternatives.required);
         let points: Vec<(f64, f64)> = worst.into_iter().map(|(f, y)| (dwell * f + slews, y)).collect();
         let (color, _) = style(i);
-        // a legend on the page knows colours, not strokes: where there is room each line has its own
+        // the legend of a page shows colours, not strokes, so each line of a single scheme has its own colour
         let (found, least) = if schemes.len() == 1 { (ORANGE, BLACK) } else { (color, color) };
         if points.len() > 1 {
             lines.push(line(&s.name, color, Stroke::Solid, points));
@@ -248,14 +250,16 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         log: true,
         ..Figure::default()
     };
-    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme determines: the scheme at other \
-                   dwells, and the Pareto front (at six dwells) of schemes of as many cardinal attitudes, five at most (twelve under reset carry), for \
-                   the same coefficients; under reset carry with the bound that no scheme of as many cardinal attitudes in equal dwells crosses";
+    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme \
+                   determines: the scheme at other dwells, and the Pareto front (at six dwells) of schemes \
+                   of as many cardinal attitudes, five at most (twelve under reset carry), for the same \
+                   coefficients; under reset carry with the bound that no scheme of as many cardinal \
+                   attitudes in equal dwells crosses";
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
-/// Errors of the estimate with the band of three sigma, a picture each.
-/// What is `flat` is not drawn: nothing moves it; `last` is what the last part of the run is called.
+/// Errors of the estimate with the band of three sigma, a picture each. Unknowns in `flat` are not drawn,
+/// since nothing affects them. `last` is the name of the last part of the run.
 pub(super) fn errors(traces: &Traces, flat: &[&str], last: &str, id: &str) -> Vec<Block> {
     let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {

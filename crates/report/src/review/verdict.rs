@@ -1,4 +1,4 @@
-//! The verdict on a scheme in words, led by what limits it, and its status at a glance.
+//! Verdict on a scheme in words, its limits first, and its status.
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::SchemeReview;
@@ -6,10 +6,10 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, joined, seconds};
-use crate::document::{Finding, Grade, Status, number};
+use crate::document::{Grade, Status, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
-/// What the unknowns besides psi are.
+/// Name for the unknowns besides psi.
 fn kind(coefficients: &[&Quantity]) -> &'static str {
     match coefficients.first() {
         Some(q) if q.name.starts_with("eps") => "components of the drift",
@@ -18,13 +18,13 @@ fn kind(coefficients: &[&Quantity]) -> &'static str {
     }
 }
 
-/// Why the small-angle model does not hold; `None` when it does.
+/// Reason why the small-angle model does not hold; `None` if it does.
 fn small_angles(s: &SchemeReview) -> Option<String> {
     let v = &s.simulation.validity;
     (!v.holds).then(|| {
         format!(
-            "the small-angle model does NOT hold for {}: |psi| reaches {} deg, which leaves out {} times the noise of Z and {} deg/h of \
-             drift",
+            "the small-angle model does NOT hold for {}: |psi| reaches {} deg, which leaves out {} times the \
+             noise of Z and {} deg/h of drift",
             stated::drifts(&s.simulation.conditions),
             number(v.largest_psi_deg),
             number(v.neglected_g / v.accelerometer_noise_g),
@@ -33,20 +33,20 @@ fn small_angles(s: &SchemeReview) -> Option<String> {
     })
 }
 
-/// Estimates of the run that say what the prior says.
+/// Unknowns whose estimate in the run equals the prior.
 fn by_prior(s: &SchemeReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
     s.simulation.quantities.iter().filter(|q| rests(q.outcome)).map(|q| q.name.as_str()).collect()
 }
 
-/// Unknowns with a degree that the dwell does not leave determined.
+/// Unknowns with a degree that the samples of the dwell do not determine.
 fn lost_with_dwell(s: &SchemeReview) -> Vec<&str> {
     let a = &s.analysis;
     let lost = a.quantities.iter().filter(|q| q.degree.is_some() && q.accuracy_order.is_none());
     lost.filter(|_| a.has_accuracy_orders).map(|q| q.name.as_str()).collect()
 }
 
-/// The evidence: whether the checks of a filter agree.
+/// Answer to the question whether the checks of a filter agree.
 fn evidence(s: &SchemeReview) -> (Grade, String) {
     match &s.evidence {
         Ok(e) if e.passed => {
@@ -69,9 +69,9 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
     }
 }
 
-/// What limits the verdict, the gravest first.
+/// Limits of the verdict, the gravest first.
 fn limits(s: &SchemeReview) -> Vec<String> {
-    // drifts that nobody states limit no scheme
+    // drifts that are not stated limit no scheme
     let states_drifts = !stated::drifts_by_default(&s.simulation.conditions);
     let mut out: Vec<String> = small_angles(s).filter(|_| states_drifts).into_iter().collect();
     out.extend(gimbals::lead(s.analysis.gimbals.as_ref()));
@@ -106,12 +106,12 @@ fn limits(s: &SchemeReview) -> Vec<String> {
     out
 }
 
-/// What samples have that derivatives have not.
+/// Advantage of samples over derivatives: the dwell, or dwell and slews.
 fn dwell_or_slews(s: &SchemeReview) -> &'static str {
     if s.simulation.timeline.iter().any(|t| t.slew) { "dwell and slews" } else { "dwell" }
 }
 
-/// Requirements by prediction, which decides, and in the run.
+/// Requirements by prediction, which decides the grade, and in the run.
 fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
     let predicted = stated::requirements(&review.requirements);
     let run = stated::run(&s.simulation.run, &s.simulation.conditions);
@@ -122,7 +122,7 @@ fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
     }
 }
 
-/// The verdict: what is missed, what limits it, what is determined, and how well.
+/// Verdict: missed requirements, limits, determined unknowns, accuracy.
 pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) -> String {
     let a = &s.analysis;
     let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
@@ -134,7 +134,8 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         (n, true) if n == all => format!("The scheme determines every one of the {all} {what}"),
         (n, true) => format!("The scheme determines {n} of the {all} {what}"),
         (n, false) => format!(
-            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with {}, during which psi moves",
+            "The scheme determines {n} of the {all} {what} by derivatives, and {} of them with {}, during \
+             which psi moves",
             with_dwell.len(),
             dwell_or_slews(s)
         ),
@@ -193,7 +194,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     format!("{missed}{lead}{first}. {accuracy}{total}{others}{filter}.")
 }
 
-/// The box of a scheme.
+/// Status of a scheme.
 pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
     let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
@@ -223,11 +224,11 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let prior = by_prior(s);
     let (checks, agreement) = evidence(s);
     let (required, requirements) = requirements(s, review);
-    // what the outcome rests on: sizes of errors that no bench states
+    // condition of the outcome: sizes of errors that no bench states
     let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
     let open = open.filter(|_| review.requirements.stated > 0);
     let requirements = open.map_or(requirements.clone(), |open| format!("{requirements}. {open}"));
-    let row = |what, grade, text| Finding { what, grade, text };
+    let row = |what, grade, text| StatusRow { what, grade, text };
     Status {
         title: s.name.clone(),
         rows: vec![
@@ -248,7 +249,9 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
                 match (consistency.consistent, s.simulation.filter.trusted) {
                     (true, true) => "consistent with its truth".into(),
                     (true, false) => {
-                        "consistent with its truth, which says little: its sigmas are not to be trusted at these drifts".into()
+                        "consistent with its truth, which says little: its sigmas are not to be trusted at \
+                         these drifts"
+                            .into()
                     }
                     (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
                 },

@@ -29,7 +29,7 @@ pub(crate) fn derivatives(dynamics: &Dynamics, order: usize) -> Result<Vec<Vec<A
     Ok(out)
 }
 
-/// The same as text, output by output.
+/// Derivatives as text, output by output.
 pub(crate) fn formulas(dynamics: &Dynamics, order: usize) -> Result<Vec<String>, JobError> {
     Ok(derivatives(dynamics, order)?.iter().flatten().map(ToString::to_string).collect())
 }

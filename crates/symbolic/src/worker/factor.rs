@@ -5,8 +5,8 @@ use symbolica::poly::factor::Factorize;
 use super::JobError;
 use super::tower::{Scalar, Tower};
 
-/// The irreducible factors (without constants and multiplicities) of one maximal minor of a matrix of
-/// rational functions: wherever the rank drops, one of them vanishes, or an entry has a pole.
+/// Irreducible factors (without constants and multiplicities) of one maximal minor of a matrix of
+/// rational functions. Wherever the rank drops, one of them vanishes, or an entry has a pole.
 pub(crate) fn minor_factors(tower: &Tower, matrix: &[Vec<String>]) -> Result<Vec<String>, JobError> {
     let mut rows: Vec<Vec<Scalar>> =
         matrix.iter().map(|row| row.iter().map(|t| tower.scalar(t)).collect()).collect::<Result<_, _>>()?;

@@ -1,4 +1,4 @@
-//! The worker side: Symbolica behind [`serve`].
+//! Worker side: Symbolica behind [`serve`].
 
 mod derive;
 mod factor;
@@ -15,41 +15,41 @@ use crate::lock;
 use crate::protocol::{Job, Order, PREFIX, Request, Response, SECONDS_PER_UNIT, UNIT};
 use tower::Tower;
 
-/// How often the processor time of a job is looked at.
+/// Interval between two checks of the processor time of a job.
 const WATCH: Duration = Duration::from_millis(20);
 
-/// Why a job failed.
+/// Error of a job.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum JobError {
-    /// A text is no rational function of the announced symbols.
+    /// Text that is no rational function of the declared symbols.
     #[error("`{text}` is not a rational function of the announced symbols")]
     NotAnElement { text: String },
     /// Rows or columns of different lengths.
     #[error("the {what} has {found} entries, expected {expected}")]
     Shape { what: &'static str, found: usize, expected: usize },
-    /// No solution, or more than one.
+    /// System with no solution, or more than one.
     #[error("the system is {0} over the field of its symbols")]
     NotUnique(&'static str),
-    /// The solution does not satisfy the check.
+    /// Solution that does not satisfy the check.
     #[error("the solution failed its verification by substitution")]
     NotVerified,
-    /// The work counted is beyond the limit.
+    /// Work beyond the limit.
     #[error("more work than the limit")]
     OverLimit,
 }
 
-/// Answers requests, one per line, as soon as this process holds `lock_file`. Whatever the engine itself
-/// writes to stdout has no [`PREFIX`].
+/// Answers requests, one per line, as soon as this process holds `lock_file`. Output of the engine
+/// itself to stdout has no [`PREFIX`].
 ///
-/// `end` ends the process: it is called in the middle of whatever is going on when the input ends, since then
-/// nobody waits for an answer any more, and when a job has used up its processor time.
+/// `end` ends the process. It is called at any point of the work when the input ends, since nobody
+/// waits for an answer then, and when a job has used up its processor time.
 ///
-/// The work of a job is counted where that is possible (products of terms), so that it ends at the same place
-/// on every machine and under any load. What cannot be counted, such as a factorisation, is bounded by the
-/// time that this process has spent on the processor.
+/// Work is counted where possible (products of terms), so a job ends at the same point on every machine
+/// and under any load. Work that cannot be counted, such as a factorisation, is bounded by the
+/// processor time of this process.
 ///
 /// # Errors
-/// Whatever `output` reports.
+/// Errors of `output`.
 pub fn serve(
     lock_file: &Path,
     input: impl BufRead + Send + 'static,
@@ -94,16 +94,16 @@ pub fn serve(
             let output = Arc::clone(&output);
             move || {
                 if watch(&watched, seconds) {
-                    // nobody else writes any more
+                    // no other thread writes after this
                     let mut output = output.lock().unwrap_or_else(PoisonError::into_inner);
-                    let _ = write(&mut *output, &Response::OverLimit); // nobody listens: nobody waits
+                    let _ = write(&mut *output, &Response::OverLimit); // errors are ignored: the process ends
                     end();
                 }
             }
         });
         let response = answer(&order.request, order.limit.saturating_mul(UNIT));
         drop(done);
-        let _ = watch.join(); // it does not panic
+        let _ = watch.join(); // the thread does not panic
         say(&response)?;
     }
     Ok(())
@@ -115,7 +115,7 @@ fn write(output: &mut impl Write, response: &Response) -> std::io::Result<()> {
     output.flush()
 }
 
-/// True if a job has spent so many seconds on the processor before it was done.
+/// True if a job has spent `seconds` seconds on the processor before it was done.
 fn watch(done: &Receiver<()>, seconds: u64) -> bool {
     let start = processor_time();
     while done.recv_timeout(WATCH) == Err(RecvTimeoutError::Timeout) {
@@ -126,7 +126,7 @@ fn watch(done: &Receiver<()>, seconds: u64) -> bool {
     false
 }
 
-/// The time that this process has spent on the processor.
+/// Processor time of this process.
 #[cfg(unix)]
 fn processor_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
@@ -134,7 +134,7 @@ fn processor_time() -> Duration {
     Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec.unsigned_abs() as u32)
 }
 
-/// Unknown here: only work that is counted is limited.
+/// Unknown on this system: only counted work is limited.
 #[cfg(not(unix))]
 fn processor_time() -> Duration {
     Duration::ZERO

@@ -7,8 +7,8 @@ use super::derive::derivatives;
 use super::tower::{Element, Tower, atom};
 use crate::protocol::{Check, System};
 
-/// Solves the system and answers with `x` or `P x` as text, and whether the check was made (it fails
-/// the job when it does not hold).
+/// Solves the system. Returns `x` or `P x` as text, and true if the check was made; a check that does
+/// not hold is an error.
 pub(crate) fn solve(
     tower: &Tower,
     system: &System,
@@ -46,7 +46,7 @@ fn shape(what: &'static str, found: usize, expected: usize) -> Result<(), JobErr
     if found == expected { Ok(()) } else { Err(JobError::Shape { what, found, expected }) }
 }
 
-/// Gauss-Jordan elimination of `[M | b]`; the simplest entry is the next pivot, since its inverse keeps
+/// Gauss-Jordan elimination of `[M | b]`. The simplest entry is the next pivot, since its inverse keeps
 /// the others short.
 fn eliminate(tower: &Tower, mut rows: Vec<Vec<Element>>, unknowns: usize) -> Result<Vec<Element>, JobError> {
     let entries = |row: &[Element]| row.iter().filter(|e| !tower.is_zero(e)).count();

@@ -1,8 +1,9 @@
 //! Rational functions of some symbols and of the cosines and sines of some angles, extended by square
 //! roots of constants.
 //!
-//! An angle `a` is carried by `t_a = tan(a/2)`: `c_a = (1-t^2)/(1+t^2)`, `s_a = 2t/(1+t^2)`, so that
-//! `c_a^2 + s_a^2 = 1` needs no rule. Printed, a function of `t_a` is one of `c_a` and `s_a` again.
+//! An angle `a` is represented by `t_a = tan(a/2)`: `c_a = (1-t^2)/(1+t^2)`, `s_a = 2t/(1+t^2)`, so
+//! `c_a^2 + s_a^2 = 1` needs no rule. In print, functions of `t_a` are converted back to `c_a` and
+//! `s_a`.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -17,28 +18,28 @@ use super::JobError;
 /// A rational function of the symbols.
 pub(crate) type Scalar = RationalPolynomial<IntegerRing, u16>;
 
-/// `sum_m scalars[m] * product of the generators in the bit set m`.
+/// Element `sum_m scalars[m] * product of the generators in the bit set m`.
 #[derive(Clone)]
 pub(crate) struct Element(pub(crate) Vec<Scalar>);
 
-/// The field of rational functions of the symbols and half tangents, extended by the square roots
+/// Field of rational functions of the symbols and half tangents, extended by the square roots
 /// `generators`.
 pub(crate) struct Tower {
-    /// Symbols, then half tangents.
+    /// Variables: symbols, then half tangents.
     variables: Arc<Vec<PolyVariable>>,
-    /// Names that stand for scalars: symbols, then cosines, then sines.
+    /// Names of scalars with their values: symbols, then cosines, then sines.
     scalars: Vec<(Symbol, Scalar)>,
-    /// The square roots and their squares.
+    /// Square roots with their squares.
     generators: Vec<(Symbol, Scalar)>,
-    /// The names of the angles; their half tangents are the last variables.
+    /// Names of the angles; their half tangents are the last variables.
     angles: Vec<String>,
-    /// Products of terms that may still be formed.
+    /// Number of products of terms that may still be formed.
     work: Cell<u64>,
 }
 
-/// What an operation costs besides its products of terms.
+/// Work of an operation besides its products of terms.
 const OPERATION: u64 = 200;
-/// What it costs to write a term with its angles.
+/// Work to print a term with its angles.
 const PRINTED: u64 = 10_000;
 
 pub(crate) fn atom(text: &str) -> Result<Atom, JobError> {
@@ -81,7 +82,7 @@ impl Tower {
         Ok(tower)
     }
 
-    /// A rational function of the symbols and half tangents alone.
+    /// Rational function of the symbols and half tangents alone.
     pub(crate) fn scalar(&self, text: &str) -> Result<Scalar, JobError> {
         self.scalar_of(&atom(text)?)
     }
@@ -94,8 +95,8 @@ impl Tower {
         Ok(s)
     }
 
-    /// Accounts for an operation on two scalars: its cost follows their products of terms (a common divisor
-    /// is sought among them).
+    /// Counts the work of an operation on two scalars by their products of terms, which a common
+    /// divisor costs too.
     pub(crate) fn charge(&self, x: &Scalar, y: &Scalar) {
         let terms = |s: &Scalar| (s.numerator.nterms() + s.denominator.nterms()) as u64;
         self.spend(OPERATION.saturating_add(terms(x).saturating_mul(terms(y))));
@@ -105,7 +106,7 @@ impl Tower {
         self.work.set(self.work.get().saturating_sub(work));
     }
 
-    /// An error when the work is used up.
+    /// Checks that work is left.
     pub(crate) fn go_on(&self) -> Result<(), JobError> {
         if self.work.get() == 0 { Err(JobError::OverLimit) } else { Ok(()) }
     }
@@ -128,7 +129,7 @@ impl Tower {
         e
     }
 
-    /// A rational function of symbols and generators.
+    /// Rational function of symbols and generators.
     pub(crate) fn element(&self, text: &str) -> Result<Element, JobError> {
         self.element_of(&atom(text)?)
     }
@@ -183,7 +184,7 @@ impl Tower {
         a.0.iter().all(Scalar::is_zero)
     }
 
-    /// How many monomials an element has in numerators and denominators.
+    /// Number of monomials of an element in numerators and denominators.
     pub(crate) fn terms(&self, a: &Element) -> usize {
         let of = |x: &Scalar| x.numerator.nterms() + x.denominator.nterms();
         a.0.iter().filter(|x| !x.is_zero()).map(of).sum()
@@ -246,15 +247,15 @@ impl Tower {
         Atom::num(1).to_rational_polynomial(&Q, &Z, self.variables.clone())
     }
 
-    /// The element as text over one denominator, both factored; of two ways to write it, with powers of
-    /// cosines or of sines, the shorter.
+    /// Element as text over one denominator, both factored. It is written with powers of cosines or of
+    /// sines, whichever is shorter.
     pub(crate) fn print(&self, e: &Element) -> Result<String, JobError> {
         if self.is_zero(e) {
             return Ok("0".into());
         }
         self.spend((self.terms(e) as u64).saturating_mul(PRINTED));
         self.go_on()?;
-        // common denominator: the product of denominators that do not divide what is there already
+        // common denominator: product of the denominators that do not divide it already
         let mut denominator = self.one_scalar();
         for x in e.0.iter().filter(|x| !x.is_zero()) {
             let missing = &Scalar::from(x.denominator.clone()) * &denominator.clone().inv();
@@ -282,7 +283,7 @@ impl Tower {
         Ok(ways.into_iter().min_by_key(String::len).unwrap_or_default())
     }
 
-    /// A polynomial over `product (1 + t_a^2)^half_a` as one in cosines and sines.
+    /// Polynomial over `product (1 + t_a^2)^half_a`, in cosines and sines.
     fn in_angles(&self, p: &Polynomial, halves: &[u32], powers: Powers) -> Atom {
         let first = self.variables.len() - self.angles.len();
         let mut sum = Atom::num(0);
@@ -303,19 +304,20 @@ impl Tower {
 /// A polynomial in the symbols.
 pub(crate) type Polynomial = MultivariatePolynomial<IntegerRing, u16>;
 
-/// Whose powers above one are kept; the other's square is replaced.
+/// Function whose powers above one are kept; the square of the other is replaced.
 #[derive(Clone, Copy)]
 enum Powers {
     OfSine,
     OfCosine,
 }
 
-/// Its highest power of a variable.
+/// Highest power of a variable.
 pub(crate) fn degree(p: &Polynomial, variable: usize) -> u32 {
     p.into_iter().filter_map(|term| term.exponents.get(variable)).copied().max().map_or(0, u32::from)
 }
 
-/// `t^j / (1+t^2)^m = cos^(2m-j)(a/2) sin^j(a/2)` in the cosine and sine of `a`, for `j <= 2m`.
+/// Fraction `t^j / (1+t^2)^m = cos^(2m-j)(a/2) sin^j(a/2)` in the cosine and sine of `a`, for `j <=
+/// 2m`.
 fn trigonometric(angle: &str, j: u32, m: u32, powers: Powers) -> Atom {
     let (c, s) = (Atom::var(symbol!(format!("c_{angle}"))), Atom::var(symbol!(format!("s_{angle}"))));
     let half = Atom::num((1, 2));

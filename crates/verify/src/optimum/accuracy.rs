@@ -1,13 +1,14 @@
-//! Lower bounds on the criterion of a sequence in double precision, rounding allowed for.
+//! Lower bounds on the criterion of a sequence in double precision, valid despite rounding.
 //!
-//! Information is held as its root: `M = Y^T Y`, with the rows `Y_i = U L_i` of position i, where `U^T U` is
-//! the information of one dwell on the local quantities and `L_i` those in terms of the unknowns. For any x
+//! Information is stored as its root: `M = Y^T Y`, with the rows `Y_i = U L_i` of position i. `U^T U`
+//! is the information of one dwell on the local quantities, and `L_i` gives these in terms of the
+//! unknowns. For any x
 //!
 //! ```text
 //! v^T M^-1 v >= (v x)^2 / |Y x|^2        (Cauchy and Schwarz)
 //! ```
 //!
-//! so how x was found does not matter, and `|Y x|` is known to within the majorant of its rows.
+//! so the origin of x does not matter, and `|Y x|` is known to within the majorant of its rows.
 
 use crate::problem::{Problem, Ring, Source, TURN};
 
@@ -17,15 +18,15 @@ const EARTH_RATE: f64 = 7.292115e-5;
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Local quantities of a position: psi, eps, a in n.
 const LOCAL: usize = 9;
-/// Pivots below this part of a diagonal entry are rounding.
+/// Pivots below this fraction of a diagonal entry are rounding.
 const PIVOT: f64 = 1e-13;
-/// Pivots from this part of a diagonal entry on are known to a part of some 1e-6.
+/// Pivots from this fraction of a diagonal entry on are known to a relative accuracy of about 1e-6.
 pub(super) const SURE_PIVOT: f64 = 1e-9;
 
 /// Rows of any length.
 pub(super) type Rows = Vec<Vec<f64>>;
 
-/// Double precision.
+/// Ring of double-precision numbers, with the rates of a problem.
 pub(super) struct Double {
     rates: [f64; 2],
 }
@@ -37,7 +38,7 @@ impl Double {
     }
 }
 
-/// Cosine and sine of an angle in 1e-9 degrees: exact at multiples of 90 degrees.
+/// Cosine and sine of an angle in 1e-9 degrees, exact at multiples of 90 degrees.
 fn cos_sin(angle: i64) -> (f64, f64) {
     let quarter = TURN / 4;
     let turns = (angle + quarter / 2).div_euclid(quarter);
@@ -99,52 +100,53 @@ pub(super) struct Dwell {
     pub azimuth_noise_deg: Option<f64>,
 }
 
-/// Evaluates sequences.
+/// Evaluator of sequences.
 pub(super) struct Accuracy {
     carry: String,
     criterion: Criterion,
     /// Number of coefficients, those that do not count first.
     d: usize,
     nuisance: usize,
-    /// Per coefficient that counts: the sigma that is 1 in the criterion.
+    /// Sigma that is 1 in the criterion, per coefficient that counts.
     limits: Vec<f64>,
     /// Root of the information of a dwell on the local quantities (9 x 9, upper triangle).
     root: Rows,
-    /// psi^n behind the dwell, by psi^n and eps^n before it (3 x 6).
+    /// psi^n after the dwell as a function of psi^n and eps^n before it (3 x 6).
     behind: Rows,
-    /// Per candidate C, and drift and accelerometer error by the coefficients (6 x d).
+    /// Matrix C of every candidate, with drift and accelerometer error as functions of the coefficients
+    /// (6 x d).
     candidates: Vec<(Rows, Rows)>,
-    /// Under reset carry, per candidate: rows on the coefficients (9 x d), and psi that makes them small (3 x
-    /// d).
+    /// Rows on the coefficients (9 x d) under reset carry, per candidate, and the psi that minimises
+    /// them (3 x d).
     alone: Vec<(Rows, Rows)>,
-    /// Per row of the root: sums of its sizes at psi, eps and a.
+    /// Sums of the absolute values at psi, eps and a, per row of the root.
     sizes: [[f64; 3]; LOCAL],
-    /// Sizes of the columns of a coefficient: at eps and a.
+    /// Sums of the absolute values of the columns of a coefficient: at eps and a.
     scales: Vec<[f64; 2]>,
     seconds: f64,
     samples: usize,
 }
 
-/// A sequence so far.
+/// State of a sequence of positions.
 #[derive(Clone)]
-pub(super) struct State {
-    /// psi in the carried axes by the unknowns (3 x n).
+pub(super) struct SequenceState {
+    /// psi in the carried axes as a function of the unknowns (3 x n).
     psi: Rows,
     /// Rows Y of the positions so far.
     rows: Vec<Rows>,
-    /// Per position the psi of reset carry by the coefficients.
+    /// psi of each position under reset carry as a function of the coefficients.
     own: Vec<Rows>,
-    /// `Y^T Y` (n x n).
+    /// Information `Y^T Y` (n x n).
     information: Rows,
 }
 
-/// Value of a criterion, and what no rounding makes it fall below.
+/// Value of a criterion with its lower bound.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Value {
+pub(super) struct BoundedValue {
     pub computed: f64,
     pub at_least: f64,
-    /// Smallest pivot of the root by its diagonal entry, but for those that are left out; 0 if a coefficient
-    /// is held by rounding alone.
+    /// Smallest pivot of the root relative to its diagonal entry, without those that are left out; 0 if
+    /// a coefficient is determined by rounding alone.
     pub pivot: f64,
     /// Number of unknowns that are left out because nothing determines them.
     pub left_out: usize,
@@ -154,7 +156,7 @@ fn zeros(rows: usize, columns: usize) -> Rows {
     vec![vec![0.0; columns]; rows]
 }
 
-/// `A B`.
+/// Product `A B`.
 fn product(a: &Rows, b: &Rows) -> Rows {
     let mut out = zeros(a.len(), b[0].len());
     for (row, a) in out.iter_mut().zip(a) {
@@ -173,7 +175,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// `psi^n` and `eps^n` after `t` seconds as psi^n: `[exp(W t), int exp(W s) ds]` (3 x 6).
+/// psi^n after `t` seconds as a function of `psi^n` and `eps^n`: `[exp(W t), int exp(W s) ds]` (3 x 6).
 fn behind(rates: [f64; 2], t: f64) -> Rows {
     let [n, u] = rates;
     let w: Rows = vec![vec![0.0, 0.0, -u], vec![0.0, 0.0, n], vec![u, -n, 0.0]];
@@ -181,7 +183,7 @@ fn behind(rates: [f64; 2], t: f64) -> Rows {
     let rate = n.hypot(u);
     let x = rate * t;
     let half = (x / 2.0).sin() / rate;
-    // (x - sin x)/rate^3: where x is small by its series
+    // (x - sin x)/rate^3, by its series if x is small
     let third = match x {
         x if x < 0.5 => {
             let (mut term, mut sum, mut k) = (t * t * t / 6.0, 0.0, 3.0);
@@ -205,7 +207,7 @@ fn behind(rates: [f64; 2], t: f64) -> Rows {
         .collect()
 }
 
-/// Folds a row into an upper triangular root, by Givens rotations.
+/// Adds a row to an upper triangular root, by Givens rotations.
 fn fold(root: &mut Rows, mut row: Vec<f64>) {
     for i in 0..row.len() {
         if row[i] == 0.0 {
@@ -221,14 +223,15 @@ fn fold(root: &mut Rows, mut row: Vec<f64>) {
     }
 }
 
-/// SI units per unit of a coefficient: deg/h, arc seconds, or millionths.
+/// Factor from the unit of a coefficient to SI units: deg/h, arc seconds, or millionths.
 fn unit(name: &str) -> f64 {
     let arc = name.starts_with("D_") || name.starts_with("GM_") || name.starts_with("M_");
     if arc { ARCSEC } else { 1e-6 }
 }
 
 impl Accuracy {
-    /// `required`: columns of the coefficients that count, with the sigma that is 1 in the criterion.
+    /// Evaluator of sequences. `required`: columns of the coefficients that count, with the sigma that
+    /// is 1 in the criterion.
     pub(super) fn new(
         problem: &Problem,
         carry: &str,
@@ -278,7 +281,7 @@ impl Accuracy {
         out
     }
 
-    /// Rows of a position with a psi of its own, and that psi: it makes the rows 0 that begin at it.
+    /// Rows of a position with a psi of its own, and that psi, which makes the rows 0 that begin at it.
     fn alone(&self, effects: &Rows) -> (Rows, Rows) {
         let d = self.d;
         let mut rows: Rows =
@@ -296,19 +299,24 @@ impl Accuracy {
         (rows, psi)
     }
 
-    /// Unknowns before the coefficients: psi, unless every position has its own.
+    /// Number of unknowns before the coefficients: those of psi, unless every position has its own.
     fn psi(&self) -> usize {
         if self.carry == "reset" { 0 } else { 3 }
     }
 
-    pub(super) fn start(&self) -> State {
+    pub(super) fn start(&self) -> SequenceState {
         let n = self.psi() + self.d;
         let unit = |r: usize| (0..n).map(|j| f64::from(u8::from(j == r))).collect();
-        State { psi: (0..3).map(unit).collect(), rows: Vec::new(), own: Vec::new(), information: zeros(n, n) }
+        SequenceState {
+            psi: (0..3).map(unit).collect(),
+            rows: Vec::new(),
+            own: Vec::new(),
+            information: zeros(n, n),
+        }
     }
 
-    /// The sequence with one more candidate.
-    pub(super) fn extended(&self, state: &State, candidate: usize) -> State {
+    /// State of the sequence with one more candidate.
+    pub(super) fn extended(&self, state: &SequenceState, candidate: usize) -> SequenceState {
         let mut out = state.clone();
         let (c, effects) = &self.candidates[candidate];
         let rows = if self.carry == "reset" {
@@ -334,12 +342,12 @@ impl Accuracy {
         out
     }
 
-    /// The criterion of a sequence.
-    pub(super) fn value(&self, state: &State) -> Value {
+    /// Criterion of a sequence.
+    pub(super) fn value(&self, state: &SequenceState) -> BoundedValue {
         let root = Root::new(&state.information, self.psi() + self.nuisance);
         let n = root.l.len();
         let (first, d) = (n - self.limits.len(), self.limits.len() as f64);
-        // the inverse of the block of what counts: columns
+        // inverse of the block of the coefficients that count: columns
         let inverse: Rows = (first..n).map(|j| root.column(j)).collect();
         let variance = |k: usize| inverse[k].iter().map(|x| x * x).sum::<f64>() / self.limits[k].powi(2);
         let unit = |k: usize| (0..n).map(|i| f64::from(u8::from(i == first + k))).collect::<Vec<_>>();
@@ -370,8 +378,8 @@ impl Accuracy {
                 (largest, of(&v) / dot(&v, &v))
             }
         };
-        // the few roundings of the bound itself
-        Value {
+        // rounding of the bound itself
+        BoundedValue {
             computed: squared.sqrt(),
             at_least: (bound.sqrt() * (1.0 - 1e-13)).max(0.0),
             pivot: root.pivot,
@@ -379,8 +387,8 @@ impl Accuracy {
         }
     }
 
-    /// `|Y x|` at most, whatever rounding did.
-    fn energy(&self, state: &State, x: &[f64]) -> f64 {
+    /// Upper bound on `|Y x|`, valid despite rounding.
+    fn energy(&self, state: &SequenceState, x: &[f64]) -> f64 {
         let psi = self.psi();
         let (mut sum, mut hidden) = (0.0, 0.0);
         let sizes = |of: usize| x[psi..].iter().zip(&self.scales).map(|(x, s)| x.abs() * s[of]).sum::<f64>();
@@ -427,11 +435,12 @@ fn root(problem: &Problem, rates: [f64; 2], dwell: &Dwell) -> Rows {
     root
 }
 
-/// Lower triangular root of an information matrix. What the first `nuisance` unknowns leave undetermined is
-/// left out; what counts and is undetermined is held by rounding alone.
+/// Lower triangular root of an information matrix. Directions that the first `nuisance` unknowns leave
+/// undetermined are left out; undetermined coefficients that count are determined by rounding alone.
 struct Root {
     l: Rows,
-    /// Smallest pivot by its diagonal entry, but for those that are left out; 0 if one counts as rounding.
+    /// Smallest pivot relative to its diagonal entry, without those that are left out; 0 if one is
+    /// rounding.
     pivot: f64,
     left_out: usize,
 }
@@ -471,13 +480,13 @@ impl Root {
             let unit = f64::from(u8::from(i == j));
             out.push((unit - dot(&row[j..i], &out)) / row[i]);
         }
-        // as long as all of them
+        // padded to the full length
         let mut whole = vec![0.0; self.l.len() - out.len()];
         whole.extend(out);
         whole
     }
 
-    /// `L^-T e_i`.
+    /// Solution `L^-T e_i`.
     fn backward(&self, i: usize) -> Vec<f64> {
         let mut unit = vec![0.0; self.l.len()];
         unit[i] = 1.0;
@@ -493,7 +502,7 @@ impl Root {
         x
     }
 
-    /// `L^-T L^-1 v`.
+    /// Solution `L^-T L^-1 v`.
     fn solved(&self, v: &[f64]) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(v.len());
         for (row, v) in self.l.iter().zip(v) {
@@ -504,7 +513,7 @@ impl Root {
     }
 }
 
-/// Largest eigenvalue of a symmetric matrix, and its vector: cyclic Jacobi rotations.
+/// Largest eigenvalue of a symmetric matrix, and its eigenvector: cyclic Jacobi rotations.
 fn principal(mut a: Rows) -> (f64, Vec<f64>) {
     let n = a.len();
     let mut vectors: Rows = (0..n).map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect()).collect();

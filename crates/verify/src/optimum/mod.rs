@@ -1,5 +1,5 @@
-//! Certificates of optima: the best of all sequences of candidates, by blocks that any checker can search
-//! again.
+//! Certificates of optima: the best of all sequences of candidates, with blocks that any checker can
+//! search again.
 
 mod accuracy;
 mod space;
@@ -10,29 +10,29 @@ use crate::file::{RawGyro, RawProblem};
 use crate::modular::{Randomness, chance};
 use crate::problem::{Problem, known_carry};
 use crate::{Refused, Replay, by_primes, need, parsed, refusal, same};
-use accuracy::{Accuracy, Criterion, Dwell, SURE_PIVOT, State, Value};
-use space::{Space, multisets, power};
+use accuracy::{Accuracy, BoundedValue, Criterion, Dwell, SURE_PIVOT, SequenceState};
+use space::{SetVerdicts, multisets, power};
 
 /// Layout of certificates of optima.
 pub(crate) const LAYOUT: &str = "obsdeg.optimum-certificate/1";
-/// Number of sequences up to which all blocks are searched again, unless a number of blocks is asked for.
+/// Number of sequences up to which all blocks are searched again, unless a number of blocks is given.
 const ALL_UP_TO: u64 = 2_000_000;
-/// Part by which a printed lower bound is smaller: it is not rounded up.
+/// Relative margin by which a printed lower bound is reduced, so that printing does not round it up.
 const DIGITS: f64 = 1e-6;
-/// Relative tolerance of every value and bound: of the value, the bound and what is found together three
-/// times that.
+/// Relative tolerance of every value and bound; three times that for value, bound and found result
+/// together.
 const TOLERANCE: f64 = 1e-5;
-/// Most blocks of a certificate.
+/// Largest number of blocks of a certificate.
 const MOST_BLOCKS: usize = 100_000;
-/// Dwell of a position, in s.
+/// Range of the dwell of a position, in s.
 const DWELL_S: [f64; 2] = [10.0, 1e6];
-/// Noise of a sample of Z, in g.
+/// Range of the noise of a sample of Z, in g.
 const NOISE_G: [f64; 2] = [1e-9, 1e-2];
-/// Noise of a sample of the azimuth, in degrees.
+/// Range of the noise of a sample of the azimuth, in degrees.
 const AZIMUTH_NOISE_DEG: [f64; 2] = [1e-6, 10.0];
-/// Required sigma of a coefficient, in its unit.
+/// Range of the required sigma of a coefficient, in its unit.
 const LIMIT: [f64; 2] = [1e-12, 1e12];
-/// Latitude, north or south, in degrees.
+/// Range of the latitude, north or south, in degrees.
 const LATITUDE_DEG: [f64; 2] = [1.0, 89.0];
 
 #[derive(Deserialize)]
@@ -67,7 +67,7 @@ struct RawSearch {
     required: Vec<Required>,
 }
 
-/// A coefficient that must be observable.
+/// Coefficient that must be observable.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Required {
@@ -94,14 +94,14 @@ struct RawBlock {
     bound: Option<f64>,
 }
 
-/// The search, checked.
-struct Search {
+/// Checked search.
+struct CheckedSearch {
     problem: Problem,
     carry: String,
     positions: usize,
     accuracy: Accuracy,
-    space: Space,
-    /// Probability that all primes mislead about any set.
+    space: SetVerdicts,
+    /// Bound on the probability that all primes give a wrong result for any set.
     error: f64,
     primes: usize,
     unit: &'static str,
@@ -116,11 +116,11 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
         "one",
     )?;
     let file: Optimum = parsed(certificate)?;
-    let mut search = Search::new(&file.problem, certificate)?;
+    let mut search = CheckedSearch::new(&file.problem, certificate)?;
     let least = winners(&mut search, &file)?;
     let (firsts, depth) = search.cover(&file, least)?;
     let (chosen, seed) = chosen(&file, certificate, replay)?;
-    let mut found = Found { at_least: f64::INFINITY, ..Found::default() };
+    let mut found = ReplayResult { at_least: f64::INFINITY, ..ReplayResult::default() };
     for &i in &chosen {
         let block = &file.blocks[i];
         let start: Vec<usize> = block.start.iter().map(|c| c - 1).collect();
@@ -143,17 +143,17 @@ pub(crate) fn verify(certificate: &[u8], scheme: bool, replay: &Replay) -> Resul
     Ok(search.sentences(&file, (&firsts, depth), (chosen.len(), seed), &found))
 }
 
-/// Findings of replays.
+/// Results of replays.
 #[derive(Default)]
-struct Found {
+struct ReplayResult {
     sequences: u64,
-    /// Sequences of the degree of the optimum within the caps.
+    /// Number of sequences with the degree of the optimum within the caps.
     counted: u64,
     at_least: f64,
-    least: Option<(Vec<usize>, Value)>,
+    least: Option<(Vec<usize>, BoundedValue)>,
 }
 
-impl Found {
+impl ReplayResult {
     fn add(&mut self, other: Self) {
         self.sequences += other.sequences;
         self.counted += other.counted;
@@ -169,8 +169,8 @@ fn listed(sequence: &[usize]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// The best sequences are what they seem; the value of the first.
-fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
+/// Checks the best sequences, and returns the value of the first.
+fn winners(search: &mut CheckedSearch, file: &Optimum) -> Result<f64, Refused> {
     let (n, k) = (search.problem.positions.len(), search.positions);
     need((1..=1000).contains(&file.best.len()), "best", "1 to 1000 sequences", file.best.len())?;
     let mut before = 0.0;
@@ -188,7 +188,7 @@ fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
         let value = search.value(&sequence);
         let near = (best.value / value.computed - 1.0).abs() <= TOLERANCE;
         need(near, &place, &format!("{:e}", value.computed), best.value)?;
-        // double precision decides it
+        // decided by double precision
         let sure = value.pivot >= SURE_PIVOT && value.left_out <= undetermined;
         let expected = format!("pivots from {SURE_PIVOT:e} on, and {undetermined} unknowns left out at most");
         need(sure, &place, &expected, format!("{:e}, {} left out", value.pivot, value.left_out))?;
@@ -198,7 +198,7 @@ fn winners(search: &mut Search, file: &Optimum) -> Result<f64, Refused> {
     Ok(file.best[0].value)
 }
 
-/// The blocks that are searched again, and the seed of the choice if there is one.
+/// Blocks that are searched again, and the seed of the choice if there is one.
 fn chosen(file: &Optimum, certificate: &[u8], replay: &Replay) -> Result<(Vec<usize>, Option<u64>), Refused> {
     let all = file.blocks.len();
     let count = match replay.blocks {
@@ -224,21 +224,21 @@ fn chosen(file: &Optimum, certificate: &[u8], replay: &Replay) -> Result<(Vec<us
     Ok((places, Some(seed)))
 }
 
-/// A number that nobody knew when the certificate was written.
+/// Random number of the system, unknown when the certificate was written.
 fn of_the_system() -> u64 {
     use std::hash::{BuildHasher, Hasher};
     std::collections::hash_map::RandomState::new().build_hasher().finish()
 }
 
-/// A number of a file within limits.
+/// Number of a file, refused unless it is within limits.
 fn between(place: &str, x: f64, [least, most]: [f64; 2]) -> Result<f64, Refused> {
     need((least..=most).contains(&x), place, &format!("a number from {least:e} to {most:e}"), x)?;
     Ok(x)
 }
 
-/// Searches that double precision decides: cardinal candidates, all coefficients required, a latitude away
-/// from the equator and the poles. Elsewhere a sequence may determine so little that rounding decides its
-/// value.
+/// Refuses searches that double precision cannot decide. It decides those with cardinal candidates, all
+/// coefficients required, and a latitude away from the equator and the poles. Elsewhere a sequence may
+/// determine so little that rounding decides its value.
 fn within_precision(raw: &RawSearch, problem: &Problem) -> Result<(), Refused> {
     let right = |text: &String| text.parse::<f64>().is_ok_and(|x| x % 90.0 == 0.0);
     let other = raw.candidates.iter().flatten().find(|text| !right(text));
@@ -272,10 +272,10 @@ fn dwell(raw: &RawSearch) -> Result<Dwell, Refused> {
     })
 }
 
-impl Search {
+impl CheckedSearch {
     fn new(raw: &RawSearch, certificate: &[u8]) -> Result<Self, Refused> {
         known_carry(&raw.carry)?;
-        // rows of the candidates; the carry acts where they are put together
+        // rows of the candidates; the carry acts when positions are combined
         let problem = Problem::new(&RawProblem {
             carry: "platform".into(),
             latitude_deg: Some(raw.latitude_deg.clone()),
@@ -314,7 +314,7 @@ impl Search {
         };
         let caps = required.iter().map(|r| (r.0, r.1)).collect();
         let random = &mut Randomness::new(certificate);
-        let space = Space::new(&problem, &raw.carry, caps, primes as usize, random, &alike);
+        let space = SetVerdicts::new(&problem, &raw.carry, caps, primes as usize, random, &alike);
         Ok(Self {
             accuracy: Accuracy::new(&problem, &raw.carry, &dwell, criterion, &columns),
             unit: unit(&problem, criterion, &required)?,
@@ -327,13 +327,13 @@ impl Search {
         })
     }
 
-    fn value(&self, sequence: &[usize]) -> Value {
+    fn value(&self, sequence: &[usize]) -> BoundedValue {
         let state = sequence.iter().fold(self.accuracy.start(), |s, &c| self.accuracy.extended(&s, c));
         self.accuracy.value(&state)
     }
 
-    /// Number of sequences behind a start: n^left where order matters, otherwise multisets of what is not
-    /// below its last.
+    /// Number of sequences behind a start: n^left where order matters, otherwise multisets of
+    /// candidates from its last one on.
     fn behind(&self, start: &[usize]) -> Option<u64> {
         let (n, left) = (self.problem.positions.len() as u64, (self.positions - start.len()) as u64);
         match (self.carry.as_str(), start.last()) {
@@ -342,7 +342,8 @@ impl Search {
         }
     }
 
-    /// The blocks cover all sequences up to turns of the platform axes; the firsts, and the length of starts.
+    /// Checks that the blocks cover all sequences up to turns of the platform axes. Returns the first
+    /// candidates and the length of starts.
     fn cover(&self, file: &Optimum, least: f64) -> Result<(Vec<usize>, usize), Refused> {
         let n = self.problem.positions.len();
         let found = file.blocks.len();
@@ -401,12 +402,12 @@ impl Search {
     }
 
     /// Searches all sequences of a block.
-    fn replay(&mut self, start: &[usize], file: &Optimum) -> Result<Found, Refused> {
+    fn replay(&mut self, start: &[usize], file: &Optimum) -> Result<ReplayResult, Refused> {
         let mut states = vec![self.accuracy.start()];
         for &c in start {
             states.push(self.accuracy.extended(&states[states.len() - 1], c));
         }
-        let mut found = Found { at_least: f64::INFINITY, ..Found::default() };
+        let mut found = ReplayResult { at_least: f64::INFINITY, ..ReplayResult::default() };
         let state = states.swap_remove(start.len());
         self.visit(&mut start.to_vec(), &state, file.degree, &mut found)?;
         Ok(found)
@@ -415,9 +416,9 @@ impl Search {
     fn visit(
         &mut self,
         sequence: &mut Vec<usize>,
-        state: &State,
+        state: &SequenceState,
         degree: usize,
-        found: &mut Found,
+        found: &mut ReplayResult,
     ) -> Result<(), Refused> {
         if sequence.len() == self.positions {
             found.sequences += 1;
@@ -440,7 +441,7 @@ impl Search {
         for c in from..self.problem.positions.len() {
             sequence.push(c);
             let whole = sequence.len() == self.positions;
-            // what is not of the degree is not evaluated
+            // sequences of a larger degree are not evaluated
             let counts = !whole || self.space.worst_degree(sequence).is_some_and(|own| own <= degree);
             if counts {
                 let next = self.accuracy.extended(state, c);
@@ -458,14 +459,15 @@ impl Search {
         file: &Optimum,
         (firsts, depth): (&[usize], usize),
         (replayed, seed): (usize, Option<u64>),
-        found: &Found,
+        found: &ReplayResult,
     ) -> Vec<String> {
         let (n, k) = (self.problem.positions.len(), self.positions);
         let order = if self.carry == "reset" { ", order is of no account" } else { "" };
         let names: Vec<String> = file.problem.required.iter().map(|r| r.name.clone()).collect();
         let how = by_primes(self.primes, self.error);
         let mut out = vec![format!(
-            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell {} s, {} samples.",
+            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell \
+             {} s, {} samples.",
             self.carry,
             file.problem.latitude_deg,
             file.problem.criterion,
@@ -488,7 +490,8 @@ impl Search {
             out.push(format!("{} more sequences of the list; evaluated again.", file.best.len() - 3));
         }
         out.push(format!(
-            "Blocks: {} of starts of {depth}, {} sequences, stand for all: first candidates {}, {} turns of the platform axes.",
+            "Blocks: {} of starts of {depth}, {} sequences, stand for all: first candidates {}, {} turns of \
+             the platform axes.",
             file.blocks.len(),
             file.sequences,
             listed(&firsts.iter().map(|c| c - 1).collect::<Vec<_>>()),
@@ -500,11 +503,18 @@ impl Search {
             _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
         };
         out.push(match replayed {
-            0 => format!("No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."),
+            0 => format!(
+                "No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."
+            ),
             _ => format!(
-            "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of a smaller one, {least}; {} sets judged {how}.",
-            file.blocks.len(), found.sequences, found.counted, file.degree, self.space.judged_sets()
-        ),
+                "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of \
+                 a smaller one, {least}; {} sets judged {how}.",
+                file.blocks.len(),
+                found.sequences,
+                found.counted,
+                file.degree,
+                self.space.judged_sets()
+            ),
         });
         out.push(match file.blocks.len() - replayed {
             0 => {
@@ -518,12 +528,16 @@ impl Search {
                 file.sequences - found.sequences
             ),
         });
-        out.push("Assumption: the model of book/src/certificate.md, white noise of Z, nothing known beforehand, repositioning at once.".into());
+        out.push(
+            "Assumption: the model of book/src/certificate.md, white noise of Z, nothing known beforehand, \
+             repositioning at once."
+                .into(),
+        );
         out
     }
 }
 
-/// The first start of so many candidates that begins with some.
+/// First start of `depth` candidates that begins with `start`.
 fn filled(mut start: Vec<usize>, depth: usize, reset: bool) -> Vec<usize> {
     while start.len() < depth {
         start.push(if reset { start[start.len() - 1] } else { 1 });
@@ -531,7 +545,7 @@ fn filled(mut start: Vec<usize>, depth: usize, reset: bool) -> Vec<usize> {
     start
 }
 
-/// The next start in lexicographic order with the same first candidate; empty after the last.
+/// Next start in lexicographic order with the same first candidate; empty after the last.
 fn next_start(mut start: Vec<usize>, n: usize, depth: usize, reset: bool) -> Vec<usize> {
     while let Some(last) = start.pop() {
         if last < n && !start.is_empty() {
@@ -542,7 +556,7 @@ fn next_start(mut start: Vec<usize>, n: usize, depth: usize, reset: bool) -> Vec
     start
 }
 
-/// The coefficients that count: column, largest degree, and the sigma that is 1 in the criterion.
+/// Coefficients that count: column, largest degree, and the sigma that is 1 in the criterion.
 type Counting = Vec<(usize, usize, f64)>;
 
 fn required(raw: &RawSearch, problem: &Problem) -> Result<(Criterion, Counting), Refused> {
@@ -574,7 +588,7 @@ fn required(raw: &RawSearch, problem: &Problem) -> Result<(Criterion, Counting),
     Ok((criterion, out))
 }
 
-/// The unit of a criterion, after a blank; empty where it has none.
+/// Unit of a criterion, after a blank; empty if it has none.
 fn unit(problem: &Problem, criterion: Criterion, required: &Counting) -> Result<&'static str, Refused> {
     let of = |column: usize| unit_of(problem, column);
     let first = of(required[0].0);
@@ -590,7 +604,7 @@ fn unit(problem: &Problem, criterion: Criterion, required: &Counting) -> Result<
     }
 }
 
-/// The unit of a coefficient, after a blank.
+/// Unit of a coefficient, after a blank.
 fn unit_of(problem: &Problem, column: usize) -> &'static str {
     match &problem.names[problem.psi + column] {
         name if name.starts_with("D_") => " deg/h",

@@ -1,5 +1,5 @@
-//! The sequences of a search: turns of the platform axes that map them to equally good ones, worst degrees of
-//! sets.
+//! Symmetry and verdicts of the sequences of a search: turns of the platform axes that map them to
+//! equally good ones, and worst degrees of sets.
 
 use std::collections::HashMap;
 
@@ -8,24 +8,24 @@ use crate::modular::{PrimeField, Randomness, inverse, judge, subtract, times};
 use crate::problem::{Matrix, Problem, Ring, times as product};
 
 /// Rows of one candidate by order and component: psi first, then the coefficients.
-type RowsOf = Vec<(RowName, Vec<u64>)>;
+type CandidateRows = Vec<(RowName, Vec<u64>)>;
 
 /// Verdicts on sets of candidates.
-pub(super) struct Space {
-    fields: Vec<(u64, Vec<RowsOf>)>,
+pub(super) struct SetVerdicts {
+    fields: Vec<(u64, Vec<CandidateRows>)>,
     reset: bool,
     /// Names of the unknowns of one candidate.
     names: Vec<String>,
-    /// Columns of the required coefficients among the coefficients, and their largest degrees.
+    /// Columns of the required coefficients among the coefficients, with their largest degrees.
     required: Vec<(usize, usize)>,
     known: HashMap<Vec<usize>, Option<usize>>,
-    /// Images of every candidate under turns of the platform axes; the identity is among them.
+    /// Images of every candidate under turns of the platform axes, including the identity.
     pub maps: Vec<Vec<usize>>,
 }
 
-impl Space {
-    /// `problem` has the candidates as positions and carry platform; `alike(i, j)` says whether coefficients
-    /// i and j count alike.
+impl SetVerdicts {
+    /// Verdicts for a problem with the candidates as positions and carry platform; `alike(i, j)` is
+    /// true if coefficients i and j are equivalent for the criterion.
     pub(super) fn new(
         problem: &Problem,
         carry: &str,
@@ -37,12 +37,12 @@ impl Space {
         let (mut fields, mut maps) = (Vec::new(), None::<Vec<Option<Vec<usize>>>>);
         for _ in 0..primes {
             let field = PrimeField::new(problem, random);
-            let mut of: Vec<RowsOf> = vec![Vec::new(); problem.positions.len()];
+            let mut of: Vec<CandidateRows> = vec![Vec::new(); problem.positions.len()];
             let attitudes = problem.attitudes(&field);
             for (name, mut row) in problem.rows(&field) {
                 let i = name.0 - 1;
                 if carry == "inertial" {
-                    // psi^n goes on: what takes psi^n = C psi takes psi times C^T
+                    // psi^n is carried: a row on psi^n = C psi is the row on psi times C^T
                     let of_psi: Matrix<u64> = vec![row[..3].to_vec()];
                     row[..3].copy_from_slice(&product(&field, &of_psi, &transposed(&attitudes[i]))[0]);
                 }
@@ -80,7 +80,7 @@ impl Space {
         firsts
     }
 
-    /// The largest degree of a required coefficient; `None` where one is not observable or above its cap.
+    /// Largest degree of a required coefficient; `None` if one is not observable or above its cap.
     pub(super) fn worst_degree(&mut self, sequence: &[usize]) -> Option<usize> {
         let mut set = sequence.to_vec();
         set.sort_unstable();
@@ -88,14 +88,14 @@ impl Space {
         if let Some(known) = self.known.get(&set) {
             return *known;
         }
-        // a set counts where any prime says so
+        // a set counts if any prime judges it observable
         let found = self.fields.iter().filter_map(|field| self.judged(field, &set)).min();
         self.known.insert(set, found);
         found
     }
 
-    /// The largest degree by all primes, which a single one could make too small, and the number of unknowns
-    /// that nothing determines; `None` where a required coefficient is not observable or above its cap.
+    /// Largest degree by all primes, of which a single one may give too small a degree, and the number
+    /// of undetermined unknowns. `None` if a required coefficient is not observable or above its cap.
     pub(super) fn certain(&self, sequence: &[usize]) -> Option<(usize, usize)> {
         let mut set = sequence.to_vec();
         set.sort_unstable();
@@ -111,16 +111,16 @@ impl Space {
         self.known.len()
     }
 
-    fn judged(&self, field: &(u64, Vec<RowsOf>), set: &[usize]) -> Option<usize> {
+    fn judged(&self, field: &(u64, Vec<CandidateRows>), set: &[usize]) -> Option<usize> {
         self.found(field, set).map(|found| found.0)
     }
 
     /// Worst degree and number of undetermined unknowns by one prime.
-    fn found(&self, (p, candidates): &(u64, Vec<RowsOf>), set: &[usize]) -> Option<(usize, usize)> {
+    fn found(&self, (p, candidates): &(u64, Vec<CandidateRows>), set: &[usize]) -> Option<(usize, usize)> {
         let d = self.names.len() - 3;
         // under reset carry no row has entries at psi
         let psi = if self.reset { 0 } else { 3 };
-        let mut rows: RowsOf = Vec::new();
+        let mut rows: CandidateRows = Vec::new();
         for (i, &c) in set.iter().enumerate() {
             rows.extend(candidates[c].iter().map(|(name, row)| ((i + 1, name.1, name.2), row.clone())));
         }
@@ -136,9 +136,9 @@ impl Space {
     }
 }
 
-/// The combinations of the rows of one candidate that have no entries at its psi, by order, on the
-/// coefficients alone: what they add to the rows of others that have a psi of their own.
-fn without_psi(p: u64, rows: &RowsOf) -> RowsOf {
+/// Combinations of the rows of one candidate without entries at its psi, by order, on the coefficients
+/// alone: its contribution to candidates with a psi of their own.
+fn without_psi(p: u64, rows: &CandidateRows) -> CandidateRows {
     let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
     let mut out = Vec::new();
     for (name, row) in rows {
@@ -159,8 +159,8 @@ fn without_psi(p: u64, rows: &RowsOf) -> RowsOf {
     out
 }
 
-/// For the 24 rotations of the platform axes, where each takes the candidates; `None` where it takes one to
-/// no candidate, or makes other coefficients of the coefficients.
+/// Images of the candidates under the 24 rotations of the platform axes; `None` for a rotation that
+/// maps a candidate to none, or the coefficients to others.
 fn turns(
     problem: &Problem,
     field: &PrimeField,
@@ -204,7 +204,7 @@ fn transposed(c: &Matrix<u64>) -> Matrix<u64> {
     (0..3).map(|j| c.iter().map(|row| row[j]).collect()).collect()
 }
 
-/// Row along axis `a % 3`, negative from 3 on.
+/// Row along axis `a % 3`, negative for `a` from 3 on.
 fn unit(field: &PrimeField, a: usize) -> Vec<u64> {
     let sign = if a < 3 { 1 } else { field.p - 1 };
     (0..3).map(|j| if j == a % 3 { sign } else { 0 }).collect()
@@ -217,7 +217,7 @@ fn is_rotation(axes: [usize; 3]) -> bool {
     a != b && b != c && a != c && ((b + 3 - a) % 3 == 1) == (signs % 2 == 0)
 }
 
-/// `n` over `k` with repetition: multisets of `k` of `n`; `None` beyond 2^63.
+/// Number of multisets of `k` out of `n`; `None` beyond 2^63.
 pub(super) fn multisets(n: u64, k: u64) -> Option<u64> {
     let mut out: u128 = 1;
     for i in 0..u128::from(k) {
@@ -227,7 +227,7 @@ pub(super) fn multisets(n: u64, k: u64) -> Option<u64> {
     u64::try_from(out).ok()
 }
 
-/// `n^k`; `None` beyond 2^63.
+/// Power `n^k`; `None` beyond 2^63.
 pub(super) fn power(n: u64, k: u64) -> Option<u64> {
     n.checked_pow(u32::try_from(k).ok()?).filter(|x| *x < 1 << 63)
 }

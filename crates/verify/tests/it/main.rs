@@ -1,4 +1,4 @@
-//! Certificates of random schemes and published models and the changes of them, held against both checkers.
+//! Certificates of random schemes and published models, and changed ones, compared by both checkers.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "what was measured")]
 

@@ -1,4 +1,4 @@
-//! Certificates of the published models, held against both checkers and against the published verdicts.
+//! Certificates of the published models, compared by both checkers and with the published verdicts.
 
 use std::path::Path;
 
@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use crate::python::Python;
 use crate::schemes::{pick, places};
 
-/// The reference models with a certificate: name, reference, certificate; and why others have none.
+/// Reference models with a certificate (name, reference, certificate), and those without one (name,
+/// reason).
 #[expect(clippy::type_complexity, reason = "two lists, used here alone")]
 fn certified() -> (Vec<(String, Value, ModelCertificate)>, Vec<(String, String)>) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/models");
@@ -33,7 +34,7 @@ fn certified() -> (Vec<(String, Value, ModelCertificate)>, Vec<(String, String)>
     (found, without)
 }
 
-/// Both checkers accept, in the same words; the degrees are the published ones.
+/// Both checkers accept with the same sentences, and the degrees are the published ones.
 #[test]
 fn both_checkers_accept_certificates_of_published_models() {
     let (certified, without) = certified();
@@ -60,7 +61,7 @@ fn both_checkers_accept_certificates_of_published_models() {
     assert!(judged > 1000, "{judged}");
 }
 
-/// True for a place of a kind of change that makes a false claim.
+/// True for a place at which this kind of change makes a false claim.
 fn belongs(kind: &str, path: &[String]) -> bool {
     let (first, last) = (path.first().map_or("", String::as_str), path.last().map_or("", String::as_str));
     match kind {
@@ -128,9 +129,9 @@ fn both_checkers_refuse_1000_single_changes_of_models_of_every_kind() {
     refuse(1000);
 }
 
-/// By hand: x' = -a x + u, y = b x. From y, y' and y'' come b x, then a (the input is known, so b as well):
-/// every unknown is observable, x and b with degree 1 (y' = -a y + b u holds two more unknowns, a and b), so
-/// all of them need y''.
+/// Hand computation: x' = -a x + u, y = b x. From y, y' and y'' follow b x, then a (the input is known,
+/// so b as well). Every unknown is observable, x and b with degree 1 (y' = -a y + b u holds two more
+/// unknowns, a and b), so all of them need y''.
 const DECAY: &str = r#"
 name = "decay"
 [known_inputs]
@@ -154,12 +155,12 @@ fn a_change_of_the_equations_is_another_statement() {
     let text = certificate.text().expect("JSON");
     let sentences = verify(text.as_bytes(), None).expect("accepted").join("\n");
     assert!(sentences.contains("Output 1: y = (x * b)."), "{sentences}");
-    // without the input b and x are seen as a product alone
+    // without the input only the product of b and x is observable
     let mut value: Value = serde_json::from_str(&text).expect("JSON");
     value["problem"]["inputs"] = json!([["u", 0]]);
     value["problem"]["rates"] = json!([0]);
     assert!(verify(value.to_string().as_bytes(), None).is_err());
-    // a program that reads what comes later, and one that divides by zero
+    // a program with an operand that comes later, and one that divides by zero
     let mut value: Value = serde_json::from_str(&text).expect("JSON");
     value["problem"]["program"][0] = json!(["*", 0, 99]);
     assert!(
@@ -188,7 +189,7 @@ fn models_without_certificates() {
     }
 }
 
-/// Names that pass for an expression or for a sentence of the answer are refused, by both checkers.
+/// Names that pass for an expression or for a sentence of the answer are refused by both checkers.
 #[test]
 fn names_that_lie_are_refused() {
     let model = model_file::read("name='m'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'")

@@ -1,5 +1,5 @@
-//! Certificates of proven optima of random searches and the changes of them, held against both checkers and
-//! against what the simulation says of every sequence.
+//! Certificates of proven optima of random searches, and changed ones, compared by both checkers and
+//! with the simulation of every sequence.
 
 use nalgebra::DMatrix;
 use obsdeg_core::degree::judge;
@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::python::Python;
 use crate::schemes::pick;
 
-/// A search for the best sequence.
+/// Search for the best sequence.
 struct Task {
     base: Scheme,
     conditions: Conditions,
@@ -39,7 +39,7 @@ fn candidates(rng: &mut SplitMix64, count: usize) -> Candidates {
     out
 }
 
-/// A random search with few sequences; the carries and criteria by turns.
+/// Random search with few sequences; carries and criteria alternate.
 fn draw(rng: &mut SplitMix64, i: usize) -> Task {
     let carry = [Carry::Platform, Carry::Inertial, Carry::Reset][i % 3];
     let criterion = CRITERIA[i / 3 % 5];
@@ -82,7 +82,7 @@ fn draw(rng: &mut SplitMix64, i: usize) -> Task {
     Task { base, conditions, options }
 }
 
-/// The certificate of a search, and its text; `None` where no sequence does.
+/// Certificate of a search, and its text; `None` if no sequence is sufficient.
 fn certified(task: &Task) -> Option<(OptimumCertificate, String)> {
     let Task { base, conditions, options } = task;
     let found = match design(base, conditions, options, &|_| true) {
@@ -90,7 +90,7 @@ fn certified(task: &Task) -> Option<(OptimumCertificate, String)> {
         found => found.expect("a search"),
     };
     match certify_optimum(base, conditions, options, &found, &|_| true) {
-        // what double precision does not determine
+        // sequences that double precision does not determine
         Err(DesignError::NoCertificate { found }) if found.contains("double precision") => None,
         certificate => {
             let certificate = certificate.expect("a certificate");
@@ -100,8 +100,8 @@ fn certified(task: &Task) -> Option<(OptimumCertificate, String)> {
     }
 }
 
-/// Worst degree and criterion of every sequence by the simulation's information filter: neither the search
-/// nor a checker.
+/// Smallest worst degree and criterion of all sequences by the simulation's information filter,
+/// independent of the search and the checkers.
 fn best_by_simulation(task: &Task, required: &[String]) -> Option<(usize, f64)> {
     let Task { base, conditions, options } = task;
     let (n, k) = (options.candidates.attitudes.len(), options.positions.unwrap_or(1));
@@ -153,8 +153,8 @@ fn said(sentences: &[String], part: &str) -> bool {
     sentences.iter().any(|s| s.contains(part))
 }
 
-/// Both checkers accept the certificates of `count` random searches, all blocks searched again; of every
-/// tenth the simulation finds the same optimum among all sequences.
+/// Both checkers accept the certificates of `count` random searches, with all blocks searched again.
+/// For every tenth the simulation finds the same optimum among all sequences.
 fn accept(count: usize, seed: u64, simulated: usize) {
     let mut rng = SplitMix64::new(seed);
     let mut python = Python::start();
@@ -186,8 +186,8 @@ fn accept(count: usize, seed: u64, simulated: usize) {
         {
             let required: Vec<String> = certificate.problem.required.iter().map(|r| r.name.clone()).collect();
             let (degree, value) = best_by_simulation(&task, &required).expect("an optimum");
-            // the covariance that the simulation gives is a difference of variances, which its determinant
-            // magnifies
+            // the covariance of the simulation is a difference of variances, and its determinant
+            // magnifies rounding
             let within = if task.options.criterion == CriterionName::D { 2e-3 } else { 1e-5 };
             let claimed = certificate.best[0].value;
             assert!(
@@ -214,7 +214,7 @@ fn both_checkers_accept_optima_of_200_random_searches() {
     accept(200, 4242, 40);
 }
 
-/// Changes that make a false claim, and the place that a refusal names.
+/// Changes that make a false claim, and the place that a refusal must name.
 const CHANGES: [(&str, &str); 15] = [
     ("a value lowered", "best.0.value"),
     ("a winner swapped", "best.0"),
@@ -233,7 +233,7 @@ const CHANGES: [(&str, &str); 15] = [
     ("the noise", "best.0.value"),
 ];
 
-/// The change of a certificate; `None` where it has no place for it, or the claim stays true.
+/// Change of a certificate; `None` if there is no place for it, or the claim stays true.
 fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
     let mut out = value.clone();
     let blocks = value["blocks"].as_array()?;
@@ -282,7 +282,7 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
             out["problem"]["criterion"] = json!(other);
         }
         "the samples" => out["problem"]["samples"] = json!(2 * problem["samples"].as_u64()?),
-        // beside a measured azimuth it may be of no account
+        // beside a measured azimuth this noise may have no effect
         "the noise" if problem["measured_azimuth"] == false => {
             out["problem"]["noise_g"] = json!(problem["noise_g"].as_f64()? * 1.01)
         }
@@ -291,7 +291,7 @@ fn changed(rng: &mut SplitMix64, what: &str, value: &Value) -> Option<Value> {
     Some(out)
 }
 
-/// Both checkers refuse `count` changes of every kind, all blocks searched again.
+/// Both checkers refuse `count` changes of every kind, with all blocks searched again.
 fn refuse(count: usize, seed: u64) {
     let mut rng = SplitMix64::new(seed);
     let mut python = Python::start();
@@ -338,9 +338,9 @@ fn cardinals(carry: Carry, positions: usize) -> Task {
     Task { base, conditions: Conditions { step_s: 50.0, ..Conditions::default() }, options }
 }
 
-/// The cardinal attitudes: one first candidate stands for all, since all 24 turns of the platform axes map
-/// them to themselves; without the image of a start a block is missing, and of the blocks as many are
-/// searched again as are asked for.
+/// The cardinal attitudes: one first candidate represents all, since all 24 turns of the platform axes
+/// map the attitudes to themselves. Without the image of a start a block is missing. The number of
+/// blocks searched again is the number asked for.
 #[test]
 fn symmetry_and_a_choice_of_blocks() {
     let (certificate, json) = certified(&cardinals(Carry::Platform, 4)).expect("an optimum");
@@ -366,16 +366,16 @@ fn symmetry_and_a_choice_of_blocks() {
             "{said}"
         );
     }
-    // a candidate less takes the symmetry away: then every first candidate needs blocks
+    // with one candidate less the symmetry is lost, and every first candidate needs blocks
     let mut value: Value = serde_json::from_str(&json).expect("JSON");
     value["problem"]["candidates"].as_array_mut().expect("candidates").pop();
     let refused = verify(value.to_string().as_bytes(), None).expect_err("no symmetry").to_string();
     assert!(refused.starts_with("b"), "{refused}");
 }
 
-/// Searches that double precision does not decide are refused by both checkers, by the place: candidates that
-/// are nearly alike, some of the coefficients, a latitude near the equator, and numbers that leave nothing
-/// measured.
+/// Both checkers refuse searches that double precision cannot decide, and name the place: candidates
+/// that are nearly alike, only some of the coefficients, a latitude near the equator, and numbers
+/// without any measurement.
 #[test]
 fn searches_beyond_double_precision_are_refused() {
     let (_, json) = certified(&cardinals(Carry::Platform, 4)).expect("a certificate");
@@ -414,8 +414,8 @@ fn searches_beyond_double_precision_are_refused() {
     }
 }
 
-/// Near a pole, with a dwell of seconds, the value of a sequence is rounding: a claim that agrees with the
-/// checker's own computation to all digits is refused all the same, by the pivots.
+/// Near a pole, with a dwell of seconds, the value of a sequence is rounding. A claim that agrees with
+/// the checker's own value to all digits is refused by the pivots.
 #[test]
 fn values_that_are_rounding_are_refused() {
     let (_, json) = certified(&cardinals(Carry::Platform, 4)).expect("a certificate");
@@ -445,7 +445,7 @@ fn values_that_are_rounding_are_refused() {
     }
 }
 
-/// Searches that certificates do not cover are refused with a sentence that names what is not covered.
+/// Searches that certificates do not cover are refused, and the sentence names the uncovered part.
 #[test]
 fn what_certificates_of_optima_do_not_cover() {
     let plain = || cardinals(Carry::Inertial, 4);

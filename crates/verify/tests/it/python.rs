@@ -1,4 +1,4 @@
-//! The checkers in Python, `tools/verify_certificate.py` and those beside it.
+//! Checkers in Python, `tools/verify_certificate.py` and those beside it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use serde_json::json;
 
-/// The checker in Python, asked certificate by certificate.
+/// Process of the checker in Python, which checks one certificate after the other.
 pub(crate) struct Python {
     child: Child,
     input: ChildStdin,
@@ -28,7 +28,7 @@ for line in sys.stdin:
 "#;
 
 impl Python {
-    /// `None` where there is no Python 3.11.
+    /// Starts the checker; `None` without Python 3.11.
     pub(crate) fn start() -> Option<Self> {
         let probe = Command::new("python3").args(["-c", "import tomllib"]).stderr(Stdio::null()).status();
         if !probe.is_ok_and(|s| s.success()) {
@@ -48,12 +48,13 @@ impl Python {
         Some(Self { child, input, output })
     }
 
-    /// Accepted or refused, and what was printed.
+    /// True if the certificate is accepted, and the printed text.
     pub(crate) fn asks(&mut self, certificate: &str, scheme: Option<&str>) -> (bool, String) {
         self.answers(certificate, &json!([certificate, scheme, 1_000_000]))
     }
 
-    /// The same of an optimum, of which `blocks` blocks are searched again that a seed chooses.
+    /// Result as [`Self::asks`] for an optimum, with `blocks` blocks searched again that `seed`
+    /// chooses.
     pub(crate) fn replays(&mut self, certificate: &str, blocks: usize, seed: u64) -> (bool, String) {
         self.answers(certificate, &json!([certificate, null, blocks, seed]))
     }

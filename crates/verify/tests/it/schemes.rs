@@ -1,4 +1,4 @@
-//! Certificates of random schemes and the changes of them, held against both checkers: this crate and
+//! Certificates of random schemes, and changed ones, compared by both checkers: this crate and
 //! `tools/verify_certificate.py`.
 
 use obsdeg_core::certificate::{Certificate, Kind, certify};
@@ -14,7 +14,7 @@ pub(crate) fn pick<'a, T>(rng: &mut SplitMix64, list: &'a [T]) -> &'a T {
     &list[rng.below(list.len() as u64) as usize]
 }
 
-/// A random scheme file.
+/// Random scheme file.
 fn draw(rng: &mut SplitMix64) -> String {
     let mut text = format!("carry = \"{}\"\n", pick(rng, &["platform", "inertial", "reset"]));
     let latitude = pick(rng, &["", "", "28.2", "-33.868", "90", "0", "45"]);
@@ -46,7 +46,7 @@ fn draw(rng: &mut SplitMix64) -> String {
         1 => text += "combinations = [\"D_FZ - wN*psi_y\", \"sqrt(3)*wU*psi_x + D_FY\"]\n",
         _ => {}
     }
-    // at a pole wN is 0, and so is what a combination divides by
+    // at a pole wN is 0, and so is the divisor of a combination
     if text.contains("reset") || !text.contains("\"F\"") || text.contains("latitude_deg = 90") {
         text = text.lines().filter(|l| !l.starts_with("comb")).map(|l| format!("{l}\n")).collect();
     }
@@ -64,7 +64,8 @@ fn draw(rng: &mut SplitMix64) -> String {
         text += &format!("[[position]]\nangles_deg = [{}, {}, {}]\n", angle(), angle(), angle());
     }
     if rng.below(5) == 0 {
-        text += "[geometry]\nX = { I = \"+y\", O = \"+x\", S = \"-z\" }\nY = { I = \"-x\", O = \"+z\", S = \"+y\" }\nZ = { I = \"z\", O = \"x\", S = \"y\" }\n";
+        text += "[geometry]\nX = { I = \"+y\", O = \"+x\", S = \"-z\" }\nY = { I = \"-x\", O = \"+z\", S = \
+            \"+y\" }\nZ = { I = \"z\", O = \"x\", S = \"y\" }\n";
     }
     text
 }
@@ -73,14 +74,14 @@ fn scheme(text: &str) -> Scheme {
     scheme_file::read(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// A scheme file, its certificate and the text of that.
+/// Certificate of a scheme file, and its text.
 fn certified(text: &str) -> (Certificate, String) {
     let certificate = certify(&scheme(text), 1).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let json = certificate.text().expect("JSON");
     (certificate, json)
 }
 
-/// Both checkers accept, in the same words, what the engine says of `count` random schemes.
+/// Both checkers accept the certificates of `count` random schemes, with the same sentences.
 fn accept(count: usize, seed: u64) {
     let mut rng = SplitMix64::new(seed);
     let mut python = Python::start();
@@ -100,7 +101,7 @@ fn accept(count: usize, seed: u64) {
             assert_eq!((claimed.proof.status, claimed.proof.degree), (status, degree), "{text}");
             observable += usize::from(status == Status::Observable);
         }
-        // no scheme shows more coefficients than the count of its positions allows
+        // no scheme determines more coefficients than the count of its positions allows
         if let Some(least) = fewest_of(&sentences) {
             assert!(least <= certificate.problem.positions.len(), "{text}\n{sentences:?}");
             fewest += usize::from(least == certificate.problem.positions.len());
@@ -115,14 +116,14 @@ fn accept(count: usize, seed: u64) {
     assert!(fewest > count / 20, "{fewest}");
 }
 
-/// The number of positions of the sentence on counting.
+/// Number of positions in the sentence on counting.
 fn fewest_of(sentences: &[String]) -> Option<usize> {
     let rest = sentences.iter().find_map(|s| s.strip_prefix("Counting: no scheme of fewer than "))?;
     rest.split(' ').next()?.parse().ok()
 }
 
-/// By hand: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, with slews too; the
-/// twelve drifts need 4, 5 and 6.
+/// Hand computation: (33 + 3)/6 = 6 positions for the 33 coefficients of the whole platform, also with
+/// slews; the twelve drifts need 4, 5 and 6.
 #[test]
 fn fewest_positions_by_counting() {
     let root =
@@ -153,7 +154,7 @@ fn fewest_positions_by_counting() {
     }
 }
 
-/// A file that is no scheme is bad input, and no key inside a table is passed over.
+/// A file that is no scheme is bad input, and no key inside a table is ignored.
 #[test]
 fn scheme_files_that_are_none() {
     let (_, json) = certified(P1_P2);
@@ -190,7 +191,7 @@ fn both_checkers_accept_certificates_of_4000_random_schemes() {
     accept(4000, 4242);
 }
 
-/// All places of a value that `wanted` picks by their path.
+/// All places of a value whose paths `wanted` accepts.
 pub(crate) fn places(
     value: &Value,
     path: &mut Vec<String>,
@@ -215,7 +216,7 @@ pub(crate) fn places(
 const KINDS: [&str; 10] =
     ["entry", "degree", "status", "scheme", "rank", "row", "pivot", "solution", "combination", "name"];
 
-/// True for a place of a kind of change.
+/// True for a place of this kind of change.
 fn belongs(kind: &str, path: &[String], value: &Value) -> bool {
     let first = path.first().map_or("", String::as_str);
     let last = path.last().map_or("", String::as_str);
@@ -244,8 +245,8 @@ fn belongs(kind: &str, path: &[String], value: &Value) -> bool {
     }
 }
 
-/// True where another coefficient makes a false claim of the place of a combination: the whole is observable,
-/// and this unknown is not.
+/// True if another coefficient at this place of a combination makes a false claim: the combination is
+/// observable, and this unknown is not.
 fn is_told_apart(certificate: &Value, path: &[String]) -> bool {
     let combination = &certificate["combinations"][path[1].parse::<usize>().expect("an index")];
     let of = |v: &&Value| v["unknown"] == path[3].as_str();
@@ -253,7 +254,7 @@ fn is_told_apart(certificate: &Value, path: &[String]) -> bool {
     combination["degree"].is_u64() && verdict.is_some_and(|v| v["degree"].is_null())
 }
 
-/// Another value in place of one.
+/// Different value in place of `value`.
 fn another(rng: &mut SplitMix64, kind: &str, value: &Value) -> Value {
     let texts = |list: &[&str], rng: &mut SplitMix64| json!(pick(rng, list));
     match value {
@@ -329,8 +330,8 @@ fn both_checkers_refuse_1000_single_changes_of_every_kind() {
 
 const P1_P2: &str = "[[position]]\nattitude = \"NUE\"\n[[position]]\nattitude = \"NDW\"\n";
 
-/// What a change of the problem makes of a certificate is a statement about another scheme: it is accepted
-/// alone if it is true, and never beside the scheme.
+/// A certificate with a changed problem is a statement about another scheme: it is accepted alone if it
+/// is true, and never together with the original scheme.
 #[test]
 fn a_true_statement_about_another_scheme() {
     let text = format!("latitude_deg = 28.2\n{P1_P2}");
@@ -346,8 +347,8 @@ fn a_true_statement_about_another_scheme() {
     assert!(verify(pole.as_bytes(), None).is_err());
 }
 
-/// By hand: at p1 p2 the D_FX of the paper, 1/2 [wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2], and psi_y with D_FZ
-/// as null vector.
+/// Hand computation: at p1 p2 the D_FX of the paper, 1/2 [wU (Z1@p1 + Z1@p2) - Z3'@p1 - Z3'@p2], and
+/// psi_y with D_FZ as null vector.
 #[test]
 fn the_solution_of_the_paper() {
     let (certificate, json) = certified(P1_P2);
@@ -361,8 +362,8 @@ fn the_solution_of_the_paper() {
             .zip(numbers.clone().unwrap_or_default())
             .collect::<Vec<_>>()
     };
-    // Z1 = psi_z is that of both positions but for its sign: psi_z^n of p2 is -psi_z, so the two terms in wU
-    // cancel
+    // Z1 = psi_z is the same at both positions up to its sign: psi_z^n of p2 is -psi_z, so the two
+    // terms in wU cancel
     assert_eq!(
         terms(&d_fx.solution, &d_fx.coefficients),
         [((1, 1, 3), vec![[-1, 2, 1, 0, 0]]), ((2, 1, 3), vec![[-1, 2, 1, 0, 0]])]
@@ -374,8 +375,8 @@ fn the_solution_of_the_paper() {
     assert!(json.len() < 20_000, "{}", json.len());
 }
 
-/// What is no certificate is refused with a reason, without a panic: every cut of one, and single wrong
-/// bytes.
+/// Invalid files are refused with a reason, without a panic: every truncation of a certificate, and
+/// single wrong bytes.
 #[test]
 fn hostile_files() {
     let (_, json) = certified(P1_P2);
@@ -391,7 +392,7 @@ fn hostile_files() {
         }
     }
     let deep = "{\"a\":".repeat(100_000);
-    // what is an object in the layout is no list of its values
+    // a list of values is no object of the layout
     let list = json.replace("{\"I\":\"+x\",\"O\":\"-z\",\"S\":\"+y\"}", "[\"+x\",\"-z\",\"+y\"]");
     assert_ne!(list, json);
     let repeated = json.replacen("\"ranks\"", "\"kind\": \"exact\", \"ranks\"", 1);
@@ -431,7 +432,7 @@ fn schemes_without_certificates() {
     }
 }
 
-/// A verdict that holds at the latitude of the scheme alone has a certificate of kind modular that both
+/// A verdict that holds only at the latitude of the scheme has a certificate of kind modular that both
 /// checkers accept; a combination that is zero there is refused.
 #[test]
 fn what_holds_at_one_latitude_is_modular() {
@@ -464,7 +465,7 @@ fn what_holds_at_one_latitude_is_modular() {
     }
 }
 
-/// Axes as a list are those of a table in its order.
+/// Axes in a list equal those in a table, in its order.
 #[test]
 fn axes_in_a_list() {
     let positions = "[[position]]\nangles_deg = [0, 0, 0]\n[[position]]\nangles_deg = [180, 0, 0]\n";

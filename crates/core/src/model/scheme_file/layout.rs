@@ -1,4 +1,5 @@
-//! What a scheme file holds, as TOML reads it: every value with its place. The JSON Schema comes from here.
+//! Layout of a scheme file, as TOML reads it: every value with its byte range. The JSON Schema is derived
+//! from it.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,7 @@ use crate::model::scheme::Carry;
 use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
 use crate::model::terms::{DefinedBy, Term};
 
-/// A number as it is written.
+/// Value as written: a number or text, with its byte range.
 pub(super) type Literal = Option<Spanned<toml::Value>>;
 /// Numbers by unknown or family.
 pub(super) type Numbers = BTreeMap<Spanned<String>, Spanned<f64>>;
@@ -102,23 +103,41 @@ pub(super) struct SimulationEntry {
     #[schemars(with = "Option<f64>", extend("minimum" = ranges::STEP_S.low, "maximum" = ranges::STEP_S.high))]
     pub(super) step_s: Option<Spanned<f64>>,
     /// Dwell, in s, of positions without dwell_s; 1000 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high)
+    )]
     pub(super) dwell_s: Option<Spanned<f64>>,
     /// Rate of the rotations between positions in deg/s; instantaneous when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high)
+    )]
     pub(super) slew_rate_deg_s: Option<Spanned<f64>>,
     /// Noise of the observation per sample, in g; 1e-5 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::NOISE_G.low, "maximum" = ranges::NOISE_G.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::NOISE_G.low, "maximum" = ranges::NOISE_G.high)
+    )]
     pub(super) accelerometer_noise_g: Option<Spanned<f64>>,
     /// Bias instability of the accelerometers, in ug (B of IEEE Std 952), a Gauss-Markov process of each;
     /// none when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::INSTABILITY_UG.low, "maximum" = ranges::INSTABILITY_UG.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::INSTABILITY_UG.low, "maximum" = ranges::INSTABILITY_UG.high)
+    )]
     pub(super) accelerometer_bias_instability_ug: Option<Spanned<f64>>,
     /// Correlation time of the accelerometer bias instability, in s; 3600 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high)
+    )]
     pub(super) accelerometer_correlation_time_s: Option<Spanned<f64>>,
     /// Noise of a measured azimuth per sample, in deg; 0.001 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::AZIMUTH_NOISE_DEG.low, "maximum" = ranges::AZIMUTH_NOISE_DEG.high)
+    )]
     pub(super) azimuth_noise_deg: Option<Spanned<f64>>,
     /// Random drift: "0.01 deg/h" (bias of one step) when left out, or for instance "0.001 deg/sqrt(h)".
     #[schemars(with = "Option<String>", extend("pattern" = "deg */ *(h|sqrt\\(h\\))|^ *0+[.]?0* *$"))]
@@ -134,12 +153,18 @@ pub(super) struct SimulationEntry {
     #[schemars(with = "Option<PerGyroEntry>")]
     pub(super) bias_instability_dph: Literal,
     /// Correlation time of the bias instability in s; 3600 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::CORRELATION_S.low, "maximum" = ranges::CORRELATION_S.high)
+    )]
     pub(super) correlation_time_s: Option<Spanned<f64>>,
     /// Propagation of the filter: exponential (default) or rk4.
     pub(super) propagation: Option<Propagation>,
     /// Factor on the true drift coefficients and their priors, dimensionless; 1 when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DRIFT_SCALE.low, "maximum" = ranges::DRIFT_SCALE.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::DRIFT_SCALE.low, "maximum" = ranges::DRIFT_SCALE.high)
+    )]
     pub(super) drift_scale: Option<Spanned<f64>>,
     /// True values by unknown or family, as in D_F = 11, in the unit of the unknown.
     #[serde(default)]
@@ -166,7 +191,10 @@ pub(super) struct PositionEntry {
     #[schemars(with = "Option<Vec<f64>>", extend("items" = angle(), "minItems" = 3, "maxItems" = 3))]
     pub(super) angles_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
     /// Dwell at the position, in s; dwell_s of the simulation when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::DWELL_S.low, "maximum" = ranges::DWELL_S.high)
+    )]
     pub(super) dwell_s: Literal,
     /// Rotation that starts at this position; dwell_s is its duration.
     #[schemars(with = "Option<RotationEntry>")]
@@ -200,7 +228,10 @@ pub(super) struct RotationEntry {
 #[serde(deny_unknown_fields)]
 pub(super) struct SlewEntry {
     /// Rate of the turn in deg/s; slew_rate_deg_s of the simulation when left out.
-    #[schemars(with = "Option<f64>", extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high))]
+    #[schemars(
+        with = "Option<f64>",
+        extend("minimum" = ranges::SLEW_RATE_DEG_S.low, "maximum" = ranges::SLEW_RATE_DEG_S.high)
+    )]
     pub(super) rate_deg_s: Option<Spanned<f64>>,
     /// Axis of the turn: X_p, Y_p, Z_p (platform), N, U, E (geographic), or a direction [North, Up, East]
     /// such as [1, 1, 0]. When left out: the shortest turn; a half turn goes about the direction whose first
@@ -255,20 +286,20 @@ pub(super) struct GimbalEntry {
     pub(super) gamma_deg: Option<Spanned<Vec<Spanned<toml::Value>>>>,
 }
 
-/// The directions of an axis to turn about.
+/// Names of the axes of a turn.
 const AXES: [&str; 6] = ["X_p", "Y_p", "Z_p", "N", "U", "E"];
 
-/// Degrees, or the name of a generic angle with an offset.
+/// JSON Schema of an angle: degrees, or the name of a generic angle with an offset.
 fn angle() -> serde_json::Value {
     serde_json::json!({ "anyOf": [{ "type": "number" }, { "type": "string" }] })
 }
 
-/// Numbers of a range.
+/// JSON Schema of the numbers in a range.
 fn within(range: ranges::Range) -> serde_json::Value {
     serde_json::json!({ "type": "number", "minimum": range.low, "maximum": range.high })
 }
 
-/// Numbers up to the end of a range.
+/// JSON Schema of zero and the numbers up to the end of a range.
 fn none_or(range: ranges::Range) -> serde_json::Value {
     serde_json::json!({ "type": "number", "minimum": 0, "maximum": range.high })
 }

@@ -1,4 +1,4 @@
-//! Scheme files: TOML, with errors that know their place.
+//! Scheme files: TOML, with errors that state their place.
 
 mod layout;
 mod position;
@@ -26,29 +26,30 @@ use layout::{GimbalEntry, Literal, Numbers, SimulationEntry};
 /// Longest scheme file, in bytes: a thousand positions with all their keys.
 pub const MAX_FILE: usize = 1_000_000;
 
-/// Why a file is no scheme.
+/// Error for a file that is no scheme.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct SchemeFileError {
-    /// What is wrong, what was expected and what was found.
+    /// Fault, expected value and value found.
     pub message: String,
-    /// Byte range in the file.
+    /// Byte range in the file; `None` if it is unknown.
     pub span: Option<Range<usize>>,
 }
 
-/// A file under way: what it says, and where each of its keys has its value.
-struct Reader<'a> {
+/// Reader of a file: its text, and the byte ranges of the values of its keys.
+struct SchemeReader<'a> {
     text: &'a str,
-    /// By key, as in `simulation.priors.D_F` or `position.0.name`; the names of lists at their keys.
+    /// Byte ranges by key, as in `simulation.priors.D_F` or `position.0.name`; names in lists by the key of
+    /// the list.
     places: HashMap<String, Range<usize>>,
 }
 
-impl Reader<'_> {
+impl SchemeReader<'_> {
     fn at(&self, span: Range<usize>, message: impl Into<String>) -> SchemeFileError {
         SchemeFileError { message: message.into(), span: Some(span) }
     }
 
-    /// A number as it stands in the file, where it is exact.
+    /// Text of a number in the file, which is its exact decimal.
     fn number(&self, value: &Spanned<toml::Value>) -> Result<String, SchemeFileError> {
         match value.get_ref() {
             toml::Value::Integer(_) | toml::Value::Float(_) => Ok(self.text[value.span()].replace('_', "")),
@@ -59,14 +60,14 @@ impl Reader<'_> {
         }
     }
 
-    /// The value of a key, whose place is kept.
+    /// The value of a key; stores its byte range.
     fn keep<T: Clone>(&mut self, key: impl Into<String>, value: Option<&Spanned<T>>) -> Option<T> {
         let value = value?;
         self.places.insert(key.into(), value.span());
         Some(value.get_ref().clone())
     }
 
-    /// Where `offset` characters into a text in quotes are: the text itself when it is written with escapes.
+    /// Byte range of a part of a text in quotes; the range of the whole text if it has escapes.
     fn within(&self, value: &Spanned<String>, range: Range<usize>) -> Range<usize> {
         let (span, text) = (value.span(), value.get_ref());
         match self.text[span.clone()].find(text.as_str()) {
@@ -80,7 +81,7 @@ impl Reader<'_> {
 
     fn numbers(&mut self, key: &str, list: &Numbers) -> std::collections::BTreeMap<String, f64> {
         let kept = list.iter().map(|(name, x)| {
-            // a name that is wrong is drawn at the name, a number at the number
+            // a wrong name is marked at the name, a wrong number at the number
             let place = if settings::may_be_unknown(name.get_ref()) { x.span() } else { name.span() };
             self.places.insert(format!("{key}.{}", name.get_ref()), place);
             (name.get_ref().clone(), *x.get_ref())
@@ -88,7 +89,7 @@ impl Reader<'_> {
         kept.collect()
     }
 
-    /// A number, or a list of three.
+    /// Noise of the gyros: a number, or a list of three.
     fn per_gyro(&mut self, key: String, value: &Literal) -> Result<Option<PerGyro>, SchemeFileError> {
         let Some(value) = value else { return Ok(None) };
         let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
@@ -135,7 +136,7 @@ impl Reader<'_> {
         })
     }
 
-    /// `["F", "I"]`, or `"F,I"`, and the frame that says which misalignments there are.
+    /// Unknown terms `["F", "I"]`, or `"F,I"`, with the frame that decides the misalignments.
     fn terms(
         &self,
         terms: &Spanned<toml::Value>,
@@ -176,7 +177,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Checks what a scheme must be, with the place of the key that is wrong.
+    /// Checks a scheme; an error has the byte range of the key at fault.
     fn validated(&self, scheme: Scheme, combinations: &[Spanned<String>]) -> Result<Scheme, SchemeFileError> {
         let platform = Platform::new(scheme).map_err(|e| {
             let span = e.key().and_then(|key| self.places.get(&key)).cloned();
@@ -213,7 +214,7 @@ pub fn is_scheme(text: &str) -> bool {
 /// Reads a scheme and checks all of it.
 ///
 /// # Errors
-/// [`SchemeFileError`] with the byte range of the offender.
+/// [`SchemeFileError`] with the byte range of the fault.
 pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
     let whole = |message: String| SchemeFileError { message, span: None };
     if text.len() > MAX_FILE {
@@ -223,7 +224,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         let (message, span) = explain::<SchemeFile>(text, &e);
         SchemeFileError { message, span }
     })?;
-    let mut r = Reader { text, places: HashMap::new() };
+    let mut r = SchemeReader { text, places: HashMap::new() };
     let mut scheme = Scheme {
         name: r.keep("name", file.name.as_ref()).unwrap_or_default(),
         description: r.keep("description", file.description.as_ref()).unwrap_or_default(),
@@ -341,7 +342,7 @@ alpha_deg = [-180, 180.5]
         assert_eq!(scheme.validate(), Ok(()));
     }
 
-    /// What is wrong with a text, and the part of it that is drawn.
+    /// Message of the error in a text, and the part of the text that it marks.
     fn place(text: &str) -> (Option<String>, String) {
         let e = read(text).expect_err("wrong");
         (e.span.map(|s| text[s].to_string()), e.message)
@@ -390,7 +391,7 @@ alpha_deg = [-180, 180.5]
         assert_eq!(place("").0, None);
     }
 
-    /// Every number and every name is checked, whatever the command will use, and drawn where it stands.
+    /// Every number and every name is checked, whatever the command uses, and marked at its place.
     #[test]
     fn the_whole_file_is_checked() {
         const ONE: &str = "[[position]]\nangles_deg=[0,0,0]\n";
@@ -453,7 +454,7 @@ alpha_deg = [-180, 180.5]
         assert_eq!(first("carry = inertial").0.as_deref(), Some("inertial"));
     }
 
-    /// Limits are tested before anything grows.
+    /// Limits are tested before anything grows with the file.
     #[test]
     fn files_that_are_too_large() {
         let (span, message) = place(&"\n".repeat(MAX_FILE + 1));

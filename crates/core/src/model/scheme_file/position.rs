@@ -3,7 +3,7 @@
 use serde_spanned::Spanned;
 
 use super::layout::{PositionEntry, RotationEntry, SlewEntry};
-use super::{Reader, SchemeFileError};
+use super::{SchemeFileError, SchemeReader};
 use crate::model::angle::{Angle, MAX_DEGREES, parse_decimal};
 use crate::model::attitude::Euler;
 use crate::model::dwell::Dwell;
@@ -11,7 +11,7 @@ use crate::model::ranges::DWELL_S;
 use crate::model::rotation::{AxisError, MIN_ROTATION, Rotation, SlewAxis, SlewTo, whole_angle};
 use crate::model::scheme::{Position, parse_attitude};
 
-impl Reader<'_> {
+impl SchemeReader<'_> {
     pub(super) fn position(
         &mut self,
         i: usize,
@@ -66,7 +66,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The rotation; with a rate it may say how long it takes.
+    /// Rotation of a position; with a rate it may determine the dwell.
     fn rotation(
         &self,
         entry: &Spanned<RotationEntry>,
@@ -81,7 +81,7 @@ impl Reader<'_> {
             (Some(a), None, _) => angle(a)?,
             (Some(a), Some(rate), None) => {
                 let (angle, seconds) = (angle(a)?, self.number(rate)?.parse::<f64>());
-                // how long it takes needs no exact number
+                // the duration needs no exact number
                 let seconds = seconds.map_or(f64::NAN, |x| angle.nanodeg() as f64 / 1e9 / x);
                 let wrong = || {
                     let message =
@@ -96,7 +96,8 @@ impl Reader<'_> {
                 let text = self.number(rate)?;
                 turned(&text, dwell).ok_or_else(|| {
                     let message = format!(
-                        "at `{text}` deg/s for {dwell} s there is no exact angle of at least 0.001 degrees; expected a decimal"
+                        "at `{text}` deg/s for {dwell} s there is no exact angle of at least 0.001 \
+                         degrees; expected a decimal"
                     );
                     self.at(rate.span(), message)
                 })?
@@ -126,7 +127,7 @@ impl Reader<'_> {
     }
 }
 
-/// What a slew cannot turn about.
+/// Reasons why a value is no axis of a slew.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 enum SlewAxisError {
     #[error("{0}, or a direction [North, Up, East] such as [1, 1, 0]")]
@@ -135,7 +136,7 @@ enum SlewAxisError {
     Direction,
 }
 
-/// What a slew turns about: a name, or three numbers.
+/// Axis of a slew: a name, or three numbers.
 fn slew_axis(about: &toml::Value) -> Result<SlewAxis, SlewAxisError> {
     let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
     let direction = |list: &Vec<toml::Value>| {
@@ -148,7 +149,7 @@ fn slew_axis(about: &toml::Value) -> Result<SlewAxis, SlewAxisError> {
     }
 }
 
-/// The exact angle of so many deg/s over a dwell, if it is a decimal.
+/// Exact angle of a rotation at `rate` deg/s over a dwell; `None` if it is no decimal.
 fn turned(rate: &str, dwell: Dwell) -> Option<Angle> {
     let rate = i128::from(parse_decimal(rate).ok()?);
     let product = rate * i128::from(dwell.nanoseconds());

@@ -1,4 +1,4 @@
-//! A scheme as a file that reads as the same scheme.
+//! Writer of scheme files: the text of a scheme, from which the same scheme is read.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
 use crate::model::{Geometry, PerGyro, Recording, SlewAxis, Unknowns};
 
-/// The text of a scheme file. Reading it gives the scheme again; a comment may be put before it.
+/// Text of a scheme file. Reading it gives the scheme again; a comment may precede it.
 pub fn write(scheme: &Scheme) -> String {
     let mut out = String::new();
     for (key, text) in [("name", &scheme.name), ("description", &scheme.description)] {
@@ -73,14 +73,14 @@ fn list(items: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", items.into_iter().collect::<Vec<_>>().join(", "))
 }
 
-/// A table, unless it is empty.
+/// Writes a table, unless it is empty.
 fn table(out: &mut String, name: &str, lines: &str) {
     if !lines.is_empty() {
         let _ = write!(out, "\n[{name}]\n{lines}");
     }
 }
 
-/// A number as TOML has it: the shortest that reads as the same double.
+/// Number in TOML: the shortest text that reads as the same double.
 fn number(x: f64) -> String {
     match x {
         x if x == 0.0 || (1e-3..1e15).contains(&x.abs()) => format!("{x}"),
@@ -88,7 +88,7 @@ fn number(x: f64) -> String {
     }
 }
 
-/// A text in quotes, with what would end it or is no character of a line escaped.
+/// Text in quotes; quotes, backslashes and control characters are escaped.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
@@ -109,7 +109,7 @@ fn quoted(text: &str) -> String {
 fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
     let mut lines = String::new();
     for (key, x) in given {
-        // names hold `@` and `^` too
+        // names may contain `@` and `^`
         line(&mut lines, &quoted(key), &number(*x));
     }
     table(out, name, &lines);
@@ -233,7 +233,12 @@ mod tests {
             angles in prop::array::uniform3(angle()),
             dwell in prop::option::of(1_000_000u64..1_000_000_000_000_000),
             turn in prop::option::of((0usize..6, 1_000_000i64..700_000_000_000)),
-            slew in prop::option::of((prop::option::of(1e-3f64..5000.0), prop::option::of(0usize..6), 1_000_000i64..700_000_000_000, any::<bool>())),
+            slew in prop::option::of((
+                prop::option::of(1e-3f64..5000.0),
+                prop::option::of(0usize..6),
+                1_000_000i64..700_000_000_000,
+                any::<bool>(),
+            )),
             direction in prop::option::of(prop::array::uniform3(-2f64..2.0)),
         ) -> Position {
             let axis = |i: usize| crate::model::rotation::Axis { index: i % 3, geographic: i >= 3 };
@@ -268,12 +273,14 @@ mod tests {
             estimates in numbers(-20..5),
             priors in numbers(-9..8),
         ) -> Settings {
-            let drift_noise = noise.map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
+            let drift_noise = noise
+                .map(|(x, walk)| if walk { DriftNoise::RandomWalk(x) } else { DriftNoise::OneStep(x) });
             let [angle, rate, bias] = gyros.map(|g| g.map(|(x, of)| PerGyro(of.map(|k| x * f64::from(k.min(1))))));
             Settings {
                 angle_random_walk_deg_sqrt_h: angle, rate_random_walk_dph_sqrt_h: rate, bias_instability_dph: bias,
-                correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s, accelerometer_noise_g, azimuth_noise_deg,
-                accelerometer_bias_instability_ug, accelerometer_correlation_time_s, drift_noise, drift_scale, values, estimates, priors,
+                correlation_time_s, truth, filter, propagation, step_s, dwell_s, slew_rate_deg_s,
+                accelerometer_noise_g, azimuth_noise_deg, accelerometer_bias_instability_ug,
+                accelerometer_correlation_time_s, drift_noise, drift_scale, values, estimates, priors,
             }
         }
     }
@@ -325,7 +332,11 @@ mod tests {
                 unknowns: if alone { Unknowns::Drift } else { Unknowns::Coefficients(terms) },
                 measured_azimuth,
                 path,
-                combinations: if combination && !alone { vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()] } else { Vec::new() },
+                combinations: if combination && !alone {
+                    vec!["psi_x + \n \"".replace('"', " 2*psi_x"), "wN*psi_z".into()]
+                } else {
+                    Vec::new()
+                },
                 simulation,
                 requirements,
                 bench: if mirrored { [("K0".into(), 20.0), ("latitude".into(), 0.5)].into() } else { [].into() },
@@ -345,7 +356,8 @@ mod tests {
             if scheme.validate().is_ok() {
                 match read(&text) {
                     Ok(back) => prop_assert_eq!(back, scheme, "{}", text),
-                    // under reset carry psi has a position; where torquers act, a turn needs an exact form
+                    // under reset carry psi belongs to a position; where torquers act, a turn needs an exact
+                    // form
                     Err(e) => prop_assert!(
                         e.message.contains("no such unknown")
                             || scheme.torquers_act() && e.message.contains("has no exact form"),

@@ -1,5 +1,5 @@
-//! Derivatives of outputs and known inputs ("jets") at random points of a model, and which of them are
-//! independent.
+//! Derivatives of outputs and known inputs ("jets") at random points of a model, and the choice of
+//! independent ones.
 
 use obsdeg_exact::groebner::{OverLimit, Work};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
@@ -10,45 +10,45 @@ use super::super::rows::Layout;
 use super::super::taylor::{Initial, Signal, Taylor};
 use super::super::work;
 
-/// Orders beyond the last independent one to which an output is followed.
+/// Number of orders beyond the last independent one to which an output is followed.
 pub(super) const BEYOND: usize = 3;
 
-/// The derivative of an output or of a known input.
+/// Derivative of an output or of a known input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Jet {
-    /// The order.
+    /// Order of the derivative.
     pub(super) order: usize,
-    /// True of an output.
+    /// True for an output, false for a known input.
     pub(super) is_output: bool,
-    /// Number of the output or known input in the model.
+    /// Index of the output or known input in the model.
     pub(super) index: usize,
 }
 
-/// A model whose quantities that do not change in time (parameters, and states with the rate zero) are
-/// chosen, and whose states and inputs are random.
-pub(super) struct Source<'a> {
+/// A model with chosen values of the quantities that do not change in time (parameters, and states with the
+/// rate zero), and with random states and inputs.
+pub(super) struct JetSource<'a> {
     pub(super) f: Field,
     model: &'a SystemModel,
     compiled: &'a Compiled,
     layout: &'a Layout,
-    /// Slots of the states that move.
+    /// Slots of the states that change in time.
     moving: Vec<usize>,
     /// Unknowns that do not change in time.
     pub(super) constants: Vec<usize>,
 }
 
-/// The jets of the outputs that are independent of those before them, as functions of the states that move.
+/// Jets of the outputs that are independent of those before them, as functions of the states that change.
 pub(super) struct Structure {
-    /// By output: the first order that depends on the jets before it.
+    /// First order, per output, that depends on the jets before it.
     pub(super) first_dependent: Vec<usize>,
-    /// By output: true if it does not change in time.
+    /// True, per output, if it does not change in time.
     pub(super) still: Vec<bool>,
-    /// `inputs[output][order]`: jets of inputs in that derivative.
+    /// Jets of inputs in each output derivative, as `inputs[output][order]`.
     inputs: Vec<Vec<Vec<Jet>>>,
 }
 
-impl<'a> Source<'a> {
-    /// Of a model with one experiment and one segment, generic starts, no unknown input, no time.
+impl<'a> JetSource<'a> {
+    /// Source for a model with one experiment and one segment, generic starts, no unknown input, no time.
     pub(super) fn new(model: &'a SystemModel, compiled: &'a Compiled, layout: &'a Layout, f: Field) -> Self {
         let is_zero =
             |i: usize| matches!(compiled.dag.ops[compiled.rates(0)[i]], Op::Number { mantissa: 0, .. });
@@ -59,8 +59,9 @@ impl<'a> Source<'a> {
         Self { f, model, compiled, layout, moving, constants }
     }
 
-    /// A series at random states and inputs; `values` are those of the unknowns, then of the known constants.
-    /// With lanes for the states that move and for `orders` jets of every input where `lanes`.
+    /// Taylor series at random states and inputs; `values` are those of the unknowns, then of the known
+    /// constants. If `lanes`, it has dual components for the states that change and for `orders` jets of
+    /// every input.
     fn series(
         &self,
         values: &[u64],
@@ -97,7 +98,7 @@ impl<'a> Source<'a> {
                         }
                     }
                 }
-                // nothing that takes part holds the time
+                // no node in use depends on the time
                 Role::Time => Signal::Time { value: 0 },
                 Role::UnknownInput(_) => return None,
             });
@@ -116,15 +117,15 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The work of a series up to an order, in products.
+    /// Work of a series up to an order, in products.
     fn cost(&self, order: usize) -> u64 {
         (self.compiled.dag.ops.len() * (order + 2) * (order + 2)) as u64
     }
 
-    /// The values of jets at random states and inputs.
+    /// Values of jets at random states and inputs; `None` if the series is not defined.
     ///
     /// # Errors
-    /// [`OverLimit`]. `None` where the series is not defined.
+    /// [`OverLimit`].
     pub(super) fn point(
         &self,
         values: &[u64],
@@ -146,10 +147,11 @@ impl<'a> Source<'a> {
         Ok(jets.iter().map(value).collect())
     }
 
-    /// The first `length` Taylor coefficients of jets along one random trajectory.
+    /// First `length` Taylor coefficients of jets along one random trajectory; `None` if the series is not
+    /// defined.
     ///
     /// # Errors
-    /// [`OverLimit`]. `None` where the series is not defined.
+    /// [`OverLimit`].
     pub(super) fn trajectory(
         &self,
         values: &[u64],
@@ -165,7 +167,7 @@ impl<'a> Source<'a> {
         while series.length <= highest {
             series.advance();
         }
-        // (i + k)!/i! of the coefficient i + k
+        // (i + k)!/i!, the factor of the coefficient i + k
         let rising =
             |i: usize, k: usize| (i + 1..=i + k).fold(f.one(), |x, j| f.mul(x, f.from_u64(j as u64)));
         let coefficients = |j: &Jet| {
@@ -176,7 +178,7 @@ impl<'a> Source<'a> {
         Ok(jets.iter().map(coefficients).collect())
     }
 
-    /// Independent jets at a random point; `None` where no point was found.
+    /// Independent jets at a random point; `None` if no point was found.
     pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<Structure> {
         let (f, n) = (self.f, self.moving.len());
         let orders = n + BEYOND + 2;
@@ -223,8 +225,9 @@ impl<'a> Source<'a> {
 }
 
 impl Structure {
-    /// Outputs that change in time, up to their first dependent order and `beyond` of output `leader` (of all
-    /// without one), with the inputs in them; by order, outputs last.
+    /// Jets of outputs that change in time, up to their first dependent order, and `beyond` more for output
+    /// `leader` (for all outputs without one), with the jets of inputs in them; sorted by order, outputs
+    /// last.
     pub(super) fn jets(&self, leader: Option<usize>, beyond: usize) -> Vec<Jet> {
         let mut out = Vec::new();
         let highest = leader.map(|l| self.first_dependent[l] + beyond);

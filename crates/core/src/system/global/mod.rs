@@ -1,14 +1,15 @@
 //! Consequences of relations among derivatives of outputs for the constants: those that are unique, and
 //! equations that every solution satisfies.
 //!
-//! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution, and where one
-//! trajectory determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output.
-//! Ratios of low degree are interpolated; that they have the values of the base point is a system in the
-//! constants alone. A constant with one value among its solutions is unique, whatever other ratios say;
-//! several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
+//! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution. If one trajectory
+//! determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output. Ratios of
+//! low degree are interpolated; setting them to their values at the base point gives a system in the
+//! constants alone. A constant with one value among its solutions is unique, whatever other ratios are.
+//! Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
 //! doi:10.1016/0005-1098(94)90029-9; relations by evaluation instead of elimination).
 //!
-//! Constants that a symmetry moves keep their values: the solutions for all others are conjugate over them.
+//! Constants that a symmetry changes keep their values: the solutions for all others are conjugate over
+//! them.
 
 mod jets;
 mod ratios;
@@ -20,38 +21,38 @@ use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
 use super::judge::Judgement;
 use super::model::{Compiled, SystemModel};
-use jets::Source;
+use jets::JetSource;
 use ratios::{Pool, Ratio, ratios};
 use relation::{Relation, relations};
 
-/// Most evaluations of a relation for one ratio, in steps: what is found with few makes the next ratios
-/// cheaper.
+/// Largest numbers of evaluations of a relation for one ratio, in steps: results of a cheap step make the
+/// next ratios cheaper.
 const EVALUATIONS: [usize; 5] = [30, 100, 300, 700, 1500];
-/// Ratios beyond those that raise the rank, at each step.
+/// Number of ratios at each step beyond those that raise the rank.
 const EXTRAS: usize = 6;
-/// Work of one Groebner basis in the constants.
+/// Limit of the work of one Groebner basis in the constants.
 const BASIS: u64 = 20_000_000;
-/// Highest degree of a minimal polynomial of a constant that is looked at.
+/// Highest degree of a minimal polynomial of a constant that is computed.
 const SOLUTIONS: usize = 24;
 
 /// Consequences of relations for the unknowns at a point.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Known {
+pub(super) struct RelationConsequences {
     /// Unknowns with one value among all points with the same outputs.
     pub(super) unique: Vec<usize>,
     /// Polynomials in the unknowns (numbered as in the layout) that are zero at all those points.
     pub(super) zero: Vec<Polynomial>,
 }
 
-/// The relations of a model, which are the same at every point and in every field.
+/// Relations of a model, the same at every point and in every field; `None` before they were sought.
 #[derive(Debug, Default)]
-pub(super) struct Found(Option<Vec<Relation>>);
+pub(super) struct ModelRelations(Option<Vec<Relation>>);
 
-/// True if relations among derivatives decide anything: one experiment and segment, generic starts and
+/// True if relations among derivatives can decide anything: one experiment and segment, generic starts and
 /// inputs, no function.
 pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgement) -> bool {
     let generic = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
-    // with the time in it a relation would hold at one time only
+    // a relation that contains the time would hold at one time only
     let autonomous = compiled.dag.is_rational() && !compiled.uses_time();
     generic
         && autonomous
@@ -66,30 +67,31 @@ pub(super) fn known(
     (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
     f: Field,
     at: &[u64],
-    found: &mut Found,
+    found: &mut ModelRelations,
     rng: &mut SplitMix64,
     work: &mut Work,
-) -> Known {
-    let source = Source::new(model, compiled, &judged.layout, f);
-    let Some(span) = &judged.span else { return Known::default() };
+) -> RelationConsequences {
+    let source = JetSource::new(model, compiled, &judged.layout, f);
+    let Some(span) = &judged.span else { return RelationConsequences::default() };
     let (open, added) = open_constants(span, &source.constants);
     if found.0.is_none() {
         let structure = source.structure(at, rng);
         found.0 = Some(structure.map_or_else(Vec::new, |s| relations(&source, &s, at, rng, work)));
     }
     let relations = found.0.as_deref().unwrap_or_default();
-    let mut fibre = Fibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
-    // what was found before the work ended holds
+    let mut fibre =
+        ConstantFibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
+    // results found before the work ended are valid
     let _ended = fibre.narrow(&source, relations, rng, work);
     let is_observable = |lane: usize| judged.findings.degrees.degree[lane].is_some();
     let unique = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v) && is_observable(*v));
-    // where more constants were kept than elsewhere the equations hold only beside them
+    // if additional constants were fixed, the equations hold only together with these
     let zero = if added { Vec::new() } else { fibre.zero() };
-    Known { unique: unique.collect(), zero }
+    RelationConsequences { unique: unique.collect(), zero }
 }
 
-/// The constants without as many as the symmetries move: no pivots of the span first, then any that is
-/// independent of it; and whether there were any of these.
+/// The constants without as many as there are symmetry directions (first those that are no pivots of the
+/// span, then any that is independent of it); true if any of the latter were fixed.
 fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
     let mut space = span.clone();
     let (mut open, mut added) = (Vec::new(), false);
@@ -108,30 +110,30 @@ fn open_constants(span: &Echelon, constants: &[usize]) -> (Vec<usize>, bool) {
     (open, added)
 }
 
-/// The constants with the same values of ratios.
-struct Fibre {
+/// Constants with the same values of ratios.
+struct ConstantFibre {
     f: Field,
     at: Vec<u64>,
     /// All constants that were open at first.
     variables: Vec<usize>,
-    /// Those that are not yet known to be unique.
+    /// Constants that are not yet known to be unique.
     open: Vec<usize>,
     /// Ratios as functions, with their gradients.
-    equations: Vec<Equation>,
+    equations: Vec<RatioEquation>,
 }
 
-/// A ratio that has its value at the base point.
-struct Equation {
+/// Ratio that has its value at the base point.
+struct RatioEquation {
     above: Polynomial,
     below: Polynomial,
     gradient: Vec<u64>,
 }
 
-impl Fibre {
+impl ConstantFibre {
     /// Interpolates ratios, cheap ones first, as long as they make constants unique.
     fn narrow(
         &mut self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         relations: &[Relation],
         rng: &mut SplitMix64,
         work: &mut Work,
@@ -148,7 +150,7 @@ impl Fibre {
                 for ratio in &chosen {
                     if let Some([above, below]) = pool.function(ratio, &places, rng, work)? {
                         let gradient = ratio.gradient.clone();
-                        self.equations.push(Equation { above, below, gradient });
+                        self.equations.push(RatioEquation { above, below, gradient });
                     }
                 }
                 let unique = if chosen.is_empty() { Vec::new() } else { self.unique(work) };
@@ -161,13 +163,13 @@ impl Fibre {
         Ok(())
     }
 
-    /// The places of the open constants among the variables.
+    /// Indices of the open constants among the variables.
     fn places(&self) -> Vec<usize> {
         let open = |k: &usize| self.open.contains(&self.variables[*k]);
         (0..self.variables.len()).filter(open).collect()
     }
 
-    /// The space of the gradients of the equations, by the open constants.
+    /// Span of the gradients of the equations, by the open constants.
     fn space(&self, places: &[usize]) -> Echelon {
         let mut space = Echelon::new(self.f, places.len());
         for e in &self.equations {
@@ -176,8 +178,8 @@ impl Fibre {
         space
     }
 
-    /// Takes ratios out of the list that cost at most `limit` evaluations: those that raise the rank, the
-    /// cheapest first, and some others at random.
+    /// Removes from the list the ratios of at most `limit` evaluations that are used: those that raise the
+    /// rank, the cheapest first, and some others at random.
     fn chosen(&self, all: &mut Vec<Ratio>, limit: usize, rng: &mut SplitMix64) -> Vec<Ratio> {
         let places = self.places();
         let depends = |r: &Ratio| places.iter().any(|&k| r.gradient[k] != 0);
@@ -197,7 +199,7 @@ impl Fibre {
             }
             !new
         });
-        // without one of a few constants alone the others would be sought in vain
+        // random extras: without a ratio of few constants alone the others would be sought in vain
         for _ in 0..EXTRAS.min(left.len()) {
             let at = rng.below(left.len() as u64) as usize;
             taken.push(left.swap_remove(at).1);
@@ -208,10 +210,10 @@ impl Fibre {
         out
     }
 
-    /// Polynomials that are zero: every ratio less its value.
+    /// Polynomials that are zero: every ratio minus its value.
     fn zero(&self) -> Vec<Polynomial> {
         let f = self.f;
-        let less = |e: &Equation| {
+        let less = |e: &RatioEquation| {
             let mut out = e.above.scaled(&f, e.below.at(&f, &self.at));
             out.add_scaled(&f, &e.below, f.neg(e.above.at(&f, &self.at)));
             out
@@ -219,14 +221,14 @@ impl Fibre {
         self.equations.iter().map(less).filter(|p| !p.is_empty()).collect()
     }
 
-    /// The open constants with one value.
+    /// Open constants with one value.
     fn unique(&self, work: &mut Work) -> Vec<usize> {
         let f = self.f;
         let places = self.places();
         let space = self.space(&places);
         let name = |v: u32| self.open.iter().position(|&o| o == v as usize).map(|i| i as u32);
         let mut ideal: Vec<Polynomial> = self.zero().iter().filter_map(|p| p.renamed(name)).collect();
-        // nothing is divided by zero
+        // no divisor is zero
         let mut below: Vec<&Polynomial> = Vec::new();
         for e in self.equations.iter().filter(|e| e.below.as_constant().is_none()) {
             if !below.contains(&&e.below) {
@@ -262,7 +264,7 @@ impl Fibre {
         out
     }
 
-    /// Gives constants their values.
+    /// Sets constants to their values.
     fn fix(&mut self, unique: &[usize]) {
         for &v in unique {
             let value = Polynomial::constant(self.at[v]);

@@ -9,36 +9,36 @@ use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::reconstruct::{Abscissae, Quotient};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::Source;
+use super::jets::JetSource;
 use super::relation::Relation;
 
-/// Highest degree above and below of a ratio that is used.
+/// Highest degree of numerator and denominator of a ratio that is used.
 const DEGREE: usize = 6;
-/// Points on a line through all constants, and on one along a constant.
+/// Number of points on a line through all constants, and on one along a constant.
 const LINE: usize = 16;
 const ALONG: usize = 12;
-/// Most ratios of a relation that are kept, those of low degree.
+/// Largest number of ratios of a relation that are kept, lowest degrees first.
 const KEPT: usize = 1500;
-/// Points that confirm an interpolation beyond those that determine it.
+/// Number of points that confirm an interpolation, beyond those that determine it.
 const SPARE: usize = 3;
 
-/// A ratio of two coefficients of a relation that is no constant.
+/// Ratio of two coefficients of a relation that is not constant.
 #[derive(Debug, Clone)]
 pub(super) struct Ratio {
     pub(super) relation: usize,
     above: usize,
     below: usize,
-    /// Total degrees above and below.
+    /// Total degrees of numerator and denominator.
     degrees: (usize, usize),
-    /// By variable: degrees above and below.
+    /// Degrees of numerator and denominator in each variable.
     own: Vec<(usize, usize)>,
-    /// By variable: the derivative at the base point.
+    /// Derivative at the base point by each variable.
     pub(super) gradient: Vec<u64>,
 }
 
-/// A relation's coefficients at the points of a line through the base point.
+/// Coefficients of a relation at the points of a line through the base point.
 fn on_line(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     relation: &Relation,
     at: &[u64],
     direction: &[(usize, u64)],
@@ -58,15 +58,15 @@ fn on_line(
     Ok(out)
 }
 
-/// Coefficients on a line with their inverses.
-struct Values {
+/// Coefficients on a line, with their inverses.
+struct LineValues {
     f: Field,
     abscissae: Abscissae,
     values: Vec<Vec<u64>>,
     inverses: Vec<Vec<u64>>,
 }
 
-impl Values {
+impl LineValues {
     fn new(f: Field, values: Vec<Vec<u64>>) -> Self {
         let inverses = values.iter().map(|v| v.iter().map(|&x| f.inv(x)).collect()).collect();
         Self { f, abscissae: Abscissae::new(&f, values.len()), values, inverses }
@@ -82,13 +82,13 @@ impl Values {
     }
 }
 
-/// The ratios of a relation's coefficients at the base point `at`, as functions of `variables`, of low degree
+/// Ratios of a relation's coefficients at the base point `at`, as functions of `variables`, low degrees
 /// first.
 ///
 /// # Errors
 /// [`OverLimit`].
 pub(super) fn ratios(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     (number, relation): (usize, &Relation),
     at: &[u64],
     variables: &[usize],
@@ -99,12 +99,12 @@ pub(super) fn ratios(
     let direction: Vec<(usize, u64)> = variables.iter().map(|&v| (v, rng.below(f.modulus()))).collect();
     let line = on_line(source, relation, at, &direction, None, LINE, (&mut *rng, &mut *work))?;
     let base = line[0].clone();
-    let line = Values::new(f, line);
+    let line = LineValues::new(f, line);
     let mut along = Vec::new();
     for &v in variables {
         let both = (&mut *rng, &mut *work);
         let values = on_line(source, relation, at, &[(v, f.one())], Some(&base), ALONG, both)?;
-        along.push(Values::new(f, values));
+        along.push(LineValues::new(f, values));
     }
     let size = base.len();
     let mut seen: BTreeSet<u64> = BTreeSet::new();
@@ -116,7 +116,7 @@ pub(super) fn ratios(
                 continue;
             }
             let inverse = line.ratio(1, j, i);
-            // the same function again, its opposite, or its inverse
+            // the same function, its opposite, or its inverse
             let again = [second, f.neg(second), inverse, f.neg(inverse)];
             if again.iter().any(|x| seen.contains(x)) {
                 continue;
@@ -148,7 +148,7 @@ pub(super) fn ratios(
     Ok(out)
 }
 
-/// Exponents of a total degree up to `total` and of each variable up to its limit, by degree.
+/// Exponents of total degree up to `total` and of each variable up to its limit, sorted by degree.
 fn boxed(total: usize, limits: &[usize]) -> Vec<Vec<usize>> {
     let mut out = vec![(0, Vec::new())];
     for &limit in limits {
@@ -161,7 +161,7 @@ fn boxed(total: usize, limits: &[usize]) -> Vec<Vec<usize>> {
     out.into_iter().map(|e| e.1).collect()
 }
 
-/// The number of [`boxed`] exponents.
+/// Number of [`boxed`] exponents.
 fn boxed_count(total: usize, limits: &[usize]) -> usize {
     let mut table = vec![0usize; total + 1];
     table[0] = 1;
@@ -175,13 +175,13 @@ fn boxed_count(total: usize, limits: &[usize]) -> usize {
 }
 
 impl Ratio {
-    /// The limits of the open variables' degrees, above or below.
+    /// Limits of the degrees in the open variables, of the numerator or (`below`) of the denominator.
     fn limits(&self, open: &[usize], below: bool) -> Vec<usize> {
         open.iter().map(|&k| if below { self.own[k].1 } else { self.own[k].0 }).collect()
     }
 
-    /// The number of evaluations that its interpolation in the open variables (places in the list of
-    /// variables) takes.
+    /// Number of evaluations that the interpolation in the open variables (indices in the list of variables)
+    /// takes.
     pub(super) fn cost(&self, open: &[usize]) -> usize {
         let (above, below) = (self.limits(open, false), self.limits(open, true));
         let unknown = boxed_count(self.degrees.0, &above).saturating_add(boxed_count(self.degrees.1, &below));
@@ -189,9 +189,9 @@ impl Ratio {
     }
 }
 
-/// Random values of the open variables, and what the coefficients of relations are there.
+/// Random values of the open variables, with the coefficients of relations at them.
 pub(super) struct Pool<'s, 'a> {
-    source: &'s Source<'a>,
+    source: &'s JetSource<'a>,
     relations: &'s [Relation],
     at: Vec<u64>,
     /// Unknowns that are drawn.
@@ -202,7 +202,7 @@ pub(super) struct Pool<'s, 'a> {
 
 impl<'s, 'a> Pool<'s, 'a> {
     pub(super) fn new(
-        source: &'s Source<'a>,
+        source: &'s JetSource<'a>,
         relations: &'s [Relation],
         at: &[u64],
         open: Vec<usize>,
@@ -233,8 +233,8 @@ impl<'s, 'a> Pool<'s, 'a> {
         Ok(())
     }
 
-    /// A ratio as polynomials above and below in the open variables (numbered as unknowns). `None` where the
-    /// points contradict its degrees.
+    /// Numerator and denominator of a ratio as polynomials in the open variables (numbered as unknowns);
+    /// `None` if the points contradict its degrees.
     ///
     /// # Errors
     /// [`OverLimit`].
@@ -257,7 +257,7 @@ impl<'s, 'a> Pool<'s, 'a> {
         let coefficients = &self.coefficients[&ratio.relation];
         let row = |(here, c): (&Vec<u64>, &Vec<u64>)| -> Vec<u64> {
             let (n, d) = (c[ratio.above], f.neg(c[ratio.below]));
-            // numerator d - denominator n = 0
+            // numerator * d - denominator * n = 0
             let first = above.iter().map(|e| f.mul(d, product(e, here)));
             first.chain(below.iter().map(|e| f.mul(n, product(e, here)))).collect()
         };

@@ -1,5 +1,5 @@
-//! Polynomial relations among jets: found as dependencies among products of jets at random points, small ones
-//! first.
+//! Polynomial relations among jets, found as dependencies among products of jets at random points, small
+//! ones first.
 
 use std::collections::BTreeMap;
 
@@ -7,39 +7,38 @@ use obsdeg_exact::dense::ColumnEchelon;
 use obsdeg_exact::groebner::{OverLimit, Work};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::{BEYOND, Jet, Source, Structure};
+use super::jets::{BEYOND, Jet, JetSource, Structure};
 
-/// Most products of jets among which a relation is sought.
+/// Largest number of products of jets among which a relation is sought.
 const MONOMIALS: usize = 4000;
-/// The first budget of products; it doubles up to [`MONOMIALS`].
+/// First budget of products; it doubles up to [`MONOMIALS`].
 const FIRST: usize = 60;
 /// Highest degree of a product.
 const DEGREE: usize = 8;
-/// Most products among which all relations of all outputs are sought at once.
+/// Largest number of products among which all relations of all outputs are sought at once.
 const TOGETHER: usize = 400;
-/// Points beyond the number of products: a relation that holds at all of them is one.
+/// Number of points beyond the number of products: a dependency that holds at all of them is a relation.
 const SPARE: usize = 4;
 
-/// Exponents, by jet.
+/// Exponents, one per jet.
 type Exponents = Vec<u8>;
 
-/// A relation `sum_i c_i m_i(jets) = 0`, the only one among its products up to a factor.
+/// Relation `sum_i c_i m_i(jets) = 0`, the only one among its products up to a factor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Relation {
     jets: Vec<Jet>,
     pub(super) products: Vec<Exponents>,
 }
 
-/// The degree of a product, and its weighted degree.
+/// Degree and weighted degree of a product.
 fn degrees(e: &[u8], weights: &[usize]) -> (usize, usize) {
     let degree = e.iter().map(|&k| usize::from(k)).sum();
     (degree, e.iter().zip(weights).map(|(&k, w)| usize::from(k) * w).sum())
 }
 
-/// Number of exponents of a degree up to `degree`, by their largest weighted degree up to
-/// `weighted`.
+/// Numbers of exponents of degree up to `degree`, one for each largest weighted degree up to `weighted`.
 fn counts(weights: &[usize], degree: usize, weighted: usize) -> Vec<usize> {
-    // by degree and weighted degree
+    // indexed by degree and weighted degree
     let mut table = vec![vec![0usize; weighted + 1]; degree + 1];
     table[0][0] = 1;
     for &w in weights {
@@ -63,7 +62,7 @@ fn count(weights: &[usize], degree: usize, weighted: usize) -> usize {
     counts(weights, degree, weighted)[weighted]
 }
 
-/// All exponents of a degree and a weighted degree up to a limit, by degree and then by the last jets.
+/// All exponents up to a degree and a weighted degree, sorted by degree and then by the last jets.
 fn exponents(weights: &[usize], degree: usize, weighted: usize) -> Vec<Exponents> {
     let mut out = vec![(Exponents::new(), 0, 0)];
     for &w in weights {
@@ -77,7 +76,7 @@ fn exponents(weights: &[usize], degree: usize, weighted: usize) -> Vec<Exponents
     out.into_iter().map(|e| e.0).collect()
 }
 
-/// The value of every product at a point.
+/// Value of every product at a point.
 fn values(f: &Field, products: &[Exponents], point: &[u64]) -> Vec<u64> {
     let most = products.iter().flatten().copied().max().unwrap_or(0);
     let mut powers = vec![vec![f.one(); point.len()]];
@@ -91,16 +90,16 @@ fn values(f: &Field, products: &[Exponents], point: &[u64]) -> Vec<u64> {
     products.iter().map(value).collect()
 }
 
-/// Points at the given constants, drawn as they are needed.
-struct Points<'s, 'a> {
-    source: &'s Source<'a>,
+/// Points at the given constants, drawn on demand.
+struct JetPoints<'s, 'a> {
+    source: &'s JetSource<'a>,
     at: &'s [u64],
     jets: Vec<Jet>,
     drawn: Vec<Vec<u64>>,
 }
 
-impl Points<'_, '_> {
-    /// Rows of the products of some of the jets at so many points.
+impl JetPoints<'_, '_> {
+    /// Rows of the products of some of the jets, one per point.
     fn rows(
         &mut self,
         jets: &[Jet],
@@ -124,10 +123,10 @@ impl Points<'_, '_> {
     }
 }
 
-/// Relations at the given constants (values of the unknowns, then of the known constants): of every output
-/// one, or all of a few products where they suffice. What was found when the work ended.
+/// Relations at the given constants (values of the unknowns, then of the known constants): one for every
+/// output, or all of a few products if these suffice. Contains what was found when the work ended.
 pub(super) fn relations(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     structure: &Structure,
     at: &[u64],
     rng: &mut SplitMix64,
@@ -159,16 +158,16 @@ pub(super) fn relations(
     kept
 }
 
-/// All relations among products of degree one or two of jets, in the order of the highest derivative in them.
+/// All relations among products of degree one or two of jets, sorted by the highest derivative in them.
 fn together(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     jets: Vec<Jet>,
     at: &[u64],
     rng: &mut SplitMix64,
     work: &mut Work,
 ) -> Result<Vec<Relation>, OverLimit> {
     let weights: Vec<usize> = jets.iter().map(|j| j.order).collect();
-    let mut points = Points { source, at, jets: jets.clone(), drawn: Vec::new() };
+    let mut points = JetPoints { source, at, jets: jets.clone(), drawn: Vec::new() };
     for degree in 1..=2 {
         let weighted = degree * weights.iter().max().unwrap_or(&0);
         if count(&weights, degree, weighted) > TOGETHER {
@@ -188,10 +187,10 @@ fn together(
     Ok(Vec::new())
 }
 
-/// A relation with the first dependent derivative of an output, or with up to [`BEYOND`] more: the smallest
-/// set of products that has one decides.
+/// Relation with the first dependent derivative of an output, or with up to [`BEYOND`] more; it is sought in
+/// the smallest set of products that has one.
 fn led_by(
-    source: &Source<'_>,
+    source: &JetSource<'_>,
     structure: &Structure,
     leader: usize,
     at: &[u64],
@@ -200,8 +199,9 @@ fn led_by(
 ) -> Result<Option<Relation>, OverLimit> {
     let sets: Vec<Vec<Jet>> = (0..=BEYOND).map(|b| structure.jets(Some(leader), b)).collect();
     let weights: Vec<Vec<usize>> = sets.iter().map(|s| s.iter().map(|j| j.order).collect()).collect();
-    let mut points = Points { source, at, jets: sets.last().cloned().unwrap_or_default(), drawn: Vec::new() };
-    // what has none, nor has any part of it
+    let mut points =
+        JetPoints { source, at, jets: sets.last().cloned().unwrap_or_default(), drawn: Vec::new() };
+    // a set without a relation has no subset with one
     let mut failed: Vec<(usize, usize, usize)> = Vec::new();
     let mut budget = FIRST;
     while budget <= MONOMIALS {
@@ -210,7 +210,7 @@ fn led_by(
             let highest = *weights.iter().max().unwrap_or(&0);
             for degree in 1..=DEGREE {
                 let counts = counts(weights, degree, degree * highest);
-                // without a product of the leader the set is one of fewer jets
+                // without a product of the leader, the set belongs to fewer jets
                 match counts.iter().rposition(|&n| n <= budget) {
                     None => break,
                     Some(weighted) if weighted < highest => {}
@@ -238,7 +238,7 @@ fn led_by(
 }
 
 impl Relation {
-    /// Of the products with a coefficient, without the jets that are in none.
+    /// Relation of the products with a non-zero coefficient, without the jets that occur in none.
     fn of(jets: &[Jet], products: &[Exponents], coefficients: &[u64]) -> Self {
         let own: Vec<&Exponents> =
             products.iter().zip(coefficients).filter(|p| *p.1 != 0).map(|p| p.0).collect();
@@ -247,31 +247,31 @@ impl Relation {
         Self { jets: used.iter().map(|&j| jets[j]).collect(), products }
     }
 
-    /// The coefficients at the given constants, with a one at the last product; `None` where they are not
+    /// Coefficients at the given constants, with a one at the last product; `None` if they are not
     /// determined.
     ///
     /// # Errors
     /// [`OverLimit`].
     pub(super) fn coefficients(
         &self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
         work: &mut Work,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let size = self.products.len();
-        let mut points = Points { source, at, jets: self.jets.clone(), drawn: Vec::new() };
+        let mut points = JetPoints { source, at, jets: self.jets.clone(), drawn: Vec::new() };
         let rows = points.rows(&self.jets, &self.products, size + 1, rng, work)?;
         let echelon = ColumnEchelon::new(&source.f, size, rows, work)?;
         Ok((echelon.free() == [size - 1]).then(|| echelon.dependency(size - 1)))
     }
 
     /// True if one trajectory determines the coefficients: the products are series in time whose only
-    /// dependency is the relation. (Coefficients that only several trajectories determine say nothing of one
-    /// experiment.)
+    /// dependency is the relation. Coefficients that only several trajectories determine are unknown in one
+    /// experiment.
     fn determined_by_one_trajectory(
         &self,
-        source: &Source<'_>,
+        source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
         work: &mut Work,
@@ -283,7 +283,7 @@ impl Relation {
         one[0] = f.one();
         let mut known: BTreeMap<Exponents, Vec<u64>> = BTreeMap::from([(vec![0; self.jets.len()], one)]);
         for product in &self.products {
-            // one factor after the other; beginnings are shared
+            // multiply factor by factor; common beginnings are shared
             let mut part = vec![0; self.jets.len()];
             for (j, &power) in product.iter().enumerate() {
                 for _ in 0..power {
@@ -314,7 +314,7 @@ mod tests {
             let weights = [0, 1, 2, 1];
             let list = exponents(&weights, degree, weighted);
             assert_eq!(list.len(), count(&weights, degree, weighted));
-            // by brute force over all exponents up to the degree
+            // by enumeration of all exponents up to the degree
             let n = degree as u8 + 1;
             let mut brute = 0;
             for code in 0..usize::from(n).pow(4) {

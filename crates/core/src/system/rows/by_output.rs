@@ -1,9 +1,9 @@
-//! Rows of every output apart, each followed to the end of its own rows: those of any set of outputs are
-//! among them.
+//! Rows of every output separately, each output followed to the end of its own rows. They contain the rows
+//! of any set of outputs.
 //!
-//! With `V_k(y)` the span of the rows of output y up to order k, `V_k(S)` of a set S is the sum of `V_k(y)`
-//! over its outputs, so that a row of y which is in the span of rows of y of no higher order adds nothing to
-//! any set: it is left out.
+//! Let `V_k(y)` be the span of the rows of output y up to order k. `V_k(S)` of a set S is the sum of
+//! `V_k(y)` over its outputs. So a row of y in the span of rows of y of no higher order adds nothing to any
+//! set: it is left out.
 
 use obsdeg_exact::{Gap, RowSpace, Scalars, SplitMix64};
 
@@ -11,9 +11,9 @@ use super::super::model::{Compiled, SystemModel};
 use super::super::taylor::Singular;
 use super::super::values::Values;
 use super::super::work::{Step, Work, product};
-use super::{Followed, Layout, Maker, SystemRows, cost_of, rows_of};
+use super::{AdditionalRuns, Layout, PointBuilder, SystemRows, cost_of, rows_of};
 
-/// Rows of an output: the order and the differential of a derivative by the unknowns.
+/// Rows of an output: order, and differential of a derivative by the unknowns.
 pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
 
 /// Rows of all outputs at one random point.
@@ -21,24 +21,24 @@ pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
 pub struct PointRows<S: Scalars> {
     /// Field of the rows.
     pub field: S,
-    /// Number of unknowns: the length of a row.
+    /// Number of unknowns, the length of a row.
     pub columns: usize,
     /// Differentials of the constraints, which count as rows of order 0 of every set.
     pub known: Vec<Vec<S::Element>>,
-    /// Per output its rows, those of low orders first, without those that depend on others of no higher
-    /// order of the same output and run.
+    /// Rows per output, low orders first, without those that depend on other rows of no higher order of the
+    /// same output and run.
     pub outputs: Vec<OwnRows<S>>,
     /// True if the end of the rows of every output is proven.
     pub ended: bool,
-    /// Margin of the decisions.
+    /// Margin of the rank decisions.
     pub gap: Gap,
 }
 
 impl<'a, S: Values> SystemRows<'a, S> {
-    /// The rows of a system at a random point, to be gathered output by output.
+    /// Rows of a system at a random point, prepared for output-by-output collection.
     ///
     /// # Errors
-    /// As [`SystemRows::new`].
+    /// [`Singular`], as for [`SystemRows::new`].
     pub(in crate::system) fn apart(
         model: &SystemModel,
         compiled: &'a Compiled,
@@ -47,11 +47,11 @@ impl<'a, S: Values> SystemRows<'a, S> {
         rng: &mut SplitMix64,
         work: &'a Work,
     ) -> Result<Self, Singular> {
-        let maker = Maker { model, compiled, layout, field, work };
-        Self::drawn(&maker, work, rng, Followed { others: 0, apart: true })
+        let builder = PointBuilder { model, compiled, layout, field, work };
+        Self::drawn(&builder, work, rng, AdditionalRuns { others: 0, apart: true })
     }
 
-    /// All rows of every output, run by run; `None` where `work` refused them.
+    /// All rows of every output, run by run; `None` if `work` refused them.
     pub(in crate::system) fn by_run(mut self) -> Option<Vec<PointRows<S>>> {
         let (field, columns) = (self.field.clone(), self.lanes);
         let mut out = Vec::with_capacity(self.runs.len());
@@ -67,8 +67,8 @@ impl<'a, S: Values> SystemRows<'a, S> {
         Some(out)
     }
 
-    /// Adds the rows of a run to those of its outputs; their spans in this run. `None` where the work is
-    /// beyond its limit.
+    /// Adds the rows of a run to those of its outputs. Returns their spans in this run; `None` if the work
+    /// exceeds its limit.
     fn follow(&mut self, run: usize, outputs: &mut [OwnRows<S>], ended: &mut bool) -> Option<Vec<S::Space>> {
         let (work, bound) = (self.work, self.bound);
         let run = &mut self.runs[run];

@@ -1,55 +1,57 @@
-//! What no scheme of some candidates can beat, where information adds over positions: duality of optimal
-//! design.
+//! Lower bounds on the criterion of every scheme of given candidates, where information adds over
+//! positions: duality of optimal design.
 //!
-//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: known beforehand). For every
+//! Let `M = P + sum_i A_i` be the information of a scheme of k candidates (P: the prior). For every
 //! matrix X
 //!
 //! ```text
 //! tr(V^T M^-1 V) >= tr(V^T X)^2 / tr(X^T M X)            (Cauchy and Schwarz in the inner product of M)
-//! log det M_S    <= d log(tr(X^T M X) / d) - 2 log |det X_S|   (M_S: without the nuisance; X_S: those rows of X)
+//! log det M_S    <= d log(tr(X^T M X) / d) - 2 log |det X_S|   (M_S, X_S: without the nuisance)
 //! tr(X^T M X)    <= tr(X^T P X) + k max_i tr(X^T A_i X)
 //! ```
 //!
-//! so any X gives a bound, whatever rounding did on the way to it, and the X of the optimal weights gives the
-//! best (J. Kiefer and J. Wolfowitz, 1960, doi 10.4153/CJM-1960-030-4, for the determinant; F. Pukelsheim,
-//! *Optimal Design of Experiments*, 1993, chapter 7, for the others).
+//! so every X gives a bound, whatever rounding error X has. The X of the optimal weights gives the
+//! largest one (J. Kiefer and J. Wolfowitz, 1960, doi 10.4153/CJM-1960-030-4, for the determinant; F.
+//! Pukelsheim, *Optimal Design of Experiments*, 1993, chapter 7, for the others).
 
 use nalgebra::DMatrix;
 
 use super::bounded::rounding;
 
-/// What is to be small, of the inverse of an information matrix.
+/// Objective to minimise: a function of the inverse of an information matrix M. S is the block of this
+/// inverse for the d unknowns that count.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Aim {
-    /// `det(S)^(1/d)`, S the block of what counts of the inverse (D-optimal).
+pub(super) enum Objective {
+    /// `det(S)^(1/d)` (D-optimal).
     Volume,
     /// `mean_j v_j^T M^-1 v_j` (A-optimal), `v_j` the columns (m x t).
     Mean(DMatrix<f64>),
-    /// The largest eigenvalue of S (E-optimal).
+    /// Largest eigenvalue of S (E-optimal).
     Least,
     /// `max_j (o_j + v_j^T M^-1 v_j)`, `v_j` the columns (m x t), `o_j` the offsets (shape t).
     Largest(DMatrix<f64>, Vec<f64>),
 }
 
-/// Information that adds: a scheme takes one of the candidates, k times.
+/// Additive information: the sum over the k candidates of a scheme, repetitions allowed, and the prior.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Additive {
-    /// k times the information of each candidate (m x m), what does not count first.
+    /// k times the information of each candidate (m x m), unknowns that do not count first.
     pub(super) candidates: Vec<DMatrix<f64>>,
-    /// What is known beforehand (m x m).
+    /// Prior information (m x m).
     pub(super) prior: DMatrix<f64>,
-    /// How many unknowns do not count.
+    /// Number of unknowns that do not count.
     pub(super) nuisance: usize,
-    /// What is to be small.
-    pub(super) aim: Aim,
+    /// Objective to minimise.
+    pub(super) objective: Objective,
 }
 
-/// A matrix X with the weights of its columns: what proves a bound.
+/// Dual variables: a matrix X with weights of the columns. They prove a lower bound.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Dual {
-    /// m x t.
+    /// Matrix X (m x t).
     pub(super) x: DMatrix<f64>,
-    /// The weight of every column's aim, none below 0 (shape t, sum 1); empty where there are none.
+    /// Weights of the terms `o_j + v_j^T M^-1 v_j`, none negative (shape t, sum 1); empty for other
+    /// objectives.
     pub(super) shares: Vec<f64>,
 }
 
@@ -58,29 +60,32 @@ impl Additive {
         self.prior.nrows()
     }
 
-    /// How many unknowns count.
+    /// Number of unknowns that count.
     pub(super) fn counting(&self) -> usize {
         self.unknowns() - self.nuisance
     }
 
-    /// `tr(X^T A_i X)` of every candidate: the gradient of the aim by its weight, up to sign and factor.
+    /// `tr(X^T A_i X)` of every candidate: the gradient of the objective with respect to its weight, up
+    /// to sign and factor.
     pub(super) fn gains(&self, x: &DMatrix<f64>) -> Vec<f64> {
         let w = x * x.transpose();
         self.candidates.iter().map(|a| a.dot(&w)).collect()
     }
 
-    /// The aim is not below this at any weights of sum 1, hence in no scheme; 0 where nothing is known.
-    /// Rounding in evaluating it is allowed for: what is claimed of matrices `A_i`, P as they are given.
+    /// Lower bound on the objective for all weights of sum 1, hence for every scheme; 0 if none is
+    /// known. It allows for the rounding of its own evaluation; the matrices `A_i` and P count as
+    /// exact.
     pub(super) fn lower_bound(&self, dual: &Dual) -> f64 {
         self.lower_bound_over(dual, 0.0)
     }
 
-    /// The same where there are other candidates, none of which adds more than `others` to `tr(X^T M X)`.
+    /// Lower bound as [`Self::lower_bound`], with further candidates of which none adds more than
+    /// `others` to `tr(X^T M X)`.
     pub(super) fn lower_bound_over(&self, dual: &Dual, others: f64) -> f64 {
         let x = &dual.x;
         let (m, columns) = x.shape();
         let (w, size) = (x * x.transpose(), x.abs() * x.abs().transpose());
-        // above what it is: entries of W are rounded as well as the sum over them
+        // upper bound: entries of W are rounded, and so is the sum over them
         let above = |a: &DMatrix<f64>| a.dot(&w) + rounding(m * m + columns) * a.abs().dot(&size);
         let most = self.candidates.iter().map(&above).fold(others, f64::max);
         let energy = above(&self.prior) + most;
@@ -94,15 +99,15 @@ impl Additive {
             sum.max(0.0).powi(2) / energy
         };
         let d = self.counting() as f64;
-        let bound = match &self.aim {
-            Aim::Volume => {
+        let bound = match &self.objective {
+            Objective::Volume => {
                 let logs = || (0..self.counting()).map(|j| x[(self.nuisance + j, j)].abs().ln());
                 let sizes: f64 = logs().map(f64::abs).sum();
                 d * (2.0 * logs().sum::<f64>() / d - 4.0 * f64::EPSILON * sizes).exp() / energy
             }
-            Aim::Least => x.rows(self.nuisance, self.counting()).norm_squared() / energy,
-            Aim::Mean(vectors) => shared(vectors),
-            Aim::Largest(vectors, offsets) => {
+            Objective::Least => x.rows(self.nuisance, self.counting()).norm_squared() / energy,
+            Objective::Mean(vectors) => shared(vectors),
+            Objective::Largest(vectors, offsets) => {
                 let known: f64 = offsets.iter().zip(&dual.shares).map(|(o, s)| o * s).sum();
                 known + shared(vectors)
             }
@@ -115,7 +120,7 @@ impl Additive {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Real, Reals, real};
+    use super::super::exact::{BallRing, Real, real};
     use super::super::weights::weigh;
     use super::*;
     use crate::design::measure::criterion::{Criterion, Limits};
@@ -124,7 +129,7 @@ mod tests {
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
-    /// What is proven by an X in 512 bits, of the information of the candidates as the search has it.
+    /// Bound that an X proves, in 512 bits, for the information of the candidates in double precision.
     fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &Dual) -> Real {
         let (n, m) = (evaluator.n, problem.unknowns());
         let columns: Vec<Vec<Real>> =
@@ -152,32 +157,32 @@ mod tests {
             for (j, x) in columns.iter().enumerate() {
                 let v: Vec<Real> = vectors.column(j).iter().copied().map(real).collect();
                 let root = real(dual.shares[j]).sqrt().unwrap_or(Real::ZERO);
-                sum = sum.add(&root.mul(&Reals.dot(v.iter().zip(x))));
+                sum = sum.add(&root.mul(&BallRing.dot(v.iter().zip(x))));
             }
             over(sum.mul(&sum), &energy)
         };
         let shares = dual.shares.iter().fold(Real::ZERO, |sum, s| sum.add(&real(*s)));
-        match &problem.aim {
-            Aim::Volume => {
+        match &problem.objective {
+            Objective::Volume => {
                 let logs = (0..d).map(|j| columns[j][counting(j)].abs().ln().expect("positive"));
                 let sum = logs.fold(Real::ZERO, |sum, x| sum.add(&x));
                 let mean = over(sum.shifted(1), &Real::from_i64(d as i64));
                 over(mean.exp().expect("finite").mul(&Real::from_i64(d as i64)), &energy)
             }
-            Aim::Least => {
+            Objective::Least => {
                 let squares = columns.iter().flat_map(|x| x[problem.nuisance..].iter().map(|x| x.mul(x)));
                 over(squares.fold(Real::ZERO, |sum, x| sum.add(&x)), &energy)
             }
-            Aim::Mean(vectors) => over(shared(vectors), &shares),
-            Aim::Largest(vectors, offsets) => {
+            Objective::Mean(vectors) => over(shared(vectors), &shares),
+            Objective::Largest(vectors, offsets) => {
                 let known = offsets.iter().zip(&dual.shares).map(|(o, s)| real(*o).mul(&real(*s)));
                 over(known.fold(shared(vectors), |sum, x| sum.add(&x)), &shares)
             }
         }
     }
 
-    /// Random tasks of every criterion: the bound in double precision is not above what its X proves in 512
-    /// bits, and below by less than 1e-7 of it.
+    /// Random problems of every criterion: the bound in double precision is never above the one that
+    /// its X proves in 512 bits, and below it by less than 1e-7, relative.
     #[test]
     fn no_bound_is_above_what_its_matrix_proves() {
         let mut rng = SplitMix64::new(43);
@@ -203,7 +208,7 @@ mod tests {
             let conditions = Conditions::default();
             let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
             let k = 3 + below(9);
-            let problem = evaluator.additive(evaluator.aim(criterion), k);
+            let problem = evaluator.additive(evaluator.objective(criterion), k);
             let Some(found) = weigh(&problem, &|| true) else { continue };
             let bound = problem.lower_bound(&found.dual);
             let truth = proven(&evaluator, k, &problem, &found.dual);

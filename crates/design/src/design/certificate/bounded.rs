@@ -1,16 +1,16 @@
-//! Numbers in double precision, each with a bound on what rounding has made of it: running error analysis (N.
-//! J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, section 3.3).
+//! Double-precision numbers with bounds on their rounding errors: running error analysis (N. J. Higham,
+//! *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, section 3.3).
 
 use obsdeg_core::model::Ring;
 
-/// Relative error of a sum of so many products at most, whatever their order: Higham's
-/// `gamma_n = n u / (1 - n u)` (3.4), u = 2^-53, with a factor of two and a few more operations to spare; so
-/// it also bounds what is computed of bounds.
+/// Bound on the relative rounding error of a sum of `terms` products, in any order: Higham's `gamma_n =
+/// n u / (1 - n u)` (3.4), u = 2^-53, with a factor of two and some operations to spare. It thus also
+/// covers the rounding of computed bounds.
 pub(crate) fn rounding(terms: usize) -> f64 {
     (terms + 16) as f64 * f64::EPSILON
 }
 
-/// What is within `radius` of `value`.
+/// Interval of radius `radius` about `value`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounded {
     pub(super) value: f64,
@@ -22,7 +22,8 @@ impl Bounded {
         Self { value, radius: 0.0 }
     }
 
-    /// With what one more operation rounds: u of the result, and as much for the radius itself.
+    /// Result of one more operation: its radius grows by u of the result, and by as much for the radius
+    /// itself.
     fn rounded(value: f64, radius: f64) -> Self {
         let radius = radius + f64::EPSILON * value.abs();
         Self { value, radius: radius * (1.0 + 4.0 * f64::EPSILON) }
@@ -57,7 +58,7 @@ impl std::iter::Sum for Bounded {
     }
 }
 
-/// The ring of them.
+/// Ring of [`Bounded`] numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds;
 

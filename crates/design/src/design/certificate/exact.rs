@@ -1,4 +1,4 @@
-//! The same in balls of 512 bits, for tests: other arithmetic, by elimination.
+//! Certificates recomputed in balls of 512 bits, for tests: independent arithmetic, by elimination.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Ring, earth_rate_in, elementary, product};
@@ -14,10 +14,10 @@ pub(super) fn real(x: f64) -> Real {
     Real::from_f64(x)
 }
 
-/// The ring of balls.
-pub(super) struct Reals;
+/// Ring of balls of 512 bits.
+pub(super) struct BallRing;
 
-impl Ring for Reals {
+impl Ring for BallRing {
     type Element = Real;
     fn zero(&self) -> Real {
         Real::ZERO
@@ -43,7 +43,7 @@ pub(super) fn square_root(x: &Real) -> f64 {
     x.sqrt().expect("not negative").to_f64()
 }
 
-/// What coefficients make of drift and accelerometers at the rotation of these angles.
+/// Effects of the coefficients on drift and accelerometers at the attitude `euler`.
 pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>> {
     #[derive(Clone, Copy)]
     struct Scaled(Real);
@@ -58,15 +58,15 @@ pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>>
         let angle: &Angle = &euler[axis];
         let radians = Real::from_i64(angle.nanodeg()).mul(&Real::pi()).div(&half).expect("not zero");
         let (sin, cos) = radians.sin_cos().expect("small");
-        elementary(&Reals, axis, &(cos, sin))
+        elementary(&BallRing, axis, &(cos, sin))
     };
-    let c = product(&Reals, &product(&Reals, &turn(0), &turn(1)), &turn(2));
+    let c = product(&BallRing, &product(&BallRing, &turn(0), &turn(1)), &turn(2));
     let [w_u, w_n] = [evaluator.w[1][2], -evaluator.w[0][2]].map(real);
     let errors = evaluator.platform.errors();
     let mut rows: Vec<Vec<Real>> =
-        errors.drift_rows(&Reals, &c, || earth_rate_in(&Reals, &c, &w_n, &w_u)).into();
+        errors.drift_rows(&BallRing, &c, || earth_rate_in(&BallRing, &c, &w_n, &w_u)).into();
     if evaluator.platform.observed().accelerometers {
-        rows.extend(errors.accelerometer_rows(&Reals, &c));
+        rows.extend(errors.accelerometer_rows(&BallRing, &c));
     }
     let ordered = |row: Vec<Real>| {
         let row: Vec<Scaled> = row.into_iter().map(Scaled).collect();
@@ -75,12 +75,12 @@ pub(super) fn effects_of(evaluator: &Evaluator, euler: &Euler) -> Vec<Vec<Real>>
     rows.into_iter().map(ordered).collect()
 }
 
-/// `d` there, G being `g`.
+/// Contribution `d` of an attitude with the effects `rows`, with `g` for G.
 pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x: &DMatrix<f64>) -> Real {
     let mut sum = Real::ZERO;
     for column in x.column_iter() {
         let x: Vec<Real> = column.iter().copied().map(real).collect();
-        let y: Vec<Real> = rows.iter().map(|row| Reals.dot(row.iter().zip(&x))).collect();
+        let y: Vec<Real> = rows.iter().map(|row| BallRing.dot(row.iter().zip(&x))).collect();
         for (a, row) in y.iter().zip(g) {
             for (b, g) in y.iter().zip(row) {
                 sum = sum.add(&a.mul(b).mul(&real(*g)));
@@ -92,15 +92,15 @@ pub(super) fn energy_of(rows: &[Vec<Real>], g: &[[f64; LOCAL - 3]; LOCAL - 3], x
 
 type Matrix = Vec<Vec<Real>>;
 
-/// The information of a scheme on the coefficients, the sum of that of its positions, and its inverse.
-pub(super) struct Exact {
-    /// (m x m)
+/// Information of a scheme on the coefficients, the sum over its positions, and its inverse.
+pub(super) struct ExactInformation {
+    /// Inverse of the information (m x m).
     inverse: Matrix,
     nuisance: usize,
     dph: f64,
 }
 
-impl Exact {
+impl ExactInformation {
     pub(super) fn of(evaluator: &Evaluator, sequence: &[Stop]) -> Self {
         let (n, m) = (evaluator.n, evaluator.n - 3);
         let start = evaluator.start().information;
@@ -117,7 +117,7 @@ impl Exact {
         self.nuisance..self.inverse.len()
     }
 
-    /// The square of a criterion but E's.
+    /// Square of a criterion, for all criteria except E.
     pub(super) fn squared(&self, criterion: &Criterion, evaluator: &Evaluator, sequence: &[Stop]) -> Real {
         let unit = real(self.dph).mul(&real(self.dph)).inverse().expect("not zero");
         let d = self.counting().len();
@@ -149,9 +149,9 @@ impl Exact {
                     let own = evaluator.own_psi(stop.candidate);
                     for k in (0..3).filter(|&k| limits.psi[k].is_finite()) {
                         let moved: Vec<Real> = own.moved.iter().map(|x| real(x[k])).collect();
-                        let dot = |row: &Vec<Real>| Reals.dot(row.iter().zip(&moved));
+                        let dot = |row: &Vec<Real>| BallRing.dot(row.iter().zip(&moved));
                         let through: Vec<Real> = self.inverse.iter().map(dot).collect();
-                        let variance = real(own.variances[k]).add(&Reals.dot(through.iter().zip(&moved)));
+                        let variance = real(own.variances[k]).add(&BallRing.dot(through.iter().zip(&moved)));
                         let unit = to_degrees.div(&real(limits.psi[k])).expect("a limit");
                         all.push(variance.mul(&unit).mul(&unit));
                     }
@@ -162,7 +162,7 @@ impl Exact {
         }
     }
 
-    /// True if every principal sigma of what counts is below this.
+    /// True if all principal sigmas of the coefficients that count are below `sigma`.
     pub(super) fn covariance_is_below(&self, sigma: f64) -> bool {
         let limit = real(sigma).mul(&real(self.dph));
         let limit = limit.mul(&limit);
@@ -175,7 +175,7 @@ impl Exact {
     }
 }
 
-/// The pivots of a symmetric matrix, by elimination from the first on.
+/// Pivots of a symmetric matrix, by elimination from the first on.
 fn pivots(mut a: Matrix) -> Vec<Real> {
     let n = a.len();
     for p in 0..n {
@@ -189,7 +189,7 @@ fn pivots(mut a: Matrix) -> Vec<Real> {
     (0..n).map(|i| a[i][i]).collect()
 }
 
-/// The inverse of a positive matrix, by Gauss and Jordan.
+/// Inverse of a positive matrix, by Gauss and Jordan.
 fn inverted(mut a: Matrix) -> Matrix {
     let n = a.len();
     let mut out: Matrix =

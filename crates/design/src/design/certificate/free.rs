@@ -1,60 +1,61 @@
-//! The best weights over all attitudes: attitudes are taken up where they would add most, and what the net of
-//! attitudes leaves between its points is bounded.
+//! Optimal weights over all attitudes: attitudes with the largest contribution are added one by one. A
+//! net of attitudes and a bound between its points cover all others.
 //!
-//! What a position adds to `tr(X^T M X)` is `d(C) = |G^(1/2) C E(g) X|^2`. Along a rotation about any axis it
-//! is a trigonometric polynomial of its angle, of degree n = 2, 4, 6 for drift terms of no, one, two factors
-//! of g; it is not negative. So with D its maximum over all attitudes, `d >= D (1 + cos(n a)) / 2` at an
-//! angle a <= pi / n from there (M. Riesz, 1914, of d - D / 2), and D is not above `2 max d / (1 + cos(n h))`
-//! over a net that is never further than h.
+//! A position with attitude C adds `d(C) = |G^(1/2) C E(g) X|^2` to `tr(X^T M X)`. Along a rotation
+//! about any axis this is a trigonometric polynomial of its angle, of degree n = 2, 4, 6 for drift
+//! terms of no, one, two factors of g; it is not negative. With D its maximum over all attitudes, `d >=
+//! D (1 + cos(n a)) / 2` at an angle a <= pi / n from the maximum (M. Riesz, 1914, applied to d - D /
+//! 2). Hence D is at most `2 max d / (1 + cos(n h))` over a net that is never further than h from any
+//! attitude.
 //!
-//! G, the information on drift and accelerometers that a dwell gives, is taken as double precision gives it;
-//! what is said is of `d` with this G and X at all rotations C. Rounding: d is evaluated at the nodes of an
-//! interpolation with a bound on its rounding, that of cosines included (`bounded`). Interpolation makes of
-//! errors r at the nodes at most `L^2 r`, L the largest sum of the sizes of its weights.
+//! G is the information of a dwell on drift and accelerometers, as computed in double precision. All
+//! bounds are for `d` with this G and X, at all rotations C. Rounding: d is evaluated at the nodes of
+//! an interpolation with a bound on its rounding, that of cosines included (`bounded`). Errors up to r
+//! at the nodes become at most `L^2 r`, L the largest sum of the absolute interpolation weights.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Angle, Euler, LOCAL, Matrix3, c_n_f64, earth_rate_in, elementary, product};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use super::bounded::{Bounded, Bounds, rounding};
-use super::weights::{Weighed, listed, weigh};
+use super::weights::{OptimalWeights, listed, weigh};
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
 
-/// Step of the net of Euler angles on which attitudes are looked for, in degrees.
+/// Step of the net of Euler angles on which attitudes to add are searched, in degrees.
 const COARSE: usize = 9;
-/// Step of the net on which the bound rests.
+/// Step of the net on which the bound rests, in degrees.
 const FINE: usize = 3;
-/// Attitudes taken up at once.
+/// Number of attitudes added at once.
 const TAKEN: usize = 24;
-/// Rounds, at most.
+/// Largest number of rounds.
 const ROUNDS: usize = 25;
-/// What adds less than this part more is not taken up.
+/// Relative excess of an attitude's contribution below which it is not added.
 const GAIN: f64 = 1e-5;
-/// A whole turn in 1e-9 degrees.
+/// Full turn in 1e-9 degrees.
 const FULL: u64 = 360_000_000_000;
-/// Weights below are no support.
+/// Weight below which an attitude is not part of the support.
 const SUPPORT: f64 = 1e-7;
-/// Attitudes that are no further apart, in degrees, are equal to within the rounding of their angles.
+/// Largest angle, in degrees, between attitudes that are equal to within the rounding of their angles.
 const SAME: f64 = 0.02;
 
-/// What weights on all attitudes reach, and what nothing is below.
+/// Optimal weights over all attitudes and the lower bound that they prove.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Everywhere {
-    /// No scheme of attitudes whatever has a smaller criterion.
+    /// Lower bound on the criterion of every scheme of any attitudes.
     pub value: f64,
-    /// The criterion of the weights at these attitudes, as they are.
+    /// Criterion of the weights at the listed attitudes.
     pub attained: f64,
-    /// The attitudes, each once, with weights, heaviest first: angles to hundredths of a degree, beta up to a
-    /// quarter of a turn, the others above
-    /// -180 and up to 180 degrees; weights rounded, to be divided by their sum.
+    /// Attitudes, each once, with weights, heaviest first. Angles are rounded to hundredths of a
+    /// degree: beta within a quarter of a turn, the others above -180 and up to 180 degrees. Weights
+    /// are rounded; divide them by their sum.
     pub support: Vec<(Euler, f64)>,
 }
 
 impl Evaluator {
-    /// What no scheme of `k` attitudes is below, requirements on psi left out, and the attitudes that weights
-    /// for it need; the candidates are where the search for them begins. `None` as for [`Self::bound`], and
-    /// where psi is known beforehand about one axis better than about another: `d` is no polynomial then.
+    /// Lower bound for schemes of any `k` attitudes, requirements on psi left out, and the support of
+    /// its weights. The search for attitudes begins at the candidates. `None` as for [`Self::bound`],
+    /// and if the prior of psi differs between axes: then `d` is no such polynomial.
     pub fn everywhere(
         &self,
         criterion: &Criterion,
@@ -64,42 +65,43 @@ impl Evaluator {
         if self.ordered() || k == 0 || !self.prior.is_alike() {
             return None;
         }
-        let aim = match criterion {
+        let objective = match criterion {
             Criterion::Margin(limits) => {
-                self.aim(&Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }))
+                self.objective(&Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }))
             }
-            other => self.aim(other),
+            other => self.objective(other),
         };
         let mut here = self.clone();
-        let mut problem = here.additive(aim, k);
-        let mut found: Weighed = weigh(&problem, going)?;
+        let mut problem = here.additive(objective, k);
+        let mut found: OptimalWeights = weigh(&problem, going)?;
         let scale = k as f64 * self.dph * self.dph;
         for _ in 0..ROUNDS {
             let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
             let most = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
             let mut new: Vec<Euler> = peaks(self.degree(), &energy);
             new.retain(|e| energy(&c_n_f64(e)) > most * (1.0 + GAIN));
-            // several beginnings lead to one peak
+            // several starting points lead to the same peak
             new.sort_by_key(|e| e.each_ref().map(Angle::nanodeg));
             new.dedup();
             if new.is_empty() || !going() {
                 break;
             }
-            // those without weight give way
+            // attitudes without weight are dropped
             let kept = here.candidates.iter().zip(&found.weights).filter(|(_, w)| **w > 1e-6);
             let mut attitudes: Vec<Matrix3<f64>> = kept.map(|(c, _)| c.c).collect();
             attitudes.extend(new.iter().map(c_n_f64));
             here.stand_at(&attitudes);
-            problem = here.additive(problem.aim.clone(), k);
+            problem = here.additive(problem.objective.clone(), k);
             found = weigh(&problem, going)?;
         }
-        // h: rates of three angles, of which two axes may coincide, are a turn of at most sqrt(5) times the
-        // largest
+        // h: changes of three angles, of which two axes may coincide, are a rotation by at most sqrt(5)
+        // times the largest change
         let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
         let n = self.degree();
         let g = self.information_of_effects();
         let energy = |e: &Euler| self.energy_bounded(e, &g, &found.dual.x) * scale;
-        let on_net = on_net(FINE, n, &|e| energy(e).value).map(|(_, d)| d).reduce(|| 0.0, f64::max);
+        let largest = |points: Points<'_>| points.map(|p| p.1).fold(0.0, f64::max);
+        let on_net = on_net(FINE, n, &|e| energy(e).value, largest).into_iter().fold(0.0, f64::max);
         let (hidden, moved) = hidden(FINE, n, &energy);
         let part = (1.0 + (n as f64 * h).cos()) / 2.0 * (1.0 - rounding(0));
         let most = (on_net + hidden) / (part - moved) * (1.0 + rounding(0));
@@ -108,9 +110,9 @@ impl Evaluator {
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
         let support = here.candidates.iter().zip(&found.weights).filter(|(_, w)| **w > SUPPORT);
         let (support, weights) = merged(support.map(|(c, w)| (&c.c, *w)));
-        // what is told of the weights is what these attitudes and numbers give
+        // listed figures are those of the listed attitudes and weights
         here.stand_at(&support.iter().map(c_n_f64).collect::<Vec<_>>());
-        let problem = here.additive(problem.aim, k);
+        let problem = here.additive(problem.objective, k);
         let exact = || (weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &weights).unwrap_or_else(exact);
         let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();
@@ -118,7 +120,7 @@ impl Evaluator {
         going().then_some(Everywhere { value, attained, support })
     }
 
-    /// `d(C)` for one position, X in units of deg/h.
+    /// Contribution `d(C)` of one position, X in units of deg/h.
     fn energy(&self, c: &Matrix3<f64>, x: &DMatrix<f64>) -> f64 {
         let rows = self.effects(c);
         let g = self.information_of_effects();
@@ -132,7 +134,7 @@ impl Evaluator {
         sum
     }
 
-    /// The same at the rotation of these angles, G being `g`.
+    /// Contribution `d(C)` at the attitude `euler` with a bound on its rounding, with `g` for G.
     fn energy_bounded(&self, euler: &Euler, g: &[[f64; LOCAL - 3]; LOCAL - 3], x: &DMatrix<f64>) -> Bounded {
         let rows = self.effects_bounded(euler);
         let column = |column: nalgebra::DVectorView<'_, f64>| -> Bounded {
@@ -145,12 +147,12 @@ impl Evaluator {
         x.column_iter().map(column).sum()
     }
 
-    /// What coefficients make of drift and accelerometers at the rotation of these angles.
+    /// Effects of the coefficients on drift and accelerometers at the attitude `euler`.
     fn effects_bounded(&self, euler: &Euler) -> [Vec<Bounded>; LOCAL - 3] {
         let turn = |axis: usize| {
             let (cos, sin) = euler[axis].turn().cos_sin_f64();
-            // an angle below a whole turn is rounded three times on its way to radians; nothing is at right
-            // angles
+            // an angle below a whole turn is rounded three times in its conversion to radians; right
+            // angles are exact
             let radius = if cos * sin == 0.0 { 0.0 } else { 16.0 * f64::EPSILON };
             elementary(&Bounds, axis, &(Bounded { value: cos, radius }, Bounded { value: sin, radius }))
         };
@@ -166,8 +168,8 @@ impl Evaluator {
         std::array::from_fn(|_| rows.next().unwrap_or_default())
     }
 
-    /// How far the information of the positions of a sequence, as the search has it, is from that of the
-    /// rotations of their angles with G as it is, at most (m x m, sizes).
+    /// Largest difference (m x m, absolute values) between the information of the positions as the
+    /// search computes it and that of the exact rotations by their angles with the same G.
     pub(crate) fn errors_of<'e>(&self, positions: impl Iterator<Item = (usize, &'e Euler)>) -> DMatrix<f64> {
         let (n, m) = (self.n, self.n - 3);
         let g = self.information_of_effects();
@@ -192,15 +194,15 @@ impl Evaluator {
         sum * (1.0 + rounding(4 * LOCAL))
     }
 
-    /// Degree of `d` along a rotation.
+    /// Degree n of `d` along a rotation.
     fn degree(&self) -> usize {
         let factors = self.platform.error_terms().iter().map(|t| t.factors.len()).max().unwrap_or(0);
         2 * (1 + factors)
     }
 }
 
-/// The nodes that determine a trigonometric polynomial of degree n, and the weights of its values there at
-/// every `step` degrees.
+/// Nodes that determine a trigonometric polynomial of degree n, and the weights of its values there for
+/// its values at every `step` degrees.
 fn interpolation(step: usize, n: usize) -> (Vec<f64>, DMatrix<f64>) {
     let count = 2 * n + 1;
     let nodes: Vec<f64> = (0..count).map(|i| 360.0 * i as f64 / count as f64).collect();
@@ -211,39 +213,47 @@ fn interpolation(step: usize, n: usize) -> (Vec<f64>, DMatrix<f64>) {
     (nodes, weights)
 }
 
-/// The nodes of alpha and gamma at one of beta, to 1e-9 degrees.
+/// Euler angles in degrees, rounded to 1e-9 degrees.
 fn at(alpha: f64, beta: f64, gamma: f64) -> Euler {
     [alpha, beta, gamma].map(|x| Angle::from_nanodeg((x * 1e9).round() as i64))
 }
 
-/// A quarter of a turn down and up, in degrees.
+/// Multiples of `step` from -90 to 90 degrees.
 fn betas(step: usize) -> Vec<f64> {
     (0..=180).step_by(step).map(|b| b as f64 - 90.0).collect()
 }
 
+/// Euler angles in degrees, each with the value there.
+type Points<'a> = &'a mut dyn Iterator<Item = ([f64; 3], f64)>;
+
 /// A function of the attitude on a net of Euler angles in degrees. Along alpha and gamma, which turn about
 /// fixed axes, it is a trigonometric polynomial of degree n: 2 n + 1 values of each determine the others (the
-/// interpolation adds a few roundings to them).
-fn on_net(
+/// interpolation adds a few roundings to them). `layer` reduces the points of one beta.
+fn on_net<T: Send>(
     step: usize,
     n: usize,
     energy: &(dyn Fn(&Euler) -> f64 + Sync),
-) -> impl ParallelIterator<Item = ([f64; 3], f64)> {
+    layer: impl Fn(Points<'_>) -> T + Sync,
+) -> Vec<T> {
     let (nodes, weights) = interpolation(step, n);
-    betas(step).into_par_iter().flat_map_iter(move |b| {
+    let betas = betas(step);
+    let along = |k: usize| {
+        let b = betas[k];
         let count = nodes.len();
         let values = DMatrix::from_fn(count, count, |i, j| energy(&at(nodes[i], b, nodes[j])));
         let all = &weights * values * weights.transpose();
         let full = weights.nrows();
-        (0..full * full).map(move |k| {
+        let of = |k: usize| {
             let (i, j) = (k / full, k % full);
             ([(i * step) as f64, b, (j * step) as f64], all[(i, j)])
-        })
-    })
+        };
+        layer(&mut (0..full * full).map(of))
+    };
+    parallel::map(betas.len(), along)
 }
 
-/// What the values of [`on_net`] may be off by rounding, from what is known of those at the nodes; and what
-/// nodes that are no multiples of 1e-9 degrees add, as a part of the largest value of the function anywhere.
+/// Rounding bound of the values of [`on_net`] from those at the nodes, and the relative bound for nodes
+/// that are no multiples of 1e-9 degrees (of the largest value of the function anywhere).
 fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) -> (f64, f64) {
     let (nodes, weights) = interpolation(step, n);
     let count = nodes.len();
@@ -252,7 +262,9 @@ fn hidden(step: usize, n: usize, energy: &(dyn Fn(&Euler) -> Bounded + Sync)) ->
         all.fold((0.0, 0.0), |(size, radius): (f64, f64), x| (size.max(x.value.abs()), radius.max(x.radius)))
     };
     let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
-    let (size, radius) = betas(step).into_par_iter().map(both).reduce(|| (0.0, 0.0), larger);
+    let betas = betas(step);
+    let largest = parallel::map(betas.len(), |k| both(betas[k]));
+    let (size, radius) = largest.into_iter().fold((0.0, 0.0), larger);
     // arguments up to 2 pi k are off by some 26 k u, cosines by u, and their sum by (n + 1) u of its size
     let weight = (14 * n + 16) as f64 * f64::EPSILON;
     let sizes = weights.row_iter().map(|row| row.iter().map(|w| w.abs()).sum::<f64>()).fold(0.0, f64::max);
@@ -268,19 +280,19 @@ fn matrix(degrees: [f64; 3]) -> Matrix3<f64> {
     c_n_f64(&euler(degrees))
 }
 
-/// To hundredths of a degree.
+/// Euler angles rounded to hundredths of a degree.
 fn euler(degrees: [f64; 3]) -> Euler {
     degrees.map(|x| Angle::from_nanodeg((x * 100.0).round() as i64 * 10_000_000))
 }
 
-/// Attitudes that are equal to within the rounding of their angles are one, with the sum of their weights;
+/// Merges attitudes that are equal to within the rounding of their angles and adds their weights;
 /// heaviest first.
 fn merged<'c>(weighed: impl Iterator<Item = (&'c Matrix3<f64>, f64)>) -> (Vec<Euler>, Vec<f64>) {
     let mut sorted: Vec<(&Matrix3<f64>, f64)> = weighed.collect();
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut out: Vec<(&Matrix3<f64>, f64)> = Vec::new();
     for (c, weight) in sorted {
-        // a turn by a small angle moves the entries by its root of two, as a vector
+        // a rotation by a small angle a moves the entries, as a vector, by sqrt(2) a
         let apart = |other: &Matrix3<f64>| {
             let squares = c.as_flattened().iter().zip(other.as_flattened()).map(|(a, b)| (a - b).powi(2));
             (squares.sum::<f64>() / 2.0).sqrt().to_degrees()
@@ -294,8 +306,8 @@ fn merged<'c>(weighed: impl Iterator<Item = (&'c Matrix3<f64>, f64)>) -> (Vec<Eu
     out.into_iter().map(|(c, weight)| (angles(c), weight)).unzip()
 }
 
-/// The Euler angles of an attitude, to hundredths of a degree: `C = Mx(alpha) My(beta) Mz(gamma)`, beta up to
-/// a quarter of a turn, the others above -180 and up to 180 degrees.
+/// Euler angles of an attitude, to hundredths of a degree: `C = Mx(alpha) My(beta) Mz(gamma)`, beta
+/// within a quarter of a turn, the others above -180 and up to 180 degrees.
 fn angles(c: &Matrix3<f64>) -> Euler {
     let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
     let (alpha, gamma) = if beta.cos().abs() > 1e-9 {
@@ -308,10 +320,10 @@ fn angles(c: &Matrix3<f64>) -> Euler {
     euler([alpha, beta, gamma].map(f64::to_degrees).map(positive))
 }
 
-/// Attitudes where the energy is largest near the points of the coarse net that have most of it, largest
-/// first.
+/// Attitudes of largest energy near the best points of the coarse net, largest first.
 fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler> {
-    let mut points: Vec<([f64; 3], f64)> = on_net(COARSE, n, &|e| energy(&c_n_f64(e))).collect();
+    let mut points: Vec<([f64; 3], f64)> =
+        on_net(COARSE, n, &|e| energy(&c_n_f64(e)), |points| points.collect::<Vec<_>>()).concat();
     points.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut taken: Vec<([f64; 3], Matrix3<f64>)> = Vec::new();
     for (e, _) in points {
@@ -327,7 +339,8 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
             break;
         }
     }
-    let polished = taken.into_par_iter().map(|(mut at, c)| {
+    parallel::map(taken.len(), |k| {
+        let (mut at, c) = taken[k];
         let mut best = energy(&c);
         let mut step = COARSE as f64 / 2.0;
         while step > 0.005 {
@@ -343,8 +356,7 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
             }
         }
         euler(at)
-    });
-    polished.collect()
+    })
 }
 
 #[cfg(test)]
@@ -356,7 +368,7 @@ mod tests {
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
-    /// No positions under reset carry, with these error terms.
+    /// Scheme without positions under reset carry, with these error terms.
     fn with(terms: &str) -> Scheme {
         Scheme {
             carry: Carry::Reset,
@@ -366,8 +378,7 @@ mod tests {
         }
     }
 
-    /// What is interpolated is what it is where it is evaluated, whatever the terms; a degree less would not
-    /// do.
+    /// Interpolated values equal direct ones for every set of terms; a degree less is not enough.
     #[test]
     fn a_net_is_interpolated() {
         let mut rng = SplitMix64::new(3);
@@ -379,7 +390,8 @@ mod tests {
             let x = DMatrix::from_fn(evaluator.n - 3, 3, |_, _| draw());
             let energy = |c: &Matrix3<f64>| evaluator.energy(c, &x);
             let off = |n: usize| {
-                let all: Vec<_> = on_net(20, n, &|e| energy(&c_n_f64(e))).collect();
+                let all: Vec<_> =
+                    on_net(20, n, &|e| energy(&c_n_f64(e)), |points| points.collect::<Vec<_>>()).concat();
                 assert_eq!(all.len(), 18 * 10 * 18);
                 let largest = all.iter().map(|(_, d)| *d).fold(0.0, f64::max);
                 let far = all.iter().map(|(e, d)| (d - energy(&matrix(*e))).abs()).fold(0.0, f64::max);
@@ -391,8 +403,8 @@ mod tests {
         }
     }
 
-    /// What energies, what is interpolated of them, and the information of positions are off by is within
-    /// what is told, against 512 bits; and what is told is not much more than that.
+    /// Errors of energies, of interpolated energies and of the information of positions stay within
+    /// their bounds, against 512 bits; the bounds are not much larger than the errors.
     #[test]
     fn rounding_is_within_its_bounds() {
         let mut rng = SplitMix64::new(5);
@@ -415,7 +427,8 @@ mod tests {
                 assert!(off <= radius, "{terms}: {place} {told:e} off by {off:e}, told {radius:e}");
                 largest[kind] = largest[kind].max(if radius > 0.0 { off / radius } else { 0.0 });
             };
-            let net: Vec<_> = on_net(FINE, n, &|e| energy(e).value).collect();
+            let net: Vec<_> =
+                on_net(FINE, n, &|e| energy(e).value, |points| points.collect::<Vec<_>>()).concat();
             let most = net.iter().map(|(_, d)| *d).fold(0.0, f64::max);
             let (hidden, moved) = hidden(FINE, n, &energy);
             assert!(hidden < 1e-8 * most && moved < 1e-8, "{terms}: {hidden:e} {moved:e} {most:e}");

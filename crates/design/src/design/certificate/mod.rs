@@ -1,6 +1,5 @@
-//! How good the best scheme can be, where information adds over positions (reset carry): a lower bound on the
-//! criterion of every scheme of k candidates, from the optimal weights of the candidates (approximate design
-//! theory).
+//! Lower bounds on the criterion of every scheme of k candidates, where information adds over positions
+//! (reset carry), from the optimal weights of the candidates (approximate design theory).
 
 mod bound;
 pub(crate) mod bounded;
@@ -17,30 +16,30 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
-use bound::{Additive, Aim};
+use bound::{Additive, Objective};
 use weights::{listed, weigh};
 
-/// Most positions whose psi is looked at one by one, for requirements on psi.
+/// Largest number of first positions for which psi is bounded one by one, for requirements on psi.
 const MOST_PSI: usize = 48;
 
-/// A bound that holds for every scheme of some candidates.
+/// Lower bound on the criterion of every scheme of given candidates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bound {
-    /// No scheme has a smaller criterion: in deg/h (per g), or for margin a ratio.
+    /// Lower bound, in deg/h (per g), for margin dimensionless.
     pub value: f64,
-    /// The criterion of the weights, were they possible: this way of bounding gives no more.
+    /// Criterion of the weights themselves: the largest bound that this method can give.
     pub attained: f64,
-    /// The weight of every candidate, sum 1.
+    /// Weight of every candidate, dimensionless (sum 1).
     pub weights: Vec<f64>,
-    /// The same rounded, to be divided by their sum, and the criterion of these.
+    /// Weights as they are listed, rounded, to be divided by their sum; and the criterion of these.
     pub listed: (Vec<f64>, f64),
 }
 
 impl Evaluator {
-    /// What no scheme of `k` candidates, in any order and with repetitions, is below; `firsts` are candidates
-    /// such that every scheme is as good as one that has one of them. `None` where information does not add
-    /// over positions (platform and inertial carry, noise of Z that is correlated), where the candidates
-    /// together do not determine what counts, or when stopped.
+    /// Lower bound for schemes of `k` candidates, in any order and with repetitions. Every scheme must
+    /// be as good as one that contains a candidate of `firsts`. `None` where information does not add
+    /// over positions (platform and inertial carry, correlated noise of Z), where the candidates
+    /// together do not determine the coefficients that count, or when stopped.
     pub fn bound(
         &self,
         criterion: &Criterion,
@@ -55,42 +54,43 @@ impl Evaluator {
             Criterion::Margin(limits) if limits.psi.iter().any(|l| l.is_finite()) => {
                 self.with_psi(limits, k, firsts, going)?
             }
-            _ => self.weighed(self.aim(criterion), k, going)?,
+            _ => self.weighed(self.objective(criterion), k, going)?,
         };
         (going() && found.value > 0.0).then_some(found)
     }
 
-    /// What a criterion makes of the coefficients.
-    fn aim(&self, criterion: &Criterion) -> Aim {
+    /// Objective of a criterion, as a function of the information on the coefficients.
+    fn objective(&self, criterion: &Criterion) -> Objective {
         match criterion {
             Criterion::Margin(limits) => self.largest(limits),
             Criterion::Worst => {
                 let d = self.n - 3 - self.nuisance;
                 self.largest(&Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] })
             }
-            Criterion::A => Aim::Mean(self.units()),
-            Criterion::D => Aim::Volume,
-            Criterion::E => Aim::Least,
+            Criterion::A => Objective::Mean(self.units()),
+            Criterion::D => Objective::Volume,
+            Criterion::E => Objective::Least,
         }
     }
 
-    /// The coefficients that count as columns (m x d).
+    /// Unit columns of the coefficients that count (m x d).
     fn units(&self) -> DMatrix<f64> {
         let m = self.n - 3;
         DMatrix::from_fn(m, m - self.nuisance, |i, j| f64::from(u8::from(i == j + self.nuisance)))
     }
 
-    /// The largest variance over the square of its limit.
-    fn largest(&self, limits: &Limits) -> Aim {
+    /// Objective: largest variance over the square of its limit.
+    fn largest(&self, limits: &Limits) -> Objective {
         let mut vectors = self.units();
         for (mut column, limit) in vectors.column_iter_mut().zip(&limits.coefficients) {
             column /= *limit;
         }
         let offsets = vec![0.0; vectors.ncols()];
-        Aim::Largest(vectors, offsets)
+        Objective::Largest(vectors, offsets)
     }
 
-    /// The same with psi of one position: one of `firsts` is in every scheme, up to its images.
+    /// Bound for margin with requirements on psi: the objective of [`Self::largest`] with psi of one position
+    /// added. It is the least bound over `firsts`: every scheme, up to its images, contains one of them.
     fn with_psi(
         &self,
         limits: &Limits,
@@ -99,7 +99,7 @@ impl Evaluator {
         going: &dyn Fn() -> bool,
     ) -> Option<Bound> {
         let every: Vec<usize> = if firsts.len() <= MOST_PSI { firsts.to_vec() } else { Vec::new() };
-        let Aim::Largest(coefficients, none) = self.largest(limits) else { return None };
+        let Objective::Largest(coefficients, none) = self.largest(limits) else { return None };
         let mut least: Option<Bound> = None;
         for candidate in every.iter().map(Some).chain(every.is_empty().then_some(None)) {
             let (mut vectors, mut offsets) = (coefficients.clone(), none.clone());
@@ -115,7 +115,7 @@ impl Evaluator {
                 vectors.set_column(at, &DVector::from_iterator(psi.moved.len(), moved));
                 offsets.push(psi.variances[k] * unit * unit);
             }
-            let found = self.weighed(Aim::Largest(vectors, offsets), k, going)?;
+            let found = self.weighed(Objective::Largest(vectors, offsets), k, going)?;
             if least.as_ref().is_none_or(|l| found.value < l.value) {
                 least = Some(found);
             }
@@ -123,13 +123,13 @@ impl Evaluator {
         least
     }
 
-    /// The weights of least aim.
-    fn weighed(&self, aim: Aim, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
-        let problem = self.additive(aim, k);
+    /// Bound by the weights that minimise the objective.
+    fn weighed(&self, objective: Objective, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+        let problem = self.additive(objective, k);
         let found = weigh(&problem, going)?;
         let exact = || (found.weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
-        // that of exact weights may rest on rounding
+        // the bound of exact weights may rest on rounding
         let listed = (weights, attained.max(found.bound).sqrt());
         Some(Bound {
             value: found.bound.sqrt(),
@@ -139,8 +139,8 @@ impl Evaluator {
         })
     }
 
-    /// The information of the candidates, k times; numbers are in deg/h (per g).
-    fn additive(&self, aim: Aim, k: usize) -> Additive {
+    /// Information of the candidates, times k; numbers are in deg/h (per g).
+    fn additive(&self, objective: Objective, k: usize) -> Additive {
         let (n, m) = (self.n, self.n - 3);
         let unit = k as f64 * self.dph * self.dph;
         let known = |i: usize, j: usize| match i == j {
@@ -153,7 +153,7 @@ impl Evaluator {
             candidates: self.candidates.iter().map(|c| information(&c.own)).collect(),
             prior: DMatrix::from_fn(m, m, known),
             nuisance: self.nuisance,
-            aim,
+            objective,
         }
     }
 }

@@ -1,17 +1,17 @@
-//! What the criterion of a scheme is at most, whatever rounding did on the way to it: a posteriori, by a
-//! residual.
+//! Upper bound on the criterion of a scheme, valid despite all rounding: a posteriori, by a residual.
 //!
-//! For any regular K, best the computed inverse of the root of M, and `T = K M K^T - 1`,
+//! For any regular K, best the computed inverse of the Cholesky factor of M, and `T = K M K^T - 1`,
 //!
 //! ```text
 //! M^-1 = K^T (1 + T)^-1 K,    so    M^-1 <= K^T K / (1 - t)    wherever |T|_2 <= t < 1
 //! ```
 //!
-//! T is computed, and what rounding makes of it is at most `gamma_n` times the same product of the sizes
-//! `|K| S |K|^T`, S the sum of the sizes of what M is the sum of (N. J. Higham, *Accuracy and Stability of
-//! Numerical Algorithms*, 2nd edition, 2002, (3.4) and (3.13); the residual of an approximate inverse as a
-//! proof: S. M. Rump, *Acta Numerica* 19, 2010, 287-449). How K was found does not matter, and no condition
-//! number is assumed: where M is too near a singular matrix t is not below 1, and nothing is said.
+//! T is computed; its rounding error is at most `gamma_n` times the same product of the absolute values
+//! `|K| S |K|^T`, S the sum of the absolute values of the terms of M (N. J. Higham, *Accuracy and
+//! Stability of Numerical Algorithms*, 2nd edition, 2002, (3.4) and (3.13); the residual of an
+//! approximate inverse as a proof: S. M. Rump, *Acta Numerica* 19, 2010, 287-449). The origin of K does
+//! not matter, and no condition number is assumed. Where M is too near a singular matrix, t is not
+//! below 1 and there is no bound.
 
 use nalgebra::DMatrix;
 
@@ -21,9 +21,10 @@ use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
-    /// The criterion of a sequence is not above this, of the information of each of its positions as double
-    /// precision gives it, whose error is at most `errors` (m x m, sizes; psi left out): deg/h (per g), or
-    /// for margin a ratio. `None` where order matters, and where rounding may hide all of it.
+    /// Upper bound on the criterion of a sequence, in deg/h (per g), for margin dimensionless. It holds
+    /// for the information of each position in double precision, whose error is at most `errors` (m x
+    /// m, absolute values, without psi). `None` where order matters, and where rounding may hide all of
+    /// it.
     pub(crate) fn at_most(
         &self,
         sequence: &[Stop],
@@ -51,7 +52,7 @@ impl Evaluator {
         let rounded = (&size * &sizes * size.transpose()).norm() * rounding(2 * m + sequence.len());
         let wrong = errors.map_or(0.0, |errors| (&size * errors * size.transpose()).norm());
         let t = (residual.norm() + rounded + wrong) * (1.0 + rounding(m * m + 2 * m));
-        // K^T K on what counts, and what is made of it
+        // `K^T K` on the coefficients that count, and the criterion of it
         let counting = k.columns(self.nuisance, m - self.nuisance);
         let variances = || counting.column_iter().map(|column| column.norm_squared());
         let d = counting.ncols() as f64;
@@ -84,9 +85,9 @@ impl Evaluator {
     }
 }
 
-/// What no eigenvalue of `K^T K` is above: with Q any matrix, best its computed eigenvectors, and
-/// `Q^T Q = 1 + F`, it is at most the largest eigenvalue of `Q^T K^T K Q`, which no sum of the sizes of a row
-/// is below, divided by `1 - |F|`.
+/// Upper bound on the eigenvalues of `K^T K`. With any Q, best its computed eigenvectors, and `Q^T Q =
+/// 1 + F`, the largest is at most the largest eigenvalue of `Q^T K^T K Q` divided by `1 - |F|`. The
+/// largest eigenvalue of a matrix is at most its largest row sum of absolute values.
 fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
     let (m, d) = k.shape();
     let q = (k.transpose() * k).symmetric_eigen().eigenvectors;
@@ -104,7 +105,7 @@ fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Exact, square_root};
+    use super::super::exact::{ExactInformation, square_root};
     use super::*;
     use crate::design::measure::criterion::Limits;
     use crate::design::{Candidates, Stop};
@@ -112,9 +113,10 @@ mod tests {
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
-    /// Random schemes: the criterion in 512 bits, of the same information, is not above what is told, and
-    /// hardly below; that of double precision is often below it, so that rounding has to be allowed for. Some
-    /// have coefficients that do not count, some are near singular.
+    /// Random schemes: the criterion in 512 bits, of the same information, is never above the bound,
+    /// and hardly below it. The criterion in double precision is often below the one in 512 bits, so
+    /// rounding must be allowed for. Some schemes have coefficients that do not count, some are near
+    /// singular.
     #[test]
     fn no_criterion_is_above_what_is_told() {
         let mut rng = SplitMix64::new(41);
@@ -158,11 +160,11 @@ mod tests {
                 (0..candidates.len() + drawn(3)).map(|i| Stop::from(i % candidates.len())).collect();
             let computed = evaluator.of_sequence(&sequence, &criterion);
             let Some(most) = evaluator.at_most(&sequence, &criterion, None) else { continue };
-            let exact = Exact::of(&evaluator, &sequence);
+            let exact = ExactInformation::of(&evaluator, &sequence);
             let part = most / computed - 1.0;
             if criterion == Criterion::E {
-                // the largest eigenvalue is below a number where that times 1 - S is positive; double
-                // precision has the smallest of S^-1
+                // the largest eigenvalue is below a number where that number times 1, minus S, is
+                // positive; double precision has the smallest eigenvalue of S^-1
                 let is_above = |sigma: f64| exact.covariance_is_below(sigma);
                 assert!(is_above(most), "task {task}: {computed} {most}");
                 assert!(

@@ -1,65 +1,67 @@
-//! Optimal weights of candidates: a primal-dual interior-point method on the simplex, and candidates taken up
-//! as they are needed (column generation).
+//! Optimal weights of candidates: a primal-dual interior-point method on the simplex. Candidates are
+//! added as they are needed (column generation).
 //!
-//! With the aim f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau of the
-//! least aim. Newton's method follows these minima; the curvature of the barriers is that of their
-//! multipliers (S. J. Wright, *Primal-Dual Interior-Point Methods*, 1997), without which weights go to zero
-//! slowly. The matrix X of each minimum gives a bound that needs none of this (`bound`).
+//! With the objective f convex in the weights, `tau f(w) - sum_i ln w_i` has its minimum within N / tau
+//! of the least f. Newton's method follows these minima as tau grows. The curvature of the barriers is
+//! that of their multipliers (S. J. Wright, *Primal-Dual Interior-Point Methods*, 1997); without them
+//! weights go to zero slowly. The matrix X of each minimum gives a bound, valid whether or not the
+//! minimum is reached (`bound`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::bound::{Additive, Aim, Dual};
+use super::bound::{Additive, Dual, Objective};
 
-/// Where a relative gap ends the search for weights.
+/// Relative gap between the objective and its bound at which the search for weights ends.
 const GAP: f64 = 1e-7;
 /// Factor on tau between two minima.
 const FASTER: f64 = 12.0;
-/// Where Newton's decrement is below this tau becomes larger.
+/// Newton decrement below which tau is increased.
 const CENTRED: f64 = 1e-6;
-/// How far a step goes towards zero, at most.
+/// Largest fraction of the distance to zero that a step may cover.
 const INSIDE: f64 = 0.95;
-/// Newton steps to one minimum, at most.
+/// Largest number of Newton steps to one minimum.
 const STEPS: usize = 40;
-/// Candidates that are weighed at once.
+/// Number of candidates that column generation starts with.
 const ACTIVE: usize = 160;
-/// Rounds of taking up candidates, at most.
+/// Largest number of rounds of column generation.
 const ROUNDS: usize = 60;
-/// A bound so much above what the weights reach shows that the latter rests on the ridge.
+/// Relative gap above which the attained objective is a result of the ridge.
 const SINGULAR: f64 = 1e-6;
-/// Digits of weights that are listed, those that are not, and how much worse than exact ones they may be.
+/// Numbers of digits tried for listed weights.
 const DIGITS: [i32; 3] = [2, 3, 4];
 const FAINT: f64 = 1e-7;
 const COARSE: f64 = 1e-3;
-/// Makes what nothing determines regular: a part of the mean information.
+/// Ridge added to the information, as a fraction of the mean information: it makes undetermined
+/// directions regular.
 const RIDGE: f64 = 1e-13;
 
-/// Weights, and what they prove.
+/// Optimal weights with the bound that they prove.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Weighed {
-    /// Of every candidate, sum 1.
+pub(super) struct OptimalWeights {
+    /// Weight of every candidate, dimensionless (sum 1).
     pub(super) weights: Vec<f64>,
-    /// The aim at these weights.
+    /// Objective at these weights.
     pub(super) attained: f64,
-    /// No scheme has a smaller aim.
+    /// Lower bound on the objective of every scheme.
     pub(super) bound: f64,
-    /// What proves the bound; its X says what another candidate would add.
+    /// Dual variables that prove the bound; their X gives the gain of any other candidate.
     pub(super) dual: Dual,
 }
 
-/// The aim at some weights, with the root of the information.
-struct At {
+/// Barrier function at some weights, with the Cholesky factor of the information.
+struct BarrierPoint {
     root: Cholesky<f64, Dyn>,
-    /// `tau f`, with the barriers of the aim's own constraints.
+    /// `tau f`, with the barriers of the constraints of the objective itself.
     value: f64,
 }
 
-/// First and second derivatives of the aim's part of what is minimised.
+/// First and second derivatives of the part of the barrier function that depends on the objective.
 struct Slopes {
-    /// By the weights (shape n).
+    /// Gradient with respect to the weights (shape n).
     gradient: Vec<f64>,
-    /// By the weights (n x n), s where it is best for them.
+    /// Hessian with respect to the weights (n x n); s is at its minimum for the weights.
     hessian: DMatrix<f64>,
-    /// Where the aim has s: derivatives by it, and how it follows the weights.
+    /// Derivatives with respect to s, and of its minimum; `None` if the objective has no s.
     by_s: Option<ByS>,
 }
 
@@ -70,46 +72,47 @@ struct ByS {
     follows: Vec<f64>,
 }
 
-/// The weighing of some of the candidates.
-struct Weighing<'a> {
+/// Barrier problem for a subset of the candidates.
+struct WeightProblem<'a> {
     problem: &'a Additive,
-    /// Which.
+    /// Indices of the candidates.
     active: Vec<usize>,
-    /// `A_i = F_i^T F_i` (r x m).
+    /// Factors `F_i` of `A_i = F_i^T F_i` (r x m).
     factors: Vec<DMatrix<f64>>,
     ridge: f64,
 }
 
-/// The best weights that are found while `going`, and the bound that they prove; `None` where all candidates
-/// together do not determine what counts as far as double precision tells.
-pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<Weighed> {
-    // where the ridge decides, and where rounding does without it, nothing is known
+/// Optimal weights and the bound that they prove; stops when `going` returns false. `None` where all
+/// candidates together do not determine the unknowns that count in double precision.
+pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
+    // the result is unknown if it depends on the ridge, and if rounding decides without the ridge
     [RIDGE, 0.0].into_iter().find_map(|ridge| {
         let found = generated(problem, ridge, going)?;
         let singular = found.bound > found.attained * (1.0 + SINGULAR);
-        (!singular).then(|| Weighed { attained: found.attained.max(found.bound), ..found })
+        (!singular).then(|| OptimalWeights { attained: found.attained.max(found.bound), ..found })
     })
 }
 
-/// Weights as they are listed: of two digits, or of more where those are worse by more than [`COARSE`];
-/// divided by their sum they have this aim. `None` where rounded weights do not determine what counts.
+/// Weights as they are listed, and the objective at these divided by their sum. They have two digits,
+/// or more where the objective is worse by more than [`COARSE`]. `None` where rounded weights do not
+/// determine the unknowns that count.
 pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
     let of = |weights: &[f64]| {
         let active: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
         let sum: f64 = weights.iter().sum();
         let parts: Vec<f64> = active.iter().map(|&i| weights[i] / sum).collect();
-        Weighing::new(problem, active, 0.0).aim(&parts)
+        WeightProblem::new(problem, active, 0.0).objective(&parts)
     };
     let least = of(weights)?;
     let found = DIGITS.iter().filter_map(|&digits| {
         let weights: Vec<f64> = weights.iter().map(|&w| rounded(w, digits)).collect();
-        let aim = of(&weights)?;
-        Some((weights, aim))
+        let objective = of(&weights)?;
+        Some((weights, objective))
     });
     let mut last = None;
-    for (weights, aim) in found {
-        let near = aim <= least * (1.0 + COARSE);
-        last = Some((weights, aim));
+    for (weights, objective) in found {
+        let near = objective <= least * (1.0 + COARSE);
+        last = Some((weights, objective));
         if near {
             break;
         }
@@ -117,7 +120,7 @@ pub(super) fn listed(problem: &Additive, weights: &[f64]) -> Option<(Vec<f64>, f
     last
 }
 
-/// To so many digits; 0 below [`FAINT`].
+/// Weight rounded to `digits` digits; 0 below [`FAINT`].
 fn rounded(weight: f64, digits: i32) -> f64 {
     if weight < FAINT {
         return 0.0;
@@ -126,18 +129,18 @@ fn rounded(weight: f64, digits: i32) -> f64 {
     (weight * unit).round() / unit
 }
 
-/// The same, column by column.
-fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<Weighed> {
+/// Optimal weights as [`weigh`], by column generation with the given ridge.
+fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
     let all = problem.candidates.len();
     let mean = problem.candidates.iter().map(DMatrix::trace).sum::<f64>() / all as f64;
     let ridge = ridge * (mean + problem.prior.trace()) / problem.unknowns() as f64;
     let every = all.div_ceil(ACTIVE).max(1);
     let mut active: Vec<usize> = (0..all).step_by(every).collect();
-    let mut best: Option<Weighed> = None;
+    let mut best: Option<OptimalWeights> = None;
     for _ in 0..ROUNDS {
-        let weighing = Weighing::new(problem, active.clone(), ridge);
+        let weighing = WeightProblem::new(problem, active.clone(), ridge);
         let Some(found) = weighing.weigh(going) else {
-            // these do not determine what counts: take more
+            // these candidates do not determine the unknowns that count: add more
             let missing = (0..all).filter(|i| !active.contains(i)).step_by(2).collect::<Vec<_>>();
             if missing.is_empty() {
                 return best;
@@ -161,7 +164,7 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
         }
         missing.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
         missing.truncate(ACTIVE / 4);
-        // what has no weight and would gain little gives way
+        // candidates without weight and with a small gain are dropped
         let counts = |i: &usize| weights[*i] > 1e-7 || gains[*i] > 0.98 * of_active;
         active.retain(counts);
         active.extend(missing);
@@ -169,7 +172,8 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
     best
 }
 
-/// `F` with `A = F^T F`, its rank many rows, by Cholesky's decomposition with pivots.
+/// Factor `F` with `A = F^T F` and as many rows as the rank of A, by Cholesky's decomposition with
+/// pivots.
 fn factor(a: &DMatrix<f64>) -> DMatrix<f64> {
     let m = a.nrows();
     let mut rest = a.clone();
@@ -187,7 +191,7 @@ fn factor(a: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), m, |i, j| rows[i][j])
 }
 
-impl<'a> Weighing<'a> {
+impl<'a> WeightProblem<'a> {
     fn new(problem: &'a Additive, active: Vec<usize>, ridge: f64) -> Self {
         let factors = active.iter().map(|&i| factor(&problem.candidates[i])).collect();
         Self { problem, active, factors, ridge }
@@ -202,44 +206,44 @@ impl<'a> Weighing<'a> {
         out
     }
 
-    /// The information without what E-optimality takes of it: `M - s` on what counts.
+    /// Information reduced for E-optimality: `M - s` on the unknowns that count.
     fn reduced(&self, w: &[f64], s: f64) -> DMatrix<f64> {
         let mut out = self.information(w);
-        if self.problem.aim == Aim::Least {
+        if self.problem.objective == Objective::Least {
             (self.problem.nuisance..self.problem.unknowns()).for_each(|i| out[(i, i)] -= s);
         }
         out
     }
 
-    /// `M^-1 v_j` of the aims (m x t), and `v_j^T M^-1 v_j`.
+    /// `M^-1 v_j` of the columns of the objective (m x t), and `v_j^T M^-1 v_j` (shape t).
     fn solved(&self, root: &Cholesky<f64, Dyn>) -> (DMatrix<f64>, Vec<f64>) {
-        match &self.problem.aim {
-            Aim::Mean(vectors) | Aim::Largest(vectors, _) => {
+        match &self.problem.objective {
+            Objective::Mean(vectors) | Objective::Largest(vectors, _) => {
                 let u = root.solve(vectors);
                 let values = (0..vectors.ncols()).map(|j| vectors.column(j).dot(&u.column(j))).collect();
                 (u, values)
             }
-            Aim::Volume | Aim::Least => (DMatrix::zeros(self.problem.unknowns(), 0), Vec::new()),
+            Objective::Volume | Objective::Least => (DMatrix::zeros(self.problem.unknowns(), 0), Vec::new()),
         }
     }
 
-    /// `-log det M_S / d`.
+    /// Objective `-log det M_S / d`.
     fn volume(&self, root: &Cholesky<f64, Dyn>) -> f64 {
         let l = root.l_dirty();
         let counting = self.problem.nuisance..self.problem.unknowns();
         -2.0 * counting.map(|j| l[(j, j)].ln()).sum::<f64>() / self.problem.counting() as f64
     }
 
-    /// The aim at some weights.
-    fn aim(&self, w: &[f64]) -> Option<f64> {
+    /// Objective at the weights `w`.
+    fn objective(&self, w: &[f64]) -> Option<f64> {
         let root = self.information(w).cholesky()?;
-        let value = match &self.problem.aim {
-            Aim::Volume => self.volume(&root).exp(),
-            Aim::Mean(vectors) => self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64,
-            Aim::Largest(_, offsets) => {
+        let value = match &self.problem.objective {
+            Objective::Volume => self.volume(&root).exp(),
+            Objective::Mean(vectors) => self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64,
+            Objective::Largest(_, offsets) => {
                 self.solved(&root).1.iter().zip(offsets).map(|(v, o)| v + o).fold(0.0, f64::max)
             }
-            Aim::Least => {
+            Objective::Least => {
                 let (first, d) = (self.problem.nuisance, self.problem.counting());
                 root.inverse().view((first, first), (d, d)).into_owned().symmetric_eigenvalues().max()
             }
@@ -247,35 +251,35 @@ impl<'a> Weighing<'a> {
         Some(value).filter(|v| v.is_finite() && *v > 0.0)
     }
 
-    /// `tau f / scale` with the barriers of the aim, not those of the weights; `None` outside of where it is
-    /// defined.
-    fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<At> {
+    /// `tau f / scale` with the barriers of the objective, not those of the weights; `None` outside its
+    /// domain.
+    fn at(&self, w: &[f64], s: f64, tau: f64, scale: f64) -> Option<BarrierPoint> {
         let root = self.reduced(w, s).cholesky()?;
-        let value = match &self.problem.aim {
-            Aim::Volume => tau * self.volume(&root),
-            Aim::Mean(vectors) => {
+        let value = match &self.problem.objective {
+            Objective::Volume => tau * self.volume(&root),
+            Objective::Mean(vectors) => {
                 tau * self.solved(&root).1.iter().sum::<f64>() / vectors.ncols() as f64 / scale
             }
-            Aim::Largest(_, offsets) => {
-                let (s, left) = left_of(&self.solved(&root).1, offsets, tau / scale)?;
+            Objective::Largest(_, offsets) => {
+                let (s, left) = slacks_of(&self.solved(&root).1, offsets, tau / scale)?;
                 tau * s / scale - left.iter().map(|left| (left / scale).ln()).sum::<f64>()
             }
-            Aim::Least => {
+            Objective::Least => {
                 let l = root.l_dirty();
                 -tau * s / scale - 2.0 * (0..l.nrows()).map(|j| l[(j, j)].ln()).sum::<f64>()
             }
         };
-        value.is_finite().then_some(At { root, value })
+        value.is_finite().then_some(BarrierPoint { root, value })
     }
 
-    /// The weights of least aim, step by step; the best bound on the way.
-    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<Weighed> {
+    /// Weights that minimise the objective, step by step, with the best bound of all steps.
+    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
         let n = self.active.len();
         let mut w = vec![1.0 / n as f64; n];
-        let mut scale = self.aim(&w)?;
-        let least = self.problem.aim == Aim::Least;
+        let mut scale = self.objective(&w)?;
+        let least = self.problem.objective == Objective::Least;
         let mut s = if least { 0.5 / scale } else { 0.0 };
-        let mut best: Option<Weighed> = None;
+        let mut best: Option<OptimalWeights> = None;
         let mut tau = n as f64;
         let mut multipliers: Vec<f64> = w.iter().map(|w| 1.0 / w).collect();
         while tau < 1e3 * n as f64 / GAP {
@@ -286,13 +290,13 @@ impl<'a> Weighing<'a> {
                     break;
                 }
             }
-            scale = self.aim(&w)?;
+            scale = self.objective(&w)?;
             let dual = self.dual(&w, s, tau / unit)?;
             let bound = self.problem.lower_bound(&dual);
             if best.as_ref().is_none_or(|b| bound > b.bound) {
                 let mut weights = vec![0.0; self.problem.candidates.len()];
                 self.active.iter().zip(&w).for_each(|(&i, &w)| weights[i] = w);
-                best = Some(Weighed { weights, attained: scale, bound, dual });
+                best = Some(OptimalWeights { weights, attained: scale, bound, dual });
             }
             let sought = best.as_ref().map_or(0.0, |b| b.attained / b.bound - 1.0);
             if sought < GAP || !going() {
@@ -304,34 +308,34 @@ impl<'a> Weighing<'a> {
         best
     }
 
-    /// X at some weights.
+    /// Dual variables at the weights `w`.
     fn dual(&self, w: &[f64], s: f64, rate: f64) -> Option<Dual> {
         let problem = self.problem;
         let m = problem.unknowns();
-        // the root of an inverse: L^-T, upper triangular
+        // factor of an inverse: L^-T, upper triangular
         let inverse_root = |root: &Cholesky<f64, Dyn>| {
             let upper = root.l().transpose();
             upper.solve_upper_triangular(&DMatrix::identity(m, m))
         };
-        match &problem.aim {
-            Aim::Volume => {
+        match &problem.objective {
+            Objective::Volume => {
                 let root = self.information(w).cholesky()?;
                 let x = inverse_root(&root)?.columns(problem.nuisance, problem.counting()).into_owned();
                 Some(Dual { x, shares: Vec::new() })
             }
-            Aim::Least => {
+            Objective::Least => {
                 Some(Dual { x: inverse_root(&self.reduced(w, s).cholesky()?)?, shares: Vec::new() })
             }
-            Aim::Mean(vectors) => {
+            Objective::Mean(vectors) => {
                 let share = 1.0 / vectors.ncols() as f64;
                 let root = self.information(w).cholesky()?;
                 let x = self.solved(&root).0 * share.sqrt();
                 Some(Dual { x, shares: vec![share; vectors.ncols()] })
             }
-            Aim::Largest(_, offsets) => {
+            Objective::Largest(_, offsets) => {
                 let root = self.information(w).cholesky()?;
                 let (mut x, values) = self.solved(&root);
-                let shares = multipliers_of(&left_of(&values, offsets, rate)?.1);
+                let shares = multipliers_of(&slacks_of(&values, offsets, rate)?.1);
                 let sum: f64 = shares.iter().sum();
                 let shares: Vec<f64> = shares.iter().map(|x| x / sum).collect();
                 for (j, share) in shares.iter().enumerate() {
@@ -342,7 +346,7 @@ impl<'a> Weighing<'a> {
         }
     }
 
-    /// One damped Newton step; its decrement, or `None` when nothing gets smaller.
+    /// One damped Newton step. Returns its decrement, or `None` when nothing gets smaller.
     fn newton(
         &self,
         w: &mut [f64],
@@ -354,7 +358,7 @@ impl<'a> Weighing<'a> {
         let here = self.at(w, *s, tau, scale)?;
         let slopes = self.slopes(&here.root, w, tau, scale)?;
         let n = w.len();
-        // s where it is best for the weights as they are
+        // minimum over s at the present weights
         let to_s = slopes.by_s.as_ref().map_or(0.0, |by| -by.gradient / by.curvature);
         let pulled = |i: usize| slopes.by_s.as_ref().map_or(0.0, |by| by.gradient * by.follows[i]);
         // in units of the weights themselves
@@ -364,7 +368,7 @@ impl<'a> Weighing<'a> {
         });
         let g = DVector::from_fn(n, |i, _| w[i] * (slopes.gradient[i] + pulled(i)) - 1.0);
         let a = DVector::from_column_slice(w);
-        // what rounding makes of large curvatures may leave it indefinite
+        // rounding of large curvatures may make the Hessian indefinite
         let rough = f64::EPSILON * n as f64 * h.diagonal().max();
         let root = (h.clone() + DMatrix::identity(n, n) * rough).cholesky()?;
         let (to, along) = (root.solve(&g), root.solve(&a));
@@ -377,7 +381,7 @@ impl<'a> Weighing<'a> {
         if !(decrement.is_finite() && decrement > 0.0) {
             return None;
         }
-        // Newton's step of the multipliers, as far as they stay above zero
+        // Newton's step of the multipliers, shortened so that they stay positive
         let steps: Vec<f64> = multipliers
             .iter()
             .zip(w.iter())
@@ -407,7 +411,8 @@ impl<'a> Weighing<'a> {
         None
     }
 
-    /// Gradient and Hessian of [`Self::at`] by the weights, and by s where the aim has it.
+    /// Gradient and Hessian of [`Self::at`] with respect to the weights, and to s where the objective
+    /// has it.
     fn slopes(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64, scale: f64) -> Option<Slopes> {
         let (n, problem) = (w.len(), self.problem);
         let inverse = root.inverse();
@@ -424,11 +429,11 @@ impl<'a> Weighing<'a> {
             }
             h
         };
-        Some(match &problem.aim {
-            Aim::Volume => {
+        Some(match &problem.objective {
+            Objective::Volume => {
                 let d = problem.counting() as f64;
                 let nuisance = problem.nuisance;
-                // of the information on the nuisance alone
+                // from the information on the nuisance alone
                 let root = (nuisance > 0)
                     .then(|| self.information(w).view((0, 0), (nuisance, nuisance)).into_owned().cholesky());
                 let inner = root.flatten().map(|r| r.inverse());
@@ -446,8 +451,9 @@ impl<'a> Weighing<'a> {
                     |i: usize, j: usize| tau / d * (pair(i, j).norm_squared() - hidden(i, j).norm_squared());
                 Slopes { gradient, hessian: symmetric(&entry), by_s: None }
             }
-            Aim::Least => {
-                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on what counts
+            Objective::Least => {
+                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on the unknowns
+                // that count
                 let r = root
                     .l()
                     .transpose()
@@ -466,7 +472,7 @@ impl<'a> Weighing<'a> {
                     by_s: Some(ByS { gradient: unit.trace() - tau / scale, curvature, follows }),
                 }
             }
-            Aim::Mean(vectors) => {
+            Objective::Mean(vectors) => {
                 let factor = tau / scale / vectors.ncols() as f64;
                 let (u, _) = self.solved(root);
                 let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
@@ -475,16 +481,16 @@ impl<'a> Weighing<'a> {
                     |i: usize, j: usize| 2.0 * factor * pair(i, j).dot(&(&seen[i] * seen[j].transpose()));
                 Slopes { gradient, hessian: symmetric(&entry), by_s: None }
             }
-            Aim::Largest(_, offsets) => {
+            Objective::Largest(_, offsets) => {
                 let (u, values) = self.solved(root);
-                let shares = multipliers_of(&left_of(&values, offsets, tau / scale)?.1);
+                let shares = multipliers_of(&slacks_of(&values, offsets, tau / scale)?.1);
                 let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
                 let weighted: Vec<DMatrix<f64>> = seen
                     .iter()
                     .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
                     .collect();
-                // share_j times what the slope of v_j by the weights is beside that of s, which follows their
-                // mean
+                // share_j times the slope of v_j by the weights relative to the slope of s, which
+                // follows their mean
                 let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
                 let slopes = DMatrix::from_fn(n, shares.len(), slope);
                 let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
@@ -498,7 +504,7 @@ impl<'a> Weighing<'a> {
                 let entry = |i: usize, j: usize| {
                     outer[(i, j)] + 2.0 * pair(i, j).dot(&(&weighted[i] * seen[j].transpose()))
                 };
-                // s is the best for the weights
+                // s is at its minimum for the weights
                 Slopes {
                     gradient: (0..n).map(|i| weighed(i, &|x| x)).collect(),
                     hessian: symmetric(&entry),
@@ -509,23 +515,23 @@ impl<'a> Weighing<'a> {
     }
 }
 
-/// The s that makes `rate s - sum_j ln(s - o_j - v_j)` least, and how far each aim is below it; `None` where
-/// values are not finite.
-fn left_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
-    let aims: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
-    let largest = aims.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    // how far s is above the largest: the sum of the inverses falls with it, and is convex, so Newton's steps
-    // grow to the end
+/// Minimum over s of `rate s - sum_j ln(s - o_j - v_j)`: s, and the distance of each `o_j + v_j` below
+/// s; `None` where values are not finite.
+fn slacks_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64>)> {
+    let totals: Vec<f64> = values.iter().zip(offsets).map(|(v, o)| v + o).collect();
+    let largest = totals.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // distance of s above the largest value: the sum of the inverses falls with it and is convex, so
+    // Newton's steps increase to the end
     let mut above = 1.0 / rate;
     for _ in 0..100 {
-        let left = || aims.iter().map(|a| above + (largest - a));
+        let left = || totals.iter().map(|a| above + (largest - a));
         let beyond = left().map(|x| 1.0 / x).sum::<f64>() - rate;
         if beyond.is_nan() || beyond.abs() <= 1e-13 * rate {
             break;
         }
         above += beyond / left().map(|x| 1.0 / (x * x)).sum::<f64>();
     }
-    let left: Vec<f64> = aims.iter().map(|a| above + (largest - a)).collect();
+    let left: Vec<f64> = totals.iter().map(|a| above + (largest - a)).collect();
     (largest.is_finite() && left.iter().all(|x| *x > 0.0)).then_some((largest + above, left))
 }
 
@@ -537,11 +543,11 @@ fn multipliers_of(left: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at this many points.
-    fn quadratic(points: usize, nuisance: usize, aim: Aim) -> Additive {
+    /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at `points` points.
+    fn quadratic(points: usize, nuisance: usize, aim: Objective) -> Additive {
         let at = |i: usize| -> DMatrix<f64> {
             let x = 2.0 * i as f64 / (points - 1) as f64 - 1.0;
-            // what counts comes last
+            // unknowns that count come last
             let f = if nuisance == 2 {
                 DVector::from_vec(vec![1.0, x, x * x])
             } else {
@@ -550,23 +556,23 @@ mod tests {
             &f * f.transpose()
         };
         let candidates = (0..points).map(at).collect();
-        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, aim }
+        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, objective: aim }
     }
 
     /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and
-    /// E-optimal designs, and of the one for the coefficient of x^2 alone; column generation finds them among
-    /// 401 points.
+    /// E-optimal designs, and of the one for the coefficient of x^2 alone. Column generation finds them
+    /// among 401 points.
     #[test]
     fn weights_are_those_of_the_textbook() {
         let units = DMatrix::identity(3, 3);
         let square = DMatrix::from_column_slice(3, 1, &[0.0, 0.0, 1.0]);
         let cases = [
-            (0, Aim::Volume, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]),
-            (0, Aim::Mean(units.clone()), [0.25, 0.5, 0.25]),
-            (0, Aim::Least, [0.2, 0.6, 0.2]),
-            (2, Aim::Volume, [0.25, 0.5, 0.25]),
-            (2, Aim::Least, [0.25, 0.5, 0.25]),
-            (2, Aim::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
+            (0, Objective::Volume, [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0]),
+            (0, Objective::Mean(units.clone()), [0.25, 0.5, 0.25]),
+            (0, Objective::Least, [0.2, 0.6, 0.2]),
+            (2, Objective::Volume, [0.25, 0.5, 0.25]),
+            (2, Objective::Least, [0.25, 0.5, 0.25]),
+            (2, Objective::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
         ];
         for points in [3, 41, 401] {
             for (nuisance, aim, expected) in &cases {
@@ -580,25 +586,25 @@ mod tests {
         }
     }
 
-    /// Gradients and Hessians are the slopes of what is minimised.
+    /// Gradients and Hessians equal differences of the barrier function.
     #[test]
     fn slopes_are_differences() {
         let units = DMatrix::identity(3, 3);
         let aims = [
-            (0, Aim::Volume),
-            (1, Aim::Volume),
-            (0, Aim::Mean(units.clone())),
-            (0, Aim::Least),
-            (1, Aim::Least),
-            (0, Aim::Largest(units, vec![0.1, 0.0, 0.3])),
+            (0, Objective::Volume),
+            (1, Objective::Volume),
+            (0, Objective::Mean(units.clone())),
+            (0, Objective::Least),
+            (1, Objective::Least),
+            (0, Objective::Largest(units, vec![0.1, 0.0, 0.3])),
         ];
         for (nuisance, aim) in aims {
             let mut problem = quadratic(5, 0, aim.clone());
             problem.nuisance = nuisance;
-            let weighing = Weighing::new(&problem, (0..5).collect(), 0.0);
+            let weighing = WeightProblem::new(&problem, (0..5).collect(), 0.0);
             let w = [0.3, 0.1, 0.25, 0.15, 0.2];
-            let scale = weighing.aim(&w).expect("regular");
-            let s = if aim == Aim::Least { 0.5 / scale } else { 2.0 * scale };
+            let scale = weighing.objective(&w).expect("regular");
+            let s = if aim == Objective::Least { 0.5 / scale } else { 2.0 * scale };
             let (tau, unit) = (7.0, 1.3);
             let root = weighing.at(&w, s, tau, unit).expect("inside").root;
             // with s as a sixth variable

@@ -1,5 +1,5 @@
-//! Changes of the estimates of a sequence by errors that the scheme does not estimate, beside its
-//! information.
+//! Changes of the estimates of a sequence by errors that the scheme does not estimate, stored beside
+//! its information.
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Carry, Float, LOCAL, Matrix3, PSI_EPS, earth_rate_in};
@@ -7,27 +7,29 @@ use obsdeg_evidence::simulation::omitted::SEEN;
 use obsdeg_evidence::simulation::{Conditions, si_per_shown};
 
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Dwelling, Evaluator, State};
-use crate::design::measure::omitted::{Beside, Omitted, OmittedAt};
+use crate::design::measure::evaluator::{Dwelling, Evaluator, SequenceState};
+use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::Immune;
 
-/// Part of the samples of a unit error below which they are rounding, squared: sines of right angles are
-/// below 1e-16.
+/// Squared fraction of the samples of a unit error below which an effect is rounding: sines of right
+/// angles are below 1e-16.
 const NO_EFFECT: f64 = 1e-24;
-/// Part of the samples of an error below which what the unknowns leave of them is rounding, squared.
+/// Squared fraction of the samples of an error below which their residual after the unknowns is
+/// rounding.
 const SILENT: f64 = 1e-9;
 
 impl Dwelling {
-    /// `G v`, G the information on all local unknowns, errors of the accelerometers among them.
+    /// `G v`, G the information on all local unknowns including errors of the accelerometers.
     fn information_of(&self, v: &[f64; LOCAL]) -> [f64; LOCAL] {
         std::array::from_fn(|i| self.full[i].iter().zip(v).map(|(g, x)| g * x).sum())
     }
 }
 
 impl Evaluator {
-    /// Drift by the errors at an attitude while the platform turns as `slew` says (3 x errors).
+    /// Drift by the errors that are not estimated, at an attitude while the platform turns by `slew` (3
+    /// x errors).
     fn omitted_drift(&self, of: &Omitted, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         let (w_n, w_u) = (self.w[1][2], -self.w[0][2]);
         let earth = earth_rate_in(&Float, c, &w_n, &w_u);
@@ -35,7 +37,7 @@ impl Evaluator {
         of.model.drift_rows(&Float, c, rate, [&w_n, &w_u])
     }
 
-    /// The rows of [`Self::drift_rows`] with those of the errors behind them.
+    /// Rows of [`Self::drift_rows`], followed by those of the errors that are not estimated.
     pub(crate) fn drift_with_omitted(&self, c: &Matrix3<f64>, slew: &Slew) -> [Vec<f64>; 3] {
         let mut rows = self.ordered_columns(self.drift_rows(c, Some(slew)));
         if let Some(of) = &self.omitted {
@@ -45,9 +47,9 @@ impl Evaluator {
         rows
     }
 
-    /// Sizes of immunity are those that [`Self::not_immune`] decides: what it takes for silent in `most`
-    /// positions has less than [`SILENT`] of the information of its samples, so a record does not show it
-    /// from a size on that this bounds.
+    /// Refuses sizes of immunity that [`Self::not_immune`] cannot decide in `most` positions. An error counts
+    /// as silent below the fraction [`SILENT`] of the information of its samples. Beyond the largest size
+    /// allowed here, a record might show such an error.
     ///
     /// # Errors
     /// [`DesignError::ImmuneSize`].
@@ -72,8 +74,8 @@ impl Evaluator {
         Ok(())
     }
 
-    /// `O^T R^-1 O` of an error in `most` positions is not above this, by the triangle inequality: psi is at
-    /// most the drift times the time, and what the turns add.
+    /// Upper bound on `O^T R^-1 O` of an error in `most` positions, by the triangle inequality: psi is
+    /// at most the drift times the time plus the effect of the turns.
     fn samples_at_most(&self, of: &Omitted, kind: usize, most: usize, conditions: &Conditions) -> f64 {
         let dwell = self.dwells.iter().map(|d| d.seconds).fold(0.0, f64::max);
         let turn_s = conditions.slew_rate_deg_s.map_or(0.0, |rate| 360.0 / rate);
@@ -104,14 +106,14 @@ impl Evaluator {
         let Some(of) = &self.omitted else { return OmittedAt::default() };
         let (drift, output) = (self.omitted_drift(of, c, None), of.model.output_rows(&Float, c));
         let one = |j: usize| std::array::from_fn(|r| if r < 3 { drift[r][j] } else { output[r - 3][j] });
-        let mut out = OmittedAt { effects: (0..of.fixed()).map(one).collect(), own: Beside::default() };
+        let mut out = OmittedAt { effects: (0..of.fixed()).map(one).collect(), own: OmittedSums::default() };
         if self.carry() == Carry::Reset {
             out.own = self.omitted_alone(of, c, unknowns, dwelling, &out.effects);
         }
         out
     }
 
-    /// Sums of one position whose psi is its own and is eliminated.
+    /// Sums of one position with a psi of its own, which is eliminated.
     fn omitted_alone(
         &self,
         of: &Omitted,
@@ -119,7 +121,7 @@ impl Evaluator {
         unknowns: &[Vec<f64>; LOCAL - 3],
         dwelling: &Dwelling,
         effects: &[[f64; LOCAL - 3]],
-    ) -> Beside {
+    ) -> OmittedSums {
         let n = self.n;
         let m = effects.len() + if of.attitudes { 3 } else { 0 };
         // columns: psi, coefficients, errors
@@ -151,23 +153,23 @@ impl Evaluator {
             }
         }
         let cross = (n..n + m).flat_map(|j| (0..n).map(move |i| (i, j)));
-        Beside {
+        OmittedSums {
             cross: cross.map(|(i, j)| if i < 3 { 0.0 } else { g[i][j] }).collect(),
             squares: (n..n + m).map(|j| g[j][j]).collect(),
             psi: vec![[0.0; 3]; m],
         }
     }
 
-    /// Nothing of the errors yet.
-    pub(crate) fn beside_at_start(&self) -> Option<Box<Beside>> {
+    /// Sums of a sequence without positions; `None` where no errors count.
+    pub(crate) fn beside_at_start(&self) -> Option<Box<OmittedSums>> {
         let of = self.omitted.as_ref()?;
         let fixed = of.fixed();
         let (cross, squares) = (vec![0.0; fixed * self.n], vec![0.0; fixed]);
-        Some(Box::new(Beside { cross, squares, psi: vec![[0.0; 3]; fixed] }))
+        Some(Box::new(OmittedSums { cross, squares, psi: vec![[0.0; 3]; fixed] }))
     }
 
     /// Adds a position under reset carry.
-    pub(crate) fn add_beside(&self, state: &State, candidate: usize, out: &mut State) {
+    pub(crate) fn add_beside(&self, state: &SequenceState, candidate: usize, out: &mut SequenceState) {
         let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
             return;
         };
@@ -176,19 +178,19 @@ impl Evaluator {
         out.clone_from(before);
         out.cross.iter_mut().zip(&own.cross[..fixed * n]).for_each(|(x, y)| *x += y);
         out.squares.iter_mut().zip(&own.squares[..fixed]).for_each(|(x, y)| *x += y);
-        // the attitude of every position is an error of its own
+        // every position has its own attitude error
         out.cross.extend_from_slice(&own.cross[fixed * n..]);
         out.squares.extend_from_slice(&own.squares[fixed..]);
         out.psi.extend_from_slice(&own.psi[fixed..]);
     }
 
-    /// Adds a position whose local unknowns are these functionals of the unknowns.
+    /// Adds a position whose local unknowns are the functionals `local` of the unknowns.
     pub(crate) fn extend_beside<const L: usize, const N: usize>(
         &self,
-        state: &State,
+        state: &SequenceState,
         (candidate, turn): (usize, Option<&SlewPath>),
         local: &[[f64; N]; L],
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let (Some(of), Some(before), Some(out)) = (&self.omitted, &state.beside, &mut out.beside) else {
             return;
@@ -217,7 +219,7 @@ impl Evaluator {
             if let Some(effects) = at.omitted.effects.get(j) {
                 o[3..].copy_from_slice(effects);
             }
-            // while a position lasts, its attitude is off
+            // the attitude error of a position lasts as long as the position
             let own = (j >= before.psi.len()).then(|| (j - fixed) % 3);
             let offset: [f64; 3] = std::array::from_fn(|r| own.map_or(0.0, |axis| c[r][axis]));
             o.iter_mut().zip(&offset).for_each(|(x, y)| *x += y);
@@ -250,13 +252,13 @@ impl Evaluator {
 
     /// Changes of the coefficients that count by one sigma of every error with a size (shape d each, in units
     /// of the evaluator), one after the other; `l` is the root of the information.
-    fn each_contribution(&self, of: &Omitted, beside: &Beside, l: &[f64], mut take: impl FnMut(&[f64])) {
+    fn each_contribution(&self, of: &Omitted, beside: &OmittedSums, l: &[f64], mut take: impl FnMut(&[f64])) {
         let (n, begin) = (self.n, 3 + self.nuisance);
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         let mut y = vec![0.0; n];
         for j in (0..beside.squares.len()).filter(|&j| of.sizes[of.kind(j)] > 0.0) {
             self.forward(&beside.cross[j * n..][..n], l, first, &mut y);
-            // of what counts alone, which comes last
+            // only the coefficients that count, which come last
             for i in (begin..n).rev() {
                 y[i] /= l[i * n + i];
                 let (before, x) = (&l[i * n + begin..i * n + i], y[i]);
@@ -268,8 +270,8 @@ impl Evaluator {
         }
     }
 
-    /// The same as variances that the errors add to each coefficient that counts; empty without errors.
-    pub(crate) fn added_variances(&self, state: &State, l: &[f64]) -> Vec<f64> {
+    /// Variances that the errors add to each coefficient that counts (shape d); empty without errors.
+    pub(crate) fn added_variances(&self, state: &SequenceState, l: &[f64]) -> Vec<f64> {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return Vec::new() };
         let mut out = vec![0.0; self.n - 3 - self.nuisance];
         self.each_contribution(of, beside, l, |change| {
@@ -278,8 +280,14 @@ impl Evaluator {
         out
     }
 
-    /// The criteria D and E of the covariance of what counts, with the errors: in deg/h (per g).
-    pub(crate) fn of_total_covariance(&self, state: &State, criterion: &Criterion, l: &[f64]) -> Option<f64> {
+    /// Criteria D and E of the covariance of the coefficients that count, with the errors: in deg/h
+    /// (per g).
+    pub(crate) fn of_total_covariance(
+        &self,
+        state: &SequenceState,
+        criterion: &Criterion,
+        l: &[f64],
+    ) -> Option<f64> {
         let (of, beside) = (self.omitted.as_ref()?, state.beside.as_ref()?);
         let (n, begin) = (self.n, 3 + self.nuisance);
         let d = n - begin;
@@ -299,9 +307,10 @@ impl Evaluator {
         })
     }
 
-    /// How far a sequence is from being immune, 0 where it is: 1 for an error that must have no effect and
-    /// has one, at most 1 for one that a record shows later than it must. `root` is working space.
-    pub(crate) fn not_immune(&self, state: &State, root: &mut Vec<f64>) -> f64 {
+    /// Distance of a sequence from immunity, dimensionless; 0 if immune. Each error adds 1 if it has an
+    /// effect that it must not have or that no record shows, and less than 1 if a record shows it at a
+    /// larger size than required. `root` is working space.
+    pub(crate) fn not_immune(&self, state: &SequenceState, root: &mut Vec<f64>) -> f64 {
         let (Some(of), Some(beside)) = (&self.omitted, &state.beside) else { return 0.0 };
         if of.immune.iter().all(Option::is_none) {
             return 0.0;

@@ -1,21 +1,22 @@
-//! What goes on from position to position: psi as a functional of the unknowns, by the carry.
+//! Carry from position to position: psi as a functional of the unknowns.
 
 use obsdeg_core::model::{Carry, Matrix3};
 
-use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, State};
+use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
-    /// The local unknowns of a position behind others as functionals of the unknowns; psi where it goes on.
+    /// Local unknowns of the next position as functionals of the unknowns; psi only where it is
+    /// carried.
     #[inline]
     pub(crate) fn functionals<const L: usize, const N: usize>(
         &self,
-        state: &State,
+        state: &SequenceState,
         stop: Stop,
     ) -> [[f64; N]; L] {
         let (n, carry) = (self.n, self.carry());
         let Candidate { c, effects, .. } = &self.candidates[stop.candidate];
-        let turn = self.way_to(state.path.last().copied(), stop);
+        let turn = self.path_to(state.path.last().copied(), stop);
         let mut local = [[0.0; N]; L];
         for (row, effect) in local[3..].iter_mut().zip(&effects[..self.locals - 3]) {
             row[3..n].copy_from_slice(effect);
@@ -44,10 +45,15 @@ impl Evaluator {
         local
     }
 
-    /// What is known beforehand of psi^n, which is what goes on under inertial carry: by the axes of the
+    /// Prior information on psi^n, the carried quantity under inertial carry: about the axes of the
     /// first position.
     #[inline]
-    pub(crate) fn know_first(&self, state: &State, c: &Matrix3<f64>, mut add: impl FnMut(usize, usize, f64)) {
+    pub(crate) fn know_first(
+        &self,
+        state: &SequenceState,
+        c: &Matrix3<f64>,
+        mut add: impl FnMut(usize, usize, f64),
+    ) {
         if self.carry() != Carry::Inertial || !state.path.is_empty() {
             return;
         }
@@ -58,14 +64,14 @@ impl Evaluator {
         }
     }
 
-    /// psi behind a dwell, in the axes in which it goes on.
+    /// psi after a dwell, in the axes in which it is carried.
     #[inline]
     pub(crate) fn go_on<const L: usize, const N: usize>(
         &self,
         dwelling: &Dwelling,
         c: &Matrix3<f64>,
         local: &[[f64; N]; L],
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let n = self.n;
         if self.carry() == Carry::Reset {

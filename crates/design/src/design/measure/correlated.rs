@@ -1,51 +1,51 @@
-//! Noise of Z that is correlated: each accelerometer has a bias that is a Gauss-Markov process beside its
-//! white noise, and that goes on in platform axes from position to position. Three alike and independent ones
-//! are so in any axes.
+//! Correlated noise of Z: each accelerometer has a bias that is a Gauss-Markov process beside its white
+//! noise, and that continues in platform axes from position to position. Three such processes, alike
+//! and independent, are so in any axes.
 //!
-//! The bias b of the moment is a state that no coefficient depends on. Given the unknowns x it has a mean
-//! `K x` and a covariance that knows nothing of them, so a sequence keeps these two beside the information on
-//! x. Of a dwell the information on its local unknowns, b at its start and b at its end holds all that
-//! samples and the process say, what b was in between eliminated: it is computed once, sample by sample.
-//! Putting a position behind others adds what is left of that when b at the start, up to its mean, and b at
-//! the end are eliminated: information only grows, and nothing large is subtracted from it.
+//! The present bias b is a state that no coefficient depends on. Given the unknowns x it has a mean `K
+//! x` and a covariance that does not depend on x, so a sequence keeps these two beside the information
+//! on x. For a dwell, the information on its local unknowns, b at its start and b at its end contains
+//! everything that samples and process determine; b in between is eliminated. It is computed once,
+//! sample by sample. Adding a position adds this information after elimination of b at the start, up to
+//! its mean, and b at the end: information only grows, and nothing large is subtracted from it.
 //!
-//! So information is no sum over positions, under no carry, and order matters: bounds that rest on such a sum
-//! do not hold here.
+//! Information is thus no sum over positions under any carry, and order matters: bounds that rest on such
+//! a sum do not hold here.
 
 use nalgebra::Matrix3 as Small;
 use obsdeg_core::model::{Carry, LOCAL};
 use obsdeg_ekf::BiasState;
 
 use crate::design::measure::elimination::eliminate;
-use crate::design::measure::evaluator::{Evaluator, State};
-use crate::design::measure::noise_process::{Joint, STEP, times};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
+use crate::design::measure::noise_process::{BiasDistribution, STEP, times};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 impl Evaluator {
-    /// Adds a position to `state`. Under reset carry its psi is eliminated, or where it is `kept` stands in
-    /// the place of psi among the unknowns.
+    /// Adds a position to `state`. Under reset carry psi of the position is eliminated, or with `kept`
+    /// takes the place of psi among the unknowns.
     pub(crate) fn extend_correlated(
         &self,
         bias: &BiasState,
-        state: &State,
+        state: &SequenceState,
         stop: Stop,
         kept: bool,
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let n = self.n;
         let reset = self.carry() == Carry::Reset;
-        let seconds = self.way_to(state.path.last().copied(), stop).map_or(0.0, |t| t.seconds);
+        let seconds = self.path_to(state.path.last().copied(), stop).map_or(0.0, |t| t.seconds);
         let (c, dwelling) = self.stands(stop.candidate);
         let Some(of_dwell) = &dwelling.correlated else { return };
         // b^n = C b
         let axes = Small::from_fn(|i, j| c[i][j]);
         let before = match &state.joint {
             Some(joint) => joint.wait(bias, seconds, &axes),
-            None => Joint::start(bias, n),
+            None => BiasDistribution::start(bias, n),
         };
-        // b at the start up to its mean, psi where it is of this position alone, b at the end; the rest of
-        // the local unknowns, and the mean
+        // order: b at the start minus its mean, psi of this position alone (if it is), b at the end;
+        // then the other local unknowns, and the mean
         let alone = reset && !kept;
         let (psi, end) = if alone { (3, 6) } else { (6, 3) };
         let mean = STEP - 3;
@@ -61,7 +61,7 @@ impl Evaluator {
         for (i, row) in of_dwell.iter().enumerate() {
             for (j, &x) in row[..=i].iter().enumerate() {
                 add(place(i), place(j), x);
-                // the mean is there wherever b at the start is
+                // the mean enters wherever b at the start does
                 match (is_start(i), is_start(j)) {
                     (true, true) => {
                         add(mean + i - LOCAL, mean + j - LOCAL, x);
@@ -84,7 +84,7 @@ impl Evaluator {
                 add(psi + i, psi + j, known.sum());
             }
         }
-        // all but b and psi alone as functionals of the unknowns
+        // all but b and psi of this position, as functionals of the unknowns
         let mut local = self.functionals::<LOCAL, MAX_UNKNOWNS>(state, stop);
         if kept {
             (0..3).for_each(|r| local[r][..3].copy_from_slice(&c[r]));
@@ -123,15 +123,15 @@ impl Evaluator {
         // back into platform axes
         let mean = times(&(axes.transpose() * covariance), &through);
         let covariance = axes.transpose() * covariance * axes;
-        out.joint = Some(Joint { covariance, mean });
+        out.joint = Some(BiasDistribution { covariance, mean });
         self.go_on(dwelling, c, &local, out);
         out.path.clone_from(&state.path);
         out.path.push(stop.candidate);
         out.seconds = state.seconds + dwelling.seconds + seconds;
     }
 
-    /// The root of the information on psi of one position of a sequence and all coefficients, under reset
-    /// carry.
+    /// Cholesky factor of the information on psi of one position of a sequence and on all coefficients,
+    /// under reset carry.
     pub(crate) fn root_with_psi(
         &self,
         bias: &BiasState,

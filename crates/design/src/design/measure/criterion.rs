@@ -6,38 +6,38 @@ use obsdeg_ekf::EkfError;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::{Attained, si_per_shown};
 
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
 
-/// What makes one scheme better than another, of the coefficients that count.
+/// Criterion that orders schemes: a function of the covariance of the d coefficients that count.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Criterion {
-    /// The largest sigma.
+    /// Largest sigma.
     #[default]
     Worst,
-    /// The root of the mean variance (A-optimal).
+    /// Root of the mean variance (A-optimal).
     A,
-    /// The geometric mean of the principal sigmas: the volume of the error ellipsoid (D-optimal).
+    /// Geometric mean of the principal sigmas, after the volume of the error ellipsoid (D-optimal).
     D,
-    /// The largest principal sigma (E-optimal).
+    /// Largest principal sigma (E-optimal).
     E,
-    /// The largest sigma over its requirement.
+    /// Largest sigma over its requirement, dimensionless.
     Margin(Limits),
 }
 
-/// The largest sigmas allowed; infinite where there is no requirement.
+/// Largest sigmas allowed; infinite where there is no requirement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
-    /// Of the coefficients that count, in deg/h (per g) (shape d).
+    /// Largest sigmas of the coefficients that count, in deg/h (per g) (shape d).
     pub coefficients: Vec<f64>,
-    /// Largest sigmas of psi_x, psi_y, psi_z at the end, under reset carry at the end of every position, in
-    /// deg.
+    /// Largest sigmas of psi_x, psi_y, psi_z at the end, in deg; under reset carry at the end of every
+    /// position.
     pub psi: [f64; 3],
 }
 
 impl Criterion {
-    /// worst, A, D, E or margin.
+    /// Name: worst, A, D, E or margin.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Worst => "worst",
@@ -50,7 +50,7 @@ impl Criterion {
 }
 
 impl Criterion {
-    /// The criterion of a scheme by its covariance at the end, random drift included; `counts` names the
+    /// Criterion of a scheme from its covariance at the end, random drift included; `counts` names the
     /// coefficients that count.
     pub(crate) fn of_attained(
         &self,
@@ -83,14 +83,15 @@ impl Criterion {
 }
 
 impl Evaluator {
-    /// The root of the information, psi and the coefficients that do not count first: the block of the others
-    /// is the root of the inverse of their covariance. False when one of them is not determined.
-    pub(crate) fn root(&self, state: &State, root: &mut Vec<f64>) -> bool {
+    /// Cholesky factor of the information, with psi and the coefficients that do not count first. The
+    /// block of the others is the factor of the inverse of their covariance. False if one of them is
+    /// not determined.
+    pub(crate) fn root(&self, state: &SequenceState, root: &mut Vec<f64>) -> bool {
         self.root_from(if self.carry() == Carry::Reset { 3 } else { 0 }, state, root)
     }
 
-    /// The same of the unknowns from `first` on.
-    pub(crate) fn root_from(&self, first: usize, state: &State, root: &mut Vec<f64>) -> bool {
+    /// Factor as [`Self::root`], for the unknowns from `first` on.
+    pub(crate) fn root_from(&self, first: usize, state: &SequenceState, root: &mut Vec<f64>) -> bool {
         let n = self.n;
         root.resize(n * n, 0.0);
         let l = &mut root[..];
@@ -104,10 +105,10 @@ impl Evaluator {
                 row[j] = if other[j] > 0.0 { (given[j] - sum) / other[j] } else { 0.0 };
             }
             let pivot = given[i] - row[first..i].iter().map(|a| a * a).sum::<f64>();
-            // what rounding leaves of an undetermined direction
+            // pivot of an undetermined direction, left by rounding
             row[i] = match pivot <= 1e-13 * given[i] {
                 false => pivot.sqrt(),
-                // it couples with nothing that comes later
+                // it couples with none of the later unknowns
                 true if i < 3 + self.nuisance => 0.0,
                 true => return false,
             };
@@ -115,21 +116,21 @@ impl Evaluator {
         true
     }
 
-    /// The criterion of a sequence, smaller is better; infinite, or as large as rounding makes it, when a
-    /// coefficient that counts is not determined. Sigmas are in deg/h (per g); where errors that are not
-    /// estimated count they are total uncertainties. `root` is working space.
-    pub fn value(&self, state: &State, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
+    /// Criterion of a sequence, smaller is better. It is infinite, or as large as rounding makes it, if
+    /// a coefficient that counts is not determined. Sigmas are in deg/h (per g); where errors that are
+    /// not estimated count they are total uncertainties. `root` is working space.
+    pub fn value(&self, state: &SequenceState, criterion: &Criterion, root: &mut Vec<f64>) -> f64 {
         match self.root(state, root) {
             true => self.by_root(state, criterion, root, &mut Vec::new(), true),
             false => f64::INFINITY,
         }
     }
 
-    /// Criterion of the sigmas alone, which no total is below. `variances` takes the variances of the
-    /// coefficients that count, where the criterion is made of them.
+    /// Criterion of the sigmas alone, a lower bound on that of the total uncertainties. `variances`
+    /// receives the variances of the coefficients that count if the criterion is computed from them.
     pub(crate) fn sigma_value(
         &self,
-        state: &State,
+        state: &SequenceState,
         criterion: &Criterion,
         root: &mut Vec<f64>,
         variances: &mut Vec<f64>,
@@ -141,11 +142,12 @@ impl Evaluator {
         }
     }
 
-    /// The criterion from the root of the information and the variances of the coefficients that count, which
-    /// are computed where `own` is empty; of the total uncertainties with `total`, of the sigmas without.
+    /// Criterion from the Cholesky factor of the information and the variances of the coefficients that
+    /// count, which are computed if `own` is empty; with `total` of the total uncertainties, without of
+    /// the sigmas.
     pub(crate) fn by_root(
         &self,
-        state: &State,
+        state: &SequenceState,
         criterion: &Criterion,
         root: &[f64],
         own: &mut Vec<f64>,
@@ -159,7 +161,7 @@ impl Evaluator {
         let d = n - begin;
         let l = root;
         if *criterion == Criterion::D {
-            // the geometric mean of the principal sigmas
+            // geometric mean of the principal sigmas
             let logs: f64 = (begin..n).map(|i| l[i * n + i].ln()).sum();
             return (-logs / d as f64).exp() / self.dph;
         }
@@ -185,7 +187,7 @@ impl Evaluator {
         }
     }
 
-    /// The variance of unknown `i`: the square of column i of the inverse of the root `l`.
+    /// Variance of unknown `i`: the square of column i of the inverse of the factor `l`.
     fn variance(&self, l: &[f64], i: usize) -> f64 {
         match self.n {
             0..=MAX_DRIFTS => self.variance_in::<MAX_DRIFTS>(l, i),
@@ -207,8 +209,8 @@ impl Evaluator {
         variance
     }
 
-    /// The state behind a whole sequence.
-    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> State {
+    /// State after a whole sequence.
+    pub(crate) fn state_of<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> SequenceState {
         let (mut now, mut next) = (self.start(), self.start());
         for &stop in sequence {
             self.extend(&now, stop.into(), &mut next);
@@ -217,7 +219,7 @@ impl Evaluator {
         now
     }
 
-    /// The sigma in deg/h (per g) of every coefficient that counts, in model order; empty when one is not
+    /// Sigmas of the coefficients that count, in deg/h (per g), in model order; empty if one is not
     /// determined.
     pub fn sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<f64> {
         let mut root = Vec::new();
@@ -227,7 +229,7 @@ impl Evaluator {
         (3 + self.nuisance..self.n).map(|i| self.variance(&root, i).sqrt() / self.dph).collect()
     }
 
-    /// The criterion of a whole sequence.
+    /// Criterion of a whole sequence.
     pub fn of_sequence<S: Copy + Into<Stop>>(&self, sequence: &[S], criterion: &Criterion) -> f64 {
         self.value(&self.state_of(sequence), criterion, &mut Vec::new())
     }

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-/// The Schur complement of some unknowns of a symmetric matrix (n x n, lower triangle), those before them
-/// zero; these are set to zero.
+/// Schur complement of the unknowns `pivots` of a symmetric matrix (n x n, lower triangle); rows before
+/// them must be zero, those of the pivots are set to zero.
 pub(crate) fn eliminate<const N: usize>(m: &mut [[f64; N]], n: usize, pivots: Range<usize>) {
     for p in pivots {
         let pivot = m[p][p];

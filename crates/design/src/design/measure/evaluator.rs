@@ -1,4 +1,4 @@
-//! The evaluator of a search: its candidates, their dwells and what is known beforehand.
+//! Evaluator of a search: its candidates, their dwells and the prior.
 
 use std::ops::Mul;
 use std::sync::{Arc, OnceLock};
@@ -13,128 +13,130 @@ use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{Conditions, Plan, steps};
 
 use crate::design::measure::elimination::eliminate;
-use crate::design::measure::noise_process::{Joint, OfDwell, Output, of_dwell};
-use crate::design::measure::omitted::{Beside, Omitted, OmittedAt, with_accelerometer};
+use crate::design::measure::noise_process::{BiasDistribution, DwellInformation, Output, of_dwell};
+use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums, with_accelerometer};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
-/// One candidate: its attitude, and what coefficients make of drift and accelerometers there.
+/// One candidate: its attitude, with the effects of the coefficients on drift and accelerometers there.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) c: Matrix3<f64>,
-    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the order of
-    /// the evaluator; the last three are empty where none is unknown.
+    /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the
+    /// order of the evaluator; the last three are empty if no accelerometer error is unknown.
     pub(crate) effects: [Vec<f64>; LOCAL - 3],
     /// Information of a position there on the coefficients, psi eliminated (n x n, row by row, lower
-    /// triangle): what it adds to any scheme under reset carry; empty under the others.
+    /// triangle): its contribution to any scheme under reset carry; empty under the other carries.
     pub(crate) own: Vec<f64>,
-    /// Its own psi under reset carry, as soon as that was asked for.
+    /// Psi of a position there under reset carry, computed when first needed.
     pub(crate) psi: OnceLock<OwnPsi>,
-    /// Effects there of errors that are not estimated.
+    /// Effects of errors that are not estimated, at this attitude.
     pub(crate) omitted: OmittedAt,
-    /// Which of the dwells of the evaluator it has.
+    /// Index of its dwell in the evaluator.
     pub(crate) dwell: usize,
 }
 
-/// A position's own psi in platform axes, at the end of the position.
+/// Psi of a single position in platform axes, at the end of the position.
 #[derive(Debug, Clone)]
 pub(crate) struct OwnPsi {
-    /// The variance in rad^2 of every component, prior included, where the coefficients are known; infinite
-    /// where it is not determined.
+    /// Variance of every component in rad^2, prior included, for known coefficients; infinite where it
+    /// is not determined.
     pub(crate) variances: [f64; 3],
-    /// By which functional of the coefficients each component is off where they are not known (d x 3, in the
-    /// order of the evaluator); zero where it is not determined.
+    /// Error of each component as a functional of the errors of the coefficients (d x 3, in the order
+    /// of the evaluator); zero where it is not determined.
     pub(crate) moved: Vec<[f64; 3]>,
 }
 
-/// What a dwell makes of the local unknowns at a position.
+/// Information and transition of a dwell for the local unknowns of a position.
 #[derive(Debug, Clone)]
 pub(crate) struct Dwelling {
     pub(crate) seconds: f64,
     /// Information of the position on its local unknowns.
     pub(crate) local: [[f64; LOCAL]; LOCAL],
-    /// The same with the errors of the accelerometers, whether they are unknown or not.
+    /// Information as in `local`, with the errors of the accelerometers, whether or not they are
+    /// unknown.
     pub(crate) full: [[f64; LOCAL]; LOCAL],
-    /// `psi^n` behind it as a function of `(psi^n, eps^n)` before.
+    /// `psi^n` after the dwell as a function of `(psi^n, eps^n)` before it.
     pub(crate) phi: [[f64; PSI_EPS]; 3],
-    /// What its samples say where the noise of Z is correlated.
-    pub(crate) correlated: Option<Box<OfDwell>>,
+    /// Information of the samples where the noise of Z is correlated; `None` for white noise.
+    pub(crate) correlated: Option<Box<DwellInformation>>,
 }
 
-/// What is known beforehand: information, zero where nothing is.
+/// Prior information; zero where none is stated.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prior {
-    /// On psi in platform axes at the start, under reset carry of every position, in 1/rad^2.
+    /// Information on psi in platform axes at the start (under reset carry of every position), in
+    /// 1/rad^2.
     pub(crate) psi: [f64; 3],
-    /// On the coefficients, in the order and the units of the evaluator (shape d).
+    /// Information on the coefficients, in the order and the units of the evaluator (shape d).
     pub(crate) coefficients: Vec<f64>,
 }
 
-/// What every evaluation shares.
+/// Evaluator of sequences: data that all evaluations share.
 #[derive(Debug, Clone)]
 pub struct Evaluator {
     pub(crate) platform: Platform,
     pub(crate) conditions: Conditions,
-    /// The column of every coefficient in the order of the evaluator: those that count come last.
+    /// Column of every coefficient in the order of the evaluator: those that count come last.
     pub(crate) order: Vec<usize>,
-    /// How many coefficients do not count.
+    /// Number of coefficients that do not count.
     pub(crate) nuisance: usize,
-    /// The unit of every coefficient that is shown as 1, in `dph`, in the order of the evaluator.
+    /// Unit of every coefficient that is shown as 1, in `dph`, in the order of the evaluator.
     pub(crate) scale: Vec<f64>,
-    /// Unknowns: psi, then d coefficients.
+    /// Number of unknowns: three of psi, then d coefficients.
     pub(crate) n: usize,
-    /// Local unknowns of a position.
+    /// Number of local unknowns of a position.
     pub(crate) locals: usize,
-    /// The rotation of the dynamics of psi^n: `psi' = W psi + eps`.
+    /// Rotation of the dynamics of psi^n: `psi' = W psi + eps`.
     pub(crate) w: Matrix3<f64>,
-    /// That of all positions; where they have dwells of their own, of the first.
+    /// Dwells by `Candidate::dwell`: one for all positions, or one per candidate.
     pub(crate) dwells: Vec<Dwelling>,
     pub(crate) candidates: Vec<Candidate>,
-    /// The way from candidate i to j at `i * candidates + j`; empty when repositioning takes no time.
-    pub(crate) ways: Vec<SlewPath>,
+    /// Slew path from candidate i to j at `i * candidates + j`; empty if repositioning takes no time.
+    pub(crate) slew_paths: Vec<SlewPath>,
     pub(crate) prior: Prior,
-    /// The process that each accelerometer has beside white noise.
+    /// Bias process of each accelerometer beside its white noise; `None` for white noise alone.
     pub(crate) bias: Option<BiasState>,
-    /// Errors that are not estimated and count: they make totals of sigmas.
+    /// Errors that are not estimated and count in total uncertainties; `None` without such errors.
     pub(crate) omitted: Option<Arc<Omitted>>,
-    /// deg/h in rad/s. Coefficients of other units are scaled to it: a sigma over it is in the unit of its
-    /// coefficient.
+    /// 1 deg/h in rad/s. Coefficients of other units are scaled to it: a sigma divided by it is in the
+    /// unit of its coefficient.
     pub(crate) dph: f64,
 }
 
-/// A sequence so far.
+/// Information of a sequence of positions.
 #[derive(Debug, Clone)]
-pub struct State {
+pub struct SequenceState {
     /// Information (n x n), row by row, lower triangle.
     pub(crate) information: Vec<f64>,
-    /// psi in the carried axes as a functional of the unknowns (3 x n).
+    /// Psi in the carried axes as a functional of the unknowns (3 x n).
     pub(crate) psi: [Vec<f64>; 3],
-    /// Where the noise of Z is correlated: what is known of it by now.
-    pub(crate) joint: Option<Joint>,
-    /// Effects of errors that are not estimated, where they count.
-    pub(crate) beside: Option<Box<Beside>>,
-    /// The candidates in order.
+    /// Distribution of the accelerometer biases given the unknowns; `None` for white noise of Z.
+    pub(crate) joint: Option<BiasDistribution>,
+    /// Effects of errors that are not estimated; `None` where they do not count.
+    pub(crate) beside: Option<Box<OmittedSums>>,
+    /// Candidates in order: index of each.
     pub(crate) path: Vec<usize>,
-    /// Dwells and turns, in s.
+    /// Time of dwells and turns so far, in s.
     pub seconds: f64,
 }
 
 impl Evaluator {
-    /// The same with another dwell.
+    /// Evaluator with the same dwell `dwell_s`, in s, at every position.
     ///
     /// # Errors
     /// [`DesignError::Filter`].
     pub fn with_dwell(mut self, dwell_s: f64) -> Result<Self, DesignError> {
         self.dwells = vec![self.dwelling(dwell_s)?];
         let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
-        let ways = std::mem::take(&mut self.ways);
+        let slew_paths = std::mem::take(&mut self.slew_paths);
         self.stand_at(&attitudes);
-        self.ways = ways;
+        self.slew_paths = slew_paths;
         Ok(self)
     }
 
-    /// What so many seconds at a position are.
+    /// Dwell of `dwell_s` seconds at a position.
     pub(crate) fn dwelling(&self, dwell_s: f64) -> Result<Dwelling, DesignError> {
         let f = local_dynamics(&Float, &self.w[1][2], &-self.w[0][2]);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
@@ -169,7 +171,7 @@ impl Evaluator {
         Ok(Dwelling { seconds: dwell_s, local, full, phi, correlated })
     }
 
-    /// Every candidate with a dwell of its own, which [`Self::dwell_at`] changes.
+    /// Evaluator with a dwell of its own for every candidate; [`Self::dwell_at`] changes them.
     pub(crate) fn with_dwells(mut self) -> Self {
         self.dwells = vec![self.dwells[0].clone(); self.candidates.len()];
         self.candidates.iter_mut().enumerate().for_each(|(i, c)| c.dwell = i);
@@ -186,12 +188,12 @@ impl Evaluator {
         (changed.own, changed.omitted, changed.psi) = (own, omitted, OnceLock::new());
     }
 
-    /// What the dwell of a candidate is.
+    /// Dwell of a candidate.
     pub(crate) fn dwelling_of(&self, candidate: usize) -> &Dwelling {
         &self.dwells[self.candidates[candidate].dwell]
     }
 
-    /// The rows of `eps^n` at an attitude, while the platform turns as `slew` says.
+    /// Rows of `eps^n` on the coefficients at an attitude, while the platform turns by `slew`.
     pub(crate) fn drift_rows(&self, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         let rate = || {
             let earth = earth_rate_in(&Float, c, &self.w[1][2], &-self.w[0][2]);
@@ -210,7 +212,7 @@ impl Evaluator {
         [x, y, z, a, b, c]
     }
 
-    /// The candidates without the ways between them.
+    /// Replaces the candidates by the given attitudes, without slew paths between them.
     pub(crate) fn stand_at(&mut self, attitudes: &[Matrix3<f64>]) {
         self.candidates = attitudes
             .iter()
@@ -226,17 +228,17 @@ impl Evaluator {
                 }
             })
             .collect();
-        self.ways.clear();
+        self.slew_paths.clear();
     }
 
-    /// Where a candidate stands, and how long.
+    /// Attitude and dwell of a candidate.
     pub(crate) fn stands(&self, candidate: usize) -> (&Matrix3<f64>, &Dwelling) {
         let Candidate { c, dwell, .. } = &self.candidates[candidate];
         (c, &self.dwells[*dwell])
     }
 
-    /// Information of one position on the coefficients with a psi of its own; empty where psi goes on, or the
-    /// noise of Z.
+    /// Information of one position with a psi of its own on the coefficients; empty where psi or the
+    /// noise of Z continues from position to position.
     fn information_alone(
         &self,
         c: &Matrix3<f64>,
@@ -272,8 +274,8 @@ impl Evaluator {
             .collect()
     }
 
-    /// Information of a position on its drift in n and the error of its accelerometers in `Z^n`, its psi
-    /// eliminated, whose prior is the same about every axis.
+    /// Information of a position on its drift in n and on the error of its accelerometers in `Z^n`, psi
+    /// eliminated; the prior of psi must be the same about every axis.
     pub(crate) fn information_of_effects(&self) -> [[f64; LOCAL - 3]; LOCAL - 3] {
         let mut all = [[0.0; MAX_UNKNOWNS]; MAX_UNKNOWNS];
         for (row, local) in all.iter_mut().zip(&self.dwells[0].local) {
@@ -284,7 +286,8 @@ impl Evaluator {
         std::array::from_fn(|i| std::array::from_fn(|j| all[3 + i.max(j)][3 + i.min(j)]))
     }
 
-    /// `G L` for the functionals L of the local unknowns at a position (of n unknowns each).
+    /// Products `G L`, L the functionals `local` of the local unknowns at a position (of n unknowns
+    /// each).
     pub(crate) fn weighted<const L: usize, const N: usize>(
         &self,
         local: &[[f64; N]; L],
@@ -304,23 +307,23 @@ impl Evaluator {
         weighted
     }
 
-    /// Rows on the coefficients in SI units, in the order and the units of the evaluator.
+    /// Rows on the coefficients in SI units, rearranged to the order and the units of the evaluator.
     pub(crate) fn ordered_columns(&self, rows: [Vec<f64>; 3]) -> [Vec<f64>; 3] {
         rows.map(|row| self.in_order(&row))
     }
 
-    /// One of these rows, of any numbers.
+    /// Row in SI units rearranged as by [`Self::ordered_columns`], with entries of any number type.
     pub(crate) fn in_order<X: Copy + Mul<f64, Output = X>>(&self, row: &[X]) -> Vec<X> {
         self.order.iter().zip(&self.scale).filter_map(|(&c, scale)| Some(*row.get(c)? * *scale)).collect()
     }
 
-    /// The same where nothing is known beforehand.
+    /// Evaluator without a prior.
     pub(crate) fn without_prior(&self) -> Self {
         let prior = Prior { psi: [0.0; 3], coefficients: vec![0.0; self.n - 3] };
         let attitudes: Vec<Matrix3<f64>> = self.candidates.iter().map(|c| c.c).collect();
         let mut out = Self { prior, ..self.clone() };
         out.stand_at(&attitudes);
-        out.ways.clone_from(&self.ways);
+        out.slew_paths.clone_from(&self.slew_paths);
         out
     }
 
@@ -338,13 +341,13 @@ impl Evaluator {
         self.conditions.step_s
     }
 
-    /// Dwell of each position, in s; where they have dwells of their own, of the first.
+    /// Dwell of each position, in s; of the first if dwells differ.
     pub fn dwell_s(&self) -> f64 {
         self.dwells[0].seconds
     }
 }
 
-/// Adds `weight row^T row`.
+/// Adds `weight row^T row` to `sum`.
 fn add_square(sum: &mut [[f64; LOCAL]; LOCAL], row: &[f64; LOCAL], weight: f64) {
     for (line, x) in sum.iter_mut().zip(row) {
         line.iter_mut().zip(row).for_each(|(sum, y)| *sum += weight * x * y);
@@ -352,7 +355,7 @@ fn add_square(sum: &mut [[f64; LOCAL]; LOCAL], row: &[f64; LOCAL], weight: f64) 
 }
 
 impl Prior {
-    /// True if psi is known as well about every axis.
+    /// True if the prior of psi is the same about every axis.
     pub(crate) fn is_alike(&self) -> bool {
         self.psi.iter().all(|p| *p == self.psi[0])
     }

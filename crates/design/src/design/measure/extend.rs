@@ -1,28 +1,29 @@
-//! The information of a sequence, built up position by position: what a search evaluates millions of times.
+//! Information of a sequence, built up position by position: the innermost loop of a search.
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use crate::design::measure::evaluator::{Candidate, Evaluator, State};
-use crate::design::measure::noise_process::Joint;
+use crate::design::measure::evaluator::{Candidate, Evaluator, SequenceState};
+use crate::design::measure::noise_process::BiasDistribution;
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
 
 impl Evaluator {
-    /// Nothing but what is known beforehand.
-    pub fn start(&self) -> State {
+    /// State without positions: the prior alone.
+    pub fn start(&self) -> SequenceState {
         let n = self.n;
         let unit = |r: usize| (0..n).map(|c| f64::from(u8::from(c == r))).collect();
         let mut information = vec![0.0; n * n];
         let mut known = |i: usize, p: f64| information[i * n + i] = p;
         self.prior.coefficients.iter().enumerate().for_each(|(j, &p)| known(3 + j, p));
-        // of platform axes; psi^n is known by the first position, and that of reset carry by every one
+        // in platform axes; under inertial carry the prior is added with the first position, under
+        // reset with each
         if self.carry() == Carry::Platform {
             self.prior.psi.iter().enumerate().for_each(|(k, &p)| known(k, p));
         }
-        State {
+        SequenceState {
             information,
             psi: std::array::from_fn(unit),
-            joint: self.bias.as_ref().map(|bias| Joint::start(bias, n)),
+            joint: self.bias.as_ref().map(|bias| BiasDistribution::start(bias, n)),
             beside: self.beside_at_start(),
             path: Vec::new(),
             seconds: 0.0,
@@ -30,23 +31,23 @@ impl Evaluator {
     }
 
     /// Adds a position to `state`; the result goes to `out`.
-    pub fn extend(&self, state: &State, stop: Stop, out: &mut State) {
+    pub fn extend(&self, state: &SequenceState, stop: Stop, out: &mut SequenceState) {
         self.extend_any(state, stop, true, out);
     }
 
-    /// Adds the information of a position alone: effects of errors that are not estimated stay in `out` as
-    /// they were. Enough for sigmas and for bounds on them.
-    pub(crate) fn extend_information(&self, state: &State, stop: Stop, out: &mut State) {
+    /// Adds only the information of a position: effects of errors that are not estimated stay in `out`
+    /// as they were. Sufficient for sigmas and for bounds on them.
+    pub(crate) fn extend_information(&self, state: &SequenceState, stop: Stop, out: &mut SequenceState) {
         self.extend_any(state, stop, false, out);
     }
 
-    /// Adds the effects of errors that are not estimated, to an `out` that [`Self::extend_information`] made
-    /// of the same `state` and `stop`.
-    pub(crate) fn extend_errors(&self, state: &State, stop: Stop, out: &mut State) {
+    /// Adds the effects of errors that are not estimated. `out` must be the result of
+    /// [`Self::extend_information`] for the same `state` and `stop`.
+    pub(crate) fn extend_errors(&self, state: &SequenceState, stop: Stop, out: &mut SequenceState) {
         if self.carry() == Carry::Reset {
             return self.add_beside(state, stop.candidate, out);
         }
-        let at = (stop.candidate, self.way_to(state.path.last().copied(), stop));
+        let at = (stop.candidate, self.path_to(state.path.last().copied(), stop));
         match self.locals {
             PSI_EPS => {
                 let local = self.functionals::<PSI_EPS, MAX_DRIFTS>(state, stop);
@@ -59,11 +60,11 @@ impl Evaluator {
         }
     }
 
-    fn extend_any(&self, state: &State, stop: Stop, beside: bool, out: &mut State) {
+    fn extend_any(&self, state: &SequenceState, stop: Stop, beside: bool, out: &mut SequenceState) {
         if let Some(bias) = &self.bias {
             return self.extend_correlated(bias, state, stop, false, out);
         }
-        // sizes that the compiler knows
+        // sizes known at compile time
         match self.locals {
             PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, beside, out),
             _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, beside, out),
@@ -72,21 +73,21 @@ impl Evaluator {
 
     fn extend_in<const L: usize, const N: usize>(
         &self,
-        state: &State,
+        state: &SequenceState,
         stop: Stop,
         beside: bool,
-        out: &mut State,
+        out: &mut SequenceState,
     ) {
         let n = self.n;
         let carry = self.carry();
         let Candidate { c, own, dwell, .. } = &self.candidates[stop.candidate];
         let dwelling = &self.dwells[*dwell];
-        let turn = self.way_to(state.path.last().copied(), stop);
+        let turn = self.path_to(state.path.last().copied(), stop);
         out.path.clone_from(&state.path);
         out.path.push(stop.candidate);
         out.seconds = state.seconds + dwelling.seconds + turn.map_or(0.0, |t| t.seconds);
         if carry == Carry::Reset {
-            // psi of the position is eliminated: information adds
+            // psi of the position is eliminated: information adds up
             for ((sum, x), y) in out.information.iter_mut().zip(&state.information).zip(own) {
                 *sum = x + y;
             }

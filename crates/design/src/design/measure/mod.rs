@@ -1,4 +1,4 @@
-//! What the samples of a sequence say: information, criteria, psi.
+//! Information of the samples of a sequence: criteria, psi, errors that are not estimated.
 
 pub(crate) mod beside;
 pub(crate) mod carry;

@@ -1,4 +1,4 @@
-//! Noise of Z that is correlated: the process that each accelerometer has beside its white noise, over waits
+//! Correlated noise of Z: the bias process b of each accelerometer beside its white noise, over waits
 //! and dwells.
 
 use nalgebra::{DMatrix, Matrix3 as Small};
@@ -7,36 +7,37 @@ use obsdeg_ekf::BiasState;
 
 use crate::design::measure::elimination::eliminate;
 
-/// Local unknowns, b at the start of a dwell, b at its end.
+/// Size of the information of a dwell: local unknowns, b at its start, b at its end.
 const SIZE: usize = LOCAL + 6;
-/// With one b more: that of the sample before, or the mean of the one at the start.
+/// Size with one more b: that of the previous sample, or the mean of b at the start.
 pub(crate) const STEP: usize = SIZE + 3;
 
-/// The information of a dwell on its local unknowns, b at its start and b at its end, in n (lower triangle).
-pub(crate) type OfDwell = [[f64; SIZE]; SIZE];
+/// Information of a dwell on its local unknowns, b at its start and b at its end, in n (lower
+/// triangle).
+pub(crate) type DwellInformation = [[f64; SIZE]; SIZE];
 
-/// What is known of b given the unknowns, in platform axes.
+/// Distribution of b given the unknowns, in platform axes.
 #[derive(Debug, Clone)]
-pub(crate) struct Joint {
-    /// Its covariance, in g^2 (3 x 3).
+pub(crate) struct BiasDistribution {
+    /// Covariance in g^2 (3 x 3).
     pub(crate) covariance: Small<f64>,
-    /// Its mean as a functional of the unknowns (3 x n).
+    /// Mean as a functional of the unknowns (3 x n).
     pub(crate) mean: [Vec<f64>; 3],
 }
 
-/// What of a process goes on over `seconds`: the factor on b, and the variance that comes anew.
+/// Propagation of the process over `seconds`: the factor on b, and the variance of its increment.
 fn step(bias: &BiasState, seconds: f64) -> (f64, f64) {
     let x = bias.decay * seconds;
     ((-x).exp(), bias.variance * -(-2.0 * x).exp_m1())
 }
 
-impl Joint {
-    /// Where nothing has been measured (n unknowns).
+impl BiasDistribution {
+    /// Stationary distribution, before any sample (n unknowns).
     pub(crate) fn start(bias: &BiasState, n: usize) -> Self {
         Self { covariance: Small::identity() * bias.variance, mean: std::array::from_fn(|_| vec![0.0; n]) }
     }
 
-    /// Over a time without samples, then in other axes.
+    /// Distribution after `seconds` without samples, then in other axes.
     pub(crate) fn wait(&self, bias: &BiasState, seconds: f64, axes: &Small<f64>) -> Self {
         let (left, variance) = step(bias, seconds);
         let covariance = self.covariance * (left * left) + Small::identity() * variance;
@@ -44,13 +45,13 @@ impl Joint {
     }
 }
 
-/// `A X` (3 x n).
+/// Product `A X` (3 x n).
 pub(crate) fn times(a: &Small<f64>, x: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
     let n = x[0].len();
     std::array::from_fn(|r| (0..n).map(|j| (0..3).map(|k| a[(r, k)] * x[k][j]).sum()).collect())
 }
 
-/// A component of Z in n: its index, its row on the local unknowns, and the weight of a sample (1 /
+/// Component of Z in n: its index, its row on the local unknowns, and the weight of a sample (1 /
 /// variance).
 pub(crate) struct Output {
     pub(crate) component: usize,
@@ -58,7 +59,7 @@ pub(crate) struct Output {
     pub(crate) weight: f64,
 }
 
-/// The information of the `steps` samples of a dwell, `dt` s apart, where the noise of Z is correlated;
+/// Information of the `steps` samples of a dwell, `dt` s apart, where the noise of Z is correlated;
 /// `transition` is that of the local unknowns from sample to sample.
 pub(crate) fn of_dwell(
     outputs: &[Output],
@@ -66,14 +67,14 @@ pub(crate) fn of_dwell(
     transition: &DMatrix<f64>,
     steps: usize,
     dt: f64,
-) -> OfDwell {
+) -> DwellInformation {
     let (left, variance) = step(bias, dt);
     let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
-    // b of the sample before, local unknowns, b at the start, b of this sample
+    // order: b of the previous sample, local unknowns, b at the start, b of this sample
     let mut all = [[0.0; STEP]; STEP];
     for k in 0..steps {
         now = transition * now;
-        // b of the sample before is b at the start, first
+        // for the first sample, b of the previous one is b at the start
         let before = if k == 0 { 3 + LOCAL } else { 0 };
         for axis in 0..3 {
             let (b, c) = (before + axis, 6 + LOCAL + axis);
@@ -97,7 +98,7 @@ pub(crate) fn of_dwell(
             }
         }
         if k + 1 < steps {
-            // b of this sample becomes that of the one before
+            // b of this sample becomes that of the previous one
             let from = |i: usize| if i < 3 { 6 + LOCAL + i } else { i };
             let gone = |i: usize| i >= 6 + LOCAL;
             let held = all;

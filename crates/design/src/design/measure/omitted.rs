@@ -1,11 +1,11 @@
 //! Errors that a scheme does not estimate, in a search: how they change the estimates of a sequence, built up
 //! position by position beside its information.
 //!
-//! With J the columns of the unknowns and O those of the errors, `M = J^T R^-1 J` is the information of a
-//! sequence and `N = J^T R^-1 O` what stands here. Estimates change by `B = M^-1 N`, and the total
-//! uncertainty of an estimate is `sqrt(sigma^2 + sum (B s)^2)`, s the sizes. A record shows error j with the
-//! information `O_j^T R^-1 O_j - N_j^T M^-1 N_j`. A total is never below its sigma, so a bound on sigmas is
-//! one on totals.
+//! With J the columns of the unknowns and O those of the errors, `M = J^T R^-1 J` is the information of
+//! a sequence and `N = J^T R^-1 O` is stored here. Estimates change by `B = M^-1 N`, and the total
+//! uncertainty of an estimate is `sqrt(sigma^2 + sum (B s)^2)`, s the sizes. A record shows error j
+//! with the information `O_j^T R^-1 O_j - N_j^T M^-1 N_j`. A total is never below its sigma, so a lower
+//! bound on sigmas is one on totals.
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::slew::W_IE;
@@ -19,49 +19,49 @@ use crate::design::request::options::Immune;
 /// Errors that count in a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Omitted {
-    /// The errors but those of attitudes, which are three more at every position.
+    /// Errors except those of attitudes, which are three more at every position.
     pub(super) model: OmittedModel,
-    /// One sigma of every error in SI units, those about x, y and z of the attitude of a position last; zero
-    /// where none is stated.
+    /// One sigma of every error in SI units, zero where none is stated; the last three are about x, y
+    /// and z of the attitude of a position.
     pub(super) sizes: Vec<f64>,
-    /// Largest size in SI units from which on a record may show the error, zero where it must have no effect,
-    /// in the order of `sizes`; `None` for what no scheme has to be immune to.
+    /// Largest size in SI units at which a record may begin to show the error, zero where it must have
+    /// no effect, in the order of `sizes`; `None` if no immunity is required.
     pub(super) immune: Vec<Option<f64>>,
-    /// Most that one SI unit makes of drift (rad/s) or of the output (g), in the order of `sizes`.
+    /// Largest effect of one SI unit on drift (rad/s) or on the output (g), in the order of `sizes`.
     pub(super) largest: Vec<f64>,
-    /// True if attitudes count.
+    /// True if attitude errors count.
     pub(super) attitudes: bool,
-    /// True if a turn of the platform axes changes no criterion.
+    /// True if a turn of the platform axes leaves every criterion unchanged.
     pub(crate) alike: bool,
 }
 
 /// Effects of the errors at one candidate.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OmittedAt {
-    /// Drift, then the output, of every error at that attitude (errors x 6).
+    /// Drift, then output, of every error at this attitude (errors x 6).
     pub(super) effects: Vec<[f64; LOCAL - 3]>,
-    /// Under reset carry what the position adds, psi eliminated.
-    pub(super) own: Beside,
+    /// Contribution of a position under reset carry, psi eliminated.
+    pub(super) own: OmittedSums,
 }
 
-/// Sums over a sequence that concern the errors, beside its information.
+/// Sums over a sequence for the errors that are not estimated.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Beside {
+pub(crate) struct OmittedSums {
     /// `J^T R^-1 O`, error by error (errors x n).
     pub(super) cross: Vec<f64>,
     /// `O^T R^-1 O` of every error.
     pub(super) squares: Vec<f64>,
-    /// psi in the carried axes by every error.
+    /// Psi in the carried axes by every error.
     pub(super) psi: Vec<[f64; 3]>,
 }
 
 impl Omitted {
-    /// The errors of the bench that `conditions` state, and those that schemes are immune to. `None` where
-    /// there are none, or where a search does not count them: random drift and biases, turns at once in which
-    /// torquers act, and sizes of single attitudes.
+    /// Errors of the bench that `conditions` state, and those that schemes must be immune to. `None` if
+    /// there are none, or if a search does not count them: with random drift and biases, with
+    /// instantaneous turns in which torquers act, and with sizes for single attitudes.
     ///
     /// # Errors
-    /// [`DesignError::Immune`] for what no error is.
+    /// [`DesignError::Immune`] for a name that is no error.
     pub(crate) fn of(
         base: &Scheme,
         platform: &Platform,
@@ -78,12 +78,12 @@ impl Omitted {
         }
         let mut names = bench.iter().map(|a| &a.name).chain(immune.iter().map(|i| &i.name)).peekable();
         let stated = names.peek().is_some();
-        // the attitude of a single position
+        // an attitude error of a single position
         let counts = stated && names.all(|name| !name.contains('@')) && are_counted(base, conditions);
         Ok(counts.then(|| Self::among(&all, bench, immune)))
     }
 
-    /// Units of the sizes of errors.
+    /// Units of the sizes of the errors in `immune`.
     pub(crate) fn units(platform: &Platform, immune: &[Immune]) -> Vec<&'static str> {
         let all = OmittedModel::new(platform);
         let own = |i: &Immune| all.terms().iter().find(|t| i.names(t.family, &t.name));
@@ -113,7 +113,7 @@ impl Omitted {
         let immune: Vec<Option<f64>> = of.iter().map(|(f, n, u)| largest_of(f, n, u)).collect();
         let first = model.terms().len();
         let attitudes = (first..of.len()).any(|j| sizes[j] > 0.0 || immune[j].is_some());
-        // a rate of the platform is at least that of the earth
+        // a rate of the platform is at least the earth rate
         let rate = |t: &&str| matches!(*t, "GS" | "GM" | "latitude" | "azimuth" | "earth_rate");
         let largest = of.iter().map(|(f, _, _)| if rate(f) { W_IE } else { 1.0 }).collect();
         let alike =
@@ -135,12 +135,12 @@ impl Omitted {
         self.sizes.iter().any(|s| *s > 0.0)
     }
 
-    /// The same with all sizes times a factor.
+    /// Errors with all sizes multiplied by a factor.
     pub(crate) fn scaled(&self, factor: f64) -> Self {
         Self { sizes: self.sizes.iter().map(|s| s * factor).collect(), ..self.clone() }
     }
 
-    /// Number of errors but those of attitudes.
+    /// Number of errors except those of attitudes.
     pub(super) fn fixed(&self) -> usize {
         self.model.terms().len()
     }
@@ -152,8 +152,8 @@ impl Omitted {
     }
 }
 
-/// True if the information of a sequence is that of its samples, and turns are those of the slews: then
-/// errors count in a search.
+/// True if a search counts errors: the information of a sequence is that of its samples alone, and
+/// turns are those of the slews.
 fn are_counted(base: &Scheme, conditions: &Conditions) -> bool {
     let at_once = conditions.slew_rate_deg_s.is_none();
     conditions.gyro_noise.is_none()
@@ -162,7 +162,7 @@ fn are_counted(base: &Scheme, conditions: &Conditions) -> bool {
         && !(at_once && base.carry == Carry::Inertial && base.path.is_some())
 }
 
-/// The row of an output on all local unknowns: the error of its accelerometer too, which may be no unknown.
+/// Row of an output on all local unknowns, with the error of its accelerometer, unknown or not.
 pub(crate) fn with_accelerometer(component: usize, mut row: [f64; LOCAL]) -> [f64; LOCAL] {
     if component != AZIMUTH {
         row[PSI_EPS + component - 1] = 1.0;

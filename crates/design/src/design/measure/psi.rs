@@ -1,23 +1,22 @@
-//! The accuracy of psi at the end of a scheme, with which the platform is used: what requirements on it are
-//! held against.
+//! Accuracy of psi at the end of a scheme, when the platform is used: requirements on psi refer to it.
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use crate::design::measure::evaluator::{Candidate, Evaluator, OwnPsi, State};
+use crate::design::measure::evaluator::{Candidate, Evaluator, OwnPsi, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 impl Evaluator {
-    /// Sigma in deg of psi in platform axes at the end of a whole sequence (inertial carry: in those of its
-    /// first position), under reset carry at the end of its every position; infinite where it is not
-    /// determined, none when a coefficient that counts is not.
+    /// Sigma in deg of psi at the end of a sequence, in platform axes (inertial carry: those of its
+    /// first position); under reset carry at the end of every position. It is infinite where psi is not
+    /// determined. The list is empty if a coefficient that counts is not determined.
     pub fn psi_sigmas<S: Copy + Into<Stop>>(&self, sequence: &[S]) -> Vec<[f64; 3]> {
         let (state, mut root) = (self.state_of(sequence), Vec::new());
         if self.root(&state, &mut root) { self.psi_of(&state, &root) } else { Vec::new() }
     }
 
-    /// The largest sigma of psi over its limit (deg).
-    pub(crate) fn psi_over(&self, state: &State, root: &[f64], limits: &[f64; 3]) -> f64 {
+    /// Largest ratio of a sigma of psi to its limit in deg, dimensionless.
+    pub(crate) fn psi_over(&self, state: &SequenceState, root: &[f64], limits: &[f64; 3]) -> f64 {
         if limits.iter().all(|l| l.is_infinite()) {
             return 0.0;
         }
@@ -25,8 +24,8 @@ impl Evaluator {
         self.psi_of(state, root).into_iter().map(over).fold(0.0, f64::max)
     }
 
-    /// The same from the root of the information behind the sequence.
-    fn psi_of(&self, state: &State, root: &[f64]) -> Vec<[f64; 3]> {
+    /// Sigmas as [`Self::psi_sigmas`], from the Cholesky factor of the information of the sequence.
+    fn psi_of(&self, state: &SequenceState, root: &[f64]) -> Vec<[f64; 3]> {
         let n = self.n;
         let sigma = |root: &[f64], psi: &[f64]| {
             solved(root, n, psi.iter().copied()).map_or(f64::INFINITY, |y| norm(&y).to_degrees())
@@ -55,8 +54,8 @@ impl Evaluator {
         std::array::from_fn(row)
     }
 
-    /// psi in platform axes at the end of a position by its own psi in these axes at its start and the
-    /// coefficients (3 x n).
+    /// Psi in platform axes at the end of a position as a functional of psi at its start in these axes
+    /// and of the coefficients (3 x n).
     fn own_psi_at_end(&self, candidate: usize) -> [Vec<f64>; 3] {
         let Candidate { c, effects, .. } = &self.candidates[candidate];
         let phi = &self.dwelling_of(candidate).phi;
@@ -68,9 +67,9 @@ impl Evaluator {
         self.in_platform_axes(candidate, &rows.each_ref().map(Vec::as_slice))
     }
 
-    /// Information of a position, with the prior of its psi, on psi^n at its end: with itself and with the
-    /// other local unknowns (3 x L). `psi(end) = A psi(start) + B eps` with a rotation A, so psi(start) is
-    /// `A^T (psi(end) - B eps)`.
+    /// Information of a position, with the prior of its psi, on psi^n at its end: with itself and with
+    /// the other local unknowns (3 x L). `psi(end) = A psi(start) + B eps` with a rotation A, so
+    /// psi(start) is `A^T (psi(end) - B eps)`.
     fn information_at_end(&self, candidate: usize) -> [[f64; LOCAL]; 3] {
         let (c, dwelling) = self.stands(candidate);
         let phi = &dwelling.phi;
@@ -80,7 +79,7 @@ impl Evaluator {
                 *x += self.prior.psi.iter().enumerate().map(|(k, p)| c[i][k] * p * c[j][k]).sum::<f64>();
             }
         }
-        // of psi(start) with psi(end) and what else there is
+        // of psi(start) with psi(end) and the other unknowns
         let with: [[f64; LOCAL]; 3] = std::array::from_fn(|i| {
             let psi: [f64; 3] = std::array::from_fn(|j| (0..3).map(|k| start[i][k] * phi[j][k]).sum());
             std::array::from_fn(|j| match j {
@@ -92,8 +91,8 @@ impl Evaluator {
         std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| phi[i][k] * with[k][j]).sum()))
     }
 
-    /// Sigma in deg of psi at the end of a position with a psi of its own, when the rest of the scheme knows
-    /// the coefficients as `root` says.
+    /// Sigma in deg of psi at the end of a position with a psi of its own; `root` is the factor of the
+    /// information of the whole scheme on the coefficients.
     fn psi_of_position(&self, candidate: usize, root: &[f64]) -> [f64; 3] {
         let OwnPsi { variances, moved } = self.own_psi(candidate);
         let n = self.n;
@@ -109,14 +108,14 @@ impl Evaluator {
                 z[i] = rest.map(|x| x / row[i]);
                 (0..3).for_each(|k| sums[k] += z[i][k] * z[i][k]);
             } else {
-                // what leaves it open
+                // components that the open direction affects
                 (0..3).filter(|&k| rest[k].abs() >= OPEN).for_each(|k| sums[k] = f64::INFINITY);
             }
         }
         sums.map(|sum| sum.sqrt().to_degrees())
     }
 
-    /// The psi of a position of its own, found when first asked for.
+    /// Psi of a single position, computed when first needed.
     pub(crate) fn own_psi(&self, candidate: usize) -> &OwnPsi {
         self.candidates[candidate].psi.get_or_init(|| self.psi_alone(candidate))
     }
@@ -150,7 +149,7 @@ impl Evaluator {
         for k in 0..3 {
             let unit = (0..3).map(|r| f64::from(u8::from(r == k)));
             let Some(y) = solved(&l, 3, unit) else { continue };
-            // A^-1 e = L^-T y, from the last
+            // A^-1 e = L^-T y, from the last row on
             let mut x = [0.0; 3];
             for i in (0..3).rev() {
                 let sum: f64 = (i + 1..3).map(|j| l[3 * j + i] * x[j]).sum();
@@ -165,10 +164,11 @@ impl Evaluator {
     }
 }
 
-/// What is below is rounding, of what a zero on the diagonal leaves open.
+/// Tolerance below which a component along an undetermined direction is rounding.
 const OPEN: f64 = 1e-12;
 
-/// `L^-1 b` of a lower triangular `l` (n x n); `None` where a zero on its diagonal leaves it open.
+/// Solution `L^-1 b` for a lower triangular `l` (n x n); `None` where a zero on its diagonal leaves it
+/// open.
 fn solved(l: &[f64], n: usize, b: impl Iterator<Item = f64>) -> Option<Vec<f64>> {
     let mut y: Vec<f64> = Vec::with_capacity(n);
     for (i, b) in b.enumerate().take(n) {

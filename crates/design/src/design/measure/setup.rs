@@ -14,8 +14,8 @@ use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 impl Evaluator {
-    /// The evaluator for positions of `dwell_s` each, without drift noise; of priors those count that are
-    /// stated. `required` are the coefficients that count (indices among the coefficients); the others are
+    /// Evaluator for positions of `dwell_s` each, without drift noise, with the priors that are stated.
+    /// `required` are the coefficients that count (indices among the coefficients); the others are
     /// estimated with them.
     ///
     /// # Errors
@@ -29,8 +29,8 @@ impl Evaluator {
         Self::while_going((base, candidates), required, (conditions, None), &|| true)
     }
 
-    /// The same with errors that are not estimated and count, as long as `going` says so: the ways between
-    /// many candidates take a while.
+    /// Evaluator with errors that are not estimated and count. Stops when `going` returns false: slew
+    /// paths between many candidates take time.
     pub(crate) fn while_going(
         (base, candidates): (&Scheme, &[Euler]),
         required: &[usize],
@@ -76,7 +76,7 @@ impl Evaluator {
             w: std::array::from_fn(|i| std::array::from_fn(|j| f[i][j])),
             dwells: Vec::new(),
             candidates: Vec::new(),
-            ways: Vec::new(),
+            slew_paths: Vec::new(),
             dph,
         };
         let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(c_n_f64).collect();
@@ -85,7 +85,7 @@ impl Evaluator {
 }
 
 impl Prior {
-    /// What `conditions` state of the unknowns of `platform`; coefficients in this order.
+    /// Prior that `conditions` state for the unknowns of `platform`; coefficients in the order `order`.
     fn of(platform: &Platform, conditions: &Conditions, order: &[usize]) -> Result<Self, DesignError> {
         let sigmas = resolve(PRIOR, platform, conditions.stated_priors(), f64::INFINITY)?;
         let scaled = |(sigma, unit): (&f64, &&str)| match is_rate(unit) {

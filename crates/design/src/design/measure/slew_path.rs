@@ -1,4 +1,4 @@
-//! A slew path: what turning from one candidate to another does to psi, where that takes time.
+//! Slew path: the effect on psi of a turn that takes time, from one candidate to another.
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::{Slew, Turn};
@@ -6,33 +6,34 @@ use obsdeg_core::model::slew::{Slew, Turn};
 /// Largest turn of an integration step, in rad.
 const TURN_STEP: f64 = 0.05;
 
-/// What a turn from one candidate to another does.
+/// Effect of the turn from one candidate to another.
 #[derive(Debug, Clone)]
 pub(crate) struct SlewPath {
     pub(crate) seconds: f64,
-    /// `psi^n` after the turn by `psi^n` before it.
+    /// `psi^n` after the turn as a function of `psi^n` before it.
     pub(crate) phi: Matrix3<f64>,
-    /// `psi^n` after the turn by the coefficients (3 x d).
+    /// `psi^n` after the turn as a function of the coefficients (3 x d).
     pub(crate) drift: [Vec<f64>; 3],
-    /// `psi^n` after the turn by the errors that are not estimated and count (3 x errors).
+    /// `psi^n` after the turn as a function of the errors that are not estimated and count (3 x
+    /// errors).
     pub(crate) omitted: [Vec<f64>; 3],
     /// Axis and angle; `None` where both attitudes are the same.
     pub(crate) turn: Option<Turn>,
-    /// The opposite path of a half turn.
+    /// Opposite path of a half turn; `None` for other turns.
     pub(crate) other: Option<Box<Self>>,
 }
 
 impl SlewPath {
-    /// The path between equal attitudes, of `d` coefficients.
+    /// Path between equal attitudes, for `d` coefficients.
     pub(crate) fn none(d: usize) -> Self {
         let phi = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
         let drift = std::array::from_fn(|_| vec![0.0; d]);
         Self { seconds: 0.0, phi, drift, omitted: Default::default(), turn: None, other: None }
     }
 
-    /// `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n after a turn by psi^n and the
-    /// coefficients; `drift_at` is `C E(g)` (3 x d) at a time in s, columns of errors that are not estimated
-    /// behind it.
+    /// Integrates `X' = W X + [0 | C(t) E(g(t))]` from `X = [1 | 0]` by Runge-Kutta: psi^n after a turn
+    /// as a function of psi^n before it and of the coefficients. `drift_at` is `C E(g)` (3 x d) at a
+    /// time in s, followed by the columns of errors that are not estimated.
     pub(crate) fn along(
         slew: &Slew,
         w: &Matrix3<f64>,
@@ -67,7 +68,7 @@ impl SlewPath {
             before = after;
         }
         Self {
-            // times are compared: what rounding adds is no time
+            // durations are compared: rounding must not make them differ
             seconds: (slew.duration_s * 1e9).round() / 1e9,
             phi: std::array::from_fn(|i| std::array::from_fn(|j| x[i][j])),
             drift: std::array::from_fn(|i| x[i][3..3 + d].to_vec()),

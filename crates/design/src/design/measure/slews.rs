@@ -1,8 +1,9 @@
-//! The slew paths between candidates, where turning takes time: the shortest, and of half turns both.
+//! Slew paths between candidates, where turning takes time: the shortest, for half turns both
+//! directions.
 
 use obsdeg_core::model::slew::{Slew, Turn};
 use obsdeg_core::model::{Matrix3, SlewTo};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::slew_path::SlewPath;
@@ -11,7 +12,7 @@ use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_TURNING;
 
 impl Evaluator {
-    /// The same with other candidates, and all the ways between them.
+    /// Evaluator with other candidates, and all slew paths between them.
     pub(crate) fn among(
         mut self,
         attitudes: &[Matrix3<f64>],
@@ -23,40 +24,41 @@ impl Evaluator {
             if found > MAX_TURNING {
                 return Err(DesignError::Pairs { found });
             }
-            let ways = (0..found * found).into_par_iter().map(|k| {
-                let way = || self.way(&attitudes[k / found], &attitudes[k % found]);
-                going().then(way).ok_or(DesignError::Interrupted)
-            });
-            self.ways = ways.collect::<Result<_, _>>()?;
+            self.slew_paths = parallel::try_map(found * found, |k| {
+                let shortest_path = || self.shortest_path(&attitudes[k / found], &attitudes[k % found]);
+                going().then(shortest_path).ok_or(DesignError::Interrupted)
+            })?;
         }
         Ok(self)
     }
 
-    /// The same with the positions of one sequence as candidates, and the ways from each to the next.
+    /// Evaluator with the positions of one sequence as candidates, and the slew paths from each to the
+    /// next.
     pub(crate) fn along(&self, attitudes: &[Matrix3<f64>]) -> Self {
         let mut out = self.clone();
         out.stand_at(attitudes);
         if self.conditions.slew_rate_deg_s.is_some() {
             let n = attitudes.len();
             let next = |k: usize| k % n == k / n + 1;
-            let way =
-                |k: usize| if next(k) { out.way(&attitudes[k / n], &attitudes[k % n]) } else { out.stay() };
-            out.ways = (0..n * n).map(way).collect();
+            let shortest_path = |k: usize| {
+                if next(k) { out.shortest_path(&attitudes[k / n], &attitudes[k % n]) } else { out.stay() }
+            };
+            out.slew_paths = (0..n * n).map(shortest_path).collect();
         }
         out
     }
 
-    /// The shortest way from one attitude to another, and the other one if that is as short.
-    fn way(&self, from: &Matrix3<f64>, to: &Matrix3<f64>) -> SlewPath {
+    /// Shortest slew path from one attitude to another, with the opposite one if that is as short.
+    fn shortest_path(&self, from: &Matrix3<f64>, to: &Matrix3<f64>) -> SlewPath {
         let rate = self.conditions.slew_rate_deg_s.unwrap_or(f64::INFINITY);
-        // there is always a shortest way
+        // a shortest path always exists
         let slew = Slew::to(from, to, &SlewTo::default(), rate.to_radians()).ok().flatten();
         let Some(slew) = slew else { return self.stay() };
         let other = slew.reversed().map(|other| Box::new(self.turned(&other)));
         SlewPath { other, ..self.turned(&slew) }
     }
 
-    /// The path without a turn.
+    /// Path without a turn.
     fn stay(&self) -> SlewPath {
         SlewPath::none(self.n - 3)
     }
@@ -66,26 +68,28 @@ impl Evaluator {
         SlewPath::along(slew, &self.w, self.n - 3, drift_at)
     }
 
-    /// How long it takes to get from one candidate to another, in s.
+    /// Duration of the turn from one candidate to another, in s.
     pub fn slew_s(&self, from: usize, to: usize) -> f64 {
-        self.ways.get(from * self.candidates.len() + to).map_or(0.0, |w| w.seconds)
+        self.slew_paths.get(from * self.candidates.len() + to).map_or(0.0, |w| w.seconds)
     }
 
-    /// The ways from the position before (`None`: there is none) to a candidate: one, or two where half a
-    /// turn leads there.
+    /// Slew paths from the previous position (`None` for the first position) to a candidate: one, or
+    /// two for a half turn.
     pub fn stops(&self, last: Option<usize>, candidate: usize) -> impl Iterator<Item = Stop> {
-        let way = last.and_then(|last| self.ways.get(last * self.candidates.len() + candidate));
-        let two = way.is_some_and(|w| w.other.is_some());
+        let shortest_path =
+            last.and_then(|last| self.slew_paths.get(last * self.candidates.len() + candidate));
+        let two = shortest_path.is_some_and(|w| w.other.is_some());
         [false, true].into_iter().take(1 + usize::from(two)).map(move |reversed| Stop { candidate, reversed })
     }
 
-    /// The way to a stop from the candidate before.
-    pub(crate) fn way_to(&self, last: Option<usize>, stop: Stop) -> Option<&SlewPath> {
-        let way = self.ways.get(last? * self.candidates.len() + stop.candidate)?;
-        Some(way.other.as_deref().filter(|_| stop.reversed).unwrap_or(way))
+    /// Slew path to a stop from the previous candidate; `None` for the first position.
+    pub(crate) fn path_to(&self, last: Option<usize>, stop: Stop) -> Option<&SlewPath> {
+        let shortest_path = self.slew_paths.get(last? * self.candidates.len() + stop.candidate)?;
+        Some(shortest_path.other.as_deref().filter(|_| stop.reversed).unwrap_or(shortest_path))
     }
 
-    /// Makes equal sequences equal: what is no half turn has no other way.
+    /// Canonical form, which makes equal sequences compare equal: only half turns have a second slew
+    /// path.
     pub(crate) fn tidy(&self, sequence: &mut [Stop]) {
         let mut last = None;
         for stop in sequence {
@@ -94,19 +98,19 @@ impl Evaluator {
         }
     }
 
-    /// The half turns of a sequence, with the index of the position that they lead to.
+    /// Half turns of a sequence, each with the index of the position that it leads to.
     pub fn half_turns(&self, sequence: &[Stop]) -> Vec<(usize, Turn)> {
-        let turn = |k: usize| self.way_to(Some(sequence[k - 1].candidate), sequence[k])?.turn;
+        let turn = |k: usize| self.path_to(Some(sequence[k - 1].candidate), sequence[k])?.turn;
         (1..sequence.len()).filter_map(|k| Some((k, turn(k).filter(Turn::is_half)?))).collect()
     }
 
-    /// How many sequences of `k` begin with one of `firsts`; `None` beyond 2^64.
+    /// Number of sequences of `k` positions that begin with one of `firsts`; `None` beyond 2^64.
     pub(crate) fn sequences(&self, firsts: &[usize], k: usize) -> Option<u64> {
         let n = self.candidates.len();
-        if self.ways.is_empty() {
+        if self.slew_paths.is_empty() {
             return (firsts.len() as u64).checked_mul((n as u64).checked_pow(k as u32 - 1)?);
         }
-        // how many end with each candidate
+        // number of sequences that end with each candidate
         let mut ends: Vec<u64> = (0..n).map(|c| u64::from(firsts.contains(&c))).collect();
         for _ in 1..k {
             let to = |c: usize| {

@@ -1,69 +1,70 @@
-//! Which sets of candidates make the required coefficients observable, and with what degrees: exact ranks in
-//! several prime fields, sets in lexicographic order with the echelon bases of the prefix shared.
+//! Sets of candidates that make the required coefficients observable, with their degrees: exact ranks
+//! in several prime fields. Sets are enumerated in lexicographic order and share the echelon bases of
+//! their prefixes.
 //!
-//! A rank in a field can only be too small. So a set that one field calls observable is observable, and the
-//! smallest degree that any field gives is right unless all of them err: for each rank with probability below
-//! `miss^fields`.
+//! A rank in a field can only be too small. A set that one field calls observable is therefore
+//! observable, and the smallest degree of all fields is right unless all of them err. For each rank
+//! this has a probability below `miss^fields`.
 
 use std::collections::HashMap;
 
 use obsdeg_core::degree::{EnsembleError, local_chain};
 use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme, Source};
 use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field};
-use rayon::prelude::*;
 
 use crate::design::observable::symmetry::Symmetry;
 use crate::design::request::error::DesignError;
 
-/// So many fields are taken that a rank is wrong in all of them with a probability below this: a search makes
-/// up to 1e12 of them.
+/// Bound on the probability that a rank is wrong in all fields, which sets their number: a search
+/// decides up to 1e12 ranks.
 const MISS: f64 = 1e-24;
-/// Sets and prefixes between two questions whether to go on.
+/// Number of sets and prefixes between two calls of the cancellation callback.
 const PATIENCE: u64 = 256;
 
-/// The rows that each candidate adds, whatever its place in the scheme.
+/// Rows that each candidate adds, at any place of a scheme.
 #[derive(Debug, Clone)]
 pub struct Rows {
-    /// The same in independent random fields.
-    fields: Vec<InField>,
+    /// Rows in independent random fields.
+    fields: Vec<FieldRows>,
     columns: usize,
-    /// The columns that must be solved.
+    /// Columns of the coefficients that must be observable.
     required: Vec<usize>,
     /// Bound on the probability that one rank is too small in one field.
     miss: f64,
     platform: Platform,
 }
 
-/// The rows in one field.
+/// Rows of all candidates in one field.
 #[derive(Debug, Clone)]
-struct InField {
+struct FieldRows {
     field: Field,
-    /// Of every candidate: all its rows.
+    /// Rows of each candidate, of all orders.
     rows: Vec<Vec<Vec<u64>>>,
-    /// Of every order and candidate: the rows that derivatives of that order add.
+    /// Rows that derivatives of an order add, by order and candidate.
     by_order: Vec<Vec<Vec<Vec<u64>>>>,
-    /// The most rows that a candidate adds.
+    /// Largest number of rows that a candidate adds.
     most: usize,
-    /// `C_c^n` of every candidate in the field.
+    /// Attitude `C_c^n` of every candidate in the field.
     attitudes: Vec<Matrix3<u64>>,
 }
 
-/// How long a walk over sets goes on.
-pub struct Patience<'a> {
-    /// Prefixes and sets that may still be looked at.
+/// Limits of an enumeration of sets.
+pub struct EnumerationLimits<'a> {
+    /// Number of prefixes and sets that may still be examined.
     pub budget: u64,
-    /// Asked every now and then.
+    /// Cancellation callback: false ends the enumeration.
     pub going: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Patience<'a> {
-    /// As long as `going` says so.
+impl<'a> EnumerationLimits<'a> {
+    /// Limits without a budget: the enumeration stops when `going` returns false.
     pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { budget: u64::MAX, going }
     }
 
-    /// Counts one more; false when it is enough.
+    /// Counts one set or prefix; false if the enumeration must end.
     fn goes_on(&mut self) -> bool {
         self.budget = self.budget.saturating_sub(1);
         if self.budget.is_multiple_of(PATIENCE) && !(self.going)() {
@@ -74,10 +75,10 @@ impl<'a> Patience<'a> {
 }
 
 impl Rows {
-    /// The rows of `candidates` under the assumptions of `base`, in random fields that `seed` and all of this
-    /// choose; `required` are indices among the coefficients. Under platform and inertial carry psi is shared
-    /// and the rows are those of the chain; under reset carry psi of the position is eliminated, and rows of
-    /// the coefficients are left.
+    /// Rows of `candidates` under the assumptions of `base`, in random fields that depend on `seed` and
+    /// on these inputs; `required` are indices among the coefficients. Under platform and inertial
+    /// carry psi is shared and the rows are those of the chain. Under reset carry psi of the position
+    /// is eliminated, which leaves rows on the coefficients.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -88,7 +89,7 @@ impl Rows {
         seed: u64,
     ) -> Result<Self, DesignError> {
         let reset = base.carry == Carry::Reset;
-        // psi of a position of its own: any carry does for one position
+        // psi of a position of its own: for a single position all carries are equal
         let carry = if reset { Carry::Platform } else { base.carry };
         let positions = Scheme::of_angles(candidates.iter().cloned()).positions;
         let gimbals = Gimbals::default();
@@ -101,7 +102,7 @@ impl Rows {
         let (mut fields, mut miss) = (Vec::new(), 1.0);
         while fields.len() < 2 || f64::powi(miss, fields.len() as i32) > MISS {
             let values = RandomValues::draw(platform.scheme(), &mut rng).map_err(EnsembleError::from)?;
-            let here = InField::new(&platform, &values, first);
+            let here = FieldRows::new(&platform, &values, first);
             // a rank is one minor: of the rows of all orders of some positions, each with a psi of its own
             // under reset carry
             let psi = if reset { 3 * candidates.len() } else { 3 };
@@ -127,28 +128,28 @@ impl Rows {
         })
     }
 
-    /// The number of candidates.
+    /// Number of candidates.
     pub fn candidates(&self) -> usize {
         self.fields.first().map_or(0, |here| here.rows.len())
     }
 
-    /// The number of fields.
+    /// Number of fields.
     pub fn fields(&self) -> usize {
         self.fields.len()
     }
 
-    /// Bound on the probability that of so many sets any was taken for less than it is, or that candidates
-    /// were taken for images of each other which are not.
+    /// Bound on the probability that any of `sets` sets was judged too low, or that candidates were
+    /// wrongly taken for images of each other.
     pub fn error_bound(&self, sets: f64) -> f64 {
         let images = 24.0 * (self.candidates() as f64).powi(2);
         let ranks = (sets + 1.0) * (self.last_order() + 1) as f64;
         ((ranks + images) * self.miss.powi(self.fields.len() as i32)).min(1.0)
     }
 
-    /// The rows of some candidates, in this order.
+    /// Rows of the candidates with these indices, in this order.
     pub fn select(&self, order: &[usize]) -> Self {
         let of = |rows: &Vec<Vec<Vec<u64>>>| order.iter().map(|&i| rows[i].clone()).collect();
-        let fields = self.fields.iter().map(|here| InField {
+        let fields = self.fields.iter().map(|here| FieldRows {
             field: here.field,
             rows: of(&here.rows),
             by_order: here.by_order.iter().map(of).collect(),
@@ -163,7 +164,7 @@ impl Rows {
         }
     }
 
-    /// Candidates that are the same attitude as an earlier one.
+    /// Indices of candidates with the same attitude as an earlier one.
     pub fn repeated(&self) -> Vec<usize> {
         let mut first: HashMap<Vec<&Matrix3<u64>>, usize> = HashMap::new();
         let everywhere = |i: usize| self.fields.iter().map(|here| &here.attitudes[i]).collect();
@@ -171,29 +172,29 @@ impl Rows {
         (0..self.candidates()).filter_map(seen).collect()
     }
 
-    /// How turning the platform axes maps the candidates.
+    /// Symmetry of the candidates under turns of the platform axes; `same` as in [`Symmetry::new`].
     pub fn symmetry(&self, same: &dyn Fn(usize, usize) -> bool) -> Symmetry {
         let fields: Vec<(Field, &[Matrix3<u64>])> =
             self.fields.iter().map(|here| (here.field, &here.attitudes[..])).collect();
         Symmetry::new(&fields, &self.platform, same)
     }
 
-    /// The least number of positions that could do, by counting rows.
+    /// Lower bound on the number of positions, by counting rows.
     pub fn counting_bound(&self) -> usize {
         self.required.len().div_ceil(self.most().max(1))
     }
 
-    /// The most rows that a candidate adds.
+    /// Largest number of rows that a candidate adds.
     pub fn most(&self) -> usize {
         self.fields.iter().map(|here| here.most).max().unwrap_or(0)
     }
 
-    /// Highest order of a derivative that adds anything.
+    /// Highest order of a derivative that adds rows.
     pub fn last_order(&self) -> usize {
         self.fields.iter().map(|here| here.by_order.len() - 1).max().unwrap_or(0)
     }
 
-    /// The degree of every required coefficient in a set; `None` where it is not observable.
+    /// Degree of every required coefficient in a set; `None` where it is not observable.
     pub fn degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
         let mut best = self.likely_degrees(set);
         for here in &self.fields[1..] {
@@ -208,7 +209,7 @@ impl Rows {
         best
     }
 
-    /// The same in one field: a degree may be too large.
+    /// Degrees as [`Self::degrees`], in one field only: a degree may be too large.
     pub(crate) fn likely_degrees(&self, set: &[usize]) -> Vec<Option<usize>> {
         self.fields[0].degrees(set, self.columns, &self.required)
     }
@@ -218,18 +219,18 @@ impl Rows {
     pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
         let behind = |first: usize| {
             let mut out = Vec::new();
-            self.each(&[first], size, false, &mut Patience::while_going(&|| true), &mut |set| {
+            self.each(&[first], size, false, &mut EnumerationLimits::while_going(&|| true), &mut |set| {
                 out.push(set.to_vec());
                 true
             });
             out
         };
-        (0..self.candidates()).into_par_iter().flat_map_iter(behind).collect()
+        parallel::map(self.candidates(), behind).concat()
     }
 
-    /// The first such set among those that begin with one of `firsts`, and whether all were examined
-    /// otherwise: no more than `budget` prefixes and sets are looked at for each of `firsts`, and only while
-    /// `going`.
+    /// First observable set of `size` candidates that begins with one of `firsts`, and true if no enumeration
+    /// was cut short. At most `budget` prefixes and sets are examined for each of `firsts`; stops when
+    /// `going` returns false.
     pub(crate) fn first_observable_set(
         &self,
         size: usize,
@@ -237,29 +238,27 @@ impl Rows {
         budget: u64,
         going: &(dyn Fn() -> bool + Sync),
     ) -> (Option<Vec<usize>>, bool) {
-        let found: Vec<(Option<Vec<usize>>, bool)> = firsts
-            .par_iter()
-            .map(|&first| {
-                let (mut out, mut patience) = (None, Patience { budget, going });
-                self.each(&[first], size, false, &mut patience, &mut |set| {
-                    out = Some(set.to_vec());
-                    false
-                });
-                (out, patience.budget > 0)
-            })
-            .collect();
+        let found: Vec<(Option<Vec<usize>>, bool)> = parallel::map(firsts.len(), |i| {
+            let (mut out, mut patience) = (None, EnumerationLimits { budget, going });
+            self.each(&[firsts[i]], size, false, &mut patience, &mut |set| {
+                out = Some(set.to_vec());
+                false
+            });
+            (out, patience.budget > 0)
+        });
         let complete = found.iter().all(|f| f.1);
         (found.into_iter().find_map(|f| f.0), complete)
     }
 
-    /// Hands all observable sets of `size` that begin with `prefix` (ascending) to `found`, in lexicographic
-    /// order, until it wants no more; `repeat`: a candidate may be taken more than once.
+    /// Passes all observable sets of `size` that begin with `prefix` (ascending) to `found`, in
+    /// lexicographic order, until `found` returns false. With `repeat` a candidate may occur more than
+    /// once.
     pub fn each(
         &self,
         prefix: &[usize],
         size: usize,
         repeat: bool,
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) {
         let Some((&last, before)) = prefix.split_last() else { return };
@@ -271,29 +270,30 @@ impl Rows {
         self.extend(&bases, &mut before.to_vec(), last, (size, usize::from(!repeat)), patience, found);
     }
 
-    /// Adds `candidate` and everything behind it, `step` further on at least, to a set with these bases;
-    /// false when `found` wants no more or patience is at its end.
+    /// Adds `candidate`, then all later ones at a distance of at least `step`, to a set with these
+    /// bases. Returns false if `found` does or if the limits are reached.
     fn extend(
         &self,
         bases: &[Echelon],
         set: &mut Vec<usize>,
         candidate: usize,
         (size, step): (usize, usize),
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) -> bool {
         if !patience.goes_on() {
             return false;
         }
         let left = size - set.len() - 1;
-        let longer = |(here, basis): (&InField, &Echelon)| {
+        let longer = |(here, basis): (&FieldRows, &Echelon)| {
             let mut basis = basis.clone();
             here.add(&mut basis, candidate);
             basis
         };
         let mut bases = self.fields.iter().zip(bases);
         // every further position adds at most its rows
-        let may_do = |here: &InField, basis: &Echelon| basis.rank() + left * here.most >= self.required.len();
+        let may_do =
+            |here: &FieldRows, basis: &Echelon| basis.rank() + left * here.most >= self.required.len();
         set.push(candidate);
         let mut go_on = true;
         if left == 0 {
@@ -304,7 +304,7 @@ impl Rows {
         } else {
             let bases: Vec<Echelon> = bases.map(longer).collect();
             if !self.fields.iter().zip(&bases).any(|(here, basis)| may_do(here, basis)) {
-                // none of what follows does
+                // no set that begins like this is sufficient
             } else if left == 1 {
                 go_on = self.last(&bases, set, candidate + step, patience, found);
             } else {
@@ -323,17 +323,17 @@ impl Rows {
         go_on
     }
 
-    /// Adds one more, from `first` on, to a set with these bases.
+    /// Adds one more candidate, from `first` on, to a set with these bases.
     fn last(
         &self,
         bases: &[Echelon],
         set: &mut Vec<usize>,
         first: usize,
-        patience: &mut Patience<'_>,
+        patience: &mut EnumerationLimits<'_>,
         found: &mut dyn FnMut(&[usize]) -> bool,
     ) -> bool {
-        // in further fields only when the first says no
-        let mut unseen: Vec<Unseen> = Vec::with_capacity(bases.len());
+        // in further fields only if the first one says no
+        let mut unseen: Vec<NullSpace> = Vec::with_capacity(bases.len());
         let mut scratch = Vec::new();
         for next in first..self.candidates() {
             if !patience.goes_on() {
@@ -341,7 +341,7 @@ impl Rows {
             }
             let does = self.fields.iter().zip(bases).enumerate().any(|(i, (here, basis))| {
                 if unseen.len() == i {
-                    unseen.push(Unseen::new(basis, &self.required));
+                    unseen.push(NullSpace::new(basis, &self.required));
                 }
                 unseen[i].is_seen(&here.rows[next], &mut scratch)
             });
@@ -358,15 +358,15 @@ impl Rows {
     }
 }
 
-/// What a set does not see: a basis v_1 .. v_m of the null space of its rows.
-struct Unseen {
+/// Null space of the rows of a set, with basis v_1 .. v_m.
+struct NullSpace {
     field: Field,
     vectors: Vec<Vec<u64>>,
-    /// Independent rows of the matrix of the required components of v_1 .. v_m: what must be seen.
+    /// Independent rows of the matrix of the required components of v_1 .. v_m.
     wanted: Vec<Vec<u64>>,
 }
 
-impl Unseen {
+impl NullSpace {
     fn new(basis: &Echelon, required: &[usize]) -> Self {
         let f = basis.field();
         // with pivot entries d_i and D their product: D at a free column, -row_i (D / d_i) at pivot i
@@ -403,7 +403,8 @@ impl Unseen {
         Self { field: f, vectors, wanted }
     }
 
-    /// True if `rows` leave no required component unseen: what they make of v_1 .. v_m spans `wanted`.
+    /// True if `rows` make every required component observable: their products with v_1 .. v_m span
+    /// `wanted`.
     fn is_seen(&self, rows: &[Vec<u64>], scratch: &mut Vec<u64>) -> bool {
         let (f, m) = (self.field, self.vectors.len());
         if rows.len() < self.wanted.len() {
@@ -436,8 +437,8 @@ impl Unseen {
     }
 }
 
-impl InField {
-    /// The rows of every position of `platform` at random values; psi, the first `leading` columns,
+impl FieldRows {
+    /// Rows of every position of `platform` at random values; psi, the first `leading` columns, is
     /// eliminated.
     fn new(platform: &Platform, values: &RandomValues, leading: usize) -> Self {
         let sample = values.sample(platform.scheme(), 1);
@@ -459,7 +460,7 @@ impl InField {
         let mut by_order: Vec<Vec<Vec<Vec<u64>>>> = (0..=last).map(up_to).collect();
         let rows = by_order[last].clone();
         if leading == 0 {
-            // what lower orders gave need not be given again
+            // rows of lower orders are not repeated
             for order in (1..=last).rev() {
                 let (lower, this) = by_order.split_at_mut(order);
                 for (rows, seen) in this[0].iter_mut().zip(&lower[order - 1]) {

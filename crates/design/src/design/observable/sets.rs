@@ -1,26 +1,27 @@
-//! Some of the sets of candidates, as one bit for each: at its place in the combinatorial number system (D.
-//! E. Knuth, *The Art of Computer Programming*, volume 4A, 7.2.1.3), those of fewer members first.
+//! Collection of sets of candidates with one bit per set, at its index in the combinatorial number
+//! system (D. E. Knuth, *The Art of Computer Programming*, volume 4A, 7.2.1.3), sets with fewer members
+//! first.
 //!
-//! The set `c_1 < ... < c_t` is behind `sum_i binom(c_i, i)` others of its size. What is held does not grow
-//! with the sequences, and with the sets by an eighth of a byte.
+//! The set `c_1 < ... < c_t` has `sum_i binom(c_i, i)` sets of its size before it. Memory does not grow
+//! with the sequences; it is an eighth of a byte per set.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Sets of 1 up to so many candidates.
+/// Collection of sets of 1 to `most` candidates.
 #[derive(Debug)]
 pub(crate) struct Sets {
     candidates: usize,
-    /// `binom(c, i)` at `i * candidates + c`, c below the number of candidates, i up to one more than the
-    /// members of a set; those of which no set needs the place may be cut off at the largest number.
+    /// `binom(c, i)` at `i * candidates + c`, c below the number of candidates, i up to one more than
+    /// the largest number of members. Values that no index needs may be cut off at the largest number.
     binomials: Vec<usize>,
-    /// How many sets have fewer members, by the number of members counted from 1, and how many there are in
-    /// all.
+    /// Number of sets with fewer members, by the number of members (from 1), then the number of all
+    /// sets.
     first: Vec<usize>,
     bits: Vec<AtomicU64>,
 }
 
 impl Sets {
-    /// None of the sets of up to `most` candidates.
+    /// Empty collection for sets of up to `most` candidates.
     pub(crate) fn none(candidates: usize, most: usize) -> Self {
         let most = most.min(candidates);
         let mut binomials = vec![1; candidates];
@@ -33,7 +34,7 @@ impl Sets {
         }
         let mut out = Self { candidates, binomials, first: vec![0], bits: Vec::new() };
         for size in 1..=most {
-            // one behind the last of its size
+            // index after the last set of its size
             let last: Vec<usize> = (candidates - size..candidates).collect();
             let next = out.first[size - 1] + out.behind(&last, 0) + 1;
             out.first.push(next);
@@ -46,7 +47,7 @@ impl Sets {
         self.binomials[i * self.candidates + c]
     }
 
-    /// How many sets are before an ascending one, of sets with `more` smaller members each.
+    /// Number of sets before an ascending one, among sets with `more` smaller members each.
     fn behind(&self, set: &[usize], more: usize) -> usize {
         set.iter().zip(1 + more..).map(|(&c, i)| self.binomial(c, i)).sum()
     }
@@ -59,27 +60,27 @@ impl Sets {
         self.bits[place / 64].load(Ordering::Relaxed) >> (place % 64) & 1 == 1
     }
 
-    /// Takes up an ascending set of at least one.
+    /// Adds an ascending set, which must not be empty.
     pub(crate) fn add(&self, set: &[usize]) {
         let place = self.place(set);
         self.bits[place / 64].fetch_or(1 << (place % 64), Ordering::Relaxed);
     }
 
-    /// True if an ascending set of at least one is among them.
+    /// True if the collection contains an ascending set, which must not be empty.
     pub(crate) fn contains(&self, set: &[usize]) -> bool {
         self.bit(self.place(set))
     }
 
-    /// True if there are none.
+    /// True if the collection is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.bits.iter().all(|word| word.load(Ordering::Relaxed) == 0)
     }
 
-    /// The candidates, ascending, of which each with an ascending set of at least one makes one of these;
-    /// members of the set do where it is one itself. Sets of so many more must be possible.
+    /// Candidates, ascending, whose union with an ascending set (not empty) is in the collection;
+    /// members of the set are included if the set is. Sets of one more member must be within the limit.
     pub(crate) fn completing<'a>(&'a self, set: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
         let itself = self.contains(set);
-        // of the set with a member before all others; this one goes up from there
+        // index of the set with a new first member; it rises with the candidate
         let mut others = self.first[set.len()] + self.behind(set, 1);
         let mut smaller = 0;
         (0..self.candidates).filter(move |&c| {
@@ -98,14 +99,14 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// Every set of up to so many, by bit masks.
+    /// All sets of up to `most` candidates, by bit masks.
     fn every(candidates: usize, most: usize) -> Vec<Vec<usize>> {
         let members = |mask: u32| (0..candidates).filter(|c| mask >> c & 1 == 1).collect::<Vec<_>>();
         (1..1u32 << candidates).map(members).filter(|set| set.len() <= most).collect()
     }
 
-    /// Against a tree of sets: what is added is there, nothing else is, and what completes a set does; a bit
-    /// for each.
+    /// Collection against a tree of sets: added sets are contained, others are not, and completions are
+    /// right. One bit per set.
     #[test]
     fn sets_are_those_added() {
         for (candidates, most) in [(1, 1), (1, 4), (5, 2), (7, 3), (6, 6), (4, 9), (10, 5)] {
@@ -136,7 +137,7 @@ mod tests {
         }
     }
 
-    /// Places of many candidates: the last set of each size is the last place.
+    /// Indices for many candidates: the last set of each size has the last index.
     #[test]
     fn places_of_many_candidates() {
         for (candidates, most, all) in [(1000, 2, 500_500), (24, 7, 536_154), (300, 3, 4500250)] {

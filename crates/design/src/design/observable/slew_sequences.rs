@@ -1,11 +1,11 @@
-//! Fewest positions where the way between them counts: torquer errors act in every turn, so a scheme is a
-//! walk over candidates, and a position adds rows that depend on all turns before it.
+//! Fewest positions where torquer errors act in every turn. A scheme is then a slew sequence over
+//! candidates: the rows of a position depend on all turns before it.
 //!
-//! In n a position at `C_i`, with `J` the sum of what the turns so far have left in `psi^n`, adds the rows
-//! `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most. Walks are taken
-//! depth first with the echelon bases of their beginnings; a walk ends where even six more rows in every
-//! position to come could not do. A walk that is found is exact whatever the prime; that no shorter one does
-//! is wrong with a probability that is stated.
+//! In n a position at `C_i`, with `J` the sum of the effects of all turns so far on `psi^n`, adds the
+//! rows `[r_psi | r_psi J + B_i]` of the local chain, `B_i = r_eps E_i + r_a A_i`: six at most.
+//! Sequences are enumerated depth first with the echelon bases of their beginnings. A branch ends where
+//! even six more rows in every further position are not enough. A sequence that is found is exact for
+//! any prime; the statement that no shorter one exists has a stated error bound.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -17,8 +17,8 @@ use obsdeg_core::model::{
     parse_attitude,
 };
 use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -28,25 +28,25 @@ use crate::design::request::limits::PROOF;
 
 /// Name and version of the JSON layout.
 const WALKS_SCHEMA: &str = "obsdeg.walks/1";
-/// Most walks of one length that are examined.
+/// Largest number of slew sequences of one length that are examined.
 const MOST_WALKS: u64 = 100_000_000;
-/// Most candidates: every turn between two of them is a position of one tour.
+/// Largest number of candidates: every turn between two of them is a position of the tour.
 const MOST_TURNS: usize = 900;
-/// Walks that go on from every length when one that does is sought.
+/// Beam width: sequences of each length that are extended in the search for a short one.
 const BEAM: usize = 400;
-/// Longest walk that is sought.
+/// Largest number of positions of a slew sequence.
 const LONGEST: usize = 40;
-/// Walks between two questions whether to go on.
+/// Number of slew sequences between two calls of the cancellation callback.
 const PATIENCE: u64 = 256;
 
-/// What is to be found.
+/// Options of a search for the shortest slew sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WalkOptions {
-    /// What to choose from.
+    /// Candidate attitudes.
     pub candidates: Candidates,
-    /// Coefficients or families that must be observable; none: all.
+    /// Coefficients or families that must be observable; if empty, all coefficients.
     pub required: Vec<String>,
-    /// The largest turn from one position to the next, in degrees.
+    /// Largest turn from one position to the next, in degrees.
     pub most_turn_deg: f64,
     /// Seed of all random choices.
     pub seed: u64,
@@ -100,27 +100,27 @@ pub struct Walks {
     pub seed: u64,
 }
 
-/// The rows of every candidate and turn in one field.
-struct InField {
+/// Rows of all candidates and turns in one field.
+struct TourRows {
     field: Field,
-    /// Rows of the local chain on psi (3 each), with their rows on the coefficients, by candidate.
+    /// Rows of the local chain on psi (3 each), by candidate; `rows` are theirs on the coefficients.
     of_psi: Vec<[u64; 3]>,
     rows: Vec<Vec<Vec<u64>>>,
-    /// What a turn leaves in `psi^n` (3 rows on the coefficients), by the place of the turn.
+    /// Effect of a turn on `psi^n` (3 rows on the coefficients), by the index of the turn.
     turns: Vec<[Vec<u64>; 3]>,
     coefficients: usize,
 }
 
-/// The way so far.
+/// Slew sequence with its echelon basis.
 #[derive(Clone)]
-struct Walk {
+struct SlewSequence {
     places: Vec<usize>,
-    /// `J`.
+    /// Sum `J` of the effects of the turns so far on `psi^n`.
     torqued: [Vec<u64>; 3],
     basis: Echelon,
 }
 
-impl InField {
+impl TourRows {
     fn new(tour: &Platform, values: &RandomValues, first_visit: &[usize], turn_at: &[usize]) -> Self {
         let sample = values.sample(tour.scheme(), 1);
         let (f, point) = (sample.point.ring, &sample.point);
@@ -148,16 +148,16 @@ impl InField {
         }
     }
 
-    fn start(&self, place: usize) -> Walk {
+    fn start(&self, place: usize) -> SlewSequence {
         let zero = vec![0; self.coefficients];
         let torqued = [zero.clone(), zero.clone(), zero];
         let basis = Echelon::new(self.field, 3 + self.coefficients);
-        let mut walk = Walk { places: Vec::new(), torqued, basis };
+        let mut walk = SlewSequence { places: Vec::new(), torqued, basis };
         self.arrive(&mut walk, place);
         walk
     }
 
-    fn arrive(&self, walk: &mut Walk, place: usize) {
+    fn arrive(&self, walk: &mut SlewSequence, place: usize) {
         let f = &self.field;
         walk.places.push(place);
         let mut row = vec![0; 3 + self.coefficients];
@@ -170,7 +170,7 @@ impl InField {
         }
     }
 
-    fn go(&self, walk: &Walk, turn: usize, to: usize) -> Walk {
+    fn go(&self, walk: &SlewSequence, turn: usize, to: usize) -> SlewSequence {
         let mut next = walk.clone();
         for (sum, left) in next.torqued.iter_mut().zip(&self.turns[turn]) {
             for (x, y) in sum.iter_mut().zip(left) {
@@ -182,25 +182,25 @@ impl InField {
     }
 }
 
-/// Everything that is shared.
-struct Space {
-    fields: [InField; 2],
-    /// Of every candidate: `(turn, candidate)`.
+/// Data of a search, shared by all its branches.
+struct SequenceSearch {
+    fields: [TourRows; 2],
+    /// Candidates that one turn leads to, by candidate: `(turn, candidate)`.
     neighbours: Vec<Vec<(usize, usize)>>,
     required: Vec<usize>,
-    /// The rows that a position adds at most.
+    /// Largest number of rows that a position adds.
     most: usize,
 }
 
-impl Space {
+impl SequenceSearch {
     fn does(&self, basis: &Echelon) -> bool {
         self.required.iter().all(|c| basis.has_unit(3 + c))
     }
 
-    /// A walk of `length` that goes on from `walk` and does.
+    /// First sufficient slew sequence of `length` positions that begins with `walk`.
     fn search(
         &self,
-        walk: &Walk,
+        walk: &SlewSequence,
         length: usize,
         seen: &AtomicU64,
         going: &(dyn Fn() -> bool + Sync),
@@ -222,13 +222,14 @@ impl Space {
             self.search(&self.fields[0].go(walk, turn, to), length, seen, going)
         };
         if walk.places.len() < 4 {
-            self.neighbours[here].par_iter().find_map_first(next)
+            let neighbours = &self.neighbours[here];
+            parallel::find_first(neighbours.len(), |i| next(&neighbours[i]))
         } else {
             self.neighbours[here].iter().find_map(next)
         }
     }
 
-    /// The same in the second field.
+    /// True if the sequence is sufficient in the second field.
     fn does_elsewhere(&self, places: &[usize]) -> bool {
         let field = &self.fields[1];
         let Some((&first, rest)) = places.split_first() else { return false };
@@ -241,8 +242,9 @@ impl Space {
         self.does(&walk.basis)
     }
 
-    /// The way through some places, in the first field; a place that no turn leads to begins anew.
-    fn along(&self, places: &[usize]) -> Walk {
+    /// Sequence through the given candidates in the first field; a candidate that no turn leads to
+    /// begins a new one.
+    fn along(&self, places: &[usize]) -> SlewSequence {
         let field = &self.fields[0];
         let mut walk = field.start(places[0]);
         for &to in &places[1..] {
@@ -255,7 +257,7 @@ impl Space {
         walk
     }
 
-    /// The number of walks of so many positions.
+    /// Number of slew sequences of `length` positions.
     fn walks(&self, length: usize) -> u64 {
         let n = self.neighbours.len();
         let mut ends = vec![1u64; n];
@@ -269,10 +271,11 @@ impl Space {
         ends.into_iter().fold(0, u64::saturating_add)
     }
 
-    /// A short walk that does, by the best of many at every length.
-    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<Walk> {
+    /// Short sufficient slew sequence, by beam search.
+    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<SlewSequence> {
         let mut rng = SplitMix64::new(seed);
-        let mut beam: Vec<Walk> = (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
+        let mut beam: Vec<SlewSequence> =
+            (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
         for _ in 1..LONGEST {
             if let Some(done) = beam.iter().find(|w| self.does(&w.basis)) {
                 return Some(done.clone());
@@ -280,11 +283,11 @@ impl Space {
             if !going() {
                 return None;
             }
-            let grown = |walk: &Walk| -> Vec<Walk> {
+            let grown = |walk: &SlewSequence| -> Vec<SlewSequence> {
                 let here = walk.places[walk.places.len() - 1];
                 self.neighbours[here].iter().map(|&(turn, to)| self.fields[0].go(walk, turn, to)).collect()
             };
-            let next: Vec<Walk> = beam.par_iter().flat_map_iter(grown).collect();
+            let next: Vec<SlewSequence> = parallel::map(beam.len(), |i| grown(&beam[i])).concat();
             let mut order: Vec<(usize, u64, usize)> = next
                 .iter()
                 .enumerate()
@@ -297,9 +300,9 @@ impl Space {
     }
 }
 
-/// Finds the fewest positions of a walk over candidates that make the required coefficients observable under
-/// the assumptions of `base`, whose carry is inertial and whose torquer errors are unknown. `going` is asked
-/// whether to go on.
+/// Finds the fewest positions of a slew sequence over candidates that makes the required coefficients
+/// observable under the assumptions of `base`. Its carry must be inertial and its torquer errors
+/// unknown. Stops when `going` returns false.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -350,16 +353,16 @@ pub fn walks(
     let [first, second] = values;
     let (first, second) = (first.map_err(EnsembleError::from)?, second.map_err(EnsembleError::from)?);
     let order = first.roots().order;
-    let fields = [first, second].map(|v| InField::new(&platform, &v, &first_visit, &turn_at));
+    let fields = [first, second].map(|v| TourRows::new(&platform, &v, &first_visit, &turn_at));
     let most = fields[0].of_psi.len();
-    let space = Space { fields, neighbours, required, most };
+    let space = SequenceSearch { fields, neighbours, required, most };
     let counting_bound = space.required.len().div_ceil(most).max(1);
     let claim = |length: usize| Claim {
         unknowns: 3 + d,
         decisions: space.required.len(),
         order,
         row_degree: 4,
-        // as of a verdict, and of so many turns by parts of half a turn
+        // as for a verdict, with turns given as multiples of half a turn
         row_bits: 60.0 + (length as f64).log2(),
     };
     let whole = space.along(&tour);
@@ -405,9 +408,9 @@ pub fn walks(
             stopped.fetch_or(!go, Ordering::Relaxed);
             go
         };
-        let found = (0..space.neighbours.len())
-            .into_par_iter()
-            .find_map_first(|c| space.search(&space.fields[0].start(c), length, &seen, &going));
+        let found = parallel::find_first(space.neighbours.len(), |c| {
+            space.search(&space.fields[0].start(c), length, &seen, &going)
+        });
         if let Some(found) = found {
             best = Some(found);
             break;
@@ -431,15 +434,15 @@ pub fn walks(
     Ok(out)
 }
 
-/// The walk as a scheme under the assumptions of `base`; `None` where none was found.
+/// Slew sequence as a scheme under the assumptions of `base`; `None` where none was found.
 pub fn scheme_of_walk(found: &Walks, base: &Scheme) -> Option<Scheme> {
     let attitudes: Result<Vec<Euler>, _> = found.angles.iter().map(|a| parse_attitude(a)).collect();
     let positions = Scheme::of_angles(attitudes.ok()?).positions;
     (!positions.is_empty()).then(|| Scheme { positions, path: Some(Path::OneAxis), ..base.clone() })
 }
 
-/// Of every candidate those that a turn of at most so many degrees leads to, and a tour that takes every such
-/// turn.
+/// Candidates that a turn of at most `most_turn_deg` degrees leads to, by candidate, and a tour that
+/// contains every such turn.
 fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>) {
     let matrices: Vec<Matrix3<f64>> = attitudes.iter().map(c_n_f64).collect();
     let angle = |i: usize, j: usize| {
@@ -450,7 +453,7 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
         (0..attitudes.len()).filter(|&j| j != i && angle(i, j) <= most_turn_deg + 1e-6).collect()
     };
     let neighbours: Vec<Vec<usize>> = (0..attitudes.len()).map(near).collect();
-    // Hierholzer: as many turns lead to a candidate as away from it
+    // Hierholzer: every candidate has as many turns to it as away from it
     let mut left = neighbours.clone();
     let mut tour = Vec::new();
     for start in 0..attitudes.len() {
@@ -469,8 +472,8 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
     (neighbours, tour)
 }
 
-/// True if the way between positions counts for `base`: then [`walks`] finds schemes, and no search over sets
-/// does.
+/// True if torquer errors act in the turns of `base`: then [`walks`] finds schemes, and no search over
+/// sets does.
 pub fn is_walk(base: &Scheme) -> bool {
     base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)
 }

@@ -1,9 +1,9 @@
-//! Turning the platform axes under a scheme: 24 rotations P, `C_c^n -> C_c^n P`, that map schemes to schemes
-//! of equal worth.
+//! Turns of the platform axes under a scheme: 24 rotations P, `C_c^n -> C_c^n P`, that map schemes to
+//! equally good ones.
 //!
-//! `g^c` becomes `P^T g^c`. Where every column of `C P E(P^T g)` is, up to sign, a column of `C E(g)`, the
-//! new scheme is the old one with the coefficients renamed: D_SX for D_IY, say. Then it is enough to search
-//! schemes whose first position is one of each orbit.
+//! `g^c` becomes `P^T g^c`. Where every column of `C P E(P^T g)` is, up to sign, a column of `C E(g)`,
+//! the new scheme is the old one with the coefficients renamed, for example D_SX for D_IY. Then a
+//! search needs only schemes whose first position is the first of an orbit.
 
 use std::collections::HashMap;
 
@@ -11,20 +11,20 @@ use obsdeg_exact::{Field, SplitMix64};
 
 use obsdeg_core::model::{Matrix3, Platform, earth_rate_in, product};
 
-/// The orbits of the candidates.
+/// Orbits of the candidates.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Symmetry {
-    /// The number of rotations that map candidates to candidates and coefficients to equal coefficients.
+    /// Number of rotations that map candidates to candidates and coefficients to equal coefficients.
     pub order: usize,
-    /// The orbit of every candidate, counted from 0.
+    /// Orbit of every candidate: index from 0.
     pub orbit: Vec<usize>,
-    /// Where every one of these rotations takes every candidate; the identity where there is no other.
+    /// Image of every candidate under each of these rotations; the identity if there is no other.
     pub maps: Vec<Vec<usize>>,
 }
 
 impl Symmetry {
-    /// The symmetry of candidates given by their `C_c^n` in some fields, all of which must agree;
-    /// `same(i, j)` says whether coefficients i and j count alike.
+    /// Symmetry of candidates given by their `C_c^n` in some fields, all of which must agree; `same(i,
+    /// j)` is true if coefficients i and j are equivalent for the search.
     pub fn new(
         fields: &[(Field, &[Matrix3<u64>])],
         platform: &Platform,
@@ -64,29 +64,29 @@ impl Symmetry {
         Self { order: maps.len(), orbit, maps }
     }
 
-    /// No symmetry.
+    /// Trivial symmetry: the identity alone.
     pub fn none(candidates: usize) -> Self {
         Self { order: 1, orbit: (0..candidates).collect(), maps: vec![(0..candidates).collect()] }
     }
 
-    /// How many schemes a searched one stands for, as a fraction: it has `order` images (counted once for
-    /// every turn of the axes); of these so many are searched, where only the smallest of a set must be the
-    /// first of its orbit. A turn of the axes that is not the identity moves every attitude, so one turn
-    /// brings each member of the lowest orbit to its first.
+    /// Number of searched images of a set, out of its `order` images (one per turn of the axes, counted
+    /// separately). Only images whose smallest member is the first of its orbit are searched. A turn
+    /// other than the identity moves every attitude, so one turn brings each member of the lowest orbit
+    /// to its first.
     pub(crate) fn searched_images(&self, set: &[usize]) -> usize {
         let lowest = set.iter().map(|&c| self.orbit[c]).min();
         let members = |(i, c): (usize, &usize)| Some(self.orbit[*c]) == lowest && !set[..i].contains(c);
         set.iter().enumerate().filter(|&x| members(x)).count()
     }
 
-    /// The first candidate of every orbit.
+    /// First candidate of every orbit.
     pub fn representatives(&self) -> Vec<usize> {
         let orbits = self.orbit.iter().max().map_or(0, |m| m + 1);
         (0..orbits).filter_map(|o| self.orbit.iter().position(|x| *x == o)).collect()
     }
 }
 
-/// The 24 signed permutation matrices of determinant 1.
+/// All 24 signed permutation matrices of determinant 1.
 fn rotations(f: &Field) -> Vec<Matrix3<u64>> {
     let mut out = Vec::new();
     for (permutation, even) in [
@@ -112,8 +112,8 @@ fn rotations(f: &Field) -> Vec<Matrix3<u64>> {
     out
 }
 
-/// True if turning the platform axes by `p` renames the coefficients, those that count alike among
-/// themselves. The columns (of the drift and of Z) are polynomials in C: equal at a random matrix, they are
+/// True if turning the platform axes by `p` renames the coefficients, equivalent ones among themselves.
+/// The columns (of the drift and of Z) are polynomials in C, so columns equal at a random matrix are
 /// equal.
 fn renames(f: &Field, platform: &Platform, p: &Matrix3<u64>, same: &dyn Fn(usize, usize) -> bool) -> bool {
     let mut rng = SplitMix64::new(0x7261_6e64_6f6d_2043);

@@ -1,4 +1,4 @@
-//! The total time divided among the positions of a sequence: dwells of their own, in steps of the samples.
+//! Division of the total time among the positions of a sequence, in steps of the samples.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use crate::design::measure::evaluator::{Dwelling, Evaluator};
 use crate::design::measure::stop::Stop;
 use crate::design::request::error::DesignError;
 
-/// Times that are moved from one position to another, as parts of an equal dwell: from the largest to the
-/// smallest, or to one step.
+/// Divisor of an equal dwell for the smallest time moved from one position to another (at least one
+/// step).
 const FINEST: usize = 256;
 
-/// Dwells of the positions of `path`, whose candidates are those of `evaluator` in this order, that make the
-/// criterion smaller than equal ones: multiples of the time between samples, none without a sample, of the
-/// same sum. None of them is made better by moving the finest part from one position to another. `allowed`
-/// says whether dwells keep what else is wanted. `None` when equal ones are as good.
+/// Dwells of the positions of `path` with a smaller criterion than equal ones; candidates of
+/// `evaluator` are its positions in order. Dwells are multiples of the time between samples, at least
+/// one, with the same sum. Moving the smallest time from one position to another makes none of them
+/// better. `allowed` is true if dwells keep the constraints. `None` if equal dwells are as good.
 ///
 /// # Errors
 /// [`DesignError::Filter`].

@@ -1,4 +1,4 @@
-//! What makes a found sequence better: angles, dwells.
+//! Polishing of a found sequence: angles and dwells.
 
 pub(crate) mod divide;
 pub(crate) mod refine;

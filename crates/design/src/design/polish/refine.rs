@@ -1,5 +1,5 @@
-//! Continuous refinement of a sequence: its Euler angles are moved to make the criterion smaller (COBYLA: M.
-//! J. D. Powell, 1994).
+//! Continuous refinement of the Euler angles of a sequence for a smaller criterion (COBYLA: M. J. D.
+//! Powell, 1994).
 
 use cobyla::{RhoBeg, StopTols, minimize};
 use obsdeg_core::model::{Angle, Euler, Gimbals, c_n_f64};
@@ -8,16 +8,16 @@ use crate::design::measure::criterion::Criterion;
 use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::stop::Stop;
 
-/// Evaluations of the criterion.
+/// Largest number of evaluations of the criterion.
 const EVALUATIONS: usize = 20_000;
-/// First changes of the angles, in degrees.
+/// First changes of the angles, in degrees, one run each.
 const STEPS: [f64; 3] = [20.0, 5.0, 1.0];
-/// Angles are rounded to this many 1e-9 degrees.
+/// Step to which angles are rounded, in 1e-9 degrees.
 const ROUNDED: i64 = 10_000_000;
 
-/// A sequence of attitudes near `start` with a smaller criterion, within the gimbal limits and `allowed`
-/// (given the evaluator of the attitudes, which are its candidates); angles in hundredths of a degree. `path`
-/// goes through them. `None` when there is none.
+/// Sequence of attitudes near `start` with a smaller criterion, within the gimbal limits, angles in
+/// hundredths of a degree. `allowed` receives the evaluator whose candidates are the attitudes; `path`
+/// is the sequence through them. `None` if none was found.
 pub(crate) fn refine(
     evaluator: &Evaluator,
     start: &[Euler],
@@ -41,7 +41,7 @@ pub(crate) fn refine(
     let mut x: Vec<f64> = start.iter().flat_map(degrees).collect();
     let first = value(start);
     let mut best = first;
-    // a wall for what is not allowed: ten times the value at the start
+    // penalty outside the constraints: ten times the value at the start
     let objective = |x: &[f64], _: &mut ()| value(&euler(x, 1)).min(10.0 * first);
     let no_constraints: [fn(&[f64], &mut ()) -> f64; 0] = [];
     let bounds = vec![(-400.0, 400.0); x.len()];

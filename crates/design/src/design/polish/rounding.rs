@@ -1,4 +1,4 @@
-//! A scheme moved on a grid of rounded angles.
+//! Local search for a scheme on a grid of rounded angles.
 
 use obsdeg_core::model::{Angle, Euler, Gimbals, c_n_f64};
 use obsdeg_exact::SplitMix64;
@@ -10,63 +10,64 @@ use crate::design::search::constraints::Constraints;
 
 /// Half a turn in 1e-9 degrees.
 const HALF: i64 = 180_000_000_000;
-/// The largest move of an angle, in 1e-9 degrees.
+/// Largest move of an angle, in 1e-9 degrees.
 const FARTHEST: i64 = HALF / 4;
-/// What rounding is held against: hundredths of a degree.
+/// Fine step for comparison, in 1e-9 degrees: hundredths of a degree.
 const FINE: i64 = 10_000_000;
-/// Rounds over all positions at one size of moves, and over all sizes, at most.
+/// Largest number of rounds over all positions with one size of moves, and of passes over all sizes.
 const ROUNDS: usize = 40;
 const CYCLES: usize = 6;
 
-/// A scheme that was moved.
+/// Scheme after the local search.
 #[derive(Debug, Clone)]
-pub(crate) struct Moved {
-    /// How far limits are missed.
+pub(crate) struct MovedScheme {
+    /// Violation of the limits, dimensionless; 0 when kept.
     pub(crate) violation: f64,
-    /// The criterion.
+    /// Criterion of the scheme.
     pub(crate) value: f64,
     pub(crate) scheme: Vec<Euler>,
-    /// Schemes that were evaluated on the way.
+    /// Number of schemes evaluated.
     pub(crate) examined: u64,
 }
 
-impl Moved {
+impl MovedScheme {
     pub(crate) fn order(&self, other: &Self) -> std::cmp::Ordering {
         self.violation.total_cmp(&other.violation).then(self.value.total_cmp(&other.value))
     }
 }
 
-/// A scheme moved on two grids of angles.
+/// Results of the local search on two grids of angles.
 pub(crate) struct OnGrids {
-    /// In hundredths of a degree.
-    pub(crate) finer: Moved,
-    /// In multiples of the step asked for.
-    pub(crate) on_step: Moved,
+    /// Result on the grid of hundredths of a degree.
+    pub(crate) finer: MovedScheme,
+    /// Result on the grid of the step asked for.
+    pub(crate) on_step: MovedScheme,
 }
 
-/// One move of angles, in 1e-9 degrees: by how much, on the grid of which step.
+/// Move of angles by `by` on the grid of `step`, both in 1e-9 degrees.
 #[derive(Clone, Copy)]
 struct GridMove {
     by: i64,
     step: i64,
 }
 
-/// What schemes are moved by, and within.
+/// Local search for rounded schemes: evaluator, limits and criterion.
 pub(crate) struct Moves<'a> {
     pub(crate) evaluator: &'a Evaluator,
     pub(crate) gimbals: &'a Gimbals,
     pub(crate) constraints: &'a Constraints,
     pub(crate) criterion: &'a Criterion,
-    /// Stops when it returns false.
+    /// Stops when the callback returns false.
     pub(crate) going: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// The multiple of `step` that is nearest.
+/// Nearest multiple of `step` 1e-9 degrees.
 pub(crate) fn rounded(angle: &Angle, step: i64) -> Angle {
     Angle::from_nanodeg((angle.nanodeg() as f64 / step as f64).round() as i64 * step)
 }
 
-/// `k` attitudes with angles that are multiples of `step`; `None` where the gimbals reach few of them.
+/// `k` random attitudes with angles that are multiples of `step`; `None` where the gimbals reach few of
+/// them.
 pub(crate) fn random(k: usize, step: i64, gimbals: &Gimbals, rng: &mut SplitMix64) -> Option<Vec<Euler>> {
     const TRIES: usize = 1000;
     let mut within = |most: i64| {
@@ -78,17 +79,17 @@ pub(crate) fn random(k: usize, step: i64, gimbals: &Gimbals, rng: &mut SplitMix6
     (out.len() == k).then_some(out)
 }
 
-/// Attitudes around one: every angle moved by `by`, either way or not, and a multiple of `step` as before.
+/// Neighbours of an attitude: angles moved by `by` up or down, or unchanged, to multiples of `step`.
 fn around(euler: &Euler, by: i64, step: i64) -> impl Iterator<Item = Euler> {
     let at = euler.each_ref().map(Angle::nanodeg);
     (0..27).filter(|i| *i != 13).filter_map(move |i| {
-        let ways: [i64; 3] = [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1];
-        within_a_turn(std::array::from_fn(|axis| at[axis] + ways[axis] * by), step)
+        let signs: [i64; 3] = [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1];
+        within_a_turn(std::array::from_fn(|axis| at[axis] + signs[axis] * by), step)
     })
 }
 
-/// The same attitude with beta up to a quarter of a turn and the others up to half of one, where half a turn
-/// is a multiple of `step`; where it is not, none beyond them.
+/// Same attitude with beta within a quarter of a turn and the others within half a turn. `None` for
+/// angles beyond if half a turn is no multiple of `step`.
 fn within_a_turn(at: [i64; 3], step: i64) -> Option<Euler> {
     let wrapped = |x: i64| {
         if x > HALF {
@@ -112,29 +113,30 @@ fn within_a_turn(at: [i64; 3], step: i64) -> Option<Euler> {
 }
 
 impl Moves<'_> {
-    /// A scheme moved with angles in hundredths of a degree, and with multiples of `step` 1e-9 degrees.
+    /// Local search from `start` with angles in hundredths of a degree, and in multiples of `step` 1e-9
+    /// degrees.
     pub(crate) fn rounded(&self, start: &[Euler], step: i64) -> OnGrids {
         let to_step = |scheme: &[Euler]| -> Vec<Euler> {
             scheme.iter().map(|euler| euler.each_ref().map(|angle| rounded(angle, step))).collect()
         };
         let first = self.moved(&to_step(start), step);
         if step <= FINE {
-            return OnGrids { finer: first.clone(), on_step: Moved { examined: 0, ..first } };
+            return OnGrids { finer: first.clone(), on_step: MovedScheme { examined: 0, ..first } };
         }
         let finer = self.moved(&first.scheme, FINE);
         let again = self.moved(&to_step(&finer.scheme), step);
         let examined = first.examined + again.examined;
         let best = if again.order(&first).is_lt() { again } else { first };
-        OnGrids { finer, on_step: Moved { examined, ..best } }
+        OnGrids { finer, on_step: MovedScheme { examined, ..best } }
     }
 
-    /// A scheme moved on the grid of multiples of `step` 1e-9 degrees: one position after the other goes
-    /// where the criterion is smallest around it, by smaller and smaller moves, until none helps.
-    fn moved(&self, start: &[Euler], step: i64) -> Moved {
+    /// Local search on the grid of multiples of `step` 1e-9 degrees. One position after the other moves
+    /// to the best attitude around it, by smaller and smaller moves, until no move helps.
+    fn moved(&self, start: &[Euler], step: i64) -> MovedScheme {
         let mut here = self.evaluator.along(&start.iter().map(c_n_f64).collect::<Vec<_>>());
         let order: Vec<Stop> = (0..start.len()).map(Stop::from).collect();
         let mut root = Vec::new();
-        let mut best = Moved { examined: 1, ..self.scored(&here, &order, start.to_vec(), &mut root) };
+        let mut best = MovedScheme { examined: 1, ..self.scored(&here, &order, start.to_vec(), &mut root) };
         let sizes = std::iter::successors(Some(step), |by| Some(by * 2));
         let farthest = sizes.take_while(|by| *by <= FARTHEST).last().unwrap_or(step);
         for _ in 0..CYCLES {
@@ -159,12 +161,12 @@ impl Moves<'_> {
         best
     }
 
-    /// The position at `place` goes where the criterion is smallest around it, if that makes the scheme
-    /// better.
+    /// Moves the position at `place` to the attitude around it with the smallest criterion, if that
+    /// improves the scheme.
     fn move_one(
         &self,
         here: &mut Evaluator,
-        best: &mut Moved,
+        best: &mut MovedScheme,
         place: usize,
         GridMove { by, step }: GridMove,
         root: &mut Vec<f64>,
@@ -188,8 +190,14 @@ impl Moves<'_> {
         }
     }
 
-    /// The criterion of a scheme, and how far limits are missed; not yet counted as evaluated.
-    fn scored(&self, here: &Evaluator, sequence: &[Stop], scheme: Vec<Euler>, root: &mut Vec<f64>) -> Moved {
+    /// Criterion of a scheme and violation of the limits; `examined` is not counted here.
+    fn scored(
+        &self,
+        here: &Evaluator,
+        sequence: &[Stop],
+        scheme: Vec<Euler>,
+        root: &mut Vec<f64>,
+    ) -> MovedScheme {
         let state = here.state_of(sequence);
         let violation = if scheme.iter().all(|e| self.gimbals.reach(e)) {
             self.constraints.violation(here, sequence, &state, root)
@@ -197,6 +205,6 @@ impl Moves<'_> {
             f64::INFINITY
         };
         let value = here.value(&state, self.criterion, root);
-        Moved { violation, value, scheme, examined: 0 }
+        MovedScheme { violation, value, scheme, examined: 0 }
     }
 }

@@ -1,4 +1,4 @@
-//! The attitudes that a design may choose from.
+//! Candidate attitudes of a design.
 
 use obsdeg_core::model::{
     Angle, Euler, Gimbals, Scheme, angles_text, cardinal, cardinal_name, cardinal_names,
@@ -7,12 +7,12 @@ use obsdeg_core::model::{
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_CANDIDATES;
 
-/// Named attitudes.
+/// Candidate attitudes with their names.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Candidates {
-    /// Their names.
+    /// Names of the attitudes.
     pub names: Vec<String>,
-    /// Their Euler angles.
+    /// Euler angles of the attitudes.
     pub attitudes: Vec<Euler>,
 }
 
@@ -24,8 +24,8 @@ impl Candidates {
         Self { names, attitudes }
     }
 
-    /// All attitudes whose Euler angles are multiples of `step` 1e-9 degrees, each once: beta from -90 to 90
-    /// degrees, gamma = 0 where beta = +-90 degrees.
+    /// All attitudes whose Euler angles are multiples of `step` 1e-9 degrees, each once: beta from -90
+    /// to 90 degrees, gamma = 0 where beta = +-90 degrees.
     ///
     /// # Errors
     /// [`DesignError::Grid`] when `step` does not divide 90 degrees.
@@ -54,7 +54,7 @@ impl Candidates {
         Ok(out)
     }
 
-    /// The positions of a scheme.
+    /// Positions of a scheme as candidates.
     ///
     /// # Errors
     /// [`DesignError::Rotation`] for a rotating segment.
@@ -74,9 +74,9 @@ impl Candidates {
         self.attitudes.push(attitude);
     }
 
-    /// Those that the gimbals reach, with angles within the limits, and the names of the others. An attitude
-    /// whose own angles lie beyond them has those with the shortest gimbal way from (0, 0, 0), and their name
-    /// where it was named by its angles.
+    /// Candidates that the gimbals reach, with angles within the limits, and the names of the others.
+    /// Angles beyond the limits are replaced by those with the shortest gimbal path from (0, 0, 0); a
+    /// name made of the old angles is replaced too.
     pub fn within(self, gimbals: &Gimbals) -> (Self, Vec<String>) {
         let (mut reached, mut beyond) = (Self::default(), Vec::new());
         let zero: Euler = std::array::from_fn(|_| Angle::from_degrees(0));
@@ -94,7 +94,7 @@ impl Candidates {
         (reached, beyond)
     }
 
-    /// In another order.
+    /// Candidates in another order.
     pub(crate) fn permuted(&self, order: &[usize]) -> Self {
         Self {
             names: order.iter().map(|&i| self.names[i].clone()).collect(),

@@ -1,4 +1,4 @@
-//! Why no scheme is found.
+//! Errors of a design.
 
 use obsdeg_core::degree::EnsembleError;
 use obsdeg_core::model::SchemeError;
@@ -8,168 +8,173 @@ use obsdeg_evidence::simulation::SimulationError;
 use crate::design::nearest::Nearest;
 use crate::design::request::limits::{MAX_CANDIDATES, MAX_TURNING, MAX_UNKNOWNS, MOST_EXTENSIONS};
 
-/// Why no scheme is found.
+/// Error of a design.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
-    /// Nothing to choose from, or too much.
+    /// No candidates, or too many.
     #[error("{found} candidates; expected at least one and at most {MAX_CANDIDATES}")]
     Candidates {
-        /// Their number.
+        /// Number of candidates.
         found: usize,
     },
-    /// Too many turns between candidates.
+    /// Too many candidates where turns take time.
     #[error("{found} candidates with slews; expected at most {}", MAX_TURNING)]
     Pairs {
-        /// Their number.
+        /// Number of candidates.
         found: usize,
     },
-    /// Steps that do not fit.
+    /// Grid step that does not divide 90 degrees.
     #[error("a grid of {found} degrees; expected a step that divides 90 degrees, as in grid:45")]
     Grid {
-        /// The step.
+        /// Step in degrees.
         found: String,
     },
-    /// A number of positions that cannot be.
+    /// Number of positions beyond the range 1 to 100.
     #[error("{found} positions; expected 1 to 100")]
     Positions {
-        /// The number asked for.
+        /// Number of positions that was asked for.
         found: usize,
     },
-    /// A number of added positions that is not compared.
+    /// Number of added positions other than 1 and 2.
     #[error("{found} more positions; expected 1 or 2")]
     Added {
-        /// The number asked for.
+        /// Number of added positions that was asked for.
         found: usize,
     },
-    /// Too many extensions of a scheme.
+    /// More extensions of a scheme than are compared.
     #[error(
         "{found} extensions or more; expected at most {}: fewer candidates, or one more position",
         MOST_EXTENSIONS
     )]
     Extensions {
-        /// Their number.
+        /// Number of extensions, or a lower bound on it.
         found: usize,
     },
-    /// Ageing without a calibration.
+    /// Number of days without a calibration from which they count.
     #[error("days are counted from a calibration; expected one beforehand")]
     NoCalibration,
-    /// No extension keeps the limits.
+    /// No extension within the limits of time.
     #[error("no extension by the candidates keeps the limits: {limits}")]
     NoExtension {
-        /// The limits, in words.
+        /// Limits, in words.
         limits: String,
     },
-    /// The drift itself is constant at one position only.
+    /// Unknown `drift` in place of coefficients: the drift is constant at a single position only.
     #[error("a design needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]
     Drift,
-    /// A rotating segment has no place among candidates.
+    /// Rotating segment among the candidates.
     #[error("a design chooses among positions; found the rotating segment `{name}`")]
     Rotation {
-        /// The segment.
+        /// Name of the segment.
         name: String,
     },
-    /// A generic angle has no sigma.
+    /// Generic angle: it has no sigma.
     #[error("the angle `{name}` is generic; expected numbers for a design")]
     GenericAngle {
-        /// Its name.
+        /// Name of the angle.
         name: String,
     },
     /// No certificate of an optimum covers the search or its answer.
     #[error(
-        "no certificate: found {found}; certificates of optima cover an exhaustive search that proves the best sequence of given candidates, \
-         equal dwells, repositioning at once, white noise of Z and nothing known beforehand"
+        "no certificate: found {found}; certificates of optima cover an exhaustive search that proves the \
+         best sequence of given candidates, equal dwells, repositioning at once, white noise of Z and \
+         nothing known beforehand"
     )]
     NoCertificate {
         /// Part of the search that is not covered.
         found: String,
     },
-    /// A name that is no coefficient.
+    /// Name that is no coefficient.
     #[error("`{found}` is no coefficient of this scheme; expected some of {known}, or families such as D_F")]
     UnknownName {
-        /// The name found.
+        /// Name that was found.
         found: String,
-        /// The coefficients.
+        /// Names of the coefficients.
         known: String,
     },
-    /// A name that is no error of this scheme.
+    /// Name that is no error of this scheme.
     #[error(
-        "immune to `{found}`: no error that this scheme does not estimate has this name; expected some such as K0, M, latitude"
+        "immune to `{found}`: no error that this scheme does not estimate has this name; expected some such \
+         as K0, M, latitude"
     )]
     Immune {
-        /// The name found.
+        /// Name that was found.
         found: String,
     },
-    /// A size from which on double precision does not tell whether a record shows an error.
+    /// Size at which double precision cannot decide whether a record shows an error.
     #[error(
-        "immune to `{found}`: beyond {most:.3e} {unit} a search does not tell an error that a record hardly shows from one that none shows; \
-         expected a smaller size"
+        "immune to `{found}`: beyond {most:.3e} {unit} a search does not tell an error that a record hardly \
+         shows from one that none shows; expected a smaller size"
     )]
     ImmuneSize {
-        /// The error with its size.
+        /// Error with its size.
         found: String,
-        /// Largest size, in `unit`.
+        /// Largest size that can be decided, in `unit`.
         most: f64,
         /// Unit of the size.
         unit: &'static str,
     },
-    /// Turns that take time are about one axis here.
+    /// Turns along gimbal paths that take time: a design evaluates turns about one axis only.
     #[error(
-        "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave one of them out"
+        "design evaluates turns about one axis; found path = \"gimbals\" with turns that take time: leave \
+         one of them out"
     )]
     GimbalPath,
-    /// Requirements decide, and none is stated.
+    /// Option that needs a requirement, with none stated.
     #[error(
-        "{what} needs a requirement, and none is stated on what must be observable; expected --requirement NAME=SIGMA (as in --requirement D=0.05 for all drift \
-         coefficients, psi=0.01 for psi), or [requirements] in a scheme file"
+        "{what} needs a requirement, and none is stated on what must be observable; expected --requirement \
+         NAME=SIGMA (as in --requirement D=0.05 for all drift coefficients, psi=0.01 for psi), or \
+         [requirements] in a scheme file"
     )]
     NoRequirement {
-        /// The option that needs it.
+        /// Option that needs a requirement.
         what: &'static str,
     },
-    /// Positions are what is searched for.
+    /// Requirement or prior on a single position: a design searches for the positions.
     #[error(
         "the {what} for `{found}` is that of one position; expected psi, psi_x, psi_y or psi_z, for every position"
     )]
     OnePosition {
-        /// A requirement or a prior.
+        /// Kind of statement: requirement or prior.
         what: &'static str,
-        /// The name found.
+        /// Name that was found.
         found: String,
     },
-    /// A limit that cannot be.
+    /// Time limit that is not positive.
     #[error("{what} of {found} s; expected more than 0")]
     Limit {
-        /// What is limited.
+        /// Limited quantity.
         what: &'static str,
-        /// The number found.
+        /// Limit that was found, in s.
         found: f64,
     },
-    /// Too many coefficients.
+    /// Too many unknowns.
     #[error("{found} unknowns; expected at most {}", MAX_UNKNOWNS)]
     TooManyUnknowns {
         /// Number of unknowns.
         found: usize,
     },
-    /// No sequence of that many candidates is what is wanted.
+    /// Search that proves that no sequence of these candidates is sufficient.
     #[error("no scheme of {positions} of these candidates {wanted}: {why}")]
     Impossible {
-        /// The number of positions.
+        /// Number of positions.
         positions: usize,
-        /// What is wanted, with all limits.
+        /// Requirements on the scheme in words, with all limits.
         wanted: String,
-        /// What is missed, or how that is known.
+        /// Reason or proof.
         why: String,
     },
-    /// Of those that were looked at, no sequence is what is wanted.
+    /// Search by exchange that found no sufficient sequence.
     #[error(
-        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were looked at {wanted}; there are too many to look at all"
+        "no scheme found: none of the {examined} sequences of {positions} of these candidates that were \
+         looked at {wanted}; there are too many to look at all"
     )]
     NotFound {
-        /// The number of positions.
+        /// Number of positions.
         positions: usize,
-        /// What is wanted, with all limits.
+        /// Requirements on the scheme in words, with all limits.
         wanted: String,
-        /// How many were looked at.
+        /// Number of sequences examined.
         examined: u64,
     },
     /// No scheme meets every requirement.
@@ -180,179 +185,182 @@ pub enum DesignError {
         /// Changes that would meet every requirement.
         nearest: Box<Nearest>,
     },
-    /// Parts of no exhaustive search.
+    /// Parts of a search that is not exhaustive.
     #[error("parts are of a search for so many positions of given candidates; expected these")]
     Parts,
-    /// A part that is none.
+    /// Part number out of range.
     #[error("part {} of {}; expected 1 of 1 or more, as in 2/7", .found[0], .found[1])]
     PartNumber {
-        /// Which of how many.
+        /// Number of the part, then number of parts.
         found: [usize; 2],
     },
-    /// A part that is not taken.
+    /// Part that is refused.
     #[error("{name}: {why}")]
     Part {
-        /// Its name.
+        /// Name of the part.
         name: String,
-        /// Why.
+        /// Reason for the refusal.
         why: PartError,
     },
-    /// Parts that are not there.
+    /// Missing parts.
     #[error("missing of {of} parts: {}", listed(.missing))]
     MissingParts {
-        /// Their numbers.
+        /// Numbers of the missing parts.
         missing: Vec<usize>,
-        /// How many there are.
+        /// Number of all parts.
         of: usize,
     },
-    /// More sequences than an exhaustive search takes, in parts or not.
+    /// Too many sequences for an exhaustive search, in parts or not.
     #[error(
         "all sequences of {positions} of {candidates} candidates are too many for an exhaustive search, in parts too"
     )]
     TooMany {
-        /// The number of positions.
+        /// Number of positions.
         positions: usize,
-        /// The number of candidates.
+        /// Number of candidates.
         candidates: usize,
     },
-    /// Attitudes chosen freely where nothing says which.
+    /// Free attitudes outside their scope: a number of positions under reset carry.
     #[error(
         "free attitudes are chosen for a number of positions under reset carry, where information adds; found {found}"
     )]
     Free {
-        /// What was found.
+        /// Conflicting input.
         found: String,
     },
-    /// Stopped before anything was found.
+    /// Interruption before any result.
     #[error("interrupted before anything was found")]
     Interrupted,
-    /// The scheme.
+    /// Error of the scheme.
     #[error(transparent)]
     Scheme(#[from] SchemeError),
-    /// Conditions that do not go together.
+    /// Conditions that contradict each other.
     #[error(transparent)]
     Conditions(#[from] SimulationError),
-    /// No verdict.
+    /// Verdict that cannot be reached.
     #[error(transparent)]
     Verdict(#[from] EnsembleError),
-    /// No turn, or too many, between candidates whose way counts.
+    /// No turn between candidates, or too many, where torquer errors act in turns.
     #[error(
-        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or other candidates"
+        "{found} turns between candidates; expected 1 to {most}: take a larger or smaller --max-turn, or \
+         other candidates"
     )]
     Turns {
-        /// Their number.
+        /// Number of turns.
         found: usize,
-        /// The most.
+        /// Largest number of turns.
         most: usize,
     },
-    /// What is searched over sets only.
+    /// Option that does not apply where torquer errors act in turns.
     #[error(
-        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected slews that take time (--slew-rate), about one \
-         axis, between cardinal attitudes, by exchange (no --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
+        "torquer errors act on the way between positions, so schemes are walks: found {found}; expected \
+         slews that take time (--slew-rate), about one axis, between cardinal attitudes, by exchange (no \
+         --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
     )]
     Walks {
-        /// What is not of walks.
+        /// Option or input that does not apply.
         found: String,
     },
-    /// No sigma is the largest of several units.
+    /// Criterion that compares sigmas in several units.
     #[error(
-        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over requirements), or D (their geometric mean), or \
-         --observable with coefficients of one unit: the others are estimated with them"
+        "{criterion} compares sigmas in one unit, but {units} are required; expected criterion margin (over \
+         requirements), or D (their geometric mean), or --observable with coefficients of one unit: the \
+         others are estimated with them"
     )]
     Units {
-        /// The criterion.
+        /// Name of the criterion.
         criterion: &'static str,
-        /// An example of every unit.
+        /// Example of every unit.
         units: String,
     },
-    /// A number is not finite.
+    /// Number that is not finite.
     #[error(transparent)]
     Filter(#[from] EkfError),
 }
 
-/// Why a part is not taken.
+/// Reason to refuse a part.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PartError {
-    /// No part at all.
+    /// File that is not a part.
     #[error("it is no part of a search: {why}")]
     Layout {
-        /// What is wrong.
+        /// Fault of the file.
         why: String,
     },
-    /// Changed after it was written.
+    /// Contents that do not match the seal.
     #[error("it was changed after it was written: its contents do not have the digest in its field `seal`")]
     Changed,
-    /// Counts that no search of its starts gives.
+    /// Counts that no search of these starts gives.
     #[error("its counts do not add up: {why}")]
     Counts {
-        /// Which of them.
+        /// Counts that do not add up.
         why: String,
     },
-    /// Listed sequence that no search of its starts lists.
+    /// Listed sequence that no search of these starts lists.
     #[error("it lists {sequence}: {why}")]
     Listed {
         /// Names of the candidates, or their indices.
         sequence: String,
-        /// What is wrong.
+        /// Fault of the sequence.
         why: String,
     },
-    /// Searched again, with another result.
+    /// Block whose repeated search has another result.
     #[error("its starts {} to {} (from 0) were searched again, and {why}", .starts[0], .starts[1].saturating_sub(1))]
     Block {
-        /// Index of the first start, index behind the last.
+        /// Index of the first start, then index behind the last.
         starts: [usize; 2],
-        /// What differs.
+        /// Difference between the results.
         why: String,
     },
-    /// Of other inputs.
+    /// Part of a search with other inputs.
     #[error("it is a part of another search: {why}")]
     Foreign {
-        /// Which inputs differ.
+        /// Inputs that differ.
         why: String,
     },
-    /// Divided otherwise.
+    /// Part of another number of parts.
     #[error("it is part {} of {}; expected a part of {expected}", .found[0], .found[1])]
     Division {
-        /// Which part it is.
+        /// Number of the part, then number of parts.
         found: [usize; 2],
-        /// How many there are.
+        /// Expected number of parts.
         expected: usize,
     },
-    /// Another number.
+    /// Part with another number than expected.
     #[error("it is part {} of {}; expected part {} of {}", .found[0], .found[1], .expected[0], .expected[1])]
     Number {
-        /// Which part it is.
+        /// Number of the part, then number of parts.
         found: [usize; 2],
-        /// Which part is asked for.
+        /// Expected number of the part, then of parts.
         expected: [usize; 2],
     },
-    /// Other starts than its number has.
+    /// Starts that are not those of the part number.
     #[error("it has the starts {found:?}; part {} of {} has {expected:?}", .part[0], .part[1])]
     Starts {
-        /// Its starts.
+        /// Starts that were found: first, behind the last, number of all.
         found: [usize; 3],
-        /// Those of its number.
+        /// Expected starts: first, behind the last, number of all.
         expected: [usize; 3],
-        /// Which part it is.
+        /// Number of the part, then number of parts.
         part: [usize; 2],
     },
-    /// Not done.
+    /// Part that was interrupted.
     #[error("part {} of {} was interrupted; the command that wrote it goes on with it", .part[0], .part[1])]
     Unfinished {
-        /// Which part it is.
+        /// Number of the part, then number of parts.
         part: [usize; 2],
     },
-    /// Given twice.
+    /// Part that is given twice.
     #[error("part {} of {} is in {other} too", .part[0], .part[1])]
     Doubled {
-        /// Which part it is.
+        /// Number of the part, then number of parts.
         part: [usize; 2],
-        /// Where else.
+        /// Name of the other file with this part.
         other: String,
     },
 }
 
-/// `2, 5`: at most twenty numbers.
+/// Text `2, 5`, at most twenty numbers.
 fn listed(numbers: &[usize]) -> String {
     const SHOWN: usize = 20;
     let shown: Vec<String> = numbers.iter().take(SHOWN).map(ToString::to_string).collect();

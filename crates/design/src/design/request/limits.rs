@@ -1,14 +1,14 @@
 //! Limits of a search.
 
-/// Most candidates.
+/// Largest number of candidates.
 pub(crate) const MAX_CANDIDATES: usize = 1000;
-/// Most candidates when it takes time to turn from one to another.
+/// Largest number of candidates if turns between them take time.
 pub(crate) const MAX_TURNING: usize = 256;
-/// Most unknowns of a search: psi and the coefficients of all terms.
+/// Largest number of unknowns of a search: psi and the coefficients of all terms.
 pub(crate) const MAX_UNKNOWNS: usize = 66;
-/// Most unknowns of a search without errors of the accelerometers.
+/// Largest number of unknowns of a search without errors of the accelerometers.
 pub(crate) const MAX_DRIFTS: usize = 33;
-/// Most sequences that are searched exhaustively, up to symmetry.
+/// Largest number of sequences, up to symmetry, that are searched exhaustively.
 pub const EXHAUSTIVE: u64 = 50_000_000;
 /// Most extensions of a scheme that are compared.
 pub const MOST_EXTENSIONS: usize = 20_000;
@@ -16,5 +16,5 @@ pub const MOST_EXTENSIONS: usize = 20_000;
 pub(crate) const MANY: u64 = 1_000_000;
 /// Number of sequences, under reset carry, up to which all are searched whatever a bound says.
 pub(crate) const QUICK: u64 = 2_000_000;
-/// Largest probability of an error of what is called proven.
+/// Largest error probability of a result that is called proven.
 pub(crate) const PROOF: f64 = 1e-12;

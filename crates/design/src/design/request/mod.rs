@@ -1,4 +1,4 @@
-//! What is asked for: options, candidates, limits, errors.
+//! Request of a design: options, candidates, limits, errors.
 
 pub(crate) mod candidates;
 pub(crate) mod error;

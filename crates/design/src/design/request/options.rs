@@ -10,54 +10,55 @@ use serde::{Deserialize, Serialize};
 
 use crate::design::request::candidates::Candidates;
 
-/// What is to be found.
+/// Options of a design.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignOptions {
-    /// What to choose from.
+    /// Candidate attitudes.
     pub candidates: Candidates,
-    /// Number of positions; `None`: only the minimum is asked for.
+    /// Number of positions; `None` to find only the minimum.
     pub positions: Option<usize>,
-    /// Coefficients or families that must be observable; none: all.
+    /// Coefficients or families that must be observable; if empty, all coefficients.
     pub required: Vec<String>,
-    /// Largest degrees: of a coefficient or family, or of all that are required.
+    /// Largest degrees: of a coefficient or family, or of all required coefficients (`None`).
     pub degree_caps: Vec<(Option<String>, usize)>,
     /// Errors that are not estimated and that schemes must be immune to.
     pub immune: Vec<Immune>,
-    /// Only schemes that meet the requirements of the conditions on what is required, and on psi when that is
-    /// everything.
+    /// True if only schemes are accepted that meet the requirements of the conditions on the required
+    /// coefficients, and on psi if every coefficient is required.
     pub meet: bool,
     /// Largest total time, in s.
     pub total_s: Option<f64>,
     /// Longest turn between successive positions, in s.
     pub slew_s: Option<f64>,
-    /// What makes one scheme better than another.
+    /// Criterion that orders schemes.
     pub criterion: CriterionName,
-    /// How many schemes are listed.
+    /// Number of schemes to list.
     pub keep: usize,
-    /// Restarts of the exchange, where the space is too large for exhaustion.
+    /// Number of restarts of the exchange, if the space is too large for exhaustion.
     pub restarts: u64,
-    /// Refine the angles of the best continuously.
+    /// True if the angles of the best scheme are refined continuously.
     pub refine: bool,
-    /// Divide the total time among the positions of the best.
+    /// True if the total time is divided among the positions of the best scheme.
     pub divide: bool,
-    /// Numbers of positions for the front of total time, besides that asked for.
+    /// Numbers of positions for the front of total time, besides `positions`.
     pub front: Vec<usize>,
-    /// Where many sequences would have to be searched and information adds (reset carry): all are searched
-    /// unless the criterion of a scheme found by exchange is within this part of a bound on what is possible
-    /// at all. `None`: they are not searched, and the answer says how far that scheme is from the bound at
-    /// most. 0: all are searched, however many they are, under any carry.
+    /// Relative excess over a lower bound, dimensionless, up to which a scheme found by exchange is
+    /// accepted instead of a search of all sequences. It applies where sequences are many and
+    /// information adds (reset carry). `None`: no search of all; the answer states the excess. 0: all
+    /// sequences are searched, however many they are, under any carry.
     pub within: Option<f64>,
-    /// True if the bound over all attitudes is sought too (reset carry).
+    /// True if the bound over all attitudes is computed too (reset carry).
     pub everywhere: bool,
-    /// The candidates are where the search for the best attitudes of all begins; these take their place, with
-    /// angles rounded to multiples of so many 1e-9 degrees (reset carry).
+    /// Step of free attitudes in 1e-9 degrees (reset carry); `None` to choose among the candidates.
+    /// Free attitudes, with angles rounded to this step, replace the candidates, from which their
+    /// search begins.
     pub free: Option<i64>,
     /// Seed of all random choices.
     pub seed: u64,
 }
 
 impl Default for DesignOptions {
-    /// The minimum, of the cardinal attitudes.
+    /// Search for the minimum with the cardinal attitudes.
     fn default() -> Self {
         Self {
             candidates: Candidates::cardinals(),
@@ -82,12 +83,13 @@ impl Default for DesignOptions {
     }
 }
 
-/// An error that schemes are immune to: it has no effect, or a record shows it.
+/// Error that schemes must be immune to: it has no effect, or a record shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Immune {
     /// Name of an error or a family, such as `K0` or `K0_X`.
     pub name: String,
-    /// Size from which on a record must show the error at three sigma, in its unit; `None`: it has no effect.
+    /// Size at which a record must show the error at three sigma, in its unit; `None`: it must have no
+    /// effect.
     pub size: Option<f64>,
 }
 
@@ -117,25 +119,25 @@ impl FromStr for Immune {
 }
 
 impl Immune {
-    /// True if this concerns an error of a family.
+    /// True if this applies to an error `name` of `family`.
     pub(crate) fn names(&self, family: &str, name: &str) -> bool {
         self.name == family || concerns(&self.name, name)
     }
 }
 
-/// The name of a criterion.
+/// Name of a criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CriterionName {
-    /// The largest sigma.
+    /// Largest sigma.
     #[default]
     Worst,
-    /// A-optimal.
+    /// Root of the mean variance (A-optimal).
     A,
-    /// D-optimal.
+    /// Geometric mean of the principal sigmas (D-optimal).
     D,
-    /// E-optimal.
+    /// Largest principal sigma (E-optimal).
     E,
-    /// The largest sigma over its requirement.
+    /// Largest sigma over its requirement.
     Margin,
 }

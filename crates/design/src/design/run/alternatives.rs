@@ -1,6 +1,6 @@
-//! Changes that would meet every requirement, where no scheme does: the nearest scheme, what limits it, and
-//! the dwell, the number of positions or the candidates that would. Everything told is a scheme that was
-//! evaluated; the work is counted, not timed.
+//! Changes that would meet every requirement, where no scheme does: the nearest scheme, its limiting
+//! unknown, and a longer dwell, more positions or other candidates. Every statement is about a scheme
+//! that was evaluated; the work is counted, not timed.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_evidence::simulation::Conditions;
@@ -15,21 +15,21 @@ use crate::design::run::prepared::Prepared;
 use crate::design::search::progress::{NOTHING_YET, Progress};
 use crate::design::search::score::Scored;
 
-/// Sequences that may be evaluated: no further step begins behind them.
+/// Number of evaluated sequences after which no further step begins.
 const WORK: u64 = 400_000;
-/// Restarts of the exchange for the nearest scheme and for other candidates, and for every other number of
-/// positions.
+/// Numbers of restarts of the exchange: for the nearest scheme (half of them for other candidates), and
+/// for every other number of positions.
 const RESTARTS: u64 = 24;
 const FEW_RESTARTS: u64 = 4;
-/// Most positions that are tried beyond those asked for.
+/// Largest number of positions tried beyond the number asked for.
 const MORE: usize = 12;
 /// Largest factor on the dwell.
 const LONGEST: f64 = 1024.0;
-/// Steps of the grids that are tried, in 1e-9 degrees.
+/// Steps of the grids of attitudes that are tried, in 1e-9 degrees.
 const GRIDS: [i64; 2] = [45_000_000_000, 30_000_000_000];
 
-/// A search for what would do.
-struct Seeking<'a> {
+/// Search for changes that would meet every requirement.
+struct AlternativeSearch<'a> {
     base: &'a Scheme,
     conditions: &'a Conditions,
     options: DesignOptions,
@@ -37,10 +37,10 @@ struct Seeking<'a> {
     out: Nearest,
 }
 
-/// The best sequence of an exchange, and its scheme with what became of the requirements.
-type Best = (Scored, Found);
+/// Best sequence of an exchange, and its scheme with the outcome of the requirements.
+type BestScheme = (Scored, Found);
 
-/// Changes for `options`, for which no scheme of `k` positions meets every requirement.
+/// Changes that would meet every requirement; no scheme of `k` positions for `options` meets them.
 pub(crate) fn seek(
     base: &Scheme,
     conditions: &Conditions,
@@ -58,7 +58,7 @@ pub(crate) fn seek(
         free: None,
         ..options.clone()
     };
-    let mut seeking = Seeking { base, conditions, options, progress, out: Nearest::default() };
+    let mut seeking = AlternativeSearch { base, conditions, options, progress, out: Nearest::default() };
     match seeking.all(k) {
         Err(DesignError::Interrupted) => seeking.out.unfinished = true,
         done => done?,
@@ -66,8 +66,8 @@ pub(crate) fn seek(
     Ok(seeking.out)
 }
 
-impl Seeking<'_> {
-    /// Everything that is tried.
+impl AlternativeSearch<'_> {
+    /// Tries all changes, one kind after the other.
     fn all(&mut self, k: usize) -> Result<(), DesignError> {
         let nearest = self.exchanged(k, None, RESTARTS.min(self.options.restarts), Vec::new())?;
         if let Some((scored, found)) = &nearest {
@@ -85,14 +85,15 @@ impl Seeking<'_> {
         on
     }
 
-    /// The best of `k` positions that an exchange finds, of the candidates or of others.
+    /// Best sequence of `k` positions by exchange, from `candidates` or from those of the options;
+    /// `None` if none was found or the work is used up.
     fn exchanged(
         &mut self,
         k: usize,
         candidates: Option<Candidates>,
         restarts: u64,
         given: Vec<Vec<Stop>>,
-    ) -> Result<Option<Best>, DesignError> {
+    ) -> Result<Option<BestScheme>, DesignError> {
         if !self.goes_on() {
             return Ok(None);
         }
@@ -110,8 +111,8 @@ impl Seeking<'_> {
         Ok(best.found.into_iter().zip(found).next())
     }
 
-    /// The nearest scheme with the shortest dwell that does: by factors of two, then by halves of what is
-    /// between.
+    /// Finds the shortest dwell with which the nearest scheme meets the requirements: by factors of
+    /// two, then by bisection.
     fn longer(&mut self, nearest: &Scored, k: usize) -> Result<(), DesignError> {
         let options = DesignOptions { positions: Some(k), ..self.options.clone() };
         let going = || (self.progress)(NOTHING_YET);
@@ -119,7 +120,7 @@ impl Seeking<'_> {
         let known = self.conditions.dwell_s;
         let mut examined = 0;
         let mut tried = |dwell_s: f64| -> Result<Option<Found>, DesignError> {
-            // more steps than there may be, or more time
+            // dwells with too many steps, or beyond the time limit
             let Ok(there) = prepared.evaluator.clone().with_dwell(dwell_s) else { return Ok(None) };
             examined += 1;
             if !prepared.task.constraints.keep(&there, &nearest.sequence) {
@@ -153,7 +154,7 @@ impl Seeking<'_> {
         Ok(())
     }
 
-    /// Grids of attitudes within the gimbals that are not what was chosen from.
+    /// Tries grids of attitudes within the gimbals other than the present candidates.
     fn other_candidates(&mut self, k: usize) -> Result<(), DesignError> {
         for step in GRIDS {
             let grid = Candidates::grid(step)?;
@@ -161,8 +162,8 @@ impl Seeking<'_> {
             if grid.names.iter().all(|name| chosen.contains(name)) || !self.goes_on() {
                 continue;
             }
-            // torquer errors act between cardinal attitudes only, and turns between too many attitudes are
-            // not held
+            // torquer errors act between cardinal attitudes only, and turns between too many attitudes
+            // do not fit in memory
             let best = match self.exchanged(k, Some(grid), RESTARTS / 2, Vec::new()) {
                 Err(
                     DesignError::Walks { .. } | DesignError::Pairs { .. } | DesignError::Candidates { .. },
@@ -180,7 +181,8 @@ impl Seeking<'_> {
         Ok(())
     }
 
-    /// Numbers of positions one after the other; each begins with the best before and one position more.
+    /// Tries larger numbers of positions one after the other; each begins with the best sequence before
+    /// and one position more.
     fn more_positions(&mut self, k: usize, nearest: Option<Vec<Stop>>) -> Result<(), DesignError> {
         let mut known = nearest;
         self.out.most = k;
@@ -205,7 +207,7 @@ impl Seeking<'_> {
     }
 }
 
-/// To three digits.
+/// Number rounded up to three digits.
 fn rounded_up(x: f64) -> f64 {
     let unit = 10f64.powi(x.log10().floor() as i32 - 2);
     if unit < 1.0 { (x / unit - 1e-9).ceil() / (1.0 / unit).round() } else { (x / unit - 1e-9).ceil() * unit }

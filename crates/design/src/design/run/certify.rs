@@ -1,26 +1,26 @@
-//! What is said of how good the best can be: bounds on the schemes of a task.
+//! Reports of bounds on the schemes of a task.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Euler, angles_text};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
-use crate::design::certificate::value::{Value, excess};
+use crate::design::certificate::value::{CriterionValue, excess};
 use crate::design::certificate::{Bound, Everywhere};
 use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::stop::Stop;
-use crate::design::polish::rounding::Moved;
+use crate::design::polish::rounding::MovedScheme;
 use crate::design::run::task::{DWELLS, Task};
 use crate::design::search::score::Scored;
 
-/// Number of attitudes of the weights over all attitudes that are listed.
+/// Number of attitudes that are listed of the weights over all attitudes.
 const LISTED: usize = 10;
 
-/// The bound over all attitudes in the light of the best scheme found, of this criterion.
+/// Report of the bound over all attitudes, beside the criterion `value` of the best scheme found.
 pub(crate) fn everywhere(
     found: &Everywhere,
-    value: Value,
-    rounded: Option<(i64, Option<&Moved>)>,
+    value: CriterionValue,
+    rounded: Option<(i64, Option<&MovedScheme>)>,
 ) -> EverywhereReport {
     let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
     let (listed, lighter) = found.support.split_at(found.support.len().min(LISTED));
@@ -42,31 +42,33 @@ pub(crate) fn everywhere(
 }
 
 impl Task<'_> {
-    /// What no scheme of `k` candidates is below.
+    /// Lower bound on the criterion of schemes of `k` candidates.
     pub(crate) fn bound(&self, evaluator: &Evaluator, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
         evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), going)
     }
 
-    /// The criterion of a scheme, of the information of its positions as it is evaluated.
-    pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> Value {
-        Value::new(of.worth.value, self.at_most(evaluator, of, None))
+    /// Criterion of a scheme with its rounding tolerance, for its information as evaluated.
+    pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
+        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, None))
     }
 
-    /// The same, of the information of its positions as that of all attitudes is bounded: without psi.
-    pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> Value {
+    /// Criterion with its rounding tolerance, for the information as it is bounded over all attitudes:
+    /// without psi.
+    pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
         let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
         let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
-        Value::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
+        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
     }
 
-    /// The criterion of a scheme is not above this; nothing is known of the rounding of total uncertainties.
+    /// Upper bound on the criterion of a scheme; `None` for total uncertainties, whose rounding is
+    /// unknown.
     fn at_most(&self, evaluator: &Evaluator, of: &Scored, errors: Option<&DMatrix<f64>>) -> Option<f64> {
         let of_sigmas = || evaluator.at_most(&of.sequence, &self.criterion, errors);
         if self.omitted.is_none() { of_sigmas() } else { None }
     }
 
-    /// The bound in the light of the best scheme found, of this criterion.
-    pub(crate) fn certificate(&self, bound: &Bound, value: Value) -> Certificate {
+    /// Report of the bound over the candidates, beside the criterion `value` of the best scheme found.
+    pub(crate) fn certificate(&self, bound: &Bound, value: CriterionValue) -> Certificate {
         let excess = excess(value.at_most, bound.value);
         let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
         Certificate {
@@ -81,8 +83,8 @@ impl Task<'_> {
         }
     }
 
-    /// `[total time, criterion]`: no scheme of the candidates that takes this time in equal dwells is below,
-    /// whatever of the numbers of positions asked for it has.
+    /// Lower bound over time, `[total time in s, criterion]`, for schemes of the candidates in equal
+    /// dwells with any of the numbers of positions asked for.
     pub(crate) fn front_bound(
         &self,
         evaluator: &Evaluator,
@@ -101,13 +103,13 @@ impl Task<'_> {
                 let there = evaluator.clone().with_dwell(total / count as f64).ok()?;
                 Some(self.bound(&there, count, going).map(|b| b.value))
             });
-            // where one is not known, nothing is
+            // no point unless the bound is known for every number of positions
             least
                 .collect::<Option<Vec<f64>>>()?
                 .into_iter()
                 .min_by(f64::total_cmp)
                 .map(|value| [total, value])
         };
-        totals.into_par_iter().filter_map(at).collect()
+        parallel::map(totals.len(), |i| at(totals[i])).into_iter().flatten().collect()
     }
 }

@@ -6,6 +6,7 @@ use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{Angle, Euler, Scheme};
 use obsdeg_evidence::simulation::omitted::omitted_effects;
 use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
 use crate::design::request::error::DesignError;
@@ -19,9 +20,9 @@ use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 use crate::design::search::ties::TIE;
 
-/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the noise,
-/// the dwell, the rate of slews and the requirements. `progress` says whether to go on: a search that is
-/// stopped gives the best so far.
+/// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the
+/// noise, the dwell, the rate of slews and the requirements. A search stops when `progress` returns
+/// false and gives its best schemes so far.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -34,16 +35,17 @@ pub fn design(
     answered(base, conditions, options, progress, None)
 }
 
-/// What an exhaustive search found in parts, and these.
-pub(crate) type Elsewhere<'a> = &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
+/// Source of search results instead of a search: merged parts, with their report.
+pub(crate) type ResultSource<'a> =
+    &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
-/// The answer; `elsewhere` instead of a search.
+/// Answer of a design; `elsewhere` provides the results instead of a search.
 pub(crate) fn answered(
     base: &Scheme,
     conditions: &Conditions,
     options: &DesignOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-    elsewhere: Option<Elsewhere<'_>>,
+    elsewhere: Option<ResultSource<'_>>,
 ) -> Result<Design, DesignError> {
     let stated = conditions;
     let conditions = &asked(base, conditions, &options.required)?;
@@ -127,8 +129,7 @@ pub(crate) fn answered(
             return Err(DesignError::NotMet { why: Box::new(error), nearest: Box::new(nearest) });
         };
         out.front = task.all_found(evaluator, &best.front)?;
-        // the bound is of samples without random drift: it says nothing of how far above it figures with it
-        // may be
+        // the bound is for samples without random drift: figures with drift may exceed it by any amount
         let certified = bound.filter(|_| !task.is_noisy());
         let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
@@ -137,8 +138,10 @@ pub(crate) fn answered(
             let wanted = certificate.is_some() && options.everywhere && free.is_none();
             let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
             let line = || certificate.is_some().then(|| task.front_bound(evaluator, of, &going));
-            let (front, (found, line)) =
-                rayon::join(|| task.front(evaluator, &search, of, &best), || rayon::join(over_all, line));
+            let (front, (found, line)) = parallel::join(
+                || task.front(evaluator, &search, of, &best),
+                || parallel::join(over_all, line),
+            );
             out.front.extend(front?);
             if let (Some(certificate), Some(line)) = (&mut certificate, line) {
                 let every = free.as_ref().map(|f| &f.every).or(found.as_ref());
@@ -202,42 +205,42 @@ pub(crate) fn answered(
     })
 }
 
-/// Names of the requirements that `conditions` leave out of those that are stated.
+/// Names of stated requirements that `conditions` leave out.
 fn not_judged(stated: &Conditions, conditions: &Conditions) -> Vec<String> {
     let judged = |a: &Assignment| conditions.requirements.iter().any(|r| concerns(&a.name, &r.name));
     stated.requirements.iter().filter(|a| !judged(a)).map(|a| a.name.clone()).collect()
 }
 
-/// The attitude with all angles zero.
+/// Attitude with all angles zero.
 fn zero() -> Euler {
     std::array::from_fn(|_| Angle::from_degrees(0))
 }
 
-/// Why an exhaustive search found nothing.
+/// Reason why an exhaustive search found nothing.
 fn examined(lost: u64, slews: bool) -> String {
     let with = if slews { " with the slews" } else { "" };
     match lost {
         0 => "every sequence was examined".into(),
         _ => format!(
-            "every sequence was examined; the samples of {lost} with observable positions do not determine it{with}, as far as double precision \
-             tells"
+            "every sequence was examined; the samples of {lost} with observable positions do not determine \
+             it{with}, as far as double precision tells"
         ),
     }
 }
 
-/// True if a polished scheme may stand first: polishing knows of no bench, and may make the total larger.
+/// True if a polished scheme may stand first: polishing ignores the bench and may increase the total.
 fn improves(task: &Task<'_>, polished: &Found, first: Option<&Found>) -> bool {
     !task.ranks() || first.is_none_or(|f| polished.value < f.value)
 }
 
-/// Puts a scheme before others, if there is one.
+/// Puts a scheme, if there is one, before others.
 fn put_first(found: &mut Vec<Found>, first: Option<Found>) {
     let moved = usize::from(first.is_some());
     found.iter_mut().flat_map(|f| &mut f.image_of).for_each(|of| *of += moved);
     found.splice(0..0, first);
 }
 
-/// Those that none beats in both total time and criterion, by time.
+/// Schemes that no other one beats in both total time and criterion, by time.
 fn pareto(mut found: Vec<Found>) -> Vec<Found> {
     found.sort_by(|a, b| a.total_s.total_cmp(&b.total_s).then(a.value.total_cmp(&b.value)));
     let mut least = f64::INFINITY;

@@ -1,19 +1,18 @@
-//! Free attitudes: those that weights on all attitudes need, and those near them, with angles rounded. What
-//! is chosen is evaluated as it is rounded.
+//! Free attitudes: the support of the weights over all attitudes, and attitudes near it, with rounded
+//! angles. All schemes are evaluated at the rounded angles.
 //!
-//! Schemes begin with the cardinal attitudes, with the rounded ones of the weights, and at random. Each of
-//! their positions then moves on the grid of rounded angles until no move helps; the attitudes of the best
-//! are what is chosen from, beside those they began with. The cardinal attitudes stay among them, and the
-//! best scheme of these is one to begin with, so that no free scheme is worse.
+//! Schemes begin with the cardinal attitudes, with the rounded support, and at random. Each of their
+//! positions then moves on the grid of rounded angles until no move helps. The attitudes of the best
+//! become candidates beside the initial ones. The cardinal attitudes stay among them, and the best
+//! scheme of these is a start, so no free scheme is worse.
 
 use obsdeg_core::model::{Carry, Euler, Scheme, c_n_f64, format_decimal};
 use obsdeg_evidence::simulation::Conditions;
-use obsdeg_exact::SplitMix64;
-use rayon::prelude::*;
+use obsdeg_exact::{SplitMix64, parallel};
 
 use crate::design::certificate::Everywhere;
 use crate::design::measure::stop::Stop;
-use crate::design::polish::rounding::{Moved, Moves, OnGrids, random, rounded};
+use crate::design::polish::rounding::{MovedScheme, Moves, OnGrids, random, rounded};
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::QUICK;
@@ -26,39 +25,40 @@ use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 
-/// Schemes that are moved, of different criteria: found by exchange, and at random.
+/// Number of schemes by exchange that are moved, with different criteria, and number of random ones.
 const MOVED: usize = 8;
 const RANDOM: usize = 8;
-/// Attitudes of the weights that schemes are exchanged from, heaviest first.
+/// Number of attitudes of the support that schemes are exchanged from, heaviest first.
 const WEIGHED: usize = 48;
-/// Those of them whose attitudes are chosen from.
+/// Number of moved schemes whose attitudes become candidates.
 const CHOSEN: usize = 2;
-/// Criteria that differ by less than this part are those of images of one scheme.
+/// Relative difference below which criteria belong to images of one scheme.
 const ALIKE: f64 = 1e-6;
-/// What a search for free attitudes chooses from, and where it begins.
+/// Candidates and starts of a search for free attitudes.
 pub(crate) struct Free {
-    /// What no scheme of any attitudes is below.
+    /// Lower bound over all attitudes with its support.
     pub(crate) every: Everywhere,
-    /// The cardinal attitudes, those of the weights, and those of the schemes that were moved.
+    /// Cardinal attitudes, those of the support, and those of the schemes that were moved.
     pub(crate) candidates: Candidates,
-    /// Schemes to begin with.
+    /// Schemes that the exchange starts from.
     starts: Vec<Vec<Euler>>,
-    /// Sequences that were evaluated to find them.
+    /// Number of sequences evaluated to find them.
     examined: u64,
-    /// No scheme of the cardinal attitudes has a smaller worst degree, or a smaller criterion.
+    /// Lower bounds on the worst degree and on the criterion of schemes of the cardinal attitudes; `None` if
+    /// unknown.
     cardinal: Option<(usize, f64)>,
-    /// The best that was found with angles in hundredths of a degree.
-    pub(crate) finer: Option<Moved>,
+    /// Best scheme with angles in hundredths of a degree; `None` if none was found.
+    pub(crate) finer: Option<MovedScheme>,
 }
 
-/// The task with the cardinal attitudes.
+/// Options of the same task with the cardinal attitudes.
 fn of_cardinals(options: &DesignOptions) -> DesignOptions {
     DesignOptions { candidates: Candidates::cardinals(), free: None, front: Vec::new(), ..options.clone() }
 }
 
 impl Free {
-    /// The attitudes for a task whose candidates are where the search for them begins; angles are multiples
-    /// of `step` 1e-9 degrees.
+    /// Free attitudes for a task whose candidates are the start of the search for them; angles are
+    /// multiples of `step` 1e-9 degrees.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -106,7 +106,7 @@ impl Free {
             candidates.add(euler.each_ref().map(|angle| rounded(angle, step)));
         }
         out.candidates = candidates;
-        // schemes of these, by exchange
+        // schemes of these candidates, by exchange
         let chosen = DesignOptions { candidates: out.candidates.clone(), ..options.clone() };
         let prepared = Prepared::new(base, conditions, &chosen, &going)?;
         let task = &prepared.task;
@@ -127,19 +127,19 @@ impl Free {
             criterion: &task.criterion,
             going: &going,
         };
-        let mut moved: Vec<OnGrids> = first.par_iter().map(|start| moves.rounded(start, step)).collect();
+        let mut moved: Vec<OnGrids> = parallel::map(first.len(), |i| moves.rounded(&first[i], step));
         out.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
         let finer = moved.iter().map(|m| &m.finer).min_by(|a, b| a.order(b));
         out.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();
         moved.sort_by(|a, b| a.on_step.order(&b.on_step));
-        for OnGrids { on_step: Moved { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
+        for OnGrids { on_step: MovedScheme { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
             scheme.iter().for_each(|euler| out.candidates.add(euler.clone()));
             out.starts.push(scheme);
         }
         Ok(out)
     }
 
-    /// The best schemes of the cardinal attitudes that an exchange finds, and what none of them is below.
+    /// Finds the best schemes of the cardinal attitudes by exchange, and a lower bound on all of these.
     fn begin_with_cardinals(
         &mut self,
         base: &Scheme,
@@ -163,8 +163,8 @@ impl Free {
         Ok(())
     }
 
-    /// The best of the candidates, which `prepared` has; all of them where they are few, with the number of
-    /// sets and sequences.
+    /// Best schemes of the candidates of `prepared`. All sequences are searched if they are few; the
+    /// numbers of sets and sequences are returned then.
     ///
     /// # Errors
     /// [`DesignError`].
@@ -184,7 +184,8 @@ impl Free {
             best.found.first().is_some_and(|f| f.worth.degree <= degree && f.worth.value <= least)
         };
         if best.complete && self.cardinal.is_some_and(|cardinal| !better(cardinal)) {
-            // what the cardinal attitudes can do is not beaten: then it is sought as it is without free ones
+            // no free scheme found beats the bound on the cardinal attitudes: search these as without free
+            // attitudes
             let options = of_cardinals(task.options);
             let going = || (search.progress)(NOTHING_YET);
             let cardinal = Prepared::new(task.base, prepared.conditions, &options, &going)?;
@@ -199,7 +200,7 @@ impl Free {
     }
 }
 
-/// Those of different criteria, best first.
+/// Sequences with different criteria, best first.
 fn unlike(found: &[Scored]) -> Vec<&Scored> {
     let mut out: Vec<&Scored> = Vec::new();
     for scored in found {
@@ -214,7 +215,7 @@ fn unlike(found: &[Scored]) -> Vec<&Scored> {
 }
 
 impl Task<'_> {
-    /// Sequences of attitudes that are candidates.
+    /// Sequences of the given schemes whose attitudes are candidates.
     fn sequences_of(&self, schemes: &[Vec<Euler>]) -> Vec<Vec<Stop>> {
         let matrix = |euler: &Euler| c_n_f64(euler).map(|row| row.map(|x| (x * 1e9).round() as i64));
         let known: Vec<_> = self.candidates.attitudes.iter().map(matrix).collect();

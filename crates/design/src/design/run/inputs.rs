@@ -97,10 +97,10 @@ fn lines(file: &str) -> Vec<(String, String)> {
     out
 }
 
-/// Everything that a search of parts depends on, exactly; an input that is not listed does not compile.
+/// Text of all inputs that a search of parts depends on, exactly; an unlisted input does not compile.
 fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> String {
     let Scheme {
-        // what a design takes of a scheme are its assumptions
+        // a design uses only the assumptions of a scheme
         name: _,
         description: _,
         positions: _,
@@ -119,7 +119,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         path,
     } = base;
     let DesignOptions {
-        // a part searches all
+        // a part searches all sequences
         within: _,
         everywhere: _,
         candidates,
@@ -216,7 +216,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
     of.into_iter().map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
 }
 
-/// `simulation.dwell_s is 999.0, here 1000.0`: the inputs that differ; long values are left out.
+/// Text `simulation.dwell_s is 999.0, here 1000.0`: inputs that differ; long values are left out.
 pub(crate) fn differing(found: &BTreeMap<String, String>, expected: &BTreeMap<String, String>) -> String {
     const LONGEST: usize = 60;
     let value = |of: &BTreeMap<String, String>, name: &String| {

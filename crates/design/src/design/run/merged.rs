@@ -1,4 +1,4 @@
-//! Parts of an exhaustive search put together to the answer of the whole.
+//! Merge of the parts of an exhaustive search into the answer of the whole.
 
 use obsdeg_core::model::Scheme;
 use obsdeg_evidence::simulation::Conditions;
@@ -10,27 +10,27 @@ use crate::design::request::options::DesignOptions;
 use crate::design::run::driver::answered;
 use crate::design::run::inputs::Inputs;
 use crate::design::run::part::{MOST_PARTS, Part};
-use crate::design::run::part_check::{BlockAt, Whole};
+use crate::design::run::part_check::{BlockIndex, WholeSearch};
 use crate::design::run::prepared::Prepared;
 use crate::design::search::best::Best;
 use crate::design::search::progress::Progress;
 
-/// A part with its name.
-type Named = (String, Part);
+/// Part with its name.
+type NamedPart = (String, Part);
 
-/// What all parts of an exhaustive search found together: the answer of the whole, if the parts were searched
-/// as they state. The parts are named, and come in any order. Everything that they list is evaluated again,
-/// their starts and counts must add up to the whole, and `check` of their blocks, chosen at random, are
-/// searched again.
+/// Merges all parts of an exhaustive search into the answer of the whole, valid if the parts were
+/// searched as they state. The parts are named and may come in any order. All listed sequences are
+/// evaluated again, starts and counts must add up to the whole, and `check` of the blocks, chosen at
+/// random, are searched again.
 ///
 /// # Errors
-/// [`DesignError::Part`] for one that is foreign, changed, doubled or not done,
+/// [`DesignError::Part`] for a part that is foreign, changed, doubled or not done,
 /// [`DesignError::MissingParts`]; [`DesignError`].
 pub fn design_merged(
     base: &Scheme,
     conditions: &Conditions,
     options: &DesignOptions,
-    parts: &[Named],
+    parts: &[NamedPart],
     check: usize,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Design, DesignError> {
@@ -39,7 +39,7 @@ pub fn design_merged(
     }
     let sorted = in_order(parts, &Inputs::new(base, conditions, options))?;
     let together = |prepared: &Prepared<'_>, k: usize| {
-        let whole = Whole::new(prepared, k, progress)?;
+        let whole = WholeSearch::new(prepared, k, progress)?;
         for (name, part) in &sorted {
             whole.check(part).map_err(|why| DesignError::Part { name: name.clone(), why })?;
         }
@@ -58,11 +58,11 @@ pub fn design_merged(
     answered(base, conditions, options, progress, Some(&together))
 }
 
-/// The parts by number, each once.
-fn in_order<'a>(parts: &'a [Named], inputs: &Inputs) -> Result<Vec<&'a Named>, DesignError> {
+/// Parts by number, each once.
+fn in_order<'a>(parts: &'a [NamedPart], inputs: &Inputs) -> Result<Vec<&'a NamedPart>, DesignError> {
     let Some((_, first)) = parts.first() else { return Err(DesignError::Parts) };
     let of = first.part[1];
-    let mut sorted: Vec<Option<&Named>> = vec![None; of.min(MOST_PARTS)];
+    let mut sorted: Vec<Option<&NamedPart>> = vec![None; of.min(MOST_PARTS)];
     for named in parts {
         let (name, part) = named;
         let named_error = |why: PartError| DesignError::Part { name: name.clone(), why };
@@ -87,13 +87,13 @@ fn in_order<'a>(parts: &'a [Named], inputs: &Inputs) -> Result<Vec<&'a Named>, D
     }
 }
 
-/// What the parts found, and at how many worst degrees they had to search.
-fn merged(sorted: &[&Named], keep: usize) -> Result<(Best, usize), DesignError> {
+/// Results of all parts together, and the number of worst degrees that they had to search.
+fn merged(sorted: &[&NamedPart], keep: usize) -> Result<(Best, usize), DesignError> {
     let mut all = Best { complete: true, ..Best::default() };
     let most = sorted.iter().map(|(_, part)| part.levels.len()).max().unwrap_or(0);
     for i in 0..most {
         for (name, part) in sorted {
-            // a part ends early only when it has found enough by itself
+            // a part ends early only if it has found enough by itself
             let unfinished =
                 || DesignError::Part { name: name.clone(), why: PartError::Unfinished { part: part.part } };
             all.merge(keep, part.levels.get(i).ok_or_else(unfinished)?.best.clone());
@@ -106,7 +106,7 @@ fn merged(sorted: &[&Named], keep: usize) -> Result<(Best, usize), DesignError> 
 }
 
 /// All blocks that the answer rests on.
-fn blocks(sorted: &[&Named], levels: usize) -> Vec<BlockAt> {
+fn blocks(sorted: &[&NamedPart], levels: usize) -> Vec<BlockIndex> {
     let mut out = Vec::new();
     for (i, (_, part)) in sorted.iter().enumerate() {
         for (j, level) in part.levels.iter().take(levels).enumerate() {
@@ -117,16 +117,16 @@ fn blocks(sorted: &[&Named], levels: usize) -> Vec<BlockAt> {
 }
 
 /// Versions of the program that wrote the parts, each once.
-fn versions(sorted: &[&Named]) -> Vec<String> {
+fn versions(sorted: &[&NamedPart]) -> Vec<String> {
     let mut out: Vec<String> = sorted.iter().map(|(_, part)| part.version.clone()).collect();
     out.sort_unstable();
     out.dedup();
     out
 }
 
-/// Random numbers for the choice of blocks: they change with every part, so that no part is written for the
-/// choice.
-fn choice(sorted: &[&Named], seed: u64) -> SplitMix64 {
+/// Random numbers for the choice of blocks. They depend on every part, so no part can be written to
+/// suit the choice.
+fn choice(sorted: &[&NamedPart], seed: u64) -> SplitMix64 {
     let seals: Vec<&str> = sorted.iter().map(|(_, part)| part.seal.as_str()).collect();
     SplitMix64::of(seed, "blocks of parts", &seals)
 }

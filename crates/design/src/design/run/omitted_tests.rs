@@ -18,7 +18,7 @@ const LATITUDE: f64 = 28.2;
 const STEP_S: f64 = 50.0;
 const DWELL_S: f64 = 1000.0;
 
-/// A task of few sequences.
+/// Design task with few sequences.
 struct Small {
     base: Scheme,
     conditions: Conditions,
@@ -56,7 +56,7 @@ impl Small {
         Self { base, conditions, options, positions }
     }
 
-    /// All sequences, as candidates.
+    /// All sequences of candidates.
     fn sequences(&self) -> Vec<Vec<usize>> {
         let n = self.options.candidates.names.len();
         (0..self.positions).fold(vec![Vec::new()], |all, _| {
@@ -121,7 +121,7 @@ impl Small {
         [of(sigmas), of(biases)]
     }
 
-    /// The best by `worth` of the sequences that `allowed` lets through.
+    /// Best sequence by `worth` among those for which `allowed` is true.
     fn brute_force(&self, allowed: impl Fn(&[usize]) -> bool) -> Option<(usize, f64)> {
         let all = self.sequences();
         let worths = all.iter().filter(|s| allowed(s)).filter_map(|s| self.worth(s));
@@ -129,7 +129,7 @@ impl Small {
     }
 }
 
-/// A bench of some families and single errors.
+/// Random bench of families and single errors.
 fn bench(rng: &mut SplitMix64) -> Vec<Assignment> {
     let all = [
         ("K0", 100.0),
@@ -149,8 +149,9 @@ fn bench(rng: &mut SplitMix64) -> Vec<Assignment> {
     drawn.collect()
 }
 
-/// The first scheme of `count` tasks with a bench is the best of brute force, by worst degree and total; it
-/// is called proven. Number of tasks with a scheme, and of those whose scheme of least sigma is another one.
+/// Checks that the first scheme of `count` tasks with a bench is the best of brute force, by worst
+/// degree and total, and called proven. Returns the number of tasks with a scheme, and of those whose
+/// scheme of least sigma is another one.
 fn benched(count: usize, seed: u64) -> [usize; 2] {
     let mut rng = SplitMix64::new(seed);
     let mut counts = [0; 2];
@@ -164,7 +165,7 @@ fn benched(count: usize, seed: u64) -> [usize; 2] {
             CriterionName::D,
             CriterionName::E,
         ][task % 5];
-        // requirements on totals, in some tasks as a limit
+        // requirements on totals, as a limit in some tasks
         small.options.meet = task % 4 == 1;
         if small.options.criterion == CriterionName::Margin || small.options.meet {
             let value = 0.1 * (1 + rng.below(20)) as f64;
@@ -196,8 +197,8 @@ fn benched(count: usize, seed: u64) -> [usize; 2] {
     counts
 }
 
-/// Points of the front of sigma against bias are what the whole answers of their schemes say; none beats
-/// another in both, and none has a total below the best.
+/// Checks the front of sigma against bias: its figures are those of the whole answers, none beats
+/// another in both, and no total is below the best.
 fn check_front(small: &Small, found: &Design, task: usize) {
     assert!(!found.bias_front.is_empty(), "task {task}");
     let without = Small {
@@ -214,7 +215,7 @@ fn check_front(small: &Small, found: &Design, task: usize) {
         assert!((p.sigma / sigma - 1.0).abs() < 1e-6, "task {task}: {p:?} {sigma}");
         assert!((p.total / total - 1.0).abs() < 1e-6, "task {task}: {p:?} {total}");
         assert!(p.total > found.found[0].value * (1.0 - 1e-9), "task {task}: {p:?}");
-        // of the largest, or of a mean: a total is at most that of both together
+        // for a largest value and for a mean: the total is at most the root sum of squares
         assert!(p.total <= p.sigma.hypot(p.bias) * (1.0 + 1e-9), "task {task}: {p:?}");
         assert!(p.total >= p.sigma.max(p.bias) * (1.0 - 1e-9), "task {task}: {p:?}");
     }
@@ -313,7 +314,7 @@ fn record(column: Column, positions: &[&str], carry: Carry) -> DVector<f64> {
     DVector::from_vec(out)
 }
 
-/// Part of a vector outside the span of others, twice orthogonalised.
+/// Part of a vector outside the span of others, orthogonalised twice.
 fn outside(basis: &[DVector<f64>], v: &DVector<f64>) -> DVector<f64> {
     let mut rest = v.clone();
     for _ in 0..2 {
@@ -324,8 +325,8 @@ fn outside(basis: &[DVector<f64>], v: &DVector<f64>) -> DVector<f64> {
     rest
 }
 
-/// Size in ug from which on each K0 shows at three sigma (1e-5 g a sample): 0 if none has an effect, infinite
-/// if one is in the span of the unknowns; by ranks of the records of this file.
+/// Smallest size in ug at which each K0 shows at three sigma (1e-5 g a sample), by ranks of the records
+/// of this file: 0 if none has an effect, infinite if one is in the span of the unknowns.
 fn shown_from(positions: &[&str], carry: Carry) -> f64 {
     let own = if carry == Carry::Reset { positions.len() } else { 1 };
     let psi = (0..own).flat_map(|at| (0..3).map(move |k| Column::Psi(k, at)));
@@ -349,9 +350,9 @@ fn shown_from(positions: &[&str], carry: Carry) -> f64 {
     (0..3).map(from).fold(0.0, f64::max)
 }
 
-/// Immune designs of `count` tasks are the best of all sequences that are immune by [`shown_from`], with and
-/// without a bench; where none is, nothing is found. Number of tasks with an immune scheme, of those without,
-/// and of those whose best scheme is not immune.
+/// Checks that immune designs of `count` tasks are the best of all sequences that are immune by
+/// [`shown_from`], with and without a bench, and that nothing is found if none is. Returns the number
+/// of tasks with an immune scheme, of those without, and of those whose best scheme is not immune.
 fn immune(count: usize, seed: u64) -> [usize; 3] {
     let mut rng = SplitMix64::new(seed);
     let mut counts = [0; 3];
@@ -366,7 +367,7 @@ fn immune(count: usize, seed: u64) -> [usize; 3] {
             let letters: Vec<&str> = s.iter().map(|&c| names[c].as_str()).collect();
             shown_from(&letters, carry)
         };
-        // sizes at which some sequences stand and others do not: that of one drawn among those that show it
+        // size at which some sequences are immune and others are not: that of a random one
         let mut finite: Vec<f64> = small.sequences().iter().map(|s| from(s)).collect();
         finite.retain(|f| *f > 0.0 && *f < 2e4);
         let drawn = finite.get(rng.below(finite.len().max(1) as u64) as usize).map_or(100.0, |f| f * 1.001);
@@ -409,8 +410,8 @@ fn immune_designs_are_those_of_ranks_at_length() {
     assert!(found > 20 && none > 20 && other > 5);
 }
 
-/// Sizes that double precision does not decide are refused; at the largest one that is not, what the search
-/// takes for silent is not seen from there on by any record: its information is below that of the size.
+/// Sizes that double precision cannot decide are refused. At the largest size allowed, an error that
+/// the search takes for silent has less information in any record than the size requires.
 #[test]
 fn immunity_is_decided_or_refused() {
     for (terms, name, carry) in [
@@ -424,7 +425,7 @@ fn immunity_is_decided_or_refused() {
         small.options.immune = vec![Immune { name: name.into(), size: Some(1e8) }];
         let found = design(&small.base, &small.conditions, &small.options, &|_| true);
         let Err(DesignError::ImmuneSize { most, unit, .. }) = found else { panic!("{name}: {found:?}") };
-        // the samples of every sequence, by the records of its whole answer
+        // samples of every sequence, by the records of its whole answer
         let si = if unit == "ppm" || unit == "ug" { 1e-6 } else { (1f64 / 3600.0).to_radians() };
         let allowed = (3.0 / (most * si)).powi(2) / 1e-9;
         for sequence in small.sequences() {
@@ -449,7 +450,7 @@ fn immunity_is_decided_or_refused() {
     }
 }
 
-/// An error that no scheme has is refused, and one that is estimated too.
+/// Immunity to a name that is no error, or to an error that is estimated, is refused.
 #[test]
 fn immunity_to_nothing_is_refused() {
     let mut small = Small::draw(&mut SplitMix64::new(1), "F");

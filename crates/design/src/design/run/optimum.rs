@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use obsdeg_core::model::{Carry, Euler, GyroAxes, Scheme, Term, cardinal_name, format_decimal};
 use obsdeg_evidence::simulation::{Conditions, latitude_of, steps};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -22,12 +22,12 @@ use crate::design::search::scoring::Search;
 
 /// Name and version of the layout.
 pub const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
-/// Number of sequences of a block above which starts are made longer.
+/// Number of sequences behind a start above which starts are made longer.
 const LONG: f64 = 1e6;
-/// Most blocks.
+/// Largest number of blocks.
 const MOST_BLOCKS: usize = 100_000;
-/// Part of what the least value of a block is above the best that its bound claims: a value far above the
-/// best may rest on rounding.
+/// Fraction of the excess of a block's least value over the best that its bound claims: values far
+/// above the best may rest on rounding.
 const ROOM: f64 = 0.9;
 /// Largest value of a block that counts, as a multiple of the best one.
 const CAP: f64 = 10.0;
@@ -166,7 +166,7 @@ pub fn check_certifiable(
     }
 }
 
-/// The certificate of an optimum that a search has proven. Its blocks are searched for their bounds.
+/// Certificate of an optimum that a search has proven. Its blocks are searched for their bounds.
 ///
 /// # Errors
 /// [`DesignError::NoCertificate`] where nothing is proven, or the layout does not cover it; [`DesignError`].
@@ -210,7 +210,7 @@ pub fn certify_optimum(
     })
 }
 
-/// The question.
+/// Question that the certificate answers.
 fn problem(prepared: &Prepared<'_>, k: usize) -> Result<OptimumProblem, DesignError> {
     let (task, conditions) = (&prepared.task, prepared.conditions);
     let scheme = task.base;
@@ -281,7 +281,7 @@ fn blocks(
             return Err(DesignError::Interrupted);
         }
         let found = best.found.first().filter(|s| s.worth.degree == degree).map(|s| s.worth.value);
-        // what a bound leaves out is above the best, and what rounding hides is not known
+        // excluded sequences are above the best, and sequences lost to rounding are unknown
         let hidden = best.excluded > 0 || best.lost > 0;
         let above = |value: f64| least + ROOM * (value.min(CAP * least) - least);
         let bound = if hidden { Some(least) } else { found.map(above) };
@@ -292,11 +292,10 @@ fn blocks(
             bound,
         })
     };
-    starts.par_iter().with_max_len(1).map(block).collect()
+    parallel::try_map(starts.len(), |i| block(&starts[i]))
 }
 
-/// Starts of all blocks, in lexicographic order: of two candidates, or more where many sequences are behind
-/// them.
+/// Starts of all blocks, in lexicographic order: two candidates, or more where many sequences follow.
 fn starts(firsts: Vec<usize>, (n, k): (usize, usize), ordered: bool) -> Result<Vec<Vec<usize>>, DesignError> {
     let mut out: Vec<Vec<usize>> = firsts.into_iter().map(|c| vec![c]).collect();
     for depth in 1..k {
@@ -316,7 +315,7 @@ fn starts(firsts: Vec<usize>, (n, k): (usize, usize), ordered: bool) -> Result<V
     }
 }
 
-/// Number of sequences behind a start; `None` beyond 2^63.
+/// Number of sequences that begin with a start; `None` beyond 2^63.
 fn behind(start: &[usize], (n, k): (usize, usize), ordered: bool) -> Option<u64> {
     let left = (k - start.len()) as u64;
     let choices = (n - if ordered { 0 } else { start.last().copied().unwrap_or(0) }) as u64;

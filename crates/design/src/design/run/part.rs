@@ -18,9 +18,10 @@ use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 
 /// Name and version of the JSON layout.
 pub const PART_SCHEMA: &str = "obsdeg.part/2";
-/// Most parts of a search.
+/// Largest number of parts of a search.
 pub(crate) const MOST_PARTS: usize = 1_000_000;
-/// Starts of a block, which are searched at once: an interrupted part goes on behind its last block.
+/// Number of starts of a block, which are searched at once: an interrupted part continues after its
+/// last block.
 pub(crate) const BLOCK: usize = 16;
 
 /// Part of an exhaustive search, done or interrupted.
@@ -74,7 +75,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// What the search of some starts found, as a part keeps it.
+    /// Block for the search of some starts, with its counts and digest.
     pub(crate) fn new(starts: &Range<usize>, best: &Best) -> Self {
         Self {
             starts: [starts.start, starts.end],
@@ -85,7 +86,7 @@ impl Block {
 }
 
 impl Part {
-    /// The same with the digest of its contents.
+    /// Same part with the digest of its contents.
     #[must_use]
     pub fn sealed(mut self) -> Self {
         self.seal.clear();
@@ -93,7 +94,7 @@ impl Part {
         self
     }
 
-    /// Whether its contents are those of its digest.
+    /// Checks the layout, and the contents against their digest.
     ///
     /// # Errors
     /// [`PartError::Layout`] for another layout, [`PartError::Changed`].
@@ -105,7 +106,7 @@ impl Part {
         if self.clone().sealed().seal == self.seal { Ok(()) } else { Err(PartError::Changed) }
     }
 
-    /// Whether it is unchanged and belongs to a search of these inputs.
+    /// Checks that the part is unchanged and belongs to a search with these inputs.
     pub(crate) fn check(&self, inputs: &Inputs) -> Result<(), PartError> {
         self.unchanged()?;
         let [number, of] = self.part;
@@ -120,11 +121,10 @@ impl Part {
     }
 }
 
-/// The starts of part `number` of `of`, counted from 1: each part has about as many sequences behind its
-/// starts as any other.
+/// Starts of part `number` of `of`, counted from 1: all parts have about the same work.
 pub(crate) fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
     let total: f64 = work.iter().sum();
-    // where the middle of a start is
+    // middle of a start on the scale of work
     let mut behind = 0.0;
     let middles: Vec<f64> = work
         .iter()
@@ -138,8 +138,8 @@ pub(crate) fn range(work: &[f64], [number, of]: [usize; 2]) -> Range<usize> {
     to(number - 1)..to(number)
 }
 
-/// The number of starts of an exhaustive search: what its parts divide. More parts than starts leave some of
-/// them empty.
+/// Number of starts of an exhaustive search, which its parts divide. If parts outnumber starts, some
+/// parts are empty.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -155,11 +155,11 @@ pub fn design_starts(
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
 }
 
-/// Part `number` of `of` of the exhaustive search, however large that is; `resumed` is what an interrupted
-/// run of the same part found. Interrupted again, it is not complete.
+/// Part `number` of `of` of the exhaustive search, of any size; `resumed` is the result of an
+/// interrupted run of the same part. The part is incomplete if interrupted again.
 ///
 /// # Errors
-/// [`DesignError`]; [`PartError`] for a part that cannot be gone on with.
+/// [`DesignError`]; [`PartError`] for a part that cannot be continued.
 pub fn design_part(
     base: &Scheme,
     conditions: &Conditions,
@@ -263,7 +263,7 @@ mod tests {
         (base, Conditions::default(), options)
     }
 
-    /// Longer starts begin the same sequences: those found and the number examined are the same.
+    /// Longer starts give the same sequences and the same number examined.
     #[test]
     fn sequences_do_not_depend_on_the_length_of_starts() {
         for (carry, candidates, k) in [(Carry::Reset, 24, 6), (Carry::Reset, 24, 7), (Carry::Inertial, 24, 5)]
@@ -289,7 +289,7 @@ mod tests {
         }
     }
 
-    /// Behind every start is a bounded number of sequences, under every carry and for many positions.
+    /// Every start has a bounded number of sequences, under every carry and for many positions.
     #[test]
     fn a_start_is_a_bounded_amount_of_work() {
         for (carry, k) in [(Carry::Reset, 8), (Carry::Reset, 12), (Carry::Reset, 15), (Carry::Inertial, 9)] {

@@ -1,4 +1,4 @@
-//! Checks of a part before it is believed: its starts and counts add up, and what it lists is evaluated
+//! Checks of a part before it is merged: starts and counts add up, and listed sequences are evaluated
 //! again.
 
 use std::collections::BTreeSet;
@@ -15,8 +15,8 @@ use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
 use crate::design::search::scoring::{Search, candidates};
 
-/// The whole search that parts are compared with.
-pub(crate) struct Whole<'a> {
+/// Whole search that parts are compared with.
+pub(crate) struct WholeSearch<'a> {
     prepared: &'a Prepared<'a>,
     search: Search<'a>,
     k: usize,
@@ -27,11 +27,11 @@ pub(crate) struct Whole<'a> {
     prunes: bool,
 }
 
-/// Block of a part: the index of the part, of the level, of the block.
-pub(crate) type BlockAt = [usize; 3];
+/// Block of a part: index of the part, of the level, of the block.
+pub(crate) type BlockIndex = [usize; 3];
 
-impl<'a> Whole<'a> {
-    /// The search of `k` positions, without what takes long.
+impl<'a> WholeSearch<'a> {
+    /// Search of `k` positions, without the steps that take long.
     ///
     /// # Errors
     /// [`DesignError::Interrupted`]; [`DesignError`] where sequences are too many.
@@ -48,10 +48,10 @@ impl<'a> Whole<'a> {
         Ok(Self { prepared, k, starts, work, levels, prunes: prepared.prunes(k), search })
     }
 
-    /// Whether the part is one that a search of its starts can write.
+    /// Checks that a search of its starts can write this part.
     ///
     /// # Errors
-    /// [`PartError`]: the first thing that no search writes.
+    /// [`PartError`]: the first contradiction found.
     pub(crate) fn check(&self, part: &Part) -> Result<(), PartError> {
         let own = range(&self.work, part.part);
         let expected = [own.start, own.end, self.work.len()];
@@ -78,7 +78,7 @@ impl<'a> Whole<'a> {
         Ok(())
     }
 
-    /// A part ends at the first worst degree behind which enough is found, or at the last.
+    /// Checks that the part ends at the first worst degree with enough sequences, or at the last one.
     fn levels_suffice(&self, part: &Part) -> Result<(), PartError> {
         let enough = self.search.keep.max(1);
         let found = |levels: &[Level]| levels.iter().map(|l| l.best.found.len()).sum::<usize>();
@@ -124,7 +124,7 @@ impl<'a> Whole<'a> {
         if found > keep.min(valid) {
             return Err(counts(format!("{found} sequences listed of {valid}, with {keep} to keep")));
         }
-        // where no requirement and no bound leaves any out, as many are listed as there are
+        // without requirements and bounds, the list holds as many as there are
         let all_count = best.excluded == 0 && self.search.constraints.sigmas.is_none();
         if all_count && found < keep.min(valid) {
             return Err(counts(format!("{found} sequences listed, {valid} examined, {keep} to keep")));
@@ -140,7 +140,7 @@ impl<'a> Whole<'a> {
         Ok(())
     }
 
-    /// Evaluates again what is listed.
+    /// Evaluates the listed sequences again.
     fn lists_hold(&self, level: &Level, starts: &[Vec<Stop>], of: &SearchLevel) -> Result<(), PartError> {
         let best = &level.best;
         let begins: BTreeSet<&[Stop]> = starts.iter().map(Vec::as_slice).collect();
@@ -158,7 +158,7 @@ impl<'a> Whole<'a> {
         Ok(())
     }
 
-    /// The names of its candidates.
+    /// Names of the candidates of a sequence.
     fn named(&self, scored: &Scored) -> String {
         let names = &self.prepared.task.candidates.names;
         let name = |s: &Stop| names.get(s.candidate).cloned().unwrap_or_else(|| s.candidate.to_string());
@@ -167,7 +167,7 @@ impl<'a> Whole<'a> {
         format!("{}{more}", shown.join(" "))
     }
 
-    /// Why the search of these starts does not list a sequence with this score.
+    /// Reason why a search of these starts does not list a sequence with this score; `None` if it does.
     fn why_not(&self, scored: &Scored, begins: &BTreeSet<&[Stop]>, level: &SearchLevel) -> Option<String> {
         let (sequence, search) = (&scored.sequence, &self.search);
         let evaluator = search.evaluator;
@@ -217,14 +217,14 @@ impl<'a> Whole<'a> {
         (!kept).then(|| "a constraint that is not kept".into())
     }
 
-    /// Searches `count` of the blocks again, chosen at random, and says how many it were.
+    /// Searches `count` of the blocks again, chosen at random, and returns their number.
     ///
     /// # Errors
     /// [`DesignError::Part`] for a block with another result, [`DesignError::Interrupted`].
     pub(crate) fn search_again(
         &self,
         parts: &[&(String, Part)],
-        blocks: Vec<BlockAt>,
+        blocks: Vec<BlockIndex>,
         count: usize,
         random: &mut SplitMix64,
     ) -> Result<usize, DesignError> {
@@ -233,7 +233,7 @@ impl<'a> Whole<'a> {
             return Ok(0);
         }
         let pruning = self.prepared.pruning(&self.search, self.k);
-        let of_one_level = |a: &BlockAt, b: &BlockAt| a[..2] == b[..2];
+        let of_one_level = |a: &BlockIndex, b: &BlockIndex| a[..2] == b[..2];
         for group in chosen.chunk_by(of_one_level) {
             let [part, level, _] = group[0];
             let (name, part) = parts[part];
@@ -276,7 +276,7 @@ impl<'a> Whole<'a> {
         Ok(Ok(()))
     }
 
-    /// True if a part would list something else, had it held what its block holds.
+    /// True if a part would list other sequences with the results of a block added.
     fn misses(&self, of_part: &Best, of_block: Best) -> bool {
         let mut again = of_part.clone();
         for scored in of_block.found.into_iter().chain(of_block.front) {
@@ -286,16 +286,16 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// Tolerance of counts in doubles.
+/// Relative tolerance of counts in doubles.
 const ROUNDING: f64 = 1.0 + 1e-9;
-/// Most positions of a sequence in a message.
+/// Largest number of positions of a sequence in a message.
 const SHOWN: usize = 12;
 
 fn counts(why: String) -> PartError {
     PartError::Counts { why }
 }
 
-/// What differs in the counts or the digest of a block.
+/// Difference in the counts or the digest of a block; `None` if they agree.
 fn differs(stated: &Block, found: &Block) -> Option<String> {
     let names = ["examined", "excluded", "lost"].into_iter().zip(stated.counts).zip(found.counts);
     let count = names.into_iter().find(|((_, stated), found)| stated != found);
@@ -303,7 +303,7 @@ fn differs(stated: &Block, found: &Block) -> Option<String> {
     count.or_else(|| (stated.digest != found.digest).then(|| "the best sequences are others".into()))
 }
 
-/// Blocks follow each other from the first start to the last, and their counts are those of the level.
+/// Checks that blocks follow each other from the first start to the last, with the counts of the level.
 fn blocks_add_up(level: &Level, from: usize, to: usize) -> Result<(), PartError> {
     let (mut next, mut sum) = (from, [0u64; 3]);
     for block in &level.blocks {
@@ -323,8 +323,8 @@ fn blocks_add_up(level: &Level, from: usize, to: usize) -> Result<(), PartError>
     Ok(())
 }
 
-/// `count` of the blocks, in their order.
-fn chosen(mut blocks: Vec<BlockAt>, count: usize, random: &mut SplitMix64) -> Vec<BlockAt> {
+/// Random choice of `count` of the blocks, in their order.
+fn chosen(mut blocks: Vec<BlockIndex>, count: usize, random: &mut SplitMix64) -> Vec<BlockIndex> {
     while blocks.len() > count {
         let place = random.below(blocks.len() as u64) as usize;
         blocks.swap_remove(place);

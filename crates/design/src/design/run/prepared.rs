@@ -1,4 +1,4 @@
-//! A search that can begin: its task, with what evaluates sequences.
+//! Prepared search: its task, and the evaluator of sequences.
 
 use obsdeg_core::model::{Euler, Path, Scheme, c_n_f64};
 use obsdeg_evidence::simulation::Conditions;
@@ -18,16 +18,17 @@ use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 use crate::design::search::screen::Screen;
 
-/// Schemes of least sigma that are kept, to be ranked by their total uncertainty, where the search does not
-/// count it.
+/// Number of schemes of least sigma that are kept, to be ranked by total uncertainty, if the search
+/// does not count it.
 const RANKED: usize = 100;
 
-/// A search that can begin: its task, and what evaluates sequences.
+/// Prepared search: its task, and the evaluator of sequences.
 pub(crate) struct Prepared<'a> {
     pub(crate) task: Task<'a>,
     pub(crate) evaluator: Evaluator,
     pub(crate) conditions: &'a Conditions,
-    /// The degree of every required coefficient in all candidates together.
+    /// Degree of every required coefficient in all candidates together; `None` where it is not
+    /// observable.
     pub(crate) degrees: Vec<Option<usize>>,
     /// Attitudes that the gimbals do not reach.
     pub(crate) beyond: Vec<String>,
@@ -78,7 +79,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// Whether schemes of `k` positions can do at all.
+    /// Checks that schemes of `k` positions can be sufficient at all.
     pub(crate) fn check(&self, k: usize) -> Result<(), DesignError> {
         let impossible = |why| Err(DesignError::Impossible { positions: k, wanted: self.task.wanted(), why });
         if let Some(limit) = self.task.options.total_s
@@ -99,20 +100,20 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// What is left out of an exhaustive search.
+    /// Bounds and incumbents for an exhaustive search; `None` if it excludes nothing.
     pub(crate) fn pruning<'s>(&self, search: &'s Search<'_>, k: usize) -> Option<Pruning<'s>> {
         let (_, sequences) = self.task.space(k, &self.evaluator)?;
         (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
     }
 
-    /// True if an exhaustive search may leave sequences out.
+    /// True if an exhaustive search may exclude sequences.
     pub(crate) fn prunes(&self, k: usize) -> bool {
         let many = self.task.space(k, &self.evaluator).is_some_and(|space| space.1 >= MANY);
         many && k >= 3 && Screen::new(&self.evaluator, &self.task.criterion).is_some()
     }
 
-    /// The best sequences: all are searched, with the number of sets and sequences, unless they are too many
-    /// or `bound` shows that those an exchange finds are good enough.
+    /// Best sequences. All are searched, with the number of sets and sequences returned, unless they
+    /// are too many or `bound` shows that the best of an exchange are good enough.
     pub(crate) fn searched(
         &self,
         search: &Search<'_>,
@@ -144,7 +145,7 @@ impl<'a> Prepared<'a> {
         (best, exhaustive)
     }
 
-    /// The number of sets and of sequences of an exhaustive search.
+    /// Numbers of sets and of sequences of an exhaustive search.
     pub(crate) fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
         if self.task.walks {
             return Err(DesignError::Walks { found: "a search of all sequences".into() });
@@ -154,7 +155,7 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Refuses what is not done where torquer errors act on the way between positions.
+/// Refuses options that do not apply where torquer errors act in turns.
 fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> Result<(), DesignError> {
     let whole = |x: &f64| (x - x.round()).abs() < 1e-12;
     let cardinal = |a: &Euler| c_n_f64(a).as_flattened().iter().all(whole);

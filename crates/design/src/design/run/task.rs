@@ -1,4 +1,4 @@
-//! A search made ready: names resolved, candidates ordered by orbits; and what is made of its results.
+//! Task of a search: names resolved, candidates ordered by orbits; and reports of its results.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use obsdeg_core::omitted::OmittedClass;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::omitted::{Bench, OmittedEffect, term_effects};
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
 use crate::design::answer::{Found, HalfTurn, Minimum};
 use crate::design::measure::criterion::{Criterion, Limits};
@@ -31,17 +31,17 @@ use crate::design::search::constraints::Constraints;
 use crate::design::search::score::Scored;
 use crate::design::search::scoring::Search;
 
-/// Most sets of which a bit is held for every degree.
+/// Largest number of sets for which one bit per degree is stored.
 const MOST_SETS: u64 = 5_000_000;
-/// Most prefixes and sets that are looked at for the minimum, when it is not what was asked for.
+/// Largest number of prefixes and sets examined for the minimum if that is not what was asked for.
 const MINIMUM_SETS: u64 = 1_000_000;
 /// Factors on the dwell for the front of total time.
 pub(crate) const DWELLS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Restarts of the exchange at each of them, besides those from the schemes found.
+/// Restarts of the exchange at each factor, besides those from the schemes found.
 const FRONT_RESTARTS: u64 = 8;
 
-/// Conditions of a search: where only some coefficients are asked for, requirements on psi and on the others
-/// are left out, also of the file that is written, so that every command judges the same.
+/// Conditions of a search. If only some coefficients are asked for, requirements on psi and on the
+/// others are left out, also in the file that is written, so that every command judges alike.
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a base that is no platform.
@@ -62,7 +62,7 @@ pub fn asked(base: &Scheme, conditions: &Conditions, required: &[String]) -> Res
     Ok(Conditions { requirements, ..conditions.clone() })
 }
 
-/// A search in preparation: names resolved, candidates ordered by orbits.
+/// Task of a search: names resolved, candidates ordered by orbits.
 pub(crate) struct Task<'a> {
     pub(crate) base: &'a Scheme,
     pub(crate) options: &'a DesignOptions,
@@ -71,18 +71,18 @@ pub(crate) struct Task<'a> {
     pub(crate) required: Vec<(String, usize)>,
     pub(crate) criterion: Criterion,
     pub(crate) constraints: Constraints,
-    /// Errors that are not estimated and that the search counts.
+    /// Errors that are not estimated and that the search counts; `None` if it counts none.
     pub(crate) omitted: Option<Omitted>,
-    /// Units of the errors that schemes are immune to.
+    /// Units of the errors that schemes must be immune to.
     immune_units: Vec<&'static str>,
     conditions: &'a Conditions,
     pub(crate) rows: Rows,
     pub(crate) symmetry: Symmetry,
     /// True if repositioning takes time.
     slews: bool,
-    /// The units of all coefficients.
+    /// Units of all coefficients.
     units: Vec<&'static str>,
-    /// True if torquer errors act on the way between positions: sets have no verdict then.
+    /// True if torquer errors act in the turns between positions: sets have no verdict then.
     pub(crate) walks: bool,
 }
 
@@ -161,7 +161,7 @@ impl<'a> Task<'a> {
         }
         // the total uncertainty of psi is that at the end, which is not built up position by position
         let of_psi = uses_requirements && limits.psi.iter().any(|l| l.is_finite());
-        // where the number of positions is sought, none has a number
+        // where the number of positions is searched for, errors of single positions do not exist
         Bench::check(&conditions.bench, options.positions.unwrap_or(0), false)
             .map_err(SimulationError::from)?;
         let omitted = Omitted::of(base, &platform, conditions, &options.immune)?;
@@ -175,7 +175,7 @@ impl<'a> Task<'a> {
         };
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let walks = is_walk(base);
-        // of walks these say which attitudes are the same
+        // for slew sequences the rows only tell which attitudes are the same
         let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
         let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
         // an attitude counts once
@@ -225,10 +225,10 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// The unit of the criterion; none when it has none, or several.
+    /// Unit of the criterion; `None` if it has none, or several.
     ///
     /// # Errors
-    /// [`DesignError::Units`] when no unit is that of what the criterion compares.
+    /// [`DesignError::Units`] if the criterion compares coefficients in different units.
     pub(crate) fn unit(&self) -> Result<Option<&'static str>, DesignError> {
         let families = [("deg/h", "deg/h"), ("ug", "ug"), ("ppm", "ppm"), ("arcsec", "arcsec")];
         let named = |family: &str| self.required.iter().find(|r| self.units[r.1].starts_with(family));
@@ -245,13 +245,15 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The required coefficients that all candidates together, of these degrees, leave unobservable.
+    /// Required coefficients that all candidates together leave unobservable; `degrees` are their
+    /// degrees.
     pub(crate) fn never<'s>(&'s self, degrees: &'s [Option<usize>]) -> impl Iterator<Item = &'s str> {
         let lost = self.required.iter().zip(degrees).filter(|(_, d)| d.is_none());
         lost.map(|(c, _)| c.0.as_str())
     }
 
-    /// The fewest candidates that do, with the proof; `proven` without regard to the bound on errors.
+    /// Smallest number of candidates that is sufficient, with the proof; `proven` ignores the bound on
+    /// errors.
     ///
     /// # Errors
     /// [`DesignError::Interrupted`].
@@ -300,8 +302,8 @@ impl<'a> Task<'a> {
         Ok(out)
     }
 
-    /// The number of sets behind an exhaustive search of `k` positions, and of sequences up to symmetry;
-    /// `None` where there are too many to hold, or to count.
+    /// Number of sets of an exhaustive search of `k` positions, and of its sequences up to symmetry;
+    /// `None` if too many to store or to count.
     pub(crate) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
         if self.walks {
             return None;
@@ -316,7 +318,8 @@ impl<'a> Task<'a> {
         Some((sets, searched))
     }
 
-    /// A sequence with its exact verdict; `None` when rounding called it determined and it is not.
+    /// Scheme of a sequence with its exact verdict; `None` if the verdict, the requirements or the immunity
+    /// of the sequence are not as required.
     fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
         let attitudes: Vec<Euler> =
             scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
@@ -324,21 +327,20 @@ impl<'a> Task<'a> {
         self.attained(self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)?)
     }
 
-    /// Those of some sequences that are what they seem.
+    /// Scored sequences confirmed by the exact verdict, as schemes.
     pub(crate) fn all_found(
         &self,
         evaluator: &Evaluator,
         list: &[Scored],
     ) -> Result<Vec<Found>, DesignError> {
-        let found: Vec<Option<Found>> =
-            list.par_iter().map(|scored| self.found(evaluator, scored)).collect::<Result<_, _>>()?;
+        let found: Vec<Option<Found>> = parallel::try_map(list.len(), |i| self.found(evaluator, &list[i]))?;
         Ok(found.into_iter().flatten().collect())
     }
 
-    /// Says of those of `found` that turns of the platform axes make of others listed before them.
+    /// Sets `image_of` of schemes that a turn of the platform axes makes of earlier ones.
     pub(crate) fn mark_images(&self, found: &mut [Found], ordered: bool) {
         // candidates in order, and half turns with their axes
-        type Way = (Vec<usize>, Vec<(usize, [i64; 3])>);
+        type Arrangement = (Vec<usize>, Vec<(usize, [i64; 3])>);
         let names: HashMap<&str, usize> = self.candidates.names.iter().map(String::as_str).zip(0..).collect();
         let arranged = |mut sequence: Vec<usize>| {
             if !ordered {
@@ -346,8 +348,8 @@ impl<'a> Task<'a> {
             }
             sequence
         };
-        // every image of those that are none themselves
-        let mut known: HashMap<Way, usize> = HashMap::new();
+        // all images of the schemes that are no images themselves
+        let mut known: HashMap<Arrangement, usize> = HashMap::new();
         for (i, f) in found.iter_mut().enumerate() {
             let sequence: Option<Vec<usize>> =
                 f.positions.iter().map(|p| names.get(p.as_str()).copied()).collect();
@@ -391,7 +393,7 @@ impl<'a> Task<'a> {
         let columns = || self.required.iter().map(|r| first + r.1);
         let degrees: Option<Vec<usize>> = columns().map(|c| verdicts.degrees.degree[c]).collect();
         let Some(degrees) = degrees.filter(|d| self.constraints.cap(d)) else { return Ok(None) };
-        // beyond the precision of the series the order is not known
+        // the order is unknown beyond the precision of the series
         let accuracy = Accuracy::new(&platform, &verdicts, self.options.seed).ok();
         let order_of = |c: usize| accuracy.as_ref().and_then(|a| a.order[c]);
         let orders = columns().map(order_of).collect::<Option<Vec<_>>>();
@@ -420,8 +422,8 @@ impl<'a> Task<'a> {
         }))
     }
 
-    /// Scheme that was found, with the figures that every other command gives of its file; `None` where
-    /// requirements are a constraint and one is missed.
+    /// Scheme with the figures that every other command gives for its file; `None` if requirements are a
+    /// constraint and one is missed, or if it is not immune as required.
     ///
     /// # Errors
     /// [`DesignError`] for a scheme that cannot be run.
@@ -449,7 +451,7 @@ impl<'a> Task<'a> {
         Ok(Some(Found { requirements, worst, worst_sigma_dph, value, ..found }))
     }
 
-    /// True if a scheme is immune to what it must be, by the exact classes of the errors.
+    /// True if a scheme is immune as required, by the exact classes of the errors.
     fn is_immune(&self, attained: &Attained, conditions: &Conditions) -> Result<bool, DesignError> {
         if self.options.immune.is_empty() {
             return Ok(true);
@@ -467,21 +469,21 @@ impl<'a> Task<'a> {
         Ok(self.options.immune.iter().all(kept))
     }
 
-    /// True if random drift is stated, or a bench that the search does not count: the search leaves them out,
-    /// and what it finds is evaluated with them.
+    /// True if random drift or a bench is stated that the search does not count: listed schemes are
+    /// evaluated with it.
     pub(crate) fn is_noisy(&self) -> bool {
         self.ranks()
             || !self.conditions.gyro_noise.is_none()
             || self.conditions.as_stated().drift_noise.amount() > 0.0
     }
 
-    /// True if a bench, or an error that schemes must be immune to, is stated that the search does not count:
-    /// the schemes of least sigma are ranked by their total uncertainty.
+    /// True if a bench or an immunity is stated that the search does not count: the schemes of least
+    /// sigma are ranked by total uncertainty.
     pub(crate) fn ranks(&self) -> bool {
         self.omitted.is_none() && !(self.conditions.bench.is_empty() && self.options.immune.is_empty())
     }
 
-    /// What is found at other dwells and numbers of positions.
+    /// Front of total time: schemes at other dwells and numbers of positions.
     pub(crate) fn front(
         &self,
         evaluator: &Evaluator,
@@ -501,7 +503,7 @@ impl<'a> Task<'a> {
                 }
                 // a dwell of too many steps is no point of the front
                 let Ok(other) = evaluator.clone().with_dwell(dwell_s * factor) else { continue };
-                // the schemes are compared by their criterion alone
+                // schemes of the front are compared by their criterion alone
                 let there = Search { evaluator: &other, keep: 1, ..*search };
                 let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
                 let best = there.exchange(count, &given, restarts, self.options.seed);
@@ -515,14 +517,15 @@ impl<'a> Task<'a> {
         Ok(out)
     }
 
-    /// The attitudes of a sequence, and the way through them where they are the candidates.
+    /// Attitudes of a sequence, and the sequence as stops of these attitudes as candidates.
     pub(crate) fn placed(&self, of: &Scored) -> (Vec<Euler>, Vec<Stop>) {
         let attitude = |s: &Stop| self.candidates.attitudes[s.candidate].clone();
         let path = of.sequence.iter().zip(0..).map(|(s, candidate)| Stop { candidate, ..*s });
         (of.sequence.iter().map(attitude).collect(), path.collect())
     }
 
-    /// The best sequence with the total time divided among its positions, if that makes it better.
+    /// Best sequence with the total time divided among its positions; `None` if equal dwells are as
+    /// good.
     pub(crate) fn divided(
         &self,
         evaluator: &Evaluator,
@@ -540,8 +543,8 @@ impl<'a> Task<'a> {
         self.attained(found.map(|f| Found { dwells_s, dwell_s: evaluator.dwell_s(), ..f }))
     }
 
-    /// The best sequence with its angles refined, if that makes it better: of no larger worst degree, and
-    /// with a smaller criterion.
+    /// Best sequence with its angles refined; `None` unless its worst degree is no larger and its
+    /// criterion smaller.
     pub(crate) fn refined(
         &self,
         evaluator: &Evaluator,
@@ -562,7 +565,7 @@ impl<'a> Task<'a> {
         self.attained(found.map(|f| Found { refined: true, ..f }))
     }
 
-    /// `makes D_FX, D_FY observable with at most 10 s in all`.
+    /// Text `makes D_FX, D_FY observable with at most 10 s in all`.
     pub(crate) fn wanted(&self) -> String {
         let every = self.options.required.is_empty();
         let names: Vec<&str> = self.required.iter().map(|r| r.0.as_str()).collect();
@@ -604,7 +607,7 @@ impl<'a> Task<'a> {
     }
 }
 
-/// The number of sets of `k` of `n`; `None` beyond 2^64.
+/// Number of sets of `k` out of `n`; `None` beyond 2^64.
 fn choose(n: u64, k: u64) -> Option<u64> {
     if k > n {
         return Some(0);

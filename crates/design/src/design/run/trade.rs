@@ -1,5 +1,5 @@
-//! The front of sigma against what the bench adds: of all schemes where there are few, else of those that are
-//! best with the bench scaled, from none of it to far more.
+//! Front of sigma against bias by the bench: of all schemes if they are few, otherwise of schemes that
+//! are best with the bench scaled, from zero to far more.
 
 use std::sync::Arc;
 
@@ -14,17 +14,17 @@ use crate::design::search::scoring::{Search, Trial};
 
 /// Factors on all sizes of the bench.
 const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
-/// Most sequences that are all held against each other.
+/// Largest number of sequences that are all compared with each other.
 const MOST: f64 = 2e4;
-/// Totals beyond so many times the best one are of no scheme that anybody wants.
+/// Largest total on the front, as a multiple of the best one.
 const WORST: f64 = 100.0;
-/// Restarts of the exchange at each of them, besides those from the schemes found.
+/// Restarts of the exchange at each factor, besides those from the schemes found.
 const RESTARTS: u64 = 4;
 
 impl Task<'_> {
-    /// Schemes of `k` positions that none of these beats in both sigma and bias, by sigma, up to 100 times
-    /// the least total, and true if these are all; empty where the search does not count a bench, and for D
-    /// and E, which are of no single coefficient.
+    /// Schemes of `k` positions on the front of sigma against bias, by sigma, with totals up to 100
+    /// times the least; true if the front is of all schemes. Empty if the search does not count a
+    /// bench, and for D and E, which belong to no single coefficient.
     pub(crate) fn bias_front(
         &self,
         evaluator: &Evaluator,
@@ -37,7 +37,7 @@ impl Task<'_> {
         let (Some(omitted), true, Some(first)) = (sized, single, main.found.first()) else {
             return (Vec::new(), false);
         };
-        // none of a larger worst degree is listed
+        // only schemes of the smallest worst degree are listed
         let same = |s: &&Scored| s.worth.degree == first.worth.degree;
         let every = search.few(&self.symmetry, k, MOST).map(|all| {
             let mut trial = Trial::new(evaluator);
@@ -50,7 +50,7 @@ impl Task<'_> {
         let mut sequences: Vec<Vec<Stop>> =
             main.found.iter().filter(same).map(|s| s.sequence.clone()).collect();
         sequences.extend(every.into_iter().flatten());
-        // from the best of the search and of the factor before
+        // from the best of the search and of the previous factor
         let mut starts: Vec<Vec<Stop>> = sequences.first().cloned().into_iter().collect();
         for factor in FACTORS.into_iter().filter(|_| !all) {
             let there = Evaluator { omitted: Some(Arc::new(omitted.scaled(factor))), ..evaluator.clone() };
@@ -70,7 +70,7 @@ impl Task<'_> {
         let best = points.iter().map(|p| p.total).fold(f64::INFINITY, f64::min);
         points.retain(|p| p.total <= WORST * best);
         let mut least = f64::INFINITY;
-        // what differs by rounding only is no other point
+        // points that differ only by rounding are merged
         points.retain(|p| {
             let better = p.bias < least * (1.0 - 1e-9);
             least = least.min(p.bias);
@@ -79,7 +79,7 @@ impl Task<'_> {
         (points, all)
     }
 
-    /// Figures of a sequence; `None` where rounding hides them.
+    /// Sigma, bias and total of a sequence; `None` where rounding hides them.
     fn point(&self, evaluator: &Evaluator, sequence: &[Stop]) -> Option<BiasPoint> {
         let (state, mut root) = (evaluator.state_of(sequence), Vec::new());
         let sigma = evaluator.sigma_value(&state, &self.criterion, &mut root, &mut Vec::new());

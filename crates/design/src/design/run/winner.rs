@@ -1,4 +1,4 @@
-//! A scheme that was found, as a scheme.
+//! Found schemes as schemes with gimbal angles and conditions.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,11 @@ use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 use crate::design::answer::{Design, Found};
 use crate::design::request::error::DesignError;
 
-/// Half a turn in degrees.
+/// Half turn in degrees.
 const HALF: i32 = 180;
 
-/// Gives every scheme of an answer the gimbal angles of its attitudes within the limits of `base`, each with
-/// the shortest gimbal way from the position before; what was named by its angles has the name of these.
+/// Gives every scheme of an answer the gimbal angles of its attitudes within the limits of `base`, each
+/// with the shortest gimbal path from the previous position. A name made of the old angles is replaced.
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a dwell that no scheme has.
@@ -42,21 +42,21 @@ pub(crate) fn within_gimbals(
     if let Some(first) = out.found.first() {
         out.gimbals = scheme(first, base, conditions)?.gimbal_report();
     }
-    // angles of a user's own file stay as they are, and are pointed out
+    // angles of a user's own file are kept, and reported
     if let (Some(report), Some(own)) = (&mut out.gimbals, base.gimbal_report()) {
         report.beyond = own.beyond;
     }
     Ok(())
 }
 
-/// The gimbal angles of successive attitudes, from their angles.
+/// Gimbal angles of successive attitudes, from their angles.
 fn chosen(angles: &[String], base: &Scheme) -> Vec<String> {
     let attitudes: Vec<_> = angles.iter().filter_map(|text| parse_attitude(text).ok()).collect();
     base.gimbals.along(&attitudes).iter().map(angles_text).collect()
 }
 
-/// What was found under the assumptions of `base` and `conditions`, with dwells, slews and the directions of
-/// half turns: its sigmas are those that the search gave. Positions are p1, p2, ...
+/// Found scheme under the assumptions of `base` and `conditions`, with dwells, slews and the directions
+/// of half turns, so that its sigmas are those of the search. Positions are p1, p2, ...
 ///
 /// # Errors
 /// [`DesignError::Scheme`] for a dwell that no scheme has.
@@ -101,7 +101,7 @@ pub(crate) fn under(
             accelerometer_bias_instability_ug: bias.map(|b| b.instability_ug),
             accelerometer_correlation_time_s: bias.map(|b| b.correlation_time_s),
             azimuth_noise_deg: base.measured_azimuth.then_some(conditions.azimuth_noise_deg),
-            // no random drift is a condition too
+            // the absence of random drift is a condition too
             drift_noise: Some(conditions.as_stated().drift_noise),
             angle_random_walk_deg_sqrt_h: gyros.map(|g| g.angle_random_walk_deg_sqrt_h),
             rate_random_walk_dph_sqrt_h: gyros.map(|g| g.rate_random_walk_dph_sqrt_h),
@@ -116,8 +116,8 @@ pub(crate) fn under(
     }
 }
 
-/// Assignments as a file states them: there what is of one unknown counts before what is of its family,
-/// whichever comes first.
+/// Assignments as a file states them: a value for a single unknown overrides that of its family, in any
+/// order.
 fn by_name(given: &[Assignment]) -> BTreeMap<String, f64> {
     let mut out = BTreeMap::new();
     for a in given {
@@ -127,7 +127,8 @@ fn by_name(given: &[Assignment]) -> BTreeMap<String, f64> {
     out
 }
 
-/// Half a turn about a direction in n: an axis by its name, others by components of which the largest is 1.
+/// Half turn about a direction in n: an axis by its name, others by components of which the largest is
+/// 1.
 pub(crate) fn half_turn(about: &[f64; 3]) -> SlewTo {
     let largest = about.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let direction = about.map(|x| (x / largest * 1e12).round() / 1e12 + 0.0);

@@ -42,8 +42,8 @@ impl Best {
                 && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
     }
 
-    /// True if an equal one of the front comes later in lexicographic order: then the new one takes its
-    /// place, so that the front does not depend on the order in which sequences come.
+    /// True if an equal sequence on the front is later in lexicographic order. The new one replaces it,
+    /// so the front does not depend on the order of the search.
     fn is_before_its_equal(&self, new: &Scored) -> bool {
         let equal = |f: &&Scored| {
             f.worth.degree == new.worth.degree && f.seconds == new.seconds && f.worth.value == new.worth.value
@@ -63,8 +63,8 @@ impl Best {
         }
     }
 
-    /// Keeps a sequence unless another of no larger degree takes no more time and has no larger criterion;
-    /// drops what it beats.
+    /// Adds a sequence to the front unless another of no larger degree takes no more time and has no
+    /// larger criterion; removes those that it beats.
     fn add_to_front(&mut self, new: &Scored) {
         if self.is_on_front(&new.worth, new.seconds) || self.is_before_its_equal(new) {
             let beaten = |f: &Scored| {
@@ -77,15 +77,16 @@ impl Best {
         }
     }
 
-    /// The largest criterion that may still count where all sequences take the same time: among the best
-    /// `keep`, or as a tie of the first. `known` were found before, of the same worst degree.
+    /// Largest criterion of a sequence that may still be kept where all sequences take the same time:
+    /// among the best `keep`, or as a tie of the first. `known` were found before, with the same worst
+    /// degree.
     pub(crate) fn limit(&self, keep: usize, known: &Self) -> f64 {
         let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.worth.value);
         let least = |place: usize| value(self, place).min(value(known, place));
         least(keep - 1).max(least(0) * (1.0 + TIE))
     }
 
-    /// Takes over what another found.
+    /// Adds the results of another search.
     pub(crate) fn merge(&mut self, keep: usize, other: Self) {
         for s in other.found.into_iter().chain(other.front) {
             self.add(keep, s);

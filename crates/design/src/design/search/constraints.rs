@@ -3,19 +3,19 @@
 use obsdeg_evidence::requirements::meets;
 
 use crate::design::measure::criterion::{Criterion, Limits};
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
-/// What a scheme must keep besides observability.
+/// Constraints on a scheme besides observability.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Constraints {
-    /// Largest total time with turns, in s.
+    /// Largest total time with turns, in s; `None` without a limit.
     pub total_s: Option<f64>,
-    /// Longest turn between successive positions, in s.
+    /// Longest turn between successive positions, in s; `None` without a limit.
     pub slew_s: Option<f64>,
-    /// Largest sigmas.
+    /// Largest sigmas; `None` without limits.
     pub sigmas: Option<Limits>,
-    /// Largest degree of every required coefficient.
+    /// Largest degree of every required coefficient; `None` without caps.
     pub degrees: Option<Vec<usize>>,
 }
 
@@ -25,13 +25,13 @@ impl Constraints {
         self.degrees.as_ref().is_none_or(|caps| degrees.iter().zip(caps).all(|(d, cap)| d <= cap))
     }
 
-    /// How far times and sigmas of a sequence, with `state` behind it, are beyond the limits; 0 when they are
-    /// kept.
+    /// Relative violation of the limits by times and sigmas of a sequence with the state `state`,
+    /// dimensionless; 0 when kept.
     pub(crate) fn violation(
         &self,
         evaluator: &Evaluator,
         sequence: &[Stop],
-        state: &State,
+        state: &SequenceState,
         root: &mut Vec<f64>,
     ) -> f64 {
         let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
@@ -51,7 +51,7 @@ impl Constraints {
     }
 }
 
-/// How far a limit is passed, as a part of it; 0 for what rounding may do.
+/// Relative excess over a limit, dimensionless; 0 within rounding.
 pub(crate) fn beyond(found: f64, limit: Option<f64>) -> f64 {
     limit.map(|l| found / l - 1.0).filter(|over| *over > 1e-9).unwrap_or(0.0)
 }

@@ -1,39 +1,38 @@
-//! Coordinate exchange, where the space is too large for exhaustion.
+//! Coordinate exchange, for spaces too large for exhaustion.
 
-use obsdeg_exact::SplitMix64;
-use rayon::prelude::*;
+use obsdeg_exact::{SplitMix64, parallel};
 
-use crate::design::measure::evaluator::State;
+use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{Meter, PATIENCE};
 use crate::design::search::score::{Scored, Worth};
 use crate::design::search::scoring::{Search, Trial};
 
-/// Rounds of one exchange before it is given up.
+/// Largest number of rounds of one exchange.
 const ROUNDS: usize = 50;
 
 impl Search<'_> {
-    /// What may stand at a place, with the ways there and from there.
+    /// Stops that may stand at a place, each with the next stop by either slew path.
     fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
         let last = place.checked_sub(1).map(|p| now[p].candidate);
         let next = now.get(place + 1).map(|next| next.candidate);
-        let ways = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
+        let with_next = |stop: Stop| -> Vec<(Stop, Option<Stop>)> {
             let Some(next) = next else { return vec![(stop, None)] };
             self.evaluator.stops(Some(stop.candidate), next).map(|next| (stop, Some(next))).collect()
         };
-        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(ways).collect()
+        (0..self.rows.candidates()).flat_map(|c| self.evaluator.stops(last, c)).flat_map(with_next).collect()
     }
 
-    /// Coordinate exchange: each place of the sequence takes the candidate that is best there, and the better
-    /// way of half turns, then any two change places, until none helps. From the sequences given, then from
-    /// random ones.
+    /// Coordinate exchange: each place of the sequence takes its best candidate and the better path of
+    /// half turns, then pairs of places are swapped, until nothing helps. Starts are the sequences in
+    /// `given`, then random ones.
     pub fn exchange(&self, k: usize, given: &[Vec<Stop>], restarts: u64, seed: u64) -> Best {
         self.exchange_from(k, given, restarts, seed, None)
     }
 
-    /// The same; with `firsts` the sequences begin with one of them, and what is tried on the way is kept
-    /// too.
+    /// Exchange as [`Self::exchange`]. With `firsts` all sequences begin with one of them, and
+    /// every evaluated sequence may be kept, not only the results.
     pub(crate) fn exchange_from(
         &self,
         k: usize,
@@ -59,8 +58,8 @@ impl Search<'_> {
             let mut best = Best::default();
             let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
             let mut trial = Trial::new(self.evaluator);
-            // takes what is better; false when the search is stopped
-            let mut try_out = |before: (&State, usize), now: &[Stop], held: &mut Scored| {
+            // keeps a better sequence; false when the search is stopped
+            let mut try_out = |before: (&SequenceState, usize), now: &[Stop], held: &mut Scored| {
                 best.examined += 1;
                 let other = self.worth_behind(before, now, &mut trial);
                 if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
@@ -80,7 +79,8 @@ impl Search<'_> {
             'rounds: for _ in 0..ROUNDS {
                 let round = held.worth;
                 for place in 0..k {
-                    // a choice may turn to the next position another way, never to this one
+                    // a choice may change the turn to the next position, but never the one to this
+                    // position
                     let before = self.evaluator.state_of(&now[..place]);
                     let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
                     for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
@@ -111,7 +111,7 @@ impl Search<'_> {
             best.add(self.keep, held);
             best
         };
-        let parts = (0..total as u64).into_par_iter().map(|start| meter.part(|| from(start))).collect();
+        let parts = parallel::map(total, |start| meter.part(|| from(start as u64)));
         meter.gather(self.keep, parts)
     }
 }

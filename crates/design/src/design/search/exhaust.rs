@@ -1,13 +1,13 @@
-//! Exhaustion: all sequences that begin with some starts, walked over with what their prefixes have in
-//! common.
+//! Exhaustion: all sequences that begin with given starts, traversed with shared states of their
+//! prefixes.
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use obsdeg_exact::parallel;
 
-use crate::design::measure::evaluator::State;
+use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
-use crate::design::observable::rows::Patience;
+use crate::design::observable::rows::EnumerationLimits;
 use crate::design::observable::sets::Sets;
 use crate::design::observable::symmetry::Symmetry;
 use crate::design::search::best::Best;
@@ -17,55 +17,57 @@ use crate::design::search::score::{Scored, Worth};
 use crate::design::search::scoring::{Search, candidates};
 use crate::design::search::screen::{Scratch, Screen};
 
-/// Restarts of the exchange that finds what an exhaustive search is pruned by.
+/// Restarts of the exchange that finds the incumbents for pruning.
 const KNOWN_RESTARTS: u64 = 24;
-/// Most sequences behind a start, as long as there are not too many starts: some 20 s of work, so that a part
-/// that is interrupted or killed goes on from what it found minutes before.
+/// Largest number of sequences behind a start, unless starts are too many: some 20 s of work, so an
+/// interrupted or killed part loses only minutes.
 pub(crate) const MOST_BEHIND: f64 = 2e7;
-/// Most starts of more than two positions.
+/// Largest number of starts of more than two positions.
 const MOST_STARTS: f64 = 1e6;
+/// Number of starts whose results are kept until they are merged.
+const BATCH: usize = 4096;
 
-/// What an exhaustive search takes at once.
+/// Sequences that an exhaustive search covers at once.
 pub(crate) enum SearchLevel {
-    /// All sequences whose set is one of these, all of this worst degree.
+    /// Sequences of one worst degree, whose sets are in the collection.
     Degree(usize, Sets),
-    /// All sets, where order does not matter.
+    /// All sequences, where order does not matter.
     Any,
 }
 
-/// What lets an exhaustive search leave out what is worse than sequences that are known beforehand.
+/// Bounds and incumbents with which an exhaustive search excludes worse sequences.
 pub(crate) struct Pruning<'a> {
     screen: Screen<'a>,
-    /// The best sequences and the front known, by worst degree.
+    /// Best sequences and front known beforehand, by worst degree.
     known: BTreeMap<usize, Best>,
 }
 
-/// The pruning of one walk.
-struct Pruned<'a> {
+/// Pruning data of one traversal.
+struct ActivePruning<'a> {
     screen: &'a Screen<'a>,
     known: &'a Best,
     scratch: Scratch,
     alive: Vec<bool>,
 }
 
-/// A walk over sequences that shares what their prefixes have in common.
-struct Walk<'a> {
+/// Traversal of sequences that shares the states of their prefixes.
+struct Traversal<'a> {
     search: &'a Search<'a>,
     meter: &'a Meter<'a>,
-    states: Vec<State>,
+    states: Vec<SequenceState>,
     root: Vec<f64>,
     variances: Vec<f64>,
     sequence: Vec<Stop>,
     /// Working space.
     members: Vec<usize>,
     best: Best,
-    pruned: Option<Pruned<'a>>,
-    /// Positions that were put behind others.
+    pruned: Option<ActivePruning<'a>>,
+    /// Number of positions added to sequences.
     pushed: u64,
     stopped: bool,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> Traversal<'a> {
     fn new(search: &'a Search<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
         Self {
             search,
@@ -82,8 +84,9 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Puts a position behind the sequence; true if times are within the limits. The last one of a sequence
-    /// takes no effects of errors that are not estimated, which [`Self::score`] adds where they count.
+    /// Adds a position to the sequence; true if times are within the limits. The last position of a
+    /// sequence is added without effects of errors that are not estimated; [`Self::score`] adds these
+    /// if they count.
     fn push(&mut self, stop: Stop, last: bool) -> bool {
         let (search, depth) = (self.search, self.sequence.len());
         self.pushed += 1;
@@ -102,7 +105,7 @@ impl<'a> Walk<'a> {
         beyond(slew, c.slew_s) == 0.0 && beyond(ahead[0].seconds, c.total_s) == 0.0
     }
 
-    /// The sequence as it is; `images` of it are searched.
+    /// Scores the present sequence; `images` of it are searched.
     fn score(&mut self, degree: usize, images: usize) {
         let (search, depth) = (self.search, self.sequence.len());
         let (behind, ahead) = self.states.split_at_mut(depth);
@@ -124,7 +127,7 @@ impl<'a> Walk<'a> {
         if wanted(&self.best, &worth) == [false; 2] {
             return;
         }
-        // a total, which is not below it
+        // the total uncertainty, which is at least the sigma
         if search.evaluator.omitted.is_some() {
             search.evaluator.extend_errors(&behind[depth - 1], self.sequence[depth - 1], state);
             value = search.evaluator.by_root(state, search.criterion, &self.root, &mut self.variances, true);
@@ -144,7 +147,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// All continuations to `k` positions with one of `sets`, all of this worst degree.
+    /// Visits all continuations to `k` positions whose sets are in `sets`, all of this worst degree.
     fn visit(&mut self, sets: &Sets, degree: usize, k: usize) {
         let left = k - self.sequence.len();
         if left == 1 {
@@ -170,7 +173,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The same of the last position, one of some candidates.
+    /// Visits all last positions with a candidate for which `among` is true.
     fn visit_last(&mut self, sets: &Sets, degree: usize, among: impl Fn(usize) -> bool) {
         let evaluator = self.search.evaluator;
         let before = self.sequence.last().map(|s| s.candidate);
@@ -189,10 +192,10 @@ impl<'a> Walk<'a> {
         self.members = members;
     }
 
-    /// The same of the last two positions, those left out that a bound excludes.
-    fn visit_pairs(&mut self, sets: &Sets, degree: usize, pruned: &mut Pruned<'_>) {
+    /// Visits all pairs of last positions except those that a bound excludes.
+    fn visit_pairs(&mut self, sets: &Sets, degree: usize, pruned: &mut ActivePruning<'_>) {
         let depth = self.sequence.len();
-        let Pruned { screen, known, scratch, alive } = pruned;
+        let ActivePruning { screen, known, scratch, alive } = pruned;
         let candidates = self.search.rows.candidates();
         alive.clear();
         alive.resize(candidates * candidates, true);
@@ -210,7 +213,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// One given sequence; the states of what it has in common with the one before are kept.
+    /// Moves to a given sequence; states of the common prefix are kept.
     fn go_to(&mut self, sequence: &[Stop]) -> bool {
         let common = self.sequence.iter().zip(sequence).take_while(|(a, b)| a == b).count();
         self.sequence.truncate(common);
@@ -223,15 +226,15 @@ impl<'a> Walk<'a> {
 }
 
 impl Search<'_> {
-    /// All sequences of `k` candidates, repeated ones and both ways of half turns too, that begin with the
-    /// first of an orbit (where order does not matter: that have one of them as their smallest). As many of
-    /// the best as are kept: worst degrees that are too large for these are not looked at.
+    /// Searches all sequences of `k` candidates, with repetitions and both paths of half turns, that
+    /// begin with the first candidate of an orbit (where order does not matter: that have one as their
+    /// smallest). Worst degrees are searched in order until `keep` sequences are found.
     pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
         self.exhausted(symmetry, k, None)
     }
 
-    /// The same, where order matters without those that a bound leaves out: what is kept is the same. The
-    /// bound is held against what an exchange from `seed` finds first.
+    /// Exhaustion as [`Self::exhaust`]; where order matters, sequences that a bound excludes are not
+    /// evaluated. The sequences kept are the same. Incumbents come from an exchange with `seed`.
     pub fn exhaust_pruned(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Best {
         let Some(pruning) = self.pruning(symmetry, k, seed) else { return self.exhaust(symmetry, k) };
         let mut best = self.exhausted(symmetry, k, Some(&pruning));
@@ -254,7 +257,7 @@ impl Search<'_> {
         best
     }
 
-    /// What lets a search of `k` positions leave sequences out; `None` where nothing does.
+    /// Bounds and incumbents for a search of `k` positions; `None` if it excludes nothing.
     pub(crate) fn pruning(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Option<Pruning<'_>> {
         if k < 3 || self.keep == 0 {
             return None;
@@ -264,7 +267,7 @@ impl Search<'_> {
         let exchanged = self.exchange_from(k, &[], KNOWN_RESTARTS, seed, Some(&firsts));
         let mut known: BTreeMap<usize, Best> = BTreeMap::new();
         for mut scored in exchanged.found.into_iter().chain(exchanged.front) {
-            // as in the sets that are searched
+            // degree as in the sets that are searched
             if let Some(degree) = self.worst(self.rows.degrees(&candidates(&scored.sequence))) {
                 scored.worth.degree = degree;
                 known.entry(degree).or_default().add(self.keep, scored);
@@ -273,14 +276,14 @@ impl Search<'_> {
         Some(Pruning { screen, known })
     }
 
-    /// What every sequence of an exhaustive search begins with, in order: its first one or two positions, or
-    /// more where too many sequences would be behind a start to be searched at once.
+    /// Starts of all sequences of an exhaustive search, in order: one or two positions, or more where
+    /// too many sequences would follow.
     pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
         self.starts_of(self.depth(symmetry.representatives().len(), k), symmetry)
     }
 
-    /// All sequences of `k` positions where there are at most so many, the first ones up to symmetry; whether
-    /// they are observable is not asked.
+    /// All sequences of `k` positions, observable or not, the first positions up to symmetry; `None` if
+    /// there are more than `most`.
     pub(crate) fn few(&self, symmetry: &Symmetry, k: usize, most: f64) -> Option<Vec<Vec<Stop>>> {
         let firsts = symmetry.representatives().len() as f64;
         let all = || self.starts_of(k, symmetry);
@@ -289,7 +292,7 @@ impl Search<'_> {
             .filter(|s| s.len() as f64 <= 8.0 * most)
     }
 
-    /// Number of sequences of so many further positions.
+    /// Number of sequences of `positions` further positions.
     fn behind(&self, positions: usize) -> f64 {
         let n = self.rows.candidates();
         match self.evaluator.ordered() {
@@ -298,7 +301,7 @@ impl Search<'_> {
         }
     }
 
-    /// Starts of so many positions.
+    /// Starts of `depth` positions.
     pub(crate) fn starts_of(&self, depth: usize, symmetry: &Symmetry) -> Vec<Vec<Stop>> {
         let ordered = self.evaluator.ordered();
         let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
@@ -313,7 +316,7 @@ impl Search<'_> {
         (1..depth).fold(firsts, |starts, _| starts.iter().flat_map(|start| longer(start)).collect())
     }
 
-    /// Number of positions of a start, of so many first ones.
+    /// Number of positions of a start; `firsts` is the number of first positions.
     fn depth(&self, firsts: usize, k: usize) -> usize {
         let starts = |depth: usize| firsts as f64 * self.behind(depth - 1);
         let mut depth = k.min(2);
@@ -323,7 +326,7 @@ impl Search<'_> {
         depth
     }
 
-    /// How many sequences are behind every start, or in proportion to that.
+    /// Work behind every start: its number of sequences, or a number in proportion.
     pub(crate) fn work(&self, starts: &[Vec<Stop>], k: usize) -> Vec<f64> {
         let n = self.rows.candidates();
         let behind = |start: &Vec<Stop>| {
@@ -337,7 +340,8 @@ impl Search<'_> {
         starts.iter().map(behind).collect()
     }
 
-    /// What is searched one after the other, smallest worst degree first; `None` when the search was stopped.
+    /// Levels to search one after the other, smallest worst degree first; `None` when the search was
+    /// stopped.
     pub(crate) fn levels_of(&self, k: usize) -> Option<Vec<SearchLevel>> {
         if !self.evaluator.ordered() {
             return Some(vec![SearchLevel::Any]);
@@ -346,7 +350,7 @@ impl Search<'_> {
         Some(levels.map(|(degree, sets)| SearchLevel::Degree(degree, sets)).collect())
     }
 
-    /// The sequences of one level that begin with some of the starts.
+    /// Searches the sequences of one level that begin with the given starts.
     pub(crate) fn exhaust_starts(
         &self,
         starts: &[Vec<Stop>],
@@ -363,18 +367,15 @@ impl Search<'_> {
             }
             SearchLevel::Any => self.exhaust_sets(&meter, start, k, symmetry),
         };
-        let none = || Best { complete: true, ..Best::default() };
-        let together = |mut best: Best, more: Best| {
-            best.merge(self.keep, more);
-            best
-        };
-        // behind some starts there is more to do than behind others
-        let parts = starts.par_iter().with_max_len(1).map(|start| meter.part(|| from(start)));
-        let best = parts.reduce(none, together);
+        let mut best = Best { complete: true, ..Best::default() };
+        for batch in starts.chunks(BATCH) {
+            let parts = parallel::map(batch.len(), |i| meter.part(|| from(&batch[i])));
+            parts.into_iter().for_each(|part| best.merge(self.keep, part));
+        }
         Best { complete: !meter.is_stopped(), ..best }
     }
 
-    /// The sequences behind a start whose set is one of `sets`, all of this worst degree.
+    /// Searches the sequences behind a start whose sets are in `sets`, all of this worst degree.
     fn exhaust_sequences(
         &self,
         meter: &Meter<'_>,
@@ -383,54 +384,60 @@ impl Search<'_> {
         (degree, sets): (usize, &Sets),
         known: Option<(&Screen<'_>, &Best)>,
     ) -> Best {
-        let mut walk = Walk::new(self, meter, k);
-        walk.pruned = known.map(|(screen, known)| Pruned {
+        let mut traversal = Traversal::new(self, meter, k);
+        traversal.pruned = known.map(|(screen, known)| ActivePruning {
             screen,
             known,
             scratch: screen.scratch(),
             alive: Vec::new(),
         });
-        if walk.go_to(start) {
+        if traversal.go_to(start) {
             if start.len() < k {
-                walk.visit(sets, degree, k);
+                traversal.visit(sets, degree, k);
             } else {
-                set_of(start, &mut walk.members);
-                if sets.contains(&walk.members) {
-                    walk.score(degree, 1);
+                set_of(start, &mut traversal.members);
+                if sets.contains(&traversal.members) {
+                    traversal.score(degree, 1);
                 }
             }
         }
-        walk.best
+        traversal.best
     }
 
-    /// The sets behind a start, where order does not matter.
+    /// Searches the sets behind a start, where order does not matter.
     fn exhaust_sets(&self, meter: &Meter<'_>, start: &[Stop], k: usize, symmetry: &Symmetry) -> Best {
         let going = || meter.report(0, 0, None);
-        let mut walk = Walk::new(self, meter, k);
+        let mut traversal = Traversal::new(self, meter, k);
         let mut sequence = Vec::with_capacity(k);
-        self.rows.each(&candidates(start), k, true, &mut Patience::while_going(&going), &mut |set| {
-            let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
-            sequence.clear();
-            sequence.extend(set.iter().map(|&c| Stop::from(c)));
-            if let Some(degree) = degree
-                && walk.go_to(&sequence)
-            {
-                walk.score(degree, symmetry.searched_images(set));
-            }
-            !walk.stopped
-        });
-        walk.best
+        self.rows.each(
+            &candidates(start),
+            k,
+            true,
+            &mut EnumerationLimits::while_going(&going),
+            &mut |set| {
+                let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
+                sequence.clear();
+                sequence.extend(set.iter().map(|&c| Stop::from(c)));
+                if let Some(degree) = degree
+                    && traversal.go_to(&sequence)
+                {
+                    traversal.score(degree, symmetry.searched_images(set));
+                }
+                !traversal.stopped
+            },
+        );
+        traversal.best
     }
 
-    /// All observable sets of up to `k` within the caps, by their worst degree; `None` when the search was
-    /// stopped. They are judged as they are found, and none is kept but as a bit.
+    /// All observable sets of up to `k` candidates within the caps, by worst degree; `None` when the
+    /// search was stopped. Each set is judged once and stored as one bit.
     fn levels(&self, k: usize) -> Option<Vec<Sets>> {
         let meter = Meter::new(self.progress, 1);
         let going = || meter.report(0, 0, None);
         let candidates = self.rows.candidates();
         let levels: Vec<Sets> = (0..=self.rows.last_order()).map(|_| Sets::none(candidates, k)).collect();
         let judged = |prefix: &[usize], size: usize| {
-            let mut patience = Patience::while_going(&going);
+            let mut patience = EnumerationLimits::while_going(&going);
             self.rows.each(prefix, size, false, &mut patience, &mut |set| {
                 let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
                 degree.inspect(|&degree| levels[degree].add(set));
@@ -440,21 +447,20 @@ impl Search<'_> {
         };
         let behind = |first: usize, size: usize| match size {
             1 => judged(&[first], size),
-            _ => (first + 1..candidates).into_par_iter().all(|second| judged(&[first, second], size)),
+            _ => parallel::all(candidates - first - 1, &|i| judged(&[first, first + 1 + i], size)),
         };
         let sizes = 1..=k.min(candidates);
-        let mut all =
-            sizes.map(|size| (0..candidates).into_par_iter().all(|first| going() && behind(first, size)));
+        let mut all = sizes.map(|size| parallel::all(candidates, &|first| going() && behind(first, size)));
         (all.all(|done| done) && going()).then_some(levels)
     }
 }
 
-/// Number of sets of so many out of `n`, each as often as one likes.
+/// Number of multisets of `positions` out of `n`.
 fn multisets(n: usize, positions: usize) -> f64 {
     (0..positions).map(|i| (n + i) as f64 / (i + 1) as f64).product()
 }
 
-/// The candidates of a sequence, each once and ascending, to `members`.
+/// Writes the candidates of a sequence to `members`, each once and ascending.
 fn set_of(sequence: &[Stop], members: &mut Vec<usize>) {
     members.clear();
     members.extend(sequence.iter().map(|s| s.candidate));

@@ -1,4 +1,4 @@
-//! Searches: all sequences, or an exchange; what they keep.
+//! Searches: exhaustive or by exchange, with their results.
 
 pub(crate) mod best;
 pub(crate) mod constraints;

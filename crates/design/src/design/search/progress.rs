@@ -1,4 +1,4 @@
-//! Progress of a search: what its workers report, and who stops it.
+//! Progress of a search: reports of its workers, and interruption.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -6,26 +6,26 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crate::design::search::best::Best;
 use crate::design::search::score::Scored;
 
-/// Sequences between two questions whether to go on.
+/// Number of sequences between two calls of the progress callback.
 pub(crate) const PATIENCE: u64 = 256;
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Parts done.
+    /// Number of parts done.
     pub done: u64,
-    /// Parts in all.
+    /// Number of all parts.
     pub total: u64,
-    /// Sequences whose sigma was computed.
+    /// Number of sequences whose sigma was computed.
     pub examined: u64,
-    /// The best criterion so far; infinite when there is none.
+    /// Best criterion so far; infinite if there is none.
     pub best: f64,
 }
 
-/// Nothing is done yet.
+/// Progress before any work.
 pub(crate) const NOTHING_YET: Progress = Progress { done: 0, total: 1, examined: 0, best: f64::INFINITY };
 
-/// Work that is told once to stop stays stopped; it hears of that too.
+/// Runs work whose progress callback stays false once it was false; the work also receives the flag.
 pub(crate) fn watched<T>(
     progress: &(dyn Fn(Progress) -> bool + Sync),
     work: impl FnOnce(&(dyn Fn(Progress) -> bool + Sync), &AtomicBool) -> T,
@@ -40,7 +40,7 @@ pub(crate) fn watched<T>(
     work(&progress, &stopped)
 }
 
-/// What the workers of a search report to.
+/// Shared meter of the workers of a search.
 pub(crate) struct Meter<'a> {
     progress: &'a (dyn Fn(Progress) -> bool + Sync),
     stopped: AtomicBool,
@@ -62,10 +62,10 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// So much more is done; whether to go on.
+    /// Adds to the work done; false if the search must stop.
     pub(crate) fn report(&self, parts: u64, examined: u64, best: Option<&Scored>) -> bool {
         let value = best.map_or(f64::INFINITY, |b| b.worth.value);
-        // a poisoned lock comes of a panic that is reported already
+        // a poisoned lock follows from a panic that is reported already
         let best = self.best.lock().map_or(value, |mut b| {
             *b = b.min(value);
             *b
@@ -92,7 +92,7 @@ impl<'a> Meter<'a> {
         best
     }
 
-    /// All parts, in their order.
+    /// Merges the results of all parts, in their order.
     pub(crate) fn gather(&self, keep: usize, parts: Vec<Best>) -> Best {
         let mut out = Best { complete: true, ..Best::default() };
         for part in parts {

@@ -1,38 +1,38 @@
-//! A search: what it chooses from, what it minimises, and the score of one sequence.
+//! Search: candidates, criterion, constraints, and the score of one sequence.
 
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::Rows;
 use crate::design::search::constraints::Constraints;
 use crate::design::search::progress::Progress;
 use crate::design::search::score::{Scored, Worth};
 
-/// What every search shares.
+/// Data that all searches share.
 pub struct Search<'a> {
     /// Exact verdicts of sets.
     pub rows: &'a Rows,
-    /// Torquer errors act on the way: then a set has no verdict, and those sequences count whose samples
-    /// determine what is required.
+    /// True if torquer errors act in turns. Sets have no verdict then; a sequence counts if its samples
+    /// determine the required coefficients.
     pub walks: bool,
-    /// Sigmas.
+    /// Evaluator of sigmas.
     pub evaluator: &'a Evaluator,
-    /// What is to be small.
+    /// Criterion to minimise.
     pub criterion: &'a Criterion,
-    /// What must be kept.
+    /// Constraints of the schemes.
     pub constraints: &'a Constraints,
-    /// How many are kept.
+    /// Number of sequences to keep.
     pub keep: usize,
-    /// The smallest worst degree that all candidates together allow: no set is better.
+    /// Smallest worst degree that all candidates together allow: no set is better.
     pub floor: usize,
-    /// Hears of progress, says whether to go on.
+    /// Progress callback: false stops the search.
     pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
 }
 
-/// Working space of one trial after the other.
+/// Working space for successive trials.
 pub(crate) struct Trial {
-    now: State,
-    next: State,
+    now: SequenceState,
+    next: SequenceState,
     root: Vec<f64>,
 }
 
@@ -43,14 +43,14 @@ impl Trial {
 }
 
 impl Search<'_> {
-    /// The worst of these degrees, if they are within the caps.
+    /// Worst of these degrees; `None` if one is missing or beyond its cap.
     pub(crate) fn worst(&self, degrees: Vec<Option<usize>>) -> Option<usize> {
         let degrees: Vec<usize> = degrees.into_iter().collect::<Option<_>>()?;
         degrees.iter().max().copied().filter(|_| self.constraints.cap(&degrees))
     }
 
-    /// The worst degree of every observable set, where it is known beforehand: none is better than all
-    /// candidates together, none worse than the last order.
+    /// Worst degree of every observable set if it is known beforehand: at least that of all candidates
+    /// together, at most the last order. `None` if sets differ.
     pub(crate) fn only_degree(&self) -> Option<usize> {
         if self.walks {
             return Some(0);
@@ -62,7 +62,7 @@ impl Search<'_> {
     /// follows. Degrees are those of one field.
     pub(crate) fn worth_behind(
         &self,
-        (state, known): (&State, usize),
+        (state, known): (&SequenceState, usize),
         sequence: &[Stop],
         trial: &mut Trial,
     ) -> Scored {
@@ -84,8 +84,8 @@ impl Search<'_> {
         Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
     }
 
-    /// With what the exact verdict misses: slews may determine a coefficient that the verdict, of
-    /// repositioning at once, does not.
+    /// Score corrected where the exact verdict, of instantaneous repositioning, misses a coefficient
+    /// that slews may determine.
     pub(crate) fn judged(&self, mut scored: Scored) -> Scored {
         if self.walks {
             return scored;
@@ -96,7 +96,7 @@ impl Search<'_> {
     }
 }
 
-/// The candidates of a sequence.
+/// Candidates of a sequence.
 pub(crate) fn candidates(sequence: &[Stop]) -> Vec<usize> {
     sequence.iter().map(|s| s.candidate).collect()
 }

@@ -1,106 +1,107 @@
-//! What the last two positions of a sequence cannot make good, where information does not add over positions:
-//! which pairs of them need not be evaluated.
+//! Lower bound over the last two positions, for pruning where information does not add over positions:
+//! pairs that cannot be good enough are not evaluated.
 //!
-//! Behind a prefix psi is a functional P of the unknowns x, and whatever follows, a sequence s, adds
-//! `T^T S(s) T`: S(s) is the information of s as a scheme of its own, on psi at its start and the
+//! After a prefix psi is a functional P of the unknowns x. Any continuation, a sequence s, adds `T^T
+//! S(s) T`: S(s) is the information of s as a scheme of its own, on psi at its start and the
 //! coefficients, and `T = [P; 0 I]`. So for any vector x
 //!
 //! ```text
 //! x^T M x = x^T M_prefix x + sum_j q_j(z_j, x),   z_0 = P x,  z_(j+1) = F_j z_j + h_j x
 //! ```
 //!
-//! with q_j the information of position j alone, F_j and h_j what its dwell makes of psi: x is carried
-//! through the positions in three numbers z, instead of a matrix. By duality (`certificate::bound`) the
-//! criterion of the whole is not below one over it, so that all pairs that add too little along x are
-//! excluded at once. Any x is valid. Good ones are those of the prefix with the mean of all that may follow,
-//! and those of one of the pairs left itself: what shows why that one is worse shows it of many others.
+//! with q_j the information of position j alone, F_j and h_j the effect of its dwell on psi: x is
+//! carried through the positions in three numbers z, instead of a matrix. By duality
+//! (`certificate::bound`) the criterion of the whole is at least the inverse of this sum, so all pairs
+//! that add too little along x are excluded at once. Any x is valid. Good choices are those of the
+//! prefix with the mean of all continuations, and those of one of the remaining pairs: an x that
+//! excludes one pair excludes many others.
 //!
-//! psi goes on here as it does. Bounds that relax this are of little use: where psi may be anything before a
-//! dwell, carry only adds information, so that reset carry bounds nothing; with psi known before every dwell
-//! the drift between is known exactly; and one X for all that may follow (the mean, or its best weights)
-//! leaves most pairs of the best schemes (`crates/README.md`, with numbers).
+//! Psi continues here as in the scheme. Relaxed bounds are of little use. Where psi may be anything
+//! before a dwell, carry only adds information, so reset carry bounds nothing. With psi known before
+//! every dwell the drift between is known exactly. One X for all continuations (the mean, or its best
+//! weights) keeps most pairs of the best schemes (`crates/README.md`, with numbers).
 //!
-//! Rounding: what is left out must be worse than the limit *as the search would have computed it*. Cholesky's
-//! decomposition and the triangular systems of a criterion are exact for a matrix that differs from the
-//! computed M by at most `gamma_(3n+1) sqrt(m_ii m_jj)` in every entry (N. J. Higham, *Accuracy and Stability
-//! of Numerical Algorithms*, 2nd edition, 2002, theorems 8.5 and 10.3, each column of L being no longer than
-//! `sqrt(m_ii)`), and every bound above holds for that matrix too. So no condition number enters: the energy
-//! of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. With the information of a position `L^T G L`,
-//! `|G_ab| <= sqrt(G_aa G_bb)`, what sums and products make of it is in the same way at most
-//! `gamma (sum_i |x_i| s_i)^2`, `s_i = sum_a sqrt(G_aa) |L_ai|` ([`Reach`]). Eigenvalues (E) are those of a
-//! matrix that is off by a small multiple of n u of its norm, as for any backward stable method (G. H. Golub,
-//! C. F. Van Loan, *Matrix Computations*, section 8.3); that of the library is taken to be [`EIGENVALUES`] n
-//! u at most. A pivot that the search passes over, as what rounding leaves of an undetermined direction, is
-//! taken for zero here as there.
+//! Rounding: an excluded pair must be worse than the limit *as the search would have computed it*.
+//! Cholesky's decomposition and the triangular systems of a criterion are exact for a matrix that
+//! differs from the computed M by at most `gamma_(3n+1) sqrt(m_ii m_jj)` in every entry (N. J. Higham,
+//! *Accuracy and Stability of Numerical Algorithms*, 2nd edition, 2002, theorems 8.5 and 10.3, each
+//! column of L being no longer than `sqrt(m_ii)`), and every bound above holds for that matrix too. So
+//! no condition number enters: the energy of x may be off by `gamma (sum_i |x_i| sqrt(m_ii))^2`. The
+//! information of a position is `L^T G L` with `|G_ab| <= sqrt(G_aa G_bb)`; the rounding of its sums
+//! and products is likewise at most `gamma (sum_i |x_i| s_i)^2`, `s_i = sum_a sqrt(G_aa) |L_ai|`
+//! ([`MagnitudeBounds`]). Eigenvalues (E) are those of a matrix that is off by a small multiple of n u of its
+//! norm, as for any backward stable method (G. H. Golub, C. F. Van Loan, *Matrix Computations*, section
+//! 8.3); for the library used it is assumed to be [`EIGENVALUES`] n u at most. A pivot that the search
+//! skips as a rounding residue of an undetermined direction counts as zero here too.
 
 use obsdeg_core::model::LOCAL;
 use obsdeg_exact::SplitMix64;
 
 use crate::design::certificate::bounded::rounding;
 use crate::design::measure::criterion::Criterion;
-use crate::design::measure::evaluator::{Evaluator, State};
+use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::request::limits::MAX_UNKNOWNS;
 
-/// What eigenvalues are taken to be off by, in n u times the norm (an assumption).
+/// Error of eigenvalues, in n u times the norm (an assumption).
 const EIGENVALUES: usize = 10;
-/// Directions that are tried, where every coefficient is one.
+/// Number of directions of the first tests, for criteria in which every coefficient is one.
 const DIRECTIONS: usize = 2;
-/// The mean's part of what a test is made by.
+/// Fraction of the mean in the information that tests are made from.
 const MEAN: f64 = 1e-3;
-/// What a vector costs, in evaluations of a pair: where vectors exclude fewer for a while, those left are
-/// evaluated.
-const WORTH: usize = 4;
+/// Cost of a vector, in evaluations of a pair; initial and largest credit. Each excluded pair adds to
+/// the credit; when it is used up, the remaining pairs are evaluated.
+const COST: usize = 4;
 const CREDIT: usize = 40;
 const MOST_CREDIT: usize = 80;
-/// Steps towards the largest principal sigma.
+/// Number of power iterations towards the largest principal sigma.
 const POWERS: usize = 4;
 
-/// Bounds on what follows a prefix.
+/// Bounds on the continuations of a prefix.
 pub(crate) struct Screen<'a> {
     evaluator: &'a Evaluator,
     criterion: &'a Criterion,
-    positions: Positions,
-    /// The mean information of two positions (n x n, lower triangle).
+    positions: CandidateInformation,
+    /// Mean information of two positions (n x n, lower triangle).
     mean: Vec<f64>,
-    reach: Reach,
+    magnitudes: MagnitudeBounds,
 }
 
-/// How large things may become at any candidate: for bounds on rounding.
-struct Reach {
-    /// `sum_a sqrt(G_aa) |L_ai|` of psi, all components together.
+/// Largest magnitudes over all candidates, for bounds on rounding.
+struct MagnitudeBounds {
+    /// `sum_a sqrt(G_aa) |L_ai|` of psi, summed over its components.
     psi: f64,
-    /// The same of every unknown (shape n); zero for psi.
+    /// `sum_a sqrt(G_aa) |L_ai|` of every unknown (shape n); zero for psi.
     own: Vec<f64>,
-    /// The largest component of psi behind a dwell by that before it.
+    /// Largest factor from psi before a dwell to a component of psi after it.
     grow: f64,
-    /// The same by every unknown (shape n); zero for psi.
+    /// Largest effect of every unknown on psi after a dwell (shape n); zero for psi.
     gain: Vec<f64>,
 }
 
-/// Every candidate as a scheme of its own, by psi at its start, as it is carried, and the coefficients: of
-/// each entry a lane, of every candidate.
-struct Positions {
+/// Information of every candidate as a scheme of its own, on psi at its start, as it is carried, and on
+/// the coefficients. Each vector holds one entry of all candidates.
+struct CandidateInformation {
     /// Information on psi: xx, 2 xy, yy, 2 xz, 2 yz, zz.
     psi: [Vec<f64>; 6],
-    /// Twice that between psi and every coefficient (3 x d).
+    /// Twice the information between psi and every coefficient (3 x d).
     cross: [Vec<Vec<f64>>; 3],
-    /// On the coefficients, row by row of the lower triangle, twice where off the diagonal.
+    /// Information on the coefficients, row by row of the lower triangle, twice where off the diagonal.
     coefficients: Vec<Vec<f64>>,
-    /// psi behind it by psi (3 x 3), and by every coefficient (3 x d).
+    /// Psi after the dwell as a function of psi (3 x 3), and of every coefficient (3 x d).
     turned: [[Vec<f64>; 3]; 3],
     shifted: [Vec<Vec<f64>>; 3],
 }
 
-/// Some vectors, and what they prove: the square of the criterion, in units of the evaluator, is not below
-/// `most` over the sum of their `x^T M x`.
-struct Test {
+/// Vectors of a bound: the square of the criterion, in units of the evaluator, is at least `most`
+/// divided by the sum of their `x^T M x`.
+struct ExclusionTest {
     vectors: Vec<[f64; MAX_UNKNOWNS]>,
     most: f64,
 }
 
-/// One vector, as every candidate takes it: a position adds `constant + linear z + psi(z)`, and leaves
-/// `turned z + shift`.
-struct Lanes {
+/// Energy of one vector at every candidate: a position adds `constant + linear z + psi(z)`, and carries
+/// on `turned z + shift`.
+struct VectorEnergy {
     linear: [Vec<f64>; 3],
     constant: Vec<f64>,
     shift: [Vec<f64>; 3],
@@ -108,31 +109,31 @@ struct Lanes {
 
 /// Working space of one thread.
 pub(crate) struct Scratch {
-    one: State,
-    two: State,
-    /// With the mean of what follows; what tests are made by.
+    one: SequenceState,
+    two: SequenceState,
+    /// Information with the mean of two further positions.
     mean: Vec<f64>,
-    mixed: State,
+    mixed: SequenceState,
     tried: Vec<bool>,
     draw: SplitMix64,
     root: Vec<f64>,
     inverse: Vec<f64>,
-    /// Of every unknown, how large the root of what it adds to M becomes: in the prefix, and at two more
+    /// Bounds on the root of the contribution of every unknown to M: of the prefix, and of two further
     /// positions.
     sizes: Vec<[f64; 3]>,
-    lanes: Lanes,
+    lanes: VectorEnergy,
     energy: Vec<f64>,
 }
 
 impl<'a> Screen<'a> {
-    /// The screen of what `evaluator` evaluates; `None` where order does not matter, where turns take time,
-    /// or where the noise of Z is correlated, so that what follows a prefix is no information of its own.
+    /// Screen for `evaluator`; `None` where order does not matter, where turns take time, or where the
+    /// noise of Z is correlated, so that continuations have no information of their own.
     pub(crate) fn new(evaluator: &'a Evaluator, criterion: &'a Criterion) -> Option<Self> {
-        if !evaluator.ordered() || !evaluator.ways.is_empty() || evaluator.bias.is_some() {
+        if !evaluator.ordered() || !evaluator.slew_paths.is_empty() || evaluator.bias.is_some() {
             return None;
         }
         let (n, count) = (evaluator.n, evaluator.candidates.len());
-        // what is known beforehand is in the prefix
+        // the prior is in the prefix
         let bare = evaluator.without_prior();
         let (start, mut one, mut two) = (bare.start(), bare.start(), bare.start());
         let mut mean = vec![0.0; n * n];
@@ -146,13 +147,13 @@ impl<'a> Screen<'a> {
             alone.push(one.clone());
         }
         mean.iter_mut().for_each(|x| *x /= (count * count) as f64);
-        let reach = Reach::of(&bare, &alone);
-        Some(Self { evaluator, criterion, positions: Positions::of(&alone, n), mean, reach })
+        let magnitudes = MagnitudeBounds::of(&bare, &alone);
+        Some(Self { evaluator, criterion, positions: CandidateInformation::of(&alone, n), mean, magnitudes })
     }
 
     pub(crate) fn scratch(&self) -> Scratch {
         let count = self.evaluator.candidates.len();
-        let lanes = Lanes {
+        let lanes = VectorEnergy {
             linear: std::array::from_fn(|_| vec![0.0; count]),
             constant: vec![0.0; count],
             shift: std::array::from_fn(|_| vec![0.0; count]),
@@ -173,13 +174,13 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// Which pairs of candidates behind `state` may have a criterion up to `limit`: second by second of every
-    /// first; `alive` is as long as there are pairs, and those that may not leave it.
-    pub(crate) fn pairs(&self, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) {
+    /// Clears the entries of `alive` for pairs of candidates after `state` whose criterion exceeds
+    /// `limit`. Pairs are ordered by first candidate, then by second.
+    pub(crate) fn pairs(&self, state: &SequenceState, limit: f64, alive: &mut [bool], on: &mut Scratch) {
         self.with_mean(state, on);
-        self.reach.behind(state, &mut on.sizes);
+        self.magnitudes.behind(state, &mut on.sizes);
         on.mixed.information.copy_from_slice(&on.mean);
-        // what no vector excludes is looked at once
+        // a pair that no vector excludes is tried once
         on.tried.clear();
         on.tried.resize(alive.len(), false);
         let (mut directions, mut credit) = (DIRECTIONS, CREDIT);
@@ -187,17 +188,17 @@ impl<'a> Screen<'a> {
             for test in self.tests(directions, on) {
                 credit += self.apply(&test, state, limit, alive, on) / test.vectors.len();
             }
-            (directions, credit) = (1, credit.min(MOST_CREDIT).saturating_sub(WORTH));
+            (directions, credit) = (1, credit.min(MOST_CREDIT).saturating_sub(COST));
             let open = |i: &usize| alive[*i] && !on.tried[*i];
             let left = (0..alive.len()).filter(open).count();
-            if left < WORTH || credit == 0 {
+            if left < COST || credit == 0 {
                 return;
             }
-            // any one of them: those near each other are alike
+            // a random pair: neighbouring pairs are alike
             let drawn = on.draw.below(left as u64) as usize;
             let Some(pair) = (0..alive.len()).filter(open).nth(drawn) else { return };
             on.tried[pair] = true;
-            // the information of that pair, with some of the mean: that is regular
+            // information of that pair, mixed with some of the mean to be regular
             let count = self.evaluator.candidates.len();
             self.evaluator.extend_information(state, (pair / count).into(), &mut on.one);
             self.evaluator.extend_information(&on.one, (pair % count).into(), &mut on.two);
@@ -210,8 +211,15 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// Takes out of `alive` what a test excludes: how many.
-    fn apply(&self, test: &Test, state: &State, limit: f64, alive: &mut [bool], on: &mut Scratch) -> usize {
+    /// Clears the entries of `alive` that a test excludes, and returns their number.
+    fn apply(
+        &self,
+        test: &ExclusionTest,
+        state: &SequenceState,
+        limit: f64,
+        alive: &mut [bool],
+        on: &mut Scratch,
+    ) -> usize {
         let Scratch { energy, lanes, sizes, .. } = on;
         energy.clear();
         energy.resize(alive.len(), 0.0);
@@ -234,18 +242,18 @@ impl<'a> Screen<'a> {
         gone
     }
 
-    /// True if a scheme whose `x^T M x` come to `energy` has a criterion above `limit`; what is no number
-    /// says nothing.
+    /// True if a scheme with the sum `energy` of `x^T M x` has a criterion above `limit`; false for an
+    /// energy that is no number.
     fn is_worse(&self, most: f64, energy: f64, limit: f64) -> bool {
-        // of n logarithms up to 100 (D), or n squares
+        // rounding of n logarithms up to 100 (D), or of n squares
         let limit = limit * self.evaluator.dph * (1.0 + rounding(64 * self.evaluator.n));
         most > limit * limit * energy
     }
 
-    /// `P x`; adds `x^T M_prefix x` and what rounding may hide of the whole energy to `known`.
+    /// Returns `P x`; adds `x^T M_prefix x` and the rounding bound of the whole energy to `known`.
     fn behind(
         &self,
-        state: &State,
+        state: &SequenceState,
         x: &[f64; MAX_UNKNOWNS],
         sizes: &[[f64; 3]],
         known: &mut f64,
@@ -271,13 +279,13 @@ impl<'a> Screen<'a> {
             _ => 0.0,
         };
         // of each position its functionals, their products and sums, and those of x with them; then the
-        // decomposition, of which the root of each m_ii is at most the sum of the three
+        // decomposition: the root of each m_ii is at most the sum of the three
         *known += sum + rounding(8 * n + 128) * size.iter().map(|s| s * s).sum::<f64>() + eigenvalues;
         z
     }
 
-    /// The information behind `state` and the mean of two positions that follow.
-    fn with_mean(&self, state: &State, on: &mut Scratch) {
+    /// Information of `state` with the mean of two further positions.
+    fn with_mean(&self, state: &SequenceState, on: &mut Scratch) {
         let n = self.evaluator.n;
         // P^T S_zz P + P^T S_zx + S_xz P + S_xx, with S_zz / 2 P + S_zx first
         let symmetric = |i: usize, j: usize| self.mean[i.max(j) * n + i.min(j)];
@@ -300,8 +308,9 @@ impl<'a> Screen<'a> {
         }
     }
 
-    /// The tests by some information: of so many directions, where every coefficient is one.
-    fn tests(&self, directions: usize, on: &mut Scratch) -> Vec<Test> {
+    /// Tests from some information; `directions` of them for criteria in which every coefficient is
+    /// one.
+    fn tests(&self, directions: usize, on: &mut Scratch) -> Vec<ExclusionTest> {
         if !self.evaluator.root(&on.mixed, &mut on.root) {
             return Vec::new();
         }
@@ -309,8 +318,8 @@ impl<'a> Screen<'a> {
         self.of_inverse(&on.inverse, directions)
     }
 
-    /// The tests from the inverse of the root, `M^-1 = K^T K`.
-    fn of_inverse(&self, k: &[f64], most: usize) -> Vec<Test> {
+    /// Tests from the inverse of the factor, `M^-1 = K^T K`.
+    fn of_inverse(&self, k: &[f64], most: usize) -> Vec<ExclusionTest> {
         let n = self.evaluator.n;
         let begin = 3 + self.evaluator.nuisance;
         let d = (n - begin) as f64;
@@ -328,7 +337,7 @@ impl<'a> Screen<'a> {
         let variance = |j: usize| (j..n).map(|r| k[r * n + j] * k[r * n + j]).sum::<f64>();
         let alone = |j: usize, limit: f64| {
             let x = solved(&unit(j));
-            Test { most: (x[j] / limit).powi(2), vectors: vec![x] }
+            ExclusionTest { most: (x[j] / limit).powi(2), vectors: vec![x] }
         };
         let directions = |limit: &dyn Fn(usize) -> f64| {
             let mut order: Vec<(f64, usize)> =
@@ -338,17 +347,20 @@ impl<'a> Screen<'a> {
         };
         match self.criterion {
             Criterion::Worst => directions(&|_| 1.0),
-            // psi left out: the margin is not below that of the coefficients
+            // without psi: the margin is at least that of the coefficients
             Criterion::Margin(limits) => directions(&|j| limits.coefficients[j - begin]),
             Criterion::A => {
                 let vectors: Vec<_> = (begin..n).map(|j| solved(&unit(j))).collect();
                 let trace: f64 = vectors.iter().zip(begin..).map(|(x, j)| x[j]).sum();
-                vec![Test { vectors, most: trace * trace / d }]
+                vec![ExclusionTest { vectors, most: trace * trace / d }]
             }
             Criterion::D => {
                 let row = |j: usize| std::array::from_fn(|i| if i <= j { k[j * n + i] } else { 0.0 });
                 let logs: f64 = (begin..n).map(|j| k[j * n + j].ln()).sum();
-                vec![Test { vectors: (begin..n).map(row).collect(), most: d * (2.0 * logs / d).exp() }]
+                vec![ExclusionTest {
+                    vectors: (begin..n).map(row).collect(),
+                    most: d * (2.0 * logs / d).exp(),
+                }]
             }
             Criterion::E => {
                 let largest = (begin..n).max_by(|a, b| variance(*a).total_cmp(&variance(*b)));
@@ -359,15 +371,16 @@ impl<'a> Screen<'a> {
                     let u = std::array::from_fn(|i| if i >= begin { x[i] / size } else { 0.0 });
                     x = solved(&u);
                 }
-                vec![Test { most: counting(&x), vectors: vec![x] }]
+                vec![ExclusionTest { most: counting(&x), vectors: vec![x] }]
             }
         }
     }
 }
 
-impl Reach {
-    /// Of the candidates of an evaluator without priors, `alone` behind nothing.
-    fn of(evaluator: &Evaluator, alone: &[State]) -> Self {
+impl MagnitudeBounds {
+    /// Bounds for the candidates of an evaluator without priors; `alone` are their states as first
+    /// positions.
+    fn of(evaluator: &Evaluator, alone: &[SequenceState]) -> Self {
         let n = evaluator.n;
         let mut out = Self { psi: 0.0, own: vec![0.0; n], grow: 1.0, gain: vec![0.0; n] };
         let start = evaluator.start();
@@ -377,8 +390,8 @@ impl Reach {
             let size = |i: usize| -> f64 {
                 local.iter().enumerate().map(|(a, row)| dwelling.local[a][a].sqrt() * row[i].abs()).sum()
             };
-            // psi is turned from the platform axes to n and back: two matrices whose rows have sizes up to
-            // sqrt(3)
+            // psi is turned from the platform axes to n and back: two matrices with rows of absolute
+            // sums up to sqrt(3)
             let after = |row: &[f64]| 3.0 * row.iter().map(|x| x.abs()).sum::<f64>();
             out.psi = out.psi.max((0..3).map(size).sum());
             out.grow = state.psi.iter().fold(out.grow, |m, row| m.max(after(&row[..3])));
@@ -390,8 +403,9 @@ impl Reach {
         out
     }
 
-    /// Of every unknown the root of what it adds to M in the prefix and at two positions behind it, at most.
-    fn behind(&self, state: &State, sizes: &mut Vec<[f64; 3]>) {
+    /// Bounds on the root of the contribution of every unknown to M, of the prefix and of two further
+    /// positions.
+    fn behind(&self, state: &SequenceState, sizes: &mut Vec<[f64; 3]>) {
         let n = self.own.len();
         sizes.clear();
         sizes.extend((0..n).map(|i| {
@@ -403,8 +417,8 @@ impl Reach {
     }
 }
 
-impl Positions {
-    fn of(alone: &[State], n: usize) -> Self {
+impl CandidateInformation {
+    fn of(alone: &[SequenceState], n: usize) -> Self {
         let entry = |i: usize, j: usize| -> Vec<f64> {
             let factor = if i == j { 1.0 } else { 2.0 };
             alone.iter().map(|a| factor * a.information[i * n + j]).collect()
@@ -421,15 +435,15 @@ impl Positions {
     }
 }
 
-/// `sum += factor * lane`.
-fn add(sum: &mut [f64], factor: f64, lane: &[f64]) {
-    sum.iter_mut().zip(lane).for_each(|(s, x)| *s += factor * x);
+/// `sum += factor * entries`, entry by entry.
+fn add(sum: &mut [f64], factor: f64, entries: &[f64]) {
+    sum.iter_mut().zip(entries).for_each(|(s, x)| *s += factor * x);
 }
 
-impl Lanes {
-    fn take(&mut self, positions: &Positions, x: &[f64; MAX_UNKNOWNS]) {
+impl VectorEnergy {
+    fn take(&mut self, positions: &CandidateInformation, x: &[f64; MAX_UNKNOWNS]) {
         let all = self.linear.iter_mut().chain(&mut self.shift).chain(std::iter::once(&mut self.constant));
-        all.for_each(|lane| lane.fill(0.0));
+        all.for_each(|entries| entries.fill(0.0));
         let d = positions.cross[0].len();
         let coefficients = &x[3..3 + d];
         for (j, &xj) in coefficients.iter().enumerate().filter(|(_, x)| **x != 0.0) {
@@ -438,33 +452,34 @@ impl Lanes {
                 add(&mut self.shift[r], xj, &positions.shifted[r][j]);
             }
             let row = &positions.coefficients[j * (j + 1) / 2..];
-            for (lane, xi) in row.iter().zip(&coefficients[..=j]) {
-                add(&mut self.constant, xj * xi, lane);
+            for (entries, xi) in row.iter().zip(&coefficients[..=j]) {
+                add(&mut self.constant, xj * xi, entries);
             }
         }
     }
 
-    /// What one candidate adds where psi is z.
-    fn at(&self, c: usize, positions: &Positions, z: &[f64; 3]) -> f64 {
+    /// Contribution of candidate `c` if psi is z.
+    fn at(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> f64 {
         let [x, y, w] = *z;
         let products = [x * x, x * y, y * y, x * w, y * w, w * w];
-        let square: f64 = positions.psi.iter().zip(products).map(|(lane, p)| lane[c] * p).sum();
-        let linear: f64 = self.linear.iter().zip(z).map(|(lane, z)| lane[c] * z).sum();
+        let square: f64 = positions.psi.iter().zip(products).map(|(entries, p)| entries[c] * p).sum();
+        let linear: f64 = self.linear.iter().zip(z).map(|(entries, z)| entries[c] * z).sum();
         self.constant[c] + linear + square
     }
 
-    /// psi behind a dwell there.
-    fn behind(&self, c: usize, positions: &Positions, z: &[f64; 3]) -> [f64; 3] {
-        let turned = |r: usize| positions.turned[r].iter().zip(z).map(|(lane, z)| lane[c] * z).sum::<f64>();
+    /// Psi after a dwell at candidate `c`.
+    fn behind(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> [f64; 3] {
+        let turned =
+            |r: usize| positions.turned[r].iter().zip(z).map(|(entries, z)| entries[c] * z).sum::<f64>();
         std::array::from_fn(|r| self.shift[r][c] + turned(r))
     }
 
-    /// What every candidate adds where psi is z, with `before`, to `energy`.
-    fn all(&self, positions: &Positions, z: &[f64; 3], before: f64, energy: &mut [f64]) {
+    /// Adds `before` and the contribution of every candidate, if psi is z, to `energy`.
+    fn all(&self, positions: &CandidateInformation, z: &[f64; 3], before: f64, energy: &mut [f64]) {
         let n = energy.len();
         let [x, y, w] = *z;
-        let [lx, ly, lw] = self.linear.each_ref().map(|lane| &lane[..n]);
-        let [xx, xy, yy, xw, yw, ww] = positions.psi.each_ref().map(|lane| &lane[..n]);
+        let [lx, ly, lw] = self.linear.each_ref().map(|entries| &entries[..n]);
+        let [xx, xy, yy, xw, yw, ww] = positions.psi.each_ref().map(|entries| &entries[..n]);
         let constant = &self.constant[..n];
         for c in 0..n {
             energy[c] += before
@@ -476,7 +491,7 @@ impl Lanes {
     }
 }
 
-/// The inverse of a lower triangular root (n x n); rows of a zero pivot are zero.
+/// Inverse of a lower triangular matrix (n x n); rows of a zero pivot are zero.
 fn inverse(root: &[f64], n: usize, out: &mut Vec<f64>) {
     out.clear();
     out.resize(n * n, 0.0);
@@ -503,14 +518,13 @@ fn inverse(root: &[f64], n: usize, out: &mut Vec<f64>) {
 mod tests {
     use super::*;
     use crate::design::measure::criterion::Limits;
-    use crate::design::{Candidates, State};
+    use crate::design::{Candidates, SequenceState};
     use obsdeg_core::model::settings::Assignment;
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
 
-    /// Whatever the limit, no pair is excluded whose criterion is within it: both carries, every criterion,
-    /// terms, candidates, dwells and coefficients that do not count drawn at random. And nearly all that are
-    /// worse are excluded.
+    /// For any limit no pair is excluded whose criterion is within it, and nearly all worse ones are:
+    /// both carries, every criterion, and random terms, candidates, dwells and coefficients that count.
     #[test]
     fn what_is_within_the_limit_is_not_excluded() {
         let mut rng = SplitMix64::new(23);
@@ -561,7 +575,7 @@ mod tests {
             let screen = Screen::new(&evaluator, &criterion).expect("a screen");
             let count = candidates.len();
             let prefix: Vec<usize> = (0..1 + below(5)).map(|_| below(count as u64)).collect();
-            let state: State = evaluator.state_of(&prefix);
+            let state: SequenceState = evaluator.state_of(&prefix);
             let values: Vec<f64> = (0..count * count)
                 .map(|pair| {
                     let sequence: Vec<usize> =

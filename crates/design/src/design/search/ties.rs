@@ -1,4 +1,4 @@
-//! How many sequences are as good as the best.
+//! Number of sequences that are as good as the best.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::design::search::score::Worth;
 
-/// Sequences tie when their worst degrees are equal and their criteria differ by less than this part.
+/// Relative difference of criteria below which sequences of equal worst degree tie.
 pub(crate) const TIE: f64 = 1e-6;
 
 /// Sequences near the best so far, counted by criterion.
@@ -51,19 +51,19 @@ impl From<Ties> for Counted {
 }
 
 impl Ties {
-    /// The largest criterion that still ties with the best.
+    /// Largest criterion that still ties with the best.
     fn limit(&self) -> f64 {
         self.counts.keys().next().map_or(f64::INFINITY, |k| f64::from_bits(k.0) * (1.0 + TIE))
     }
 
-    /// True if a sequence of this worth is as good as the best so far, or better.
+    /// True if a sequence with this score is as good as the best so far, or better.
     pub(crate) fn wants(&self, worth: &Worth) -> bool {
         self.counts.is_empty()
             || worth.degree < self.degree
             || worth.degree == self.degree && worth.value <= self.limit()
     }
 
-    /// Adds `count` sequences of this worth, each with so many images among those that are searched.
+    /// Adds `count` sequences with this score, each with `images` searched images.
     pub(crate) fn add(&mut self, worth: &Worth, images: usize, count: u64) {
         if !self.wants(worth) {
             return;
@@ -73,21 +73,22 @@ impl Ties {
             self.degree = worth.degree;
         }
         *self.counts.entry((worth.value.to_bits(), images)).or_default() += count;
-        // what does not tie with a better one
+        // criteria that do not tie with a better one are removed
         let limit = self.limit();
         while let Some(last) = self.counts.last_entry().filter(|e| f64::from_bits(e.key().0) > limit) {
             last.remove();
         }
     }
 
-    /// Smallest worst degree, the smallest criterion and the number of searched sequences, if there are any.
+    /// Smallest worst degree, smallest criterion and number of searched sequences; `None` if there are
+    /// none.
     pub(crate) fn first(&self) -> Option<(usize, f64, u64)> {
         let least = f64::from_bits(self.counts.keys().next()?.0);
         Some((self.degree, least, self.counts.values().fold(0, |sum, count| sum.saturating_add(*count))))
     }
 
-    /// True if all criteria tie with the smallest and sequences have from 1 to `order` searched images, as
-    /// after any search.
+    /// True if all criteria tie with the smallest one and all sequences have 1 to `order` searched
+    /// images, as after any search.
     pub(crate) fn are_tidy(&self, order: usize) -> bool {
         let limit = self.limit();
         let tidy = |(&(bits, images), &count): (&(u64, usize), &u64)| {
@@ -104,8 +105,8 @@ impl Ties {
         }
     }
 
-    /// How many there are of all sequences, where each searched one stands for `order` divided by its
-    /// searched images.
+    /// Number of all sequences that tie: each searched one stands for `order` divided by its searched
+    /// images.
     pub fn total(&self, order: usize) -> u64 {
         let limit = self.limit();
         let mut by_images: BTreeMap<usize, u128> = BTreeMap::new();
@@ -114,8 +115,8 @@ impl Ties {
                 *by_images.entry(images).or_default() += u128::from(count) * order as u128;
             }
         }
-        // images of one sequence have as many searched images: each sum is a multiple of them but for
-        // rounding at the limit
+        // images of one sequence have as many searched images: each sum is a multiple of that number
+        // but for rounding at the limit
         let all = by_images.into_iter().map(|(images, sum)| (sum + images as u128 / 2) / images as u128);
         u64::try_from(all.sum::<u128>()).unwrap_or(u64::MAX)
     }

@@ -1,14 +1,14 @@
-//! Arithmetic of many digits.
+//! Arithmetic of high precision.
 
 use astro_float_num::{BigFloat, Consts, RoundingMode, WORD_BIT_SIZE};
 
-/// A number of many digits.
+/// Number of high precision.
 pub(in super::super) type Real = BigFloat;
 pub(super) type Vector = Vec<Real>;
-/// A functional: `(unknown, coefficient)`, drifts in units of the earth rate.
+/// Functional of the unknowns: `(unknown, coefficient)`, drifts in units of the earth rate.
 pub(in super::super) type Functional = Vec<(usize, Real)>;
 
-/// Arithmetic of so many bits.
+/// Arithmetic of a stated number of bits.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Digits {
     pub(in super::super) bits: usize,
@@ -46,7 +46,7 @@ impl Digits {
         terms.fold(self.int(0), |sum, (a, b)| self.add(&sum, &self.mul(a, b)))
     }
 
-    /// Cosine and sine of 1e-9 degrees; exact at quarter turns.
+    /// Cosine and sine of an angle in 1e-9 degrees; exact at quarter turns.
     pub(super) fn cos_sin(self, nanodeg: i64, constants: &mut Constants) -> (Real, Real) {
         const QUARTER: i64 = 90_000_000_000;
         let (quarters, rest) = (nanodeg.div_euclid(QUARTER).rem_euclid(4), nanodeg.rem_euclid(QUARTER));
@@ -66,11 +66,11 @@ impl Digits {
     }
 }
 
-/// Cosines, sines and pi.
+/// Cache of constants for cosines, sines and pi.
 pub(super) struct Constants(Consts);
 
 impl Constants {
-    /// `None` when there is no memory for them.
+    /// Cache of constants; `None` when memory does not suffice.
     pub(super) fn new() -> Option<Self> {
         Some(Self(Consts::new().ok()?))
     }
@@ -80,7 +80,7 @@ impl Constants {
     }
 }
 
-/// Binary logarithm of a magnitude; `None` of zero.
+/// Binary logarithm of a magnitude; `None` for zero.
 pub(in super::super) fn log2(x: &Real) -> Option<f64> {
     let (words, _, _, exponent, _) = x.as_raw_parts()?;
     // the mantissa is in 0.5..1, its highest word last
@@ -88,13 +88,13 @@ pub(in super::super) fn log2(x: &Real) -> Option<f64> {
     Some(f64::from(exponent) + (*top as f64).log2() - WORD_BIT_SIZE as f64)
 }
 
-/// A number in double precision.
+/// Value in double precision.
 pub(in super::super) fn double(x: &Real) -> f64 {
     let sign = if x.is_negative() { -1.0 } else { 1.0 };
     log2(x).map_or(0.0, |e| sign * e.exp2())
 }
 
-/// The magnitude of a sum of products (or of numbers), in that of its parts.
+/// Magnitude of a sum of products (or of numbers), relative to the sum of the magnitudes of its terms.
 pub(in super::super) fn add_up<'a>(
     d: Digits,
     parts: impl Iterator<Item = (Option<&'a Real>, &'a Real)>,

@@ -1,46 +1,46 @@
-//! The information of samples on the unknowns at the start.
+//! Information of the samples on the unknowns at the start.
 
 use std::sync::Arc;
 
 use super::digits::{Digits, Functional, Real, Vector};
 use super::model::{LOCAL, Model, Moments};
 
-/// What becomes of psi between the start of one position and that of the next, besides the carry.
+/// Motion of psi between the starts of two positions, besides the carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum Between {
-    /// Nothing: Phi = 1. What samples determine then is what derivatives do.
+    /// None: Phi = 1, so that samples determine what derivatives do.
     Nothing,
-    /// It moves during the dwell.
+    /// Motion during the dwell.
     Dwell,
 }
 
-/// A local unknown at the start of a position as a functional: nine rows, one entry per column.
-struct Local {
+/// Local unknown at the start of a position as a functional: nine rows, one entry per column.
+struct LocalUnknown {
     columns: Vec<usize>,
     rows: [Vector; LOCAL],
 }
 
-/// The information of all samples on the unknowns at the start.
-pub(in super::super) struct Information {
+/// Information of all samples on the unknowns at the start.
+pub(in super::super) struct SampleInformation {
     pub(super) digits: Digits,
-    /// Its matrix (n x n), symmetric.
+    /// Information matrix (n x n), symmetric.
     pub(super) matrix: Vec<Vector>,
-    /// psi of the end in the carried axes as functionals of the unknowns at the start: one for each unknown
-    /// psi, which is that of the end of the run, with reset carry of the end of its own position.
+    /// psi of the end in the carried axes, as functionals of the unknowns at the start: one for each unknown
+    /// psi. Under reset carry each belongs to the end of its own position, otherwise to the end of the run.
     pub(super) psi_at_end: Vec<Functional>,
 }
 
-impl Information {
-    /// Of the samples of a filter: at the ends of equal steps, as many as `samples` says of each position,
-    /// over dwells of which the first is `dwell / w_ie`, with noise of these standard deviations, of Z and of
-    /// a measured azimuth.
+impl SampleInformation {
+    /// Information of the samples of a filter, at the ends of equal steps, `samples` of them per position.
+    /// The first position lasts `dwell / w_ie`. `noise` has the standard deviations of Z and of a measured
+    /// azimuth.
     pub(in super::super) fn of_filter(model: &Model, dwell: f64, samples: &[usize], noise: [f64; 2]) -> Self {
         let d = model.digits;
         let weights = noise.map(|s| d.double(1.0 / (s * s)));
         Self::new(model, &model.moments(dwell, samples, &weights), Between::Dwell)
     }
 
-    /// Of the samples `moments`, one for each position.
+    /// Information of the samples `moments`, one entry for each position.
     pub(super) fn new(model: &Model, moments: &[Arc<Moments>], between: Between) -> Self {
         let (d, reset) = (model.digits, model.reset);
         let n = model.unknowns;
@@ -59,7 +59,7 @@ impl Information {
             let columns: Vec<usize> = (own..own + 3).chain(first..n).collect();
             let behind =
                 |row: &Vector| (0..3).map(|_| d.int(0)).chain(row.iter().cloned()).collect::<Vector>();
-            // in turns at once torquers add to psi^n, not to the psi that is carried
+            // in instantaneous turns torquers add to psi^n, not to the carried psi
             let torqued: [Vector; 3] = std::array::from_fn(|r| behind(&model.torqued[i][r]));
             let carried = |r: usize, k: usize| d.dot((0..3).map(|j| (&to_n[r][j], &psi[j][k])));
             let carried: [Vector; 3] =
@@ -69,13 +69,13 @@ impl Information {
                 3..6 => behind(&drift[r - 3]),
                 _ => behind(&model.errors[i][r - 6]),
             });
-            let local = Local { columns, rows };
+            let local = LocalUnknown { columns, rows };
             local.add(d, &moments[i].gram, &mut matrix);
             if between == Between::Dwell {
                 let moved = &moments[i].end;
                 let after: [Vector; 3] = std::array::from_fn(|r| {
-                    // what the dwell makes of torqued psi^n, less that itself: no digits of it are left where
-                    // nothing moves it
+                    // effect of the dwell on torqued psi^n, less the torqued psi^n itself: no digits remain
+                    // where nothing moves it
                     let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
                     let change: [Real; 3] = std::array::from_fn(change);
                     let after = |k: usize| {
@@ -104,8 +104,8 @@ impl Information {
     }
 }
 
-impl Local {
-    /// Adds `L^T G L`.
+impl LocalUnknown {
+    /// Adds `L^T G L` to `matrix`.
     fn add(&self, d: Digits, gram: &[Vector], matrix: &mut [Vector]) {
         let c = self.columns.len();
         let weighted: Vec<Vector> = gram

@@ -1,4 +1,4 @@
-//! A scheme in numbers of many digits.
+//! Model of a scheme in numbers of high precision.
 
 use std::sync::Arc;
 
@@ -7,13 +7,14 @@ use obsdeg_exact::SplitMix64;
 
 use super::digits::{Constants, Digits, ROUNDING, Real, Vector, log2};
 
-/// Of the digits of a sum in turns, the part that is never lost: what is smaller is the rest of what cancels.
+/// Fraction of the bits below which an entry of a sum of turns is cancellation residue, relative to the
+/// largest entry.
 const CANCELLED: f64 = 0.75;
 
-/// Local unknowns: psi^n, eps^n, and the error a^n of the accelerometers.
+/// Number of local unknowns: psi^n, eps^n, and the error a^n of the accelerometers.
 pub(super) const LOCAL: usize = 9;
 
-/// What is observed: an entry of psi^n, its sign, and an entry of a^n.
+/// Observed output: an entry of psi^n with its sign, and an entry of a^n.
 #[derive(Clone, Copy)]
 struct Output {
     psi: Option<(usize, bool)>,
@@ -21,42 +22,42 @@ struct Output {
     azimuth: bool,
 }
 
-/// A scheme in numbers.
+/// Model of a scheme in numbers.
 #[derive(Clone)]
 pub(in super::super) struct Model {
     pub(super) digits: Digits,
     /// Number of unknowns.
     pub(super) unknowns: usize,
-    /// True where psi is new at every position.
+    /// True if every position has its own psi.
     pub(super) reset: bool,
-    /// Axes in which psi is carried, in n: one turn for each position.
+    /// Axes in which psi is carried, in n: one rotation for each position.
     pub(super) carried: Vec<[Vector; 3]>,
-    /// `eps^n` as a functional of the coefficients, for each position.
+    /// Drift `eps^n` as a functional of the coefficients, for each position.
     pub(super) drifts: Vec<[Vector; 3]>,
-    /// `a^n` as a functional of the coefficients, for each position.
+    /// Accelerometer error `a^n` as a functional of the coefficients, for each position.
     pub(super) errors: Vec<[Vector; 3]>,
-    /// Sum of what torquer errors add to `psi^n` in all turns up to a position, as a functional of the
-    /// coefficients.
+    /// Sum of the contributions of torquer errors to `psi^n` in all turns up to a position, as a functional
+    /// of the coefficients.
     pub(super) torqued: Vec<[Vector; 3]>,
-    /// Dwell of each position, in dwells of the first.
+    /// Dwell of each position, relative to the first.
     ratios: Vec<Real>,
-    /// `psi x omega_ie` as a matrix.
+    /// Matrix of `psi x omega_ie`.
     turning: [Vector; 3],
     outputs: Vec<Output>,
 }
 
-/// Weight of a sample of Z, and of a measured azimuth: one over the variance of its noise.
+/// Weights of a sample of Z and of a measured azimuth: one over the variance of the noise.
 pub(super) type Weights = [Real; 2];
 
 /// Samples over the dwell of one position.
 pub(super) struct Moments {
-    /// Information on the local unknowns at its start (9 x 9).
+    /// Information on the local unknowns at the start of the position (9 x 9).
     pub(super) gram: Vec<Vector>,
-    /// `psi^n` at its end as a functional of `psi^n` and `eps^n` at its start (3 x 6).
+    /// `psi^n` at the end of the position as a functional of `psi^n` and `eps^n` at its start (3 x 6).
     pub(super) end: [Vector; 3],
 }
 
-/// `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19).
+/// Attitude `C_c^n = Mx(alpha) My(beta) Mz(gamma)` (19).
 fn attitude(d: Digits, angles: &[Angle; 3], constants: &mut Constants) -> [Vector; 3] {
     let [(ca, sa), (cb, sb), (cg, sg)] = angles.each_ref().map(|a| d.cos_sin(a.nanodeg(), constants));
     let (zero, one) = (d.int(0), d.int(1));
@@ -69,24 +70,23 @@ fn attitude(d: Digits, angles: &[Angle; 3], constants: &mut Constants) -> [Vecto
     times(&times(&x, &y), &z).map(|row| row.to_vec())
 }
 
-/// The components of a vector of n in the axes of c.
+/// Components of a vector of n in the axes of c.
 fn in_c(d: Digits, c: &[Vector; 3], v: &[Real; 3]) -> Vector {
     (0..3).map(|j| d.dot((0..3).map(|i| (&c[i][j], &v[i])))).collect()
 }
 
-/// The unit matrix.
+/// Unit matrix (3 x 3).
 fn identity(d: Digits) -> [Vector; 3] {
     std::array::from_fn(|r| (0..3).map(|k| d.int(i64::from(r == k))).collect())
 }
 
-/// The component along a signed axis.
+/// Component of a vector along a signed axis.
 fn along(d: Digits, v: &[Real], axis: [i32; 3]) -> Real {
     v.iter().zip(axis).fold(d.int(0), |sum, (x, k)| d.add(&sum, &d.mul(x, &d.int(k.into()))))
 }
 
-/// What the coefficients of `terms` are multiplied with and along which axis of c they act, by their
-/// definitions (IEEE Std 517, 529, 1293): those of `source`, others with zero. `x` is `g^c`, the torqued
-/// rate, or the specific force, in c.
+/// Axis of c and factor of each coefficient of `terms`, by their definitions (IEEE Std 517, 529, 1293); terms
+/// of a source other than `source` get zero. `x` is `g^c`, the torqued rate, or the specific force, in c.
 fn acting(
     d: Digits,
     geometry: &Geometry,
@@ -132,7 +132,7 @@ fn acting(
     out
 }
 
-/// What acts along axes of c, in n: three rows, a column per coefficient.
+/// Contributions along axes of c, turned into n: three rows, one column per coefficient.
 fn in_n(d: Digits, c: &[Vector; 3], acting: &[([i32; 3], Real)]) -> [Vector; 3] {
     std::array::from_fn(|r| acting.iter().map(|(axis, x)| d.mul(x, &along(d, &c[r], *axis))).collect())
 }
@@ -141,7 +141,7 @@ fn plus(d: Digits, a: &[Vector; 3], b: &[Vector; 3]) -> [Vector; 3] {
     std::array::from_fn(|r| a[r].iter().zip(&b[r]).map(|(x, y)| d.add(x, y)).collect())
 }
 
-/// `[v x]` applied to columns.
+/// Product of `[v x]` with the columns of `m`.
 fn crossed(d: Digits, v: &[Real], m: &[Vector; 3]) -> [Vector; 3] {
     std::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -149,7 +149,8 @@ fn crossed(d: Digits, v: &[Real], m: &[Vector; 3]) -> [Vector; 3] {
     })
 }
 
-/// `exp([u x] angle) m` and the integral of `exp([u x] t) m` over t from 0 to `angle`, by their series.
+/// Matrix `exp([u x] angle) m`, and the integral of `exp([u x] t) m` over t from 0 to `angle`, by their
+/// series.
 fn turned(d: Digits, u: &[Real], angle: &Real, m: &[Vector; 3]) -> [[Vector; 3]; 2] {
     let mut power = m.clone();
     let (mut rotated, mut integral) =
@@ -168,7 +169,7 @@ fn turned(d: Digits, u: &[Real], angle: &Real, m: &[Vector; 3]) -> [[Vector; 3];
     [rotated, integral]
 }
 
-/// The unit vector in c about which the platform turns from `from`, where it stands at `to` afterwards.
+/// Unit vector in c about which the platform turns from the attitude `from` to the attitude `to`.
 fn axis_of(
     d: Digits,
     step: &PathStep,
@@ -181,7 +182,7 @@ fn axis_of(
         PathStep::Named { axis, .. } if axis.geographic => in_c(d, from, &unit(axis.index)),
         PathStep::Named { axis, .. } => unit(axis.index).to_vec(),
         PathStep::Middle { gamma, .. } => {
-            // Mz^T e_y, the second row of Mz
+            // Mz^T e_y is the second row of Mz
             let (c, s) = d.cos_sin(gamma.nanodeg(), constants);
             vec![s.neg(), c, d.int(0)]
         }
@@ -207,8 +208,8 @@ fn axis_of(
     }
 }
 
-/// Sums of what torquer errors add to `psi^n` in all turns up to each position, as functionals of the
-/// coefficients; `none` adds nothing.
+/// Sums of the contributions of torquer errors to `psi^n` in all turns up to each position, as functionals of
+/// the coefficients; `none` adds nothing.
 fn torqued(
     d: Digits,
     scheme: &Scheme,
@@ -241,7 +242,7 @@ fn torqued(
         }
         torqued[i] = sum;
     }
-    // what rounding leaves of terms that cancel, as the sine of half a turn, is nothing
+    // cancellation residue, such as the sine of half a turn, is set to zero
     let largest = torqued.iter().flatten().flatten().filter_map(log2).fold(f64::MIN, f64::max);
     for x in torqued.iter_mut().flatten().flatten() {
         if log2(x).is_some_and(|size| size < largest - d.bits as f64 * CANCELLED) {
@@ -252,8 +253,8 @@ fn torqued(
 }
 
 impl Model {
-    /// A scheme without generic angles and rotations, at its latitude.
-    /// `None` when there is no memory for constants, or no latitude.
+    /// Model of a scheme without generic angles and rotations, at its latitude. `None` when memory does not
+    /// suffice for the constants, or without a latitude.
     pub(in super::super) fn new(scheme: &Scheme, digits: Digits) -> Option<Self> {
         let d = digits;
         let mut constants = Constants::new()?;
@@ -279,7 +280,7 @@ impl Model {
                     plus(d, &gravity, &in_n(d, c, &of(c, Source::Rate, earth())))
                 })
                 .collect(),
-            // the total drift in n is unknown itself
+            // the total drift in n is an unknown itself
             Unknowns::Drift => vec![identity(d); attitudes.len()],
         };
         let none: [Vector; 3] = std::array::from_fn(|r| drifts[0][r].iter().map(|_| zero()).collect());
@@ -320,7 +321,7 @@ impl Model {
         Some(Self { digits, unknowns, reset, carried, drifts, errors, torqued, ratios, turning, outputs })
     }
 
-    /// The same with every number moved at random by up to `2^log2`: what rounding may make of a model of
+    /// Model with every number changed at random by up to `2^log2`: the effect of rounding on a model of
     /// doubles.
     pub(in super::super) fn rounded(&self, log2: i32, rng: &mut SplitMix64) -> Self {
         let d = self.digits;
@@ -334,7 +335,7 @@ impl Model {
         out
     }
 
-    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6): the series of
+    /// `psi^n` at a time as a functional of `psi^n` and `eps^n` at the start (3 x 6), by the series of
     /// `psi' = psi x omega + eps`.
     fn moved(&self, time: &Real) -> [Vector; 3] {
         let d = self.digits;
@@ -363,8 +364,8 @@ impl Model {
         sum
     }
 
-    /// Samples at the ends of equal steps over the dwell of each position, the first of `dwell / w_ie`: as
-    /// many as `samples` says of a position, of these weights ([`Weights`]). Equal dwells share them.
+    /// Samples at the ends of equal steps over the dwell of each position; the first position lasts
+    /// `dwell / w_ie`. `samples` has the number per position. Positions of equal dwell share them.
     pub(super) fn moments(&self, dwell: f64, samples: &[usize], weights: &Weights) -> Vec<Arc<Moments>> {
         let d = self.digits;
         let mut out: Vec<Arc<Moments>> = Vec::new();
@@ -377,14 +378,14 @@ impl Model {
         out
     }
 
-    /// `sum_k F^k^T G F^k` for k = 1 to `count`, by doubling, with the step `F` and the information `G` of a
-    /// sample.
+    /// Sum `sum_k F^k^T G F^k` for k = 1 to `count`, by doubling, with the step `F` and the information `G`
+    /// of a sample.
     fn of_dwell(&self, dwell: &Real, count: usize, weights: &Weights) -> Moments {
         let d = self.digits;
         let sample = self.sample(weights);
         let step = self.moved(&d.div(dwell, &d.int(count as i64)));
         let (mut gram, mut end) = (congruent(d, &sample, &step), step.clone());
-        // the bits of the count behind the first
+        // bits of the count below the highest
         for bit in (0..count.max(1).ilog2()).rev() {
             gram = sum(d, &gram, &congruent(d, &gram, &end));
             end = composed(d, &end, &end);
@@ -396,7 +397,7 @@ impl Model {
         Moments { gram, end }
     }
 
-    /// The information of one sample on the local unknowns at its time (9 x 9).
+    /// Information of one sample on the local unknowns at its time (9 x 9).
     fn sample(&self, weights: &Weights) -> Vec<Vector> {
         let d = self.digits;
         let mut out = vec![vec![d.int(0); LOCAL]; LOCAL];
@@ -415,15 +416,15 @@ impl Model {
     }
 }
 
-/// The sum of two matrices.
+/// Sum of two matrices.
 fn sum(d: Digits, a: &[Vector], b: &[Vector]) -> Vec<Vector> {
     a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(x, y)| d.add(x, y)).collect()).collect()
 }
 
-/// `F^T G F` of a symmetric `G` (9 x 9); `F` moves psi (3 x 6) and leaves eps and a.
+/// Congruence `F^T G F` of a symmetric `G` (9 x 9); `F` moves psi (3 x 6) and leaves eps and a.
 fn congruent(d: Digits, g: &[Vector], f: &[Vector; 3]) -> Vec<Vector> {
     let column = |k: usize| f.iter().map(move |row| &row[k]);
-    // row by row: G F, whose columns from 3 on have those of G besides
+    // row by row: G F, whose columns from 3 on also have those of G
     let right: Vec<Vector> = (0..LOCAL)
         .map(|i| {
             let entry = |k: usize| match k {
@@ -448,7 +449,7 @@ fn congruent(d: Digits, g: &[Vector], f: &[Vector; 3]) -> Vec<Vector> {
     out
 }
 
-/// What moves psi by `first`, then by `after` (3 x 6).
+/// Map of psi by `first`, then by `after` (3 x 6).
 fn composed(d: Digits, after: &[Vector; 3], first: &[Vector; 3]) -> [Vector; 3] {
     std::array::from_fn(|r| {
         let entry = |k: usize| {

@@ -1,24 +1,24 @@
-//! What a filter's covariance is in many digits.
+//! Covariance of a filter in high precision.
 
 use super::digits::{Digits, Functional, ROUNDING, Vector, double};
-use super::information::Information;
+use super::information::SampleInformation;
 use super::seen::at_start;
 
-/// The covariance at the end, by its inverse: samples and prior.
+/// Covariance at the end, by its inverse: the information of samples and prior.
 pub(in super::super) struct Posterior {
     digits: Digits,
     /// Standard deviations of the prior.
     prior: Vector,
-    /// Lower triangular `L` (n x n), whose rows grow: `L L^T` is the information in units of the prior.
+    /// Lower triangular `L` (n x n), row k of length k + 1: `L L^T` is the information in units of the prior.
     factor: Vec<Vector>,
     psi_at_end: Vec<Functional>,
 }
 
 impl Posterior {
-    /// Of the information of samples and a prior (standard deviations in rad and in w_ie). `None` when
-    /// rounding leaves no information.
-    pub(in super::super) fn new(information: &Information, prior: &[f64]) -> Option<Self> {
-        let Information { digits: d, matrix, psi_at_end } = information;
+    /// Covariance from the information of samples and a prior (standard deviations in rad and in w_ie).
+    /// `None` when rounding destroys the information.
+    pub(in super::super) fn new(information: &SampleInformation, prior: &[f64]) -> Option<Self> {
+        let SampleInformation { digits: d, matrix, psi_at_end } = information;
         let d = *d;
         let prior: Vector = prior.iter().map(|p| d.double(*p)).collect();
         let n = prior.len();
@@ -40,8 +40,8 @@ impl Posterior {
         Some(Self { digits: d, prior, factor, psi_at_end: psi_at_end.clone() })
     }
 
-    /// `L^-1 c` of a functional of psi at the end and the coefficients, in units of the prior: its square is
-    /// the variance.
+    /// Solution `L^-1 c` for a functional of psi at the end and the coefficients, in units of the prior. Its
+    /// squared length is the variance.
     fn solved(&self, functional: &Functional) -> Vector {
         let d = self.digits;
         let mut c = vec![d.int(0); self.prior.len()];

@@ -1,48 +1,48 @@
-//! What of the information is seen, and what is rounding.
+//! Observable directions of the information matrix, separated from rounding.
 
 use std::collections::BTreeMap;
 
 use super::digits::{Digits, Functional, ROUNDING, Real, Vector, log2};
-use super::information::Information;
+use super::information::SampleInformation;
 
-/// A pivot is seen above the first of these parts of the digits, relative to the diagonal; the errors that
-/// Cholesky's elimination then makes are within half of it, and what is below the second is rounding. Between
-/// them nothing is certain.
+/// Bounds of a pivot, as fractions of the bits below the diagonal. A pivot above the first is observable: the
+/// errors of Cholesky's elimination are within half of the digits. A pivot below the second is rounding.
+/// Between them nothing is certain.
 const CLEAR: f64 = 10.0 / 16.0;
 const ROUNDING_BELOW: f64 = 11.0 / 16.0;
-/// What is left of a functional whose coefficients are doubles, beside its largest coefficient (drifts in
-/// units of the earth rate), in bits: what their rounding spreads to other unknowns, and far below the 1e-11
-/// by which positions differ at least.
+/// Size in bits, relative to the largest coefficient (drifts in units of the earth rate), below which a
+/// coefficient is the rounding of doubles. Differences of positions, at least 1e-11, are far larger.
 const NEGLIGIBLE: f64 = -46.0;
-/// A sum of errors is at most so many bits more than the largest of them.
+/// Bits by which a sum of errors may exceed the largest of them.
 const SUMMED: f64 = 8.0;
 
-/// What is seen: `N = sum l_k l_k^T`, best seen first.
-pub(in super::super) struct Seen {
+/// Observable directions: `N = sum l_k l_k^T`, best observable first.
+pub(in super::super) struct ObservableDirections {
     digits: Digits,
-    /// The unknown of every pivot.
+    /// Unknown of each pivot.
     pub(in super::super) pivots: Vec<usize>,
-    /// `l_k` (n entries each).
+    /// Columns `l_k` (n entries each).
     columns: Vec<Vector>,
     /// Binary logarithms of the pivots, descending.
     pub(in super::super) sizes: Vec<f64>,
-    /// Of every unknown: whether its column is not zero.
+    /// Flags by unknown: true if its column is not zero.
     pub(in super::super) excited: Vec<bool>,
-    /// Binary logarithms of the diagonal of N.
+    /// Binary logarithms of the diagonal of N, by unknown.
     own: Vec<f64>,
     psi_at_end: Vec<Functional>,
 }
 
-impl Information {
-    /// Cholesky factors, the largest pivot first; `None` where what is seen and rounding are not told apart.
-    pub(super) fn seen(mut self) -> Option<Seen> {
+impl SampleInformation {
+    /// Cholesky factors, the largest pivot first; `None` where observable directions cannot be separated from
+    /// rounding.
+    pub(super) fn seen(mut self) -> Option<ObservableDirections> {
         let d = self.digits;
         let n = self.matrix.len();
         let diagonal = |m: &[Vector], c: usize| log2(&m[c][c]);
         let own: Vec<Option<f64>> = (0..n).map(|c| diagonal(&self.matrix, c)).collect();
         let largest = own.iter().flatten().copied().fold(f64::MIN, f64::max);
         let [rounding, clear] = [ROUNDING_BELOW, CLEAR].map(|part| -part * d.bits as f64);
-        // a column whose entries are rounding is below its square; what is seen is above
+        // a column whose entries are rounding lies below the square of that; an observable one lies above
         let excited: Vec<bool> =
             own.iter().map(|x| x.is_some_and(|x| x - largest > 2.0 * rounding)).collect();
         let doubtful = |x: f64| x - largest > 2.0 * rounding && x - largest < 2.0 * clear;
@@ -52,7 +52,7 @@ impl Information {
         let mut left: Vec<usize> = (0..n).filter(|&c| excited[c]).collect();
         let (mut pivots, mut columns, mut sizes): (Vec<usize>, Vec<Vector>, Vec<f64>) = Default::default();
         loop {
-            // what is left of a column, in its own
+            // rest of a column, relative to its own diagonal
             let part = |c: usize| Some((c, diagonal(&self.matrix, c)?, own[c]?));
             let parts = || left.iter().filter_map(|&c| part(c));
             let positive = |c: usize| self.matrix[c][c].is_positive();
@@ -80,11 +80,19 @@ impl Information {
             sizes.push(size);
         }
         let own = own.into_iter().map(|x| x.unwrap_or(f64::MIN)).collect();
-        Some(Seen { digits: d, pivots, columns, sizes, excited, own, psi_at_end: self.psi_at_end })
+        Some(ObservableDirections {
+            digits: d,
+            pivots,
+            columns,
+            sizes,
+            excited,
+            own,
+            psi_at_end: self.psi_at_end,
+        })
     }
 }
 
-/// A functional of psi at the end and the coefficients as one of the unknowns at the start; `psi` is psi of
+/// Functional of psi at the end and the coefficients, as one of the unknowns at the start; `psi` has psi of
 /// the end.
 pub(super) fn at_start(d: Digits, psi: &[Functional], functional: &Functional) -> Functional {
     let moved = functional.iter().flat_map(|(c, x)| match psi.get(*c) {
@@ -94,30 +102,31 @@ pub(super) fn at_start(d: Digits, psi: &[Functional], functional: &Functional) -
     moved.filter(|(_, x)| !x.is_zero()).collect()
 }
 
-impl Seen {
+impl ObservableDirections {
     pub(in super::super) fn digits(&self) -> Digits {
         self.digits
     }
 
-    /// The number of directions that are seen.
+    /// Number of observable directions.
     pub(in super::super) fn rank(&self) -> usize {
         self.pivots.len()
     }
 
-    /// Half the digits: what is smaller, in units of what rounding could make, is rounding.
+    /// Half the digits, as a binary logarithm: a smaller number, in units of the largest rounding error, is
+    /// rounding.
     fn rounding(&self) -> f64 {
         -(self.digits.bits as f64) / 2.0
     }
 
-    /// Binary logarithm of sigma of a functional, by what is seen alone; `None` when it is not in the span of
-    /// that. `rounded` is the relative error of its coefficients (none by default).
+    /// Binary logarithm of sigma of a functional, by the observable directions alone; `None` outside their
+    /// span. `rounded` is the relative error of its coefficients; without it they are exact.
     pub(in super::super) fn sigma(&self, functional: &Functional, rounded: Option<f64>) -> Option<f64> {
         let d = self.digits;
         let mut rest = vec![d.int(0); self.own.len()];
         for (c, x) in functional {
             rest[*c] = d.add(&rest[*c], x);
         }
-        // the sums of magnitudes that the rest is the difference of
+        // sums of the magnitudes of the terms that the rest is the difference of
         let mut sizes: Vec<Real> = rest.iter().map(Real::abs).collect();
         let mut variance = d.int(0);
         let largest = rest.iter().filter_map(log2).fold(f64::MIN, f64::max);
@@ -128,7 +137,7 @@ impl Seen {
                 let coefficients = rounded
                     .zip(log2(size))
                     .is_some_and(|(r, size)| x - size < r.log2() || x - largest < NEGLIGIBLE);
-                // an error of N, relative to its diagonal
+                // error of N, relative to its diagonal
                 coefficients || sigma.is_some_and(|sigma| x - (own / 2.0 + sigma) < self.rounding())
             })
         };
@@ -148,8 +157,8 @@ impl Seen {
         vanishes(&rest, &sizes, &variance).then(|| log2(&variance).map(|v| v / 2.0)).flatten()
     }
 
-    /// A functional of psi at the end and the coefficients as one of the unknowns at the start, without what
-    /// rounding leaves of unknowns that no sample holds (`cos^2 + sin^2 - 1` where attitudes cancel).
+    /// Functional of psi at the end and the coefficients, as one of the unknowns at the start. Rounding
+    /// residue of unknowns that affect no sample is left out (`cos^2 + sin^2 - 1` where attitudes cancel).
     pub(in super::super) fn at_start(&self, functional: &Functional) -> Functional {
         let mut moved: BTreeMap<usize, Real> = BTreeMap::new();
         for (c, x) in at_start(self.digits, &self.psi_at_end, functional) {
@@ -162,18 +171,18 @@ impl Seen {
         moved.into_iter().collect()
     }
 
-    /// Unknowns that are excited and no pivots.
+    /// Excited unknowns that are not pivots.
     pub(in super::super) fn free(&self) -> Vec<usize> {
         (0..self.own.len()).filter(|c| self.excited[*c] && !self.pivots.contains(c)).collect()
     }
 
-    /// What is not seen: `x_pivots = -R x_free` with `R = R_11^-1 R_12`. Its free unknowns (those that are
-    /// not excited left out), and for every pivot its row of R, with zeros for what is rounding.
+    /// Unobservable directions: `x_pivots = -R x_free` with `R = R_11^-1 R_12`. Returns the free unknowns
+    /// (excited ones only), and for every pivot its row of R, with zeros for rounding.
     pub(in super::super) fn reduced(&self) -> (Vec<usize>, Vec<Vector>) {
         let d = self.digits;
         let free = self.free();
-        // from the last pivot up; what rounding may make of an entry comes from its own pivot, or from
-        // entries below
+        // from the last pivot up; the rounding error of an entry comes from its own pivot, or from entries
+        // below
         let mut rows: Vec<Vector> = Vec::new();
         let mut errors: Vec<Vec<f64>> = Vec::new();
         for (k, column) in self.columns.iter().enumerate().rev() {

@@ -1,6 +1,6 @@
-//! Remedies where a bench uses up the margin of a requirement, each by trying it: the error among the
-//! unknowns, re-levelling, another position. And the same scheme under every carry: sigma against what the
-//! bench adds.
+//! Remedies where a bench uses up the margin of a requirement, each tried: the error among the unknowns,
+//! re-levelling, another position. Comparison of the scheme under every carry: sigma against the contribution
+//! of the bench.
 
 use obsdeg_core::model::{Carry, Platform, Scheme, Term, Unknowns, cardinal, cardinal_names};
 
@@ -9,8 +9,8 @@ use crate::simulation::carries::under;
 use crate::simulation::limits::MAX_UNKNOWNS;
 use crate::simulation::{Attained, Conditions, SimulationError, is_rate, required_sigmas, shown_unit};
 
-/// Sigma, what the bench adds and total of the drift coefficient with the largest total; `None` if one has no
-/// sigma.
+/// Sigma, contribution of the bench and total of the drift coefficient with the largest total; `None` if a
+/// coefficient has no sigma.
 fn composition(of: &Attained) -> Option<Composition> {
     let (names, units) = (of.plan.platform.names(), of.plan.platform.units());
     let worst = of.worst_of(&|_| true)?;
@@ -20,8 +20,8 @@ fn composition(of: &Attained) -> Option<Composition> {
     Some(Composition { unknown: worst.name, unit: shown_unit(units[c]).into(), sigma, bias, total })
 }
 
-/// The scheme under every carry, its own first. `None` in place of figures where a coefficient is not
-/// observable, or where nothing was judged.
+/// Outcome of the scheme under every carry, its own first; without figures where a coefficient is not
+/// observable, or the scheme could not be judged.
 pub(crate) fn carries(
     attained: &Attained,
     conditions: &Conditions,
@@ -39,8 +39,8 @@ pub(crate) fn carries(
     Ok(out)
 }
 
-/// A scheme with its accuracy, and the conditions as far as they concern it; `None` for what is no scheme, or
-/// too large.
+/// Changed scheme with its accuracy, and the conditions that concern it; `None` if it is invalid or too
+/// large.
 fn tried(
     scheme: Scheme,
     conditions: &Conditions,
@@ -65,7 +65,7 @@ fn over_required(of: &Attained, conditions: &Conditions) -> Result<Option<[f64; 
     Ok(Some(out))
 }
 
-/// Largest factor on the sigma of a drift coefficient that both have.
+/// Largest factor on the sigma of a drift coefficient that both schemes have.
 fn sigma_factor(before: &Attained, after: &Attained) -> f64 {
     let names = after.plan.platform.names();
     let factor = |c: usize| {
@@ -77,8 +77,8 @@ fn sigma_factor(before: &Attained, after: &Attained) -> f64 {
     (0..units.len()).filter(|&c| is_rate(units[c])).filter_map(factor).fold(0.0, f64::max)
 }
 
-/// Changes that lower the largest total over its requirement, the lowest first, where sigma meets every
-/// requirement and the total does not.
+/// Changes that lower the largest total over its requirement, the lowest first. They are sought where sigma
+/// meets every requirement and the total does not.
 pub(crate) fn advice(
     attained: &Attained,
     conditions: &Conditions,
@@ -122,7 +122,8 @@ pub(crate) fn advice(
     Ok(out)
 }
 
-/// Families of the bench that a required total rests on, among the unknowns: each, and all together.
+/// Schemes with families of the bench among the unknowns, for those families that a required total rests on:
+/// each by itself, and all together.
 fn estimated(scheme: &Scheme, effects: &OmittedEffects) -> Vec<(String, Scheme)> {
     let Unknowns::Coefficients(terms) = &scheme.unknowns else { return Vec::new() };
     let mut families: Vec<Term> = Vec::new();
@@ -141,7 +142,7 @@ fn estimated(scheme: &Scheme, effects: &OmittedEffects) -> Vec<(String, Scheme)>
     families.chunks(1).chain(all).map(|more| (letters(more), with(more))).collect()
 }
 
-/// The scheme with one cardinal position more, as long as the last one.
+/// Schemes with one more cardinal position, as long as the last position.
 fn with_position(scheme: &Scheme) -> Vec<(String, Scheme)> {
     let Some(last) = scheme.positions.last().filter(|_| !scheme.rotates()) else { return Vec::new() };
     let longer = |name: &String| {

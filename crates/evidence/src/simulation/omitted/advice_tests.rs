@@ -1,4 +1,5 @@
-//! Advice by applying it, the trade between carries, and correlated noise by a covariance written anew.
+//! Tests of the advice by applying it, of the carries side by side, and of correlated noise by an independent
+//! covariance.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::{Carry, Platform, Scheme, Term, Unknowns, c_n_f64, cardinal, cardinal_names};
@@ -7,7 +8,7 @@ use super::tests::letters;
 use super::{AdviceKind, OmittedEffects, omitted_effects};
 use crate::simulation::{Attained, Conditions, is_rate};
 
-/// The five positions of least sigma, with a requirement that sigma meets and a bench of `sizes`.
+/// Scheme of the five positions of least sigma, with a requirement that sigma meets and a bench of `sizes`.
 fn benched(sizes: &[(&str, f64)]) -> Scheme {
     let mut scheme = letters(&["NUE", "USE", "ENU", "EUS", "DSW"], Carry::Inertial);
     scheme.requirements = [("D".to_string(), 0.1)].into();
@@ -15,7 +16,7 @@ fn benched(sizes: &[(&str, f64)]) -> Scheme {
     scheme
 }
 
-/// Accuracy of a scheme, and whether its requirements are met.
+/// Accuracy of a scheme, and true if its requirements are met.
 fn accuracy(scheme: &Scheme) -> (Attained, bool) {
     let conditions = Conditions::of(scheme);
     let attained = Attained::new(scheme, &conditions, 1).expect("sigmas");
@@ -38,7 +39,7 @@ fn worst(of: &Attained) -> [f64; 2] {
     [largest(&of.totals) / 0.1, largest(&of.sigmas)]
 }
 
-/// A scheme with what an advice says, applied by hand.
+/// Scheme changed as an advice says, by hand.
 fn applied(scheme: &Scheme, kind: AdviceKind, what: &str) -> Scheme {
     let mut out = scheme.clone();
     match kind {
@@ -59,12 +60,12 @@ fn applied(scheme: &Scheme, kind: AdviceKind, what: &str) -> Scheme {
     out
 }
 
-/// Every advice, applied, gives the figures that it says, is better than the scheme as it is, and the
-/// position added is the best of the 24. Without a bench, or where it uses up no margin, there is none.
+/// Every advice, applied, gives its stated figures and improves the scheme; the added position is the best of
+/// the 24. There is no advice without a bench, or where the bench uses up no margin.
 #[test]
 fn advice_does_what_it_says() {
     let (mut kinds, mut met_by, mut met_by_levelling) = (Vec::new(), 0, false);
-    // of all 24 attitudes levelling again is enough, as the reference table says
+    // of all 24 attitudes re-levelling suffices, as in the reference table
     let all = super::tests::by_letters();
     let mut all = letters(&all.iter().map(String::as_str).collect::<Vec<_>>(), Carry::Inertial);
     all.requirements = [("D".to_string(), 0.1)].into();
@@ -121,8 +122,8 @@ fn an_error_among_the_unknowns_costs_little() {
     assert!(worst(&after)[1] / sigma < 1.05, "{} {sigma}", worst(&after)[1]);
 }
 
-/// The trade between carries is that of the three schemes by themselves; reset cuts the bias of K0 and raises
-/// sigma.
+/// Outcomes of the carries equal those of the three schemes by themselves; reset carry reduces the bias of K0
+/// and raises sigma.
 #[test]
 fn carries_are_traded_as_they_are() {
     let scheme = benched(&[("K0", 20.0)]);
@@ -149,8 +150,8 @@ fn carries_are_traded_as_they_are() {
     }
 }
 
-/// Correlated noise: sigmas by the information of all samples with their whole covariance, of a first-order
-/// Gauss-Markov process of each accelerometer, over those of the white noise alone.
+/// Factors of correlated noise equal the ratio of two sigmas by the information of all samples: with the full
+/// covariance of a first-order Gauss-Markov process of each accelerometer, and with white noise alone.
 #[test]
 fn the_factor_of_correlated_noise_is_that_of_its_covariance() {
     let mut scheme = letters(&["NUE", "USE", "ENU", "EUS", "DSW"], Carry::Inertial);

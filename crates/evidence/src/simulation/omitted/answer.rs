@@ -1,4 +1,4 @@
-//! Sensitivities to what a scheme does not estimate, as plain data.
+//! Sensitivities to errors that a scheme does not estimate, as plain data.
 
 use obsdeg_core::model::Carry;
 use obsdeg_core::omitted::{ExactChange, OmittedClass};
@@ -41,7 +41,7 @@ pub struct OmittedEffects {
     pub attitudes: bool,
 }
 
-/// Value of `attitudes` in answers that do not have it.
+/// Value of `attitudes` in answers without this field.
 fn yes() -> bool {
     true
 }
@@ -232,5 +232,5 @@ pub struct BudgetLine {
     pub percent: f64,
 }
 
-/// Name of the source that the samples are.
+/// Name of the samples as a source of a budget.
 pub const SAMPLES: &str = "samples";

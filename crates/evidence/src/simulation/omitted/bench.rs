@@ -1,9 +1,9 @@
-//! The bench: sizes (one sigma) of errors that are not estimated, and the total uncertainty with them.
+//! Bench: sizes (one sigma) of errors that are not estimated, and the total uncertainty with them.
 
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{MAX_ATTITUDES, OmittedModel, OmittedTerm, Platform, may_be_omitted, omitted_meant};
 
-/// Name in a bench that nothing answers to.
+/// Name in a bench that matches no error.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("bench: no error is `{found}`; {known}")]
 pub struct BenchError {
@@ -21,18 +21,18 @@ fn attitude_position(name: &str) -> Option<usize> {
 /// Sizes of the errors that a scheme does not estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bench {
-    /// One sigma of every error in its unit; `None` where the bench states none.
+    /// One sigma of every error, in its unit; `None` where the bench states none.
     pub sizes: Vec<Option<f64>>,
 }
 
 impl Bench {
-    /// The sizes that `stated` gives the errors of `model`, families before single ones. What is among the
-    /// unknowns has no size: it is estimated.
+    /// Sizes of the errors of `model` by `stated`, families before single errors. An error among the unknowns
+    /// has no size: it is estimated.
     ///
     /// # Errors
-    /// [`BenchError`] for a name that no error has.
+    /// [`BenchError`] for a name that matches no error.
     pub fn of(stated: &[Assignment], model: &OmittedModel) -> Result<Self, BenchError> {
-        // of an error that is estimated, or of a position that another scheme has, nothing counts
+        // estimated errors, and positions of another scheme, do not count
         if let Some(a) = stated.iter().find(|a| !may_be_omitted(&a.name)) {
             return Err(BenchError { found: a.name.clone(), known: omitted_meant(&a.name) });
         }
@@ -40,8 +40,8 @@ impl Bench {
         Ok(Self { sizes: model.terms().iter().map(size).collect() })
     }
 
-    /// Refuses sizes of attitudes whose effect is not computed for a scheme of so many positions, or of one
-    /// whose positions rotate.
+    /// Checks that the effect of stated attitudes is computed: not for schemes of so many positions, or with
+    /// rotating positions.
     ///
     /// # Errors
     /// [`BenchError`].
@@ -70,7 +70,7 @@ impl Bench {
         }
     }
 
-    /// The names of a bench that are among the unknowns of `platform`: estimated, so that their sizes do not
+    /// Names of a bench that are among the unknowns of `platform`: they are estimated, so their sizes do not
     /// count.
     pub fn estimated(stated: &[Assignment], platform: &Platform) -> Vec<String> {
         let model = OmittedModel::new(platform);
@@ -81,7 +81,7 @@ impl Bench {
         own.map(|a| a.name.clone()).collect()
     }
 
-    /// The sizes of a bench for the same scheme without a position (counted from 0): attitudes of later ones
+    /// Sizes of a bench for the scheme without a position (counted from 0): the attitudes of later positions
     /// move up.
     pub fn without(stated: &[Assignment], position: usize) -> Vec<Assignment> {
         let moved = |a: &Assignment| match attitude_position(&a.name) {
@@ -95,7 +95,8 @@ impl Bench {
         stated.iter().filter_map(moved).collect()
     }
 
-    /// Size that `stated` gives an error of a family, in its unit: the last one that names either.
+    /// Size of an error of a family, in its unit: the last one of `stated` that names the error or its
+    /// family.
     pub fn size_of(stated: &[Assignment], family: &str, name: &str) -> Option<f64> {
         let own = |a: &&Assignment| a.name == family || concerns(&a.name, name);
         stated.iter().rfind(own).map(|a| a.value)

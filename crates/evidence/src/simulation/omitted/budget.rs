@@ -1,5 +1,5 @@
-//! Uncertainty budgets in the form of the GUM (JCGM 100:2008): every source with its standard uncertainty,
-//! sensitivity and contribution, the largest first.
+//! Uncertainty budgets in the form of the GUM (JCGM 100:2008): sources with standard uncertainty, sensitivity
+//! and contribution, the largest contribution first.
 
 use super::answer::{Budget, BudgetLine, Evaluation, OmittedEffect, SAMPLES};
 

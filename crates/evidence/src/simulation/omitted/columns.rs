@@ -1,11 +1,11 @@
-//! Columns of omitted errors in the samples of a plan: what one SI unit of each adds to Z, step by step, and
-//! to psi.
+//! Columns of omitted errors in the samples of a plan: contribution of one SI unit of each error to Z, step
+//! by step, and to psi.
 //!
-//! `psi^n` of an error obeys the equations of the platform by itself: `psi' = psi x omega_ie + eps`,
-//! integrated over each step (exactly while a position lasts), carried between positions as the scheme says.
-//! Nothing of the filter's model enters. Of a platform that is known to be tilted by E ([`Tilt`]) it is the
-//! error `delta` of its attitude: excitations are those where the platform is, and what errors of the site do
-//! to the commands is the same in platform axes.
+//! `psi^n` of an error obeys the equations of the platform by itself: `psi' = psi x omega_ie + eps`. It is
+//! integrated over each step (exactly while a position lasts) and carried between positions as the scheme
+//! says, without the filter's model. For a platform known to be tilted by E ([`Tilt`]) it is the error
+//! `delta` of its attitude. Excitations are then those of the tilted attitude, and errors of the site change
+//! the commands equally in platform axes.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, apply, rotation, rotation_vector, times, transpose};
@@ -18,34 +18,34 @@ use obsdeg_ekf::integrate::van_loan;
 use crate::simulation::state::inverse_left_jacobian;
 use crate::simulation::{Plan, SegmentKind, SimulationError, Tilt};
 
-/// Three numbers of every error.
+/// Vectors of three components, by error.
 type Vectors = Vec<[f64; 3]>;
 
-/// The columns of all errors of a model, along the timeline of a plan.
+/// Columns of all errors of a model, along the timeline of a plan.
 pub struct OmittedColumns<'a> {
     plan: &'a Plan,
     model: &'a OmittedModel,
-    /// Turns at once on which torquer errors act.
+    /// Values for instantaneous turns on which torquer errors act.
     turning: Option<Point<Float>>,
-    /// Tilts of the platform, step by step; empty where it is where the scheme has it.
+    /// Tilts of the platform, step by step; empty for a platform in the attitude of the scheme.
     tilts: Vec<Tilt>,
-    /// Number of steps that are done, of all segments.
+    /// Number of finished steps, over all segments.
     done: usize,
     segment: usize,
-    /// Steps of the segment that are done.
+    /// Number of finished steps of the current segment.
     step: usize,
-    /// `psi^n` of every error, offsets of the position included.
+    /// `psi^n` of every error, including the offsets of the position.
     psi: Vectors,
     offset: Vectors,
-    current: Option<Dwelt>,
+    current: Option<DwellStep>,
     /// Outputs of the last step: one row per component, one entry per error.
     rows: Vec<f64>,
-    /// Psi of the unknowns where it counts: (unknown, one entry per error).
+    /// Psi of the unknowns at the ends at which they are estimated: (unknown, one entry per error).
     ends: Vec<(usize, Vec<f64>)>,
 }
 
 /// One step at a position: `psi+ = phi psi + added`, and the errors of the accelerometers.
-struct Dwelt {
+struct DwellStep {
     phi: Matrix3<f64>,
     added: Vectors,
     outputs: Vectors,
@@ -61,12 +61,12 @@ fn sum(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
 }
 
 impl<'a> OmittedColumns<'a> {
-    /// Columns at the start of `plan`, of a platform that is where the scheme has it.
+    /// Columns at the start of `plan`, for a platform in the attitude of the scheme.
     pub fn new(plan: &'a Plan, model: &'a OmittedModel) -> Self {
         Self::of_tilted(plan, model, Vec::new())
     }
 
-    /// Columns of a platform that is tilted as `tilts` say, one of every step of `plan`.
+    /// Columns for a platform with the tilts `tilts`, one per step of `plan`.
     pub fn of_tilted(plan: &'a Plan, model: &'a OmittedModel, tilts: Vec<Tilt>) -> Self {
         let turning = model.turning().and_then(|s| Platform::new(s.clone()).ok());
         let [w_n, w_u, _] = plan.earth_rate();
@@ -92,7 +92,7 @@ impl<'a> OmittedColumns<'a> {
         self.model.terms().len()
     }
 
-    /// The rows of the next step in the order of the outputs of the plan (outputs x errors, row by row); none
+    /// Rows of the next step in the order of the outputs of the plan (outputs x errors, row by row); empty
     /// for a step without outputs. `None` at the end.
     ///
     /// # Errors
@@ -115,13 +115,14 @@ impl<'a> OmittedColumns<'a> {
         Ok(Some(&self.rows))
     }
 
-    /// Psi of the unknowns at the end, as far as the errors change it: (unknown, one entry per error in rad).
-    /// Under reset carry at the end of each position.
+    /// Changes of psi of the unknowns at the end: (unknown, one entry per error in rad). Under reset carry
+    /// they belong to the end of each position.
     pub fn ends(&self) -> &[(usize, Vec<f64>)] {
         &self.ends
     }
 
-    /// What begins with a segment: turns at once and offsets of a position, and the step of a dwell.
+    /// Begins a segment: adds instantaneous turns and offsets of a position, and computes the step of a
+    /// dwell.
     fn enter(&mut self) -> Result<(), SimulationError> {
         let plan = self.plan;
         let segment = &plan.segments[self.segment];
@@ -153,7 +154,7 @@ impl<'a> OmittedColumns<'a> {
         }
     }
 
-    /// From one position to the next without a slew.
+    /// Carries psi from one position to the next without a slew.
     fn carry(&mut self, position: usize) {
         match self.plan.platform.scheme().carry {
             Carry::Reset => self.psi.fill([0.0; 3]),
@@ -173,7 +174,7 @@ impl<'a> OmittedColumns<'a> {
         }
     }
 
-    /// What ends with a segment.
+    /// Ends a segment: records psi at the end of a position and removes its offsets.
     fn leave(&mut self) {
         let plan = self.plan;
         let position = plan.segments[self.segment].position;
@@ -191,7 +192,7 @@ impl<'a> OmittedColumns<'a> {
         self.step = 0;
     }
 
-    /// Psi of the unknowns at the end of a position: `psi^n = P psi`, P a rotation.
+    /// Records psi of the unknowns at the end of a position: `psi^n = P psi`, P a rotation.
     fn end_of(&mut self, position: usize) {
         let block = &self.plan.blocks[position];
         for (k, &column) in block.columns[..3].iter().enumerate() {
@@ -201,7 +202,7 @@ impl<'a> OmittedColumns<'a> {
     }
 
     /// One step of `dt` seconds at an attitude.
-    fn dwelt(&self, c: &Matrix3<f64>, dt: f64, tilt: Option<&Tilt>) -> Result<Dwelt, SimulationError> {
+    fn dwelt(&self, c: &Matrix3<f64>, dt: f64, tilt: Option<&Tilt>) -> Result<DwellStep, SimulationError> {
         let [w_n, w_u, _] = self.plan.earth_rate();
         let f = local_dynamics(&Float, &w_n, &w_u);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
@@ -220,10 +221,10 @@ impl<'a> OmittedColumns<'a> {
                 (t.transition, there.iter().map(|a| apply(&back, a)).collect())
             }
         };
-        Ok(Dwelt { phi, added: drifts.iter().map(|d| apply(&gamma, d)).collect(), outputs })
+        Ok(DwellStep { phi, added: drifts.iter().map(|d| apply(&gamma, d)).collect(), outputs })
     }
 
-    /// Drifts `eps^n` where the platform should be at `c` and is tilted by `e`.
+    /// Drifts `eps^n` for the computed attitude `c` and the tilt `e` of the platform.
     fn drifts(&self, c: &Matrix3<f64>, slew: Option<&Slew>, e: Option<&Matrix3<f64>>) -> Vectors {
         let [w_n, w_u, _] = self.plan.earth_rate();
         let rate = self.plan.torqued_rate(c, slew);
@@ -258,7 +259,7 @@ impl<'a> OmittedColumns<'a> {
         Ok(())
     }
 
-    /// One step while the platform turns, by Runge and Kutta.
+    /// Integrates one step of a turning platform by Runge-Kutta.
     fn turn(&mut self, slew: &Slew, dt: f64, sampled: bool) {
         let parts = self.plan.substeps(self.segment);
         let h = dt / parts as f64;
@@ -289,14 +290,14 @@ impl<'a> OmittedColumns<'a> {
     }
 }
 
-/// `E` in the middle of a step.
+/// Tilt `E` in the middle of a step.
 fn middle(tilt: &Tilt) -> Matrix3<f64> {
     let turn = rotation_vector(&times(&tilt.to, &transpose(&tilt.from)));
     times(&rotation(&turn.map(|x| x / 2.0)), &tilt.from)
 }
 
 /// One component of Z of a platform tilted by `e`: `-E^T [g^n x] delta` and the error of the accelerometers,
-/// or of the azimuth.
+/// or the azimuth.
 fn tilted_output(component: usize, delta: &[f64; 3], accelerometers: &[f64; 3], e: &Matrix3<f64>) -> f64 {
     if component == AZIMUTH {
         return apply(&inverse_left_jacobian(&rotation_vector(e)), delta)[1];

@@ -1,7 +1,7 @@
-//! What is not in the model: how errors that a scheme does not estimate change its estimates.
+//! Effects of errors outside the model: changes of the estimates by errors that a scheme does not estimate.
 //!
-//! With x the unknowns and k the omitted errors, `Z = J x + O k + n`: estimates change by `B k`, `B = (J'
-//! R^-1 J + P^-1)^-1 J' R^-1 O`, with the noise and the priors that the sigmas rest on. The classes (no
+//! With x the unknowns and k the omitted errors, `Z = J x + O k + n`. Estimates change by `B k`,
+//! `B = (J' R^-1 J + P^-1)^-1 J' R^-1 O`, with the noise and the priors of the sigmas. The classes (no
 //! effect, silent, visible) are verdicts of the exact engine ([`obsdeg_core::omitted`]); sizes and
 //! sensitivities are figures.
 
@@ -33,13 +33,13 @@ use crate::simulation::{
     Attained, Conditions, SimulationError, is_rate, required_sigmas, shown_unit, si_per_shown,
 };
 
-/// Part of the information of all samples of an error that rounding leaves of it.
+/// Relative information of an error below which it counts as rounding of its samples.
 const ROUNDING: f64 = 1e-18;
-/// Sigmas of a visible error that count as seen.
+/// Size of a visible error, in sigmas, that counts as detected.
 pub const SEEN: f64 = 3.0;
 
-/// Effects of everything that the scheme of `attained` does not estimate; with a bench the uncertainty under
-/// every carry, and what would help where the bench uses up a margin.
+/// Effects of everything that the scheme of `attained` does not estimate. With a bench: also the uncertainty
+/// under every carry, and advice where the bench uses up a margin.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -57,7 +57,7 @@ pub fn omitted_effects(
     Ok(out)
 }
 
-/// Factors of the correlated noise of the accelerometers on the sigmas, if there is any.
+/// Factors of the correlated noise of the accelerometers on the sigmas; `None` without such noise.
 fn correlated_noise(
     attained: &Attained,
     conditions: &Conditions,
@@ -80,7 +80,7 @@ fn correlated_noise(
     }))
 }
 
-/// Effects of the errors alone: what [`omitted_effects`] adds with a bench is empty.
+/// Effects of the errors alone; the parts that [`omitted_effects`] adds with a bench are empty.
 ///
 /// # Errors
 /// [`SimulationError`].
@@ -151,7 +151,7 @@ pub fn term_effects(
     })
 }
 
-/// What is required of every unknown, and its total uncertainty.
+/// Requirement and total uncertainty of every unknown.
 struct Margins<'a> {
     names: &'a [String],
     required: &'a [Option<f64>],
@@ -159,14 +159,15 @@ struct Margins<'a> {
 }
 
 impl Margins<'_> {
-    /// The smallest size at which an error makes a total as large as its requirement: `change` is that of an
-    /// unknown per unit, `benched` what the bench makes of it, which the size replaces.
+    /// Smallest size at which an error raises a total to its requirement. `change` is the change of an
+    /// unknown per unit; `benched` is the change by the error's size in the bench, which the new size
+    /// replaces.
     fn used_up(&self, change: impl Fn(usize) -> f64, benched: impl Fn(usize) -> f64) -> Option<UsesUp> {
         let used = (0..self.names.len()).filter_map(|c| {
             let (change, own) = (change(c), benched(c));
             let rest = (self.totals[c]? * self.totals[c]? - own * own).max(0.0);
             let left = self.required[c]? * self.required[c]? - rest;
-            // no margin is left without this error: nothing for it to use up
+            // without a margin there is nothing to use up
             (change != 0.0 && left > 0.0)
                 .then(|| UsesUp { unknown: self.names[c].clone(), size: left.sqrt() / change.abs() })
         });
@@ -181,12 +182,12 @@ fn visible_from(
     information: f64,
     squares: f64,
 ) -> Option<f64> {
-    // without a class, what is left of the samples by rounding shows nothing
+    // without a class, a rounding rest of the samples does not count
     let visible = class.map_or(information > ROUNDING * squares, |c| c == OmittedClass::Visible);
     (visible && information > 0.0).then(|| SEEN / information.sqrt() / si_per_shown(term.unit))
 }
 
-/// Family by family, in the order of the terms.
+/// Effects by family, in the order of the terms.
 fn families(
     attained: &Attained,
     (model, terms): (&OmittedModel, &[OmittedEffect]),

@@ -1,11 +1,12 @@
-//! Score test: which omitted error explains the residuals of a fit.
+//! Score test: omitted errors that explain the residuals of a fit.
 //!
-//! With `r` the residuals and `w_j` the part of column j that no change of the unknowns imitates (both
-//! whitened), `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom where the error is zero:
-//! the fall of chi-square with the error among the unknowns. Its estimate is `(w_j r) / (w_j w_j)` (Rao 1948,
-//! doi:10.1017/S0305004100023987). Where residuals are larger than their sigmas even with the error among the
-//! unknowns, the fall counts in units of what is left per degree of freedom: noise that is larger than stated
-//! is no error of the bench. The number of errors tried counts by Bonferroni's bound.
+//! Let `r` be the whitened residuals, and `w_j` the part of the whitened column j orthogonal to all changes
+//! of the unknowns. Then `q_j = (w_j r)^2 / (w_j w_j)` is chi-square with one degree of freedom if the error
+//! is zero. It equals the fall of chi-square with the error among the unknowns. The estimate of the error is
+//! `(w_j r) / (w_j w_j)` (Rao 1948, doi:10.1017/S0305004100023987). Residuals may exceed their sigmas even
+//! with the error among the unknowns. The fall is then divided by the remaining chi-square per degree of
+//! freedom, since noise beyond the stated one is no error of the bench. Bonferroni's bound accounts for the
+//! number of errors tried.
 
 use nalgebra::DMatrix;
 use obsdeg_ekf::consistency::{chi_square_quantile, chi_square_tail};
@@ -16,41 +17,41 @@ use serde::{Deserialize, Serialize};
 pub const LEVEL: f64 = 0.01;
 /// Confidence of the bound on chi-square above which a single error does not explain the residuals.
 const UNEXPLAINED: f64 = 0.999;
-/// Fall of chi-square, of the size found, by which errors of a group differ at most: three sigma.
+/// Largest difference of the falls of chi-square within a group, at the size found: three sigma.
 const SAME: f64 = 9.0;
-/// Part of a fall that linearisation at a fit displaced by the error may miss.
+/// Relative error of a fall by linearisation at a fit that the error displaces.
 const BENT: f64 = 0.05;
-/// Part of a column that counts as rounding, squared.
+/// Squared relative length below which a column counts as rounding.
 const ROUNDING: f64 = 1e-20;
 
 /// Sums over the whitened residuals of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Score {
-    /// `w_j w_k` (errors x errors).
+    /// Products `w_j w_k` (errors x errors).
     pub products: DMatrix<f64>,
-    /// `w_j r` of every error.
+    /// Products `w_j r`, by error.
     pub against: Vec<f64>,
-    /// `r r`: chi-square of the fit.
+    /// Sum `r r`: chi-square of the fit.
     pub chi_square: f64,
     /// Degrees of freedom of the fit.
     pub degrees_of_freedom: f64,
-    /// True for each error that a record can show, by its exact class; what is left of the column of another
-    /// one is the width of the prior.
+    /// True for each error that a record can show, by its exact class. The column of any other error only
+    /// reflects the width of the prior.
     pub shown: Vec<bool>,
 }
 
-/// One error or a pair that explains residuals.
+/// Error, or pair of errors, that explains the residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
-    /// One or two errors, by number.
+    /// Indices of one or two errors.
     pub errors: Vec<usize>,
-    /// Estimate and standard deviation of each, in SI units.
+    /// Estimate and standard deviation of each error, in SI units.
     pub estimates: Vec<[f64; 2]>,
-    /// Fall of chi-square with them among the unknowns.
+    /// Fall of chi-square with the errors among the unknowns.
     pub fall: f64,
-    /// Bound on the probability that chance alone gives such a fall to any that was tried.
+    /// Bound on the probability that chance alone causes such a fall for any error tried.
     pub probability: f64,
-    /// Of each of them: other errors that these residuals do not distinguish from it, by number.
+    /// Indices, by error, of the other errors that these residuals do not distinguish from it.
     pub groups: Vec<Vec<usize>>,
     /// True if chi-square with the errors among the unknowns is within its band.
     pub explained: bool,
@@ -76,7 +77,7 @@ pub struct Suspicion {
     pub changes: Vec<SuspectedChange>,
 }
 
-/// Value of `explained` in answers that do not have it.
+/// Value of `explained` in answers without this field.
 fn yes() -> bool {
     true
 }
@@ -129,18 +130,18 @@ impl Score {
         self.against[j] * self.against[j] / self.products[(j, j)]
     }
 
-    /// Chi-square that is left per degree of freedom after a fall by `unknowns` more, if it is more than one.
+    /// Chi-square per degree of freedom after a fall by `unknowns` more unknowns; at least one.
     fn left_over(&self, fall: f64, unknowns: f64) -> f64 {
         ((self.chi_square - fall) / (self.degrees_of_freedom - unknowns).max(1.0)).max(1.0)
     }
 
-    /// True if chi-square is within its band after a fall by so many unknowns more.
+    /// True if chi-square is within its band after a fall by `unknowns` more unknowns.
     fn explained(&self, fall: f64, unknowns: f64) -> bool {
         let free = (self.degrees_of_freedom - unknowns).max(1.0);
         self.chi_square - fall <= chi_square_quantile(free, UNEXPLAINED)
     }
 
-    /// Errors that explain as much in the place of one of a pair, beside the other.
+    /// Errors that explain as much as `own` beside `other`.
     fn group_beside(
         &self,
         own: usize,
@@ -156,11 +157,11 @@ impl Score {
         tried.iter().filter(alike).copied().collect()
     }
 
-    /// Estimates, with their standard deviations, and the fall of chi-square with a pair.
+    /// Estimates with their standard deviations, and the fall of chi-square, of a pair.
     fn pair(&self, [i, j]: [usize; 2]) -> Option<([[f64; 2]; 2], f64)> {
         let (a, b, c) = (self.products[(i, i)], self.products[(i, j)], self.products[(j, j)]);
         let determinant = a * c - b * b;
-        // what the residuals do not distinguish is no pair
+        // errors that the residuals do not distinguish are no pair
         if determinant <= 1e-6 * a * c {
             return None;
         }
@@ -170,8 +171,8 @@ impl Score {
         Some(([[x, sigmas[0]], [y, sigmas[1]]], x * u + y * v))
     }
 
-    /// Errors that the residuals do not distinguish from `j` at the size found: by their columns, or by how
-    /// much they explain.
+    /// Errors that the residuals do not distinguish from `j` at the size found: by their columns, or by their
+    /// falls.
     fn group(&self, j: usize, tried: &[usize]) -> Vec<usize> {
         let left_over = self.left_over(self.fall(j), 1.0);
         let fall = self.fall(j) / left_over;
@@ -184,8 +185,8 @@ impl Score {
         tried.iter().filter(same).copied().collect()
     }
 
-    /// What explains the residuals best: a single error, or a pair where no single one does; nothing where
-    /// chance is enough.
+    /// Best explanation of the residuals: a single error, or a pair where no single error suffices; `None`
+    /// where chance suffices.
     pub fn explanation(&self) -> Option<Explanation> {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
@@ -202,12 +203,12 @@ impl Score {
             groups: vec![self.group(best, &tried)],
             explained,
         };
-        // a band of all residuals hides a second error that is many sigmas large
+        // a band of all residuals hides a second error of many sigmas
         let pair = if explained && probability >= LEVEL { None } else { self.best_pair(&tried, fall) };
         pair.or_else(|| (probability < LEVEL).then_some(single))
     }
 
-    /// The best pair, if it explains more than the best single error by more than chance.
+    /// Best pair; `None` unless it explains significantly more than the best single error.
     fn best_pair(&self, tried: &[usize], single: f64) -> Option<Explanation> {
         let pairs = tried.iter().enumerate().flat_map(|(k, &i)| tried[..k].iter().map(move |&j| [i, j]));
         let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
@@ -219,7 +220,7 @@ impl Score {
         if probability >= LEVEL || more >= LEVEL {
             return None;
         }
-        // the one that explains more by itself first
+        // the error with the larger fall of its own comes first
         if self.fall(errors[0]) < self.fall(errors[1]) {
             errors.reverse();
             estimates.reverse();

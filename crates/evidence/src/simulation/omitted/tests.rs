@@ -1,5 +1,4 @@
-//! The reference table of the method, and brute force: a model written anew here, with least squares of its
-//! own.
+//! The reference table of the method, and brute force: an independent model with its own least squares.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Angle, Carry, OmittedModel, Platform, Scheme, cardinal, cardinal_names};
@@ -27,15 +26,15 @@ fn effects(scheme: &Scheme) -> (Attained, OmittedEffects) {
     (attained, effects)
 }
 
-/// The figures of a family, in deg/h or deg/h/g: worst coefficient and largest ratio, for terms of size `s`.
+/// Figures of a family, in deg/h or deg/h/g: worst coefficient and largest ratio, for terms of size `s`.
 fn figures(of: &OmittedEffects, family: &str, s: f64) -> [f64; 2] {
     let f = of.families.iter().find(|f| f.family == family).expect("a family");
     let worst = f.worst.as_ref().map_or(0.0, |w| w.per_unit * s);
     [worst, f.worst_in_sigmas.unwrap_or(0.0) * s]
 }
 
-/// True if a figure is that of the table: within half a unit of its last digit, and four units of the fourth
-/// digit of two computations.
+/// True if a figure equals that of the table within half a unit of its last digit and four units of the
+/// fourth digit, the difference of two computations.
 fn is_printed(x: f64, like: &str) -> bool {
     let decimals = like.split_once('.').map_or(0, |(_, d)| d.len()) as i32;
     let expected: f64 = like.parse().expect("a number");
@@ -43,16 +42,16 @@ fn is_printed(x: f64, like: &str) -> bool {
 }
 
 /// The 24 cardinal attitudes by their letters, in the order N, U, E, S, D, W. Under inertial carry the
-/// figures depend on the order of the positions; with this one they are those of the table.
+/// figures depend on the order of the positions; this order gives those of the table.
 pub(super) fn by_letters() -> Vec<String> {
     let mut all = cardinal_names();
     all.sort_by_key(|n| n.chars().map(|c| "NUESDW".find(c)).collect::<Vec<_>>());
     all
 }
 
-/// The reference table of the method: two computations elsewhere, neither of them this program. The table
-/// does not state the order of its 24 attitudes; of the orders that were tried (by angles, by the alphabet,
-/// by permutations and signs) only that of [`by_letters`] gives its figures.
+/// Reference table of the method: two computations elsewhere, both independent of this program. The table
+/// does not state the order of its 24 attitudes. Of the orders tried (by angles, by the alphabet, by
+/// permutations and signs) only that of [`by_letters`] gives its figures.
 #[test]
 fn the_reference_table() {
     type Line<'a> = (Vec<&'a str>, Carry, &'a str, [(&'a str, &'a str); 6]);
@@ -125,7 +124,7 @@ fn the_reference_table() {
     }
 }
 
-/// A requirement of 0.1 deg/h/g that sigma meets is used up by 3.4 ug.
+/// An error of 3.4 ug uses up a requirement of 0.1 deg/h/g that sigma meets.
 #[test]
 fn what_uses_up_a_margin() {
     let mut scheme = letters(&["NUE", "USE", "ENU", "EUS", "DSW"], Carry::Inertial);
@@ -136,7 +135,7 @@ fn what_uses_up_a_margin() {
     let least = least.fold(f64::MAX, f64::min);
     assert_eq!(format!("{least:.1}"), "3.4");
     assert!(attained.requirements(&Conditions::of(&scheme)).expect("judged").all_met());
-    // with a bench of that size the total is the requirement, a little above it is missed
+    // with a bench of that size the total equals the requirement; a slightly larger one misses it
     for (factor, met) in [(0.999, true), (1.001, false)] {
         let name = ["K0_X", "K0_Y", "K0_Z"].into_iter().find(|n| used(n).is_some_and(|u| u.size == least));
         scheme.bench = [(name.expect("a term").to_string(), least * factor)].into();
@@ -153,9 +152,9 @@ fn what_uses_up_a_margin() {
     }
 }
 
-/// The size of a family at which a margin is used up is that of the bench that states it: just below it the
-/// requirement is met, just above it is missed. For the family whole, and for one term alone; with another
-/// family in the bench too.
+/// A family's size that uses up a margin is that of a bench at which the requirement is just met. Just below
+/// it the requirement is met, just above it is missed. This holds for the whole family, for one term alone,
+/// and with another family in the bench.
 #[test]
 fn sizes_that_use_up_a_margin_are_those_of_a_bench() {
     let mut counts = [0; 2];
@@ -193,9 +192,9 @@ fn sizes_that_use_up_a_margin_are_those_of_a_bench() {
     assert!(counts[0] > 10 && counts[1] > 40, "{counts:?}");
 }
 
-/// What one column does to the platform, written anew.
+/// Source of one column, in an independent model of the platform.
 enum Column {
-    /// psi at the start: the component, and the position where it is (reset carry).
+    /// Component of psi at the start, and the index of its position (reset carry).
     Psi(usize, usize),
     Name(String),
 }
@@ -209,7 +208,7 @@ fn attitude(angles_deg: [f64; 3]) -> DMatrix<f64> {
     x * y * z
 }
 
-/// The axes of the gyros of the paper, as I, O, S of X, Y, Z: index and sign.
+/// Axes of the gyros of the paper, as I, O, S of X, Y, Z: index and sign.
 const AXES: [[(usize, f64); 3]; 3] =
     [[(0, 1.0), (2, -1.0), (1, 1.0)], [(1, 1.0), (2, -1.0), (0, -1.0)], [(2, 1.0), (0, 1.0), (1, 1.0)]];
 
@@ -258,12 +257,12 @@ fn error(name: &str, g: [f64; 3], rate: [f64; 3]) -> ([f64; 3], [f64; 3], [f64; 
     (drift, force, north)
 }
 
-/// Z1 and Z3 at the end of every step of 10 s, of one column.
+/// Z1 and Z3 of one column at the end of every step of 10 s.
 fn record(column: &Column, angles: &[[f64; 3]], carry: Carry, dwell_s: f64) -> Vec<f64> {
     record_every(column, angles, carry, [dwell_s, 10.0])
 }
 
-/// The same at the end of every step of `step_s`, a multiple of 10 s.
+/// Z1 and Z3 of one column at the end of every step of `step_s`, a multiple of 10 s.
 fn record_every(column: &Column, angles: &[[f64; 3]], carry: Carry, [dwell_s, step_s]: [f64; 2]) -> Vec<f64> {
     let (sin, cos) = LATITUDE.to_radians().sin_cos();
     let w = DVector::from_column_slice(&[W_IE * cos, W_IE * sin, 0.0]);
@@ -319,10 +318,10 @@ fn record_every(column: &Column, angles: &[[f64; 3]], carry: Carry, [dwell_s, st
     out
 }
 
-/// An orthonormal basis of the columns (each scaled to length one), with what solves for them.
+/// Orthonormal basis of the columns, each scaled to length one, for least squares.
 struct Basis {
     q: Vec<DVector<f64>>,
-    /// Columns that are in it, with the coefficients of each in `q`, and the length of the column.
+    /// Columns in the basis by index, with their coefficients in `q` and their lengths.
     used: Vec<(usize, Vec<f64>, f64)>,
 }
 
@@ -330,7 +329,7 @@ impl Basis {
     fn of(columns: &[DVector<f64>]) -> Self {
         let mut out = Self { q: Vec::new(), used: Vec::new() };
         for (c, column) in columns.iter().enumerate() {
-            // of coefficients, whose columns are up to 1e5 s long: sines of right angles are not exactly zero
+            // columns of coefficients are up to 1e5 s long: sines of right angles are not exactly zero
             let length = column.norm();
             if length < 1e-9 {
                 continue;
@@ -345,7 +344,8 @@ impl Basis {
         out
     }
 
-    /// What is left of a vector, and its coefficients; twice, so that nothing of the basis stays.
+    /// Rest of a vector outside the basis, and its coefficients; in two passes, so that no part in the basis
+    /// remains.
     fn project(&self, v: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
         let (mut rest, mut along) = (v.clone(), vec![0.0; self.q.len()]);
         for _ in 0..2 {
@@ -358,7 +358,7 @@ impl Basis {
         (rest, along)
     }
 
-    /// Least squares: the coefficient of every column (zero for those that are not in the basis).
+    /// Least squares: coefficient of every column (zero for columns that are not in the basis).
     fn solve(&self, v: &DVector<f64>, n: usize) -> Vec<f64> {
         let (_, mut along) = self.project(v);
         let mut x = vec![0.0; n];
@@ -384,12 +384,12 @@ fn random_scheme(rng: &mut SplitMix64, cardinal_angles: bool) -> (Scheme, Vec<[f
     (scheme, angles.into_iter().map(|a| a.map(f64::from)).collect())
 }
 
-/// The columns of the unknowns F, I, O, S by the model of this file.
+/// Columns of the unknowns F, I, O, S by the model of this file.
 fn unknowns(platform: &Platform, angles: &[[f64; 3]], dwell_s: f64) -> Vec<DVector<f64>> {
     columns_every(platform, angles, dwell_s, 10.0)
 }
 
-/// The same with samples every `step_s`, a multiple of 10 s.
+/// Columns of the unknowns with samples every `step_s`, a multiple of 10 s.
 pub(super) fn columns_every(
     platform: &Platform,
     angles: &[[f64; 3]],
@@ -407,8 +407,8 @@ pub(super) fn columns_every(
     platform.names().iter().enumerate().map(column).collect()
 }
 
-/// Largest relative difference between printed sensitivities and brute force, over `schemes` random schemes:
-/// an estimate of a noise-free record with one unit of the error in its truth and not in the model.
+/// Largest relative difference between printed sensitivities and brute force, over `schemes` random schemes.
+/// Brute force estimates from a noise-free record with one unit of an error that the model does not have.
 fn largest_difference(schemes: usize, seed: u64) -> f64 {
     let mut rng = SplitMix64::new(seed);
     let mut largest: f64 = 0.0;
@@ -426,7 +426,7 @@ fn largest_difference(schemes: usize, seed: u64) -> f64 {
                 let scale = si_per_shown(&term.unit) / si_per_shown(platform.units()[c]);
                 let printed = term.sensitivities.iter().find(|s| s.unknown == *name);
                 let printed = printed.map_or(0.0, |s| s.per_unit);
-                // relative to the largest change of the term, in sigmas
+                // relative to the largest change by the term, in sigmas
                 let scale_of = |s: &super::ChangePerUnit| {
                     let k = platform.names().iter().position(|n| *n == s.unknown).expect("an unknown");
                     (s.per_unit / attained.sigmas[k].expect("a sigma")).abs()
@@ -460,8 +460,8 @@ fn sensitivities_are_those_of_brute_force_at_length() {
     assert!(found < 1e-6, "{found:e}");
 }
 
-/// Exact classes against ranks in floating point, by the model of this file: how many were decided, and how
-/// many were not (a rank that is neither full nor short beyond doubt).
+/// Comparison of exact classes with ranks in floating point, by the model of this file: numbers of decided
+/// cases, and of those with an unclear rank.
 fn compared_classes(schemes: usize, seed: u64) -> [usize; 4] {
     let mut rng = SplitMix64::new(seed);
     let mut counts = [0; 4];
@@ -510,13 +510,13 @@ fn classes_are_those_of_ranks_at_length() {
 }
 
 /// True if an error enters no sample of Z1 and Z3, by the letters of the axes X, Y, Z at each cardinal
-/// position: the conditions that the book states, each with its proof.
+/// position. The conditions are those of the book, where they are proved.
 fn enters_nothing(name: &str, positions: &[String]) -> bool {
     let all = |condition: &dyn Fn(&[u8]) -> bool| positions.iter().all(|p| condition(p.as_bytes()));
     let vertical = |p: &[u8], axis: u8| b"UD".contains(&p[usize::from(axis - b'X')]);
     let east = |p: &[u8], axis: u8| b"EW".contains(&p[usize::from(axis - b'X')]);
     if let Some(gyro) = name.strip_prefix("D_") {
-        // of g squared: a product of two components of g is zero unless both are along one vertical axis
+        // products of g: two components of g give zero unless both lie along one vertical axis
         let (letters, axis) = gyro.as_bytes().split_at(2);
         let i = usize::from(axis[0] - b'X');
         let along = |letter: u8| {
@@ -561,7 +561,7 @@ fn immune_sets_are_those_of_the_book() {
     assert!(counts.iter().all(|n| *n > 500), "{counts:?}");
 }
 
-/// A silent error changes estimates by exactly what the null vector says: the figure, and the exact form.
+/// A silent error changes estimates by exactly the null vector, in the figure and in the exact form.
 #[test]
 fn silent_errors_have_exact_changes() {
     let scheme = letters(&["NUE", "USE", "ENU", "EUS", "DSW"], Carry::Inertial);
@@ -572,7 +572,7 @@ fn silent_errors_have_exact_changes() {
     assert!(azimuth.sensitivities.iter().all(|s| s.unknown.starts_with("psi")), "{azimuth:?}");
 }
 
-/// Whitened residuals of records of one plan, from which every change of the unknowns is taken out.
+/// Whitened residuals of records of one plan, without the part that changes of the unknowns explain.
 struct Records {
     plan: Plan,
     gains: Gains,
@@ -580,7 +580,7 @@ struct Records {
     /// Columns of the errors: in Z, and whitened.
     columns: Vec<(Vec<f64>, Vec<f64>)>,
     products: DMatrix<f64>,
-    /// Errors that are visible by their exact class.
+    /// True for errors that are visible by their exact class.
     shown: Vec<bool>,
 }
 
@@ -625,7 +625,7 @@ impl Records {
         out
     }
 
-    /// The score of a record with noise and `sizes` of errors (SI) in its truth.
+    /// Score of a record with noise and errors of `sizes` (SI) in its truth.
     fn score(&self, noise: &mut Noise, sizes: &[(usize, f64)]) -> Score {
         let mut z: Vec<f64> = (0..self.columns[0].0.len()).map(|_| 1e-5 * noise.normal()).collect();
         for (j, k) in sizes {
@@ -642,14 +642,14 @@ impl Records {
         }
     }
 
-    /// Size in SI that a record shows at three sigma.
+    /// Size in SI units that a record shows at three sigma.
     fn visible(&self, j: usize) -> f64 {
         3.0 / self.products[(j, j)].sqrt()
     }
 }
 
 /// Shares of `count` records: suspicion without an error; the error or its group first at twice the visible
-/// size; found at the visible size, with the computed power.
+/// size; found at the visible size. Then the computed power of the last.
 fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
     let records =
         Records::new(&letters(&["DSW", "WSU", "WND", "WUN", "NUE", "DES", "UEN", "DNE"], Carry::Inertial));
@@ -667,14 +667,15 @@ fn shares(count: usize, seed: u64) -> ([f64; 3], f64) {
         counts[1] += usize::from(twice.is_some_and(|e| e.errors[0] == j || e.groups[0].contains(&j)));
         counts[2] += usize::from(records.score(&mut noise, &[(j, records.visible(j))]).fall(j) > limit);
     }
-    // a normal variable about three beyond the root of the limit, by its tail: half of chi-square's
+    // upper tail of a normal variable of mean three at the root of the limit: half of chi-square's tail
     let power = 1.0 - 0.5 * chi_square_tail(1.0, (3.0 - limit.sqrt()).powi(2));
     let power = if limit.sqrt() > 3.0 { 1.0 - power } else { power };
     assert!(records.model.terms().len() >= tried.len());
     (counts.map(|n| n as f64 / count as f64), power)
 }
 
-/// `least`: share of the records with an error of twice the visible size in which it must be found.
+/// Checks the shares; `least` is the required share of records in which an error of twice the visible size is
+/// found.
 #[expect(clippy::print_stderr, reason = "what was measured")]
 fn check_shares(count: usize, seed: u64, least: f64) {
     let ([none, twice, once], power) = shares(count, seed);
@@ -699,7 +700,7 @@ fn the_score_test_at_length() {
     check_shares(500, 77, 0.95);
 }
 
-/// A second error of eight sigmas is named beside the first, although the band of all residuals would hold
+/// A second error of eight sigmas is named beside the first, although the band of all residuals would hide
 /// it.
 #[test]
 fn a_second_error_is_not_hidden_by_the_band() {

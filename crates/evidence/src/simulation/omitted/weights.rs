@@ -1,4 +1,4 @@
-//! Changes of the estimates by omitted errors, by the weights that the sigmas of an answer rest on.
+//! Changes of the estimates by omitted errors, by the weights of the sigmas of an answer.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::OmittedModel;
@@ -9,26 +9,27 @@ use obsdeg_ekf::{Covariance, SquareRootInformation};
 use super::columns::OmittedColumns;
 use crate::simulation::{Plan, SimulationError, each_row, si_per_shown};
 
-/// Changes below this part of what the samples of an error are, both in sigmas, are rounding.
+/// Relative size of a change that counts as rounding: the change over the samples of the error, both in
+/// sigmas.
 const ROUNDING: f64 = 1e-12;
-/// Rows that are reduced at a time.
+/// Number of rows that are reduced at a time.
 const ROWS: usize = 1024;
 
-/// What one SI unit of every omitted error does.
+/// Effects of one SI unit of every omitted error.
 #[derive(Debug, Clone)]
 pub struct Influence {
     /// Change of the error of every estimate at the end (unknowns x errors, SI units).
     pub changes: DMatrix<f64>,
-    /// `O_j' R^-1 (O_j - J B_j)` of every error: a record shows an error of k with a chi-square of k^2 times
+    /// Information `O_j' R^-1 (O_j - J B_j)` by error: an error of k gives a record a chi-square of k^2 times
     /// it.
     pub information: Vec<f64>,
-    /// `O_j' R^-1 O_j` of every error: what all its samples are, in sigmas of the noise.
+    /// Squares `O_j' R^-1 O_j` by error: squared size of all its samples, in sigmas of the noise.
     pub squares: Vec<f64>,
 }
 
 impl Influence {
     /// Changes of every estimate that has a sigma, per unit of every error in shown units (unknowns x
-    /// errors); zero where the exact class says so, and where nothing but rounding is left. `units` and
+    /// errors). They are zero where the exact class says so, and where they are rounding. `units` and
     /// `sigmas` (shown) are those of the unknowns.
     pub fn shown(
         &self,
@@ -51,7 +52,7 @@ impl Influence {
             (0..units.len()).map(|c| (0..m).map(|j| shown(c, j)).collect()).collect();
         for j in 0..m {
             let in_sigmas = |c: usize, x: f64| sigmas[c].map_or(0.0, |s| (x / s).abs());
-            // a change is at most as many sigmas as the samples of the error are
+            // a change has at most as many sigmas as the samples of the error
             let most = self.squares[j].sqrt() * si_per_shown(model.terms()[j].unit);
             for (c, row) in out.iter_mut().enumerate() {
                 if in_sigmas(c, row[j]) < ROUNDING * most {
@@ -63,7 +64,7 @@ impl Influence {
     }
 }
 
-/// By the information of all samples and independent priors (shape n, SI units):
+/// Influence by the information of all samples and independent priors (shape n, SI units):
 /// `B = (J' R^-1 J + P^-1)^-1 J' R^-1 O`, by orthogonal reduction of `[J O]`.
 ///
 /// # Errors
@@ -77,7 +78,7 @@ pub(crate) fn by_information(
     if m == 0 {
         return Ok(Influence { changes: DMatrix::zeros(n, 0), information: Vec::new(), squares: Vec::new() });
     }
-    let mut reduced = Reduced {
+    let mut reduced = ReducedColumns {
         root: SquareRootInformation::prior(prior)?.root().clone(),
         right: DMatrix::zeros(n, m),
         information: vec![0.0; m],
@@ -119,7 +120,7 @@ pub(crate) fn by_information(
     }
     while columns.step()?.is_some() {}
     let start = reduced.solve()?;
-    // column by column: a product of whole matrices takes other instructions, and other bits, on other
+    // column by column: a product of whole matrices uses other instructions, and gives other bits, on other
     // processors
     let ended: Vec<_> = start.column_iter().map(|column| &to_end * column).collect();
     let changes = at_the_end(plan, &DMatrix::from_columns(&ended), &columns);
@@ -143,19 +144,19 @@ fn next_rows(
     Ok(Vec::new())
 }
 
-/// `[J O]` with J reduced to its root.
-struct Reduced {
+/// Matrix `[J O]` with J reduced to its root.
+struct ReducedColumns {
     root: DMatrix<f64>,
     right: DMatrix<f64>,
     information: Vec<f64>,
     squares: Vec<f64>,
 }
 
-impl Reduced {
+impl ReducedColumns {
     fn add(&mut self, left: &[f64], right: &[f64]) {
         let (n, m) = (self.root.ncols(), self.right.ncols());
         let rows = left.len() / n;
-        // errors that enter no sample so far have nothing to reduce
+        // errors that enter no sample so far need no reduction
         let enters = |j: &usize| {
             right.iter().skip(*j).step_by(m).any(|x| *x != 0.0)
                 || self.right.column(*j).iter().any(|x| *x != 0.0)
@@ -187,7 +188,7 @@ impl Reduced {
     }
 }
 
-/// Change of the error of the estimates: what they say at the end minus what is true there, of psi.
+/// Change of the error of the estimates: the estimates at the end minus the true changes of psi there.
 fn at_the_end(plan: &Plan, estimate: &DMatrix<f64>, columns: &OmittedColumns<'_>) -> DMatrix<f64> {
     let mut out = estimate.rows_range(..plan.unknowns()).into_owned();
     for (unknown, truth) in columns.ends() {
@@ -198,7 +199,8 @@ fn at_the_end(plan: &Plan, estimate: &DMatrix<f64>, columns: &OmittedColumns<'_>
     out
 }
 
-/// By the gains of the filter with random drift and biases: an error alone, without noise, run through it.
+/// Influence by the gains of the filter with random drift and biases: the filter runs on each error alone,
+/// without noise.
 ///
 /// # Errors
 /// [`SimulationError`].
