@@ -311,8 +311,8 @@ pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
     Ok(Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// The problem of `--why` with a name that is no unknown.
-fn no_such(name: &str, unknowns: Vec<String>) -> Problem {
+/// Error of `--why` with a name that is not an unknown.
+fn not_an_unknown(name: &str, unknowns: Vec<String>) -> Problem {
     Problem::input(format!("--why: {}", no_unknown(name, &unknowns)))
 }
 
@@ -333,7 +333,7 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             for name in why {
                 let found = obsdeg_core::analysis::explain(scheme, &verdicts, name, seed)?;
                 let names = verdicts.quantities.iter().map(|q| q.name.clone());
-                verdicts.why.push(found.ok_or_else(|| no_such(name, names.collect()))?);
+                verdicts.why.push(found.ok_or_else(|| not_an_unknown(name, names.collect()))?);
             }
             Judged::Scheme(Box::new(SchemeAnalysis { verdicts, sensitivities: of_record }))
         }
@@ -347,7 +347,7 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
                 let explained = explain_system(&file.model, &found, name, options);
                 let explained = explained.map_err(|e| file.wrong(&e))?;
                 let names = found.quantities.iter().map(|q| q.name.clone());
-                found.why.push(explained.ok_or_else(|| no_such(name, names.collect()))?);
+                found.why.push(explained.ok_or_else(|| not_an_unknown(name, names.collect()))?);
             }
             Judged::Model(Box::new(found))
         }

@@ -24,16 +24,16 @@ const ADDED: RangeInclusive<u64> = 1..=2;
 #[command(next_help_heading = "Further positions")]
 #[serde(default)]
 pub struct FurtherOptions {
-    /// Find the one position, or the two, by which the scheme gains most: its positions stay, and candidates
-    /// are added at its end. First count the required coefficients that become observable, then the worst
-    /// degree, then the largest uncertainty over its requirement (without requirements the largest sigma),
-    /// then the time; all extensions are compared
+    /// Find the one or two positions by which the scheme gains most. The positions of the scheme stay, and
+    /// candidates are added at its end. All extensions are compared: by the number of required coefficients
+    /// that become observable, then the worst degree, then the largest ratio of uncertainty to requirement
+    /// (without requirements the largest sigma), then the time
     #[arg(long, value_name = "1|2", value_parser = whole::<usize>(ADDED))]
     pub next: Option<usize>,
 
-    /// With --after: days since the calibration, such as 30,90,365, in which the coefficients aged as
-    /// [ageing] of the scheme states. For each the fewest positions (up to --next) and the shortest run that
-    /// meet every requirement again; the extensions are those after the last
+    /// With --after: days since the calibration, such as 30,90,365. The coefficients age as stated by
+    /// [ageing] of the scheme. For each number of days: the fewest positions (up to --next) and the shortest
+    /// run that meet every requirement again. The listed extensions are for the last number of days
     #[arg(long, value_name = "DAYS", value_delimiter = ',', value_parser = within(DAYS))]
     pub days: Vec<f64>,
 }
@@ -41,8 +41,8 @@ pub struct FurtherOptions {
 /// Days since a calibration.
 const DAYS: Range = Range { low: 0.01, high: 36_500.0, unit: "days" };
 
-/// Options that are about further positions too.
-const TAKEN: [&str; 25] = [
+/// Options of `design` that also apply to further positions.
+const APPLICABLE: [&str; 25] = [
     "seed",
     "days",
     "next",
@@ -70,7 +70,7 @@ const TAKEN: [&str; 25] = [
     "prior",
 ];
 
-/// Further options: noise of the sensors.
+/// Noise options, which also apply to further positions.
 const NOISE: [&str; 6] = [
     "accelerometer_instability",
     "accelerometer_correlation_time",
@@ -80,7 +80,7 @@ const NOISE: [&str; 6] = [
     "correlation_time",
 ];
 
-/// Compares extensions of the scheme in a file.
+/// Comparison of all extensions of the scheme in a file.
 pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<NextPositions, Problem> {
     let Some(added) = a.further.next else {
         return Err(Problem::input(
@@ -94,7 +94,7 @@ pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Resul
     let of_parts = !files.merge.is_empty() || files.resume.is_some();
     let given = stated(a)?;
     let names = given.keys().map(String::as_str).chain(of_parts.then_some("merge"));
-    if let Some(other) = names.into_iter().find(|name| !TAKEN.contains(name) && !NOISE.contains(name)) {
+    if let Some(other) = names.into_iter().find(|name| !APPLICABLE.contains(name) && !NOISE.contains(name)) {
         return Err(Problem::input(format!("--{} does nothing with --next", other.replace('_', "-"))));
     }
     for days in &a.further.days {
@@ -127,7 +127,7 @@ pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Resul
     Ok(next(&base, &conditions, &options, &going)?)
 }
 
-/// The covariance of a calibration, with what its residuals say of the noise.
+/// Covariance of a calibration, rescaled by its residuals.
 fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
     let wrong = |found: &str| {
         Problem::input(format!(

@@ -168,10 +168,9 @@ impl<S: Scalars> Directions<S> {
         open.iter().copied().filter(resolved).collect()
     }
 
-    /// Unknowns of an unobservable direction of minimal support through an unknown, that one first: of the
-    /// directions that several orders of the unknowns lead to, the shortest. `None` if no direction changes
-    /// the unknown. With as many unknowns as possible held still, among these not the unknown itself, one
-    /// direction is left.
+    /// Unknowns of an unobservable direction of minimal support that changes the unknown `column`, which
+    /// comes first. Several orders are tried, and the shortest direction is returned. `None` if no direction
+    /// changes the unknown. As many other unknowns as possible are held still, until one direction remains.
     pub(crate) fn shortest(&self, column: usize) -> Option<Vec<usize>> {
         let forward: Vec<usize> = (0..self.units.len()).filter(|&c| c != column).collect();
         let shift = forward.len() / 2;
@@ -203,8 +202,8 @@ impl<S: Scalars> Directions<S> {
         Some(std::iter::once(column).chain(rest).collect())
     }
 
-    /// True if a set of unknowns is that of an unobservable direction of minimal support: the others held
-    /// still leave one direction, which changes all of the set.
+    /// True if the set is the support of an unobservable direction of minimal support: with all other unknowns
+    /// held still, one direction remains, and it changes every unknown of the set.
     pub(crate) fn is_support(&self, set: &[usize]) -> bool {
         let mut still = <S::Space as RowSpace>::new(self.field.clone(), self.count);
         let others = (0..self.units.len()).filter(|c| !set.contains(c));
@@ -274,7 +273,7 @@ mod tests {
 
     use super::*;
 
-    /// x0 + x1 + x2 and x2 + x3 are seen: directions (1,-1,0,0), (1,0,-1,1), (0,1,-1,1).
+    /// x0 + x1 + x2 and x2 + x3 are observable: directions (1,-1,0,0), (1,0,-1,1), (0,1,-1,1).
     #[test]
     fn directions_of_minimal_support_by_hand() {
         let f = Field::new((1 << 60) + 33);

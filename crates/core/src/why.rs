@@ -11,16 +11,16 @@ use crate::degree::status::Status;
 use crate::language::among;
 use crate::remedies::{Change, Resolved};
 
-/// Most unknowns of a scheme or model of which deciding derivatives are sought: the work grows with the
-/// fourth power.
+/// Largest number of unknowns up to which deciding derivatives are sought: the work grows with the fourth
+/// power.
 pub(crate) const MOST_DECIDED: usize = 120;
 
-/// Why no derivatives are listed of a scheme or model of more unknowns.
+/// Sentence that replaces the deciding derivatives of a scheme or model with too many unknowns.
 pub(crate) fn too_many(unknowns: usize) -> String {
     format!("deciding derivatives: {unknowns} unknowns; at most {MOST_DECIDED}")
 }
 
-/// Message on a name that is none of the unknowns, with the names that could be meant.
+/// Error message for a name that is not an unknown, with similar names.
 pub fn no_unknown(name: &str, unknowns: &[String]) -> String {
     format!("no unknown `{name}`; {}", among(name, unknowns))
 }
@@ -39,10 +39,9 @@ pub struct Why {
     /// out. Other sets of derivatives may do the same. Empty if the unknown is not observable, or if
     /// `not_explained` has the reason.
     pub determined_by: Vec<OutputDerivative>,
-    /// Direction that proves why no lower order is enough, or why none is; null for degree 0.
+    /// Unobserved direction: proof that no lower order, or no order at all, is enough; null for degree 0.
     pub unseen: Option<UnseenDirection>,
-    /// Changes of all unknowns that leave every output as it is and change the unknown, in words; empty for
-    /// schemes.
+    /// Symmetries that change the unknown and leave every output unchanged, in words; empty for schemes.
     pub symmetries: Vec<String>,
     /// Assumptions of the verdict, each with the verdicts without it.
     pub assumptions: Vec<Assumption>,
@@ -144,7 +143,7 @@ pub struct Otherwise {
 }
 
 impl Assumption {
-    /// An assumption with the verdicts under other conditions; `degree` is the verdict under itself.
+    /// Assumption with the verdicts under other conditions; `degree` is the verdict under the assumption.
     pub(crate) fn new(
         kind: AssumptionKind,
         stated: String,
@@ -170,7 +169,7 @@ pub struct Improvement {
     pub loses: Vec<String>,
 }
 
-/// True if a degree is lower than another; no degree is above all.
+/// True if `after` is lower than `before`; no degree counts as higher than every degree.
 pub(crate) fn is_lower(after: Option<usize>, before: Option<usize>) -> bool {
     after.is_some_and(|a| before.is_none_or(|b| a < b))
 }
@@ -188,9 +187,9 @@ pub(crate) fn by_cost(improvements: &mut [Improvement]) {
     improvements.sort_by_key(|i| (kind(i), i.degree, i.loses.len(), Reverse(i.resolves.len())));
 }
 
-/// Indices of `rows` whose span, with that of `known`, holds the unit vector of a column while that of no
-/// smaller part of them does: of the sets that several orders of the rows lead to, the smallest. `None` where
-/// the vector is not in the span of all.
+/// Indices of a minimal set of `rows` whose span, together with `known`, contains the unit vector of a
+/// column. Several orders of the rows are tried, and the smallest set is returned. `None` if the span of all
+/// rows does not contain the vector.
 pub(crate) fn deciding_rows<S: Scalars>(
     field: &S,
     known: &[&[S::Element]],
@@ -211,8 +210,8 @@ pub(crate) fn deciding_rows<S: Scalars>(
     found.min_by_key(Vec::len)
 }
 
-/// The rows, in ascending order, that are left of those in this order up to the first with which the unit
-/// vector is in the span, after rows without which it stays there were left out.
+/// Indices, in ascending order, of a minimal set of rows whose span contains the unit vector: rows are taken
+/// in `order` until the span contains it, then every row that is not needed is dropped.
 fn decided<V: RowSpace>(
     base: &V,
     rows: &[&[V::Element]],
@@ -263,7 +262,7 @@ mod tests {
         assert_eq!(deciding_rows(&f, &[], &take(1), 0), None);
         assert_eq!(deciding_rows(&f, &[], &take(5), 0), Some(vec![0, 1]));
         assert_eq!(deciding_rows(&f, &[], &take(6), 0), Some(vec![5]));
-        // what is known needs no row
+        // a known row counts without being chosen
         assert_eq!(deciding_rows(&f, &[&rows[1]], &take(1), 0), Some(vec![0]));
         assert_eq!(deciding_rows(&f, &[&rows[5]], &take(5), 0), Some(vec![]));
     }

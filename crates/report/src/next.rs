@@ -1,4 +1,4 @@
-//! The next positions of a scheme.
+//! Answers on the next positions of a scheme.
 
 use obsdeg_design::next::{AddedPosition, Extension, NextPositions, Requalification, Standing};
 
@@ -7,7 +7,7 @@ use crate::document::{Block, Document, left, number, right};
 use crate::stated;
 use crate::words::{self, names};
 
-/// `USE`, `USE then NWU`, with the axis of a half turn behind a position.
+/// Added positions in words: `USE`, `USE then NWU`, each with the axis of a half turn.
 fn listed(positions: &[AddedPosition]) -> String {
     let one = |p: &AddedPosition| match &p.half_turn_about {
         Some(about) => format!("{} (half turn about {})", p.candidate, words::direction(about)),
@@ -20,7 +20,7 @@ fn positions(e: &Extension) -> String {
     listed(&e.positions)
 }
 
-/// What an extension changes, in words.
+/// Changes by an extension, in words.
 fn gains(n: &NextPositions, e: &Extension) -> Vec<String> {
     let list = |all: &[obsdeg_core::remedies::Resolved]| {
         let one = |r: &obsdeg_core::remedies::Resolved| format!("{} (degree {})", r.name, r.degree);

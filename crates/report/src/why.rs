@@ -9,7 +9,7 @@ use crate::document::{Block, left, right};
 use crate::resolve::changes;
 use crate::words::{self, names};
 
-/// The blocks of all explanations.
+/// Blocks of all explanations.
 pub(crate) fn blocks(all: &[Why]) -> Vec<Block> {
     all.iter().flat_map(of).collect()
 }
@@ -57,7 +57,7 @@ fn heading(why: &Why) -> String {
     format!("Why {} {verdict}", why.name)
 }
 
-/// `Z1''@p1`, `y^(4) (segment 2)`.
+/// Derivative as text: `Z1''@p1`, `y^(4) (segment 2)`.
 fn derivative(d: &OutputDerivative) -> String {
     let order = match d.order {
         k @ 0..=3 => "'".repeat(k),
@@ -110,7 +110,7 @@ fn assumption(a: &Assumption) -> String {
     }
 }
 
-/// Assumptions that decide, a line each; then the others in one line.
+/// Deciding assumptions, one line each; then the others in one line.
 fn assumptions(all: &[Assumption], degree: Option<usize>) -> Vec<String> {
     let verdict = |degree: Option<usize>| match degree {
         Some(k) => format!("degree {k}"),
@@ -130,7 +130,7 @@ fn assumptions(all: &[Assumption], degree: Option<usize>) -> Vec<String> {
     out
 }
 
-/// Improvements of one kind that do the same, together.
+/// Improvements grouped by kind and effect.
 fn groups(all: &[Improvement]) -> Vec<Vec<&Improvement>> {
     let kind = |i: &Improvement| match i.changes[..] {
         [Change::Known { .. }] => Some(0),

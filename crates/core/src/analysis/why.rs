@@ -20,7 +20,7 @@ use crate::why::{
     by_cost, deciding_rows, is_lower, too_many,
 };
 
-/// Most unknowns of a scheme to which attitudes are added, and of which values are tried.
+/// Largest number of unknowns up to which added attitudes and known values are tried.
 const MOST_UNKNOWNS: usize = 120;
 
 /// Explains the verdict on one unknown of a scheme that was analysed with this seed; `None` if the scheme has
@@ -39,7 +39,7 @@ pub fn explain(
     let judged = Judged::new(&platform, seed)?;
     let degree = judged.verdicts.degrees.degree[column];
     let stairs = stairs(&platform, &judged.verdicts.values);
-    let mut asked = Asked {
+    let mut explainer = VerdictExplainer {
         platform: &platform,
         judged: &judged,
         found,
@@ -50,10 +50,10 @@ pub fn explain(
         verdicts: 0,
         not_explained: Vec::new(),
     };
-    let (determined_by, rows) = asked.determined_by();
-    let unseen = asked.unseen(&determined_by, &rows);
-    let assumptions = asked.assumptions();
-    let remedies = asked.remedies();
+    let (determined_by, rows) = explainer.determined_by();
+    let unseen = explainer.unseen(&determined_by, &rows);
+    let assumptions = explainer.assumptions();
+    let remedies = explainer.remedies();
     Ok(Some(Why {
         name: name.into(),
         status: Verdict::of(&judged.verdicts.degrees, column).status,
@@ -63,13 +63,13 @@ pub fn explain(
         symmetries: Vec::new(),
         assumptions,
         remedies,
-        not_explained: asked.not_explained,
-        verdicts: asked.verdicts,
+        not_explained: explainer.not_explained,
+        verdicts: explainer.verdicts,
     }))
 }
 
-/// One unknown of a scheme that is asked about.
-struct Asked<'a> {
+/// One unknown of a scheme, with the findings that its explanation uses.
+struct VerdictExplainer<'a> {
     platform: &'a Platform,
     judged: &'a Judged<'a>,
     found: &'a Analysis,
@@ -81,10 +81,10 @@ struct Asked<'a> {
     not_explained: Vec<String>,
 }
 
-/// A row of derivatives in the first field.
+/// Row of derivatives in the first field.
 type Row = Vec<u64>;
 
-impl Asked<'_> {
+impl VerdictExplainer<'_> {
     fn scheme(&self) -> &Scheme {
         self.platform.scheme()
     }
@@ -139,7 +139,7 @@ impl Asked<'_> {
         chosen.into_iter().map(|i| (derivatives[i].clone(), first[i].clone())).unzip()
     }
 
-    /// The direction that no derivative sees below the degree of the unknown, or at all.
+    /// Direction along which no derivative changes: below the degree of the unknown, or at every order.
     fn unseen(&mut self, derivatives: &[OutputDerivative], rows: &[Row]) -> Option<UnseenDirection> {
         let order = match self.degree {
             Some(degree) => degree.checked_sub(1)?,
@@ -222,7 +222,7 @@ impl Asked<'_> {
         out
     }
 
-    /// Verdicts under the other carries, as the analysis has them.
+    /// Verdicts under the other carries, from the analysis.
     fn carries(&self, name: &str) -> Vec<Otherwise> {
         let of_position = name.starts_with("psi") || name.contains('@');
         let compared = self.found.carries.iter().filter_map(|report| {
@@ -254,7 +254,7 @@ impl Asked<'_> {
         out
     }
 
-    /// The improvement that a change makes by the degrees of all unknowns with it.
+    /// Improvement by some changes, from the degrees of all unknowns with them; `None` if there is none.
     fn improvement(
         &mut self,
         changes: Vec<Change>,
@@ -275,7 +275,7 @@ impl Asked<'_> {
         Some(Improvement { changes, degree, resolves, loses: Vec::new() })
     }
 
-    /// One value known.
+    /// Improvements by one known value.
     fn known(&mut self) -> Vec<Improvement> {
         let unknowns = self.platform.names().len();
         if unknowns > MOST_UNKNOWNS {
@@ -291,7 +291,7 @@ impl Asked<'_> {
         tried.collect()
     }
 
-    /// One more cardinal attitude at the end.
+    /// Improvements by one more cardinal attitude at the end.
     fn attitudes(&mut self) -> Vec<Improvement> {
         let unknowns = self.platform.names().len();
         if self.scheme().unknowns == Unknowns::Drift {
@@ -315,7 +315,7 @@ impl Asked<'_> {
         self.improvement(vec![change], platform.names(), &degree)
     }
 
-    /// Another carry, as the analysis has judged it; psi of a position is no unknown there.
+    /// Improvements by another carry, as judged by the analysis. psi of a position is not an unknown there.
     fn other_carries(&mut self) -> Vec<Improvement> {
         if self.name().contains('@') {
             return Vec::new();
@@ -352,7 +352,7 @@ impl Asked<'_> {
     }
 }
 
-/// The name of an unknown once a position is left out; `None` where the unknown goes with the position.
+/// Name of an unknown after a position is removed; `None` if the unknown belongs to that position.
 fn name_without(name: &str, position: usize) -> Option<String> {
     match name.split_once('@') {
         Some((psi, number)) => {

@@ -80,8 +80,7 @@ impl PlatformRows {
 }
 
 impl PlatformRows {
-    /// Station and component of every row of an order, in the order in which [`emit`](DerivativeRows::emit)
-    /// hands them on.
+    /// Station and component of every row of an order, in the order of [`emit`](DerivativeRows::emit).
     pub(crate) fn labels(&self, order: usize) -> Vec<(usize, usize)> {
         let chain = || self.chain.iter().filter(|r| r.order == order);
         (0..self.blocks.len()).flat_map(|i| chain().map(move |r| (i, r.component))).collect()

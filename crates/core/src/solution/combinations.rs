@@ -176,8 +176,8 @@ pub(crate) fn null_space(
         .collect()
 }
 
-/// The components of the null vector of minimal support, in the order of its support, that no derivative of
-/// an order up to `order` sees; the first is one. `None` if they could not be computed.
+/// Components of the null vector of the derivatives up to `order` on a minimal support, in the order of the
+/// support; the first is one. `None` if they could not be computed.
 pub(crate) fn null_components(solver: &mut Solver<'_>, support: &[usize], order: usize) -> Option<Sparse> {
     let lead = support[0];
     let first = solver.tables.first();

@@ -308,8 +308,9 @@ impl ModelRemedySearch<'_> {
     }
 }
 
-/// Changes of a model that make one unknown observable or lower its degree: one value known, one more state
-/// as an output; with what was not tried, and the number of verdicts. At most `MOST_EXPLAINED` are tried.
+/// Changes of a model that make one unknown observable or lower its degree (one known value, or one more
+/// state as an output), sentences on changes that were not tried, and the number of verdicts. At most
+/// `MOST_EXPLAINED` changes are tried.
 pub(super) fn improvements(
     model: &SystemModel,
     judged: &Judgement,
@@ -330,16 +331,26 @@ pub(super) fn improvements(
     let left = model.work_limit.operations().saturating_sub(before);
     let out = Remedies::default();
     let (ended, elsewhere) = (false, false);
-    let mut search =
-        ModelRemedySearch { model, judged, order, open, roles, budget: MOST_EXPLAINED, left, ended, elsewhere, out };
+    let mut search = ModelRemedySearch {
+        model,
+        judged,
+        order,
+        open,
+        roles,
+        budget: MOST_EXPLAINED,
+        left,
+        ended,
+        elsewhere,
+        out,
+    };
     let is_state = |role: &Role| matches!(role, Role::State(_));
     let roles: Vec<Role> = search.roles.iter().map(|r| r.0).collect();
-    // with constraints, ranks tell only of values that are not observable where a changed model was judged
-    let told = |role: &&Role| {
+    // with constraints, a changed model was judged only for values that are not observable
+    let judged_there = |role: &&Role| {
         let own = |c: &usize| unknowns[*c].role == **role && *c != column;
         model.constraints.is_empty() || search.open.iter().any(own)
     };
-    let values = roles.iter().filter(|role| **role != unknowns[column].role).filter(told);
+    let values = roles.iter().filter(|role| **role != unknowns[column].role).filter(judged_there);
     let values = values.map(|role| search.known(*role));
     let outputs = roles.iter().filter(|role| is_state(role)).map(|role| search.output(*role));
     let changes: Vec<Change> = values.chain(outputs).collect();

@@ -17,7 +17,7 @@ use crate::why::{
     UnseenDirection, Why, by_cost, deciding_rows, too_many,
 };
 
-/// Most assumptions that are tried.
+/// Largest number of assumptions that are tried.
 const MOST_ASSUMPTIONS: usize = 48;
 
 /// Explains the verdict on one unknown of a model that was analysed with these options; `None` if the model
@@ -85,13 +85,13 @@ fn two(found: &SystemAnalysis, name: &str) -> Vec<Improvement> {
     of.collect()
 }
 
-/// Derivatives that decide, and the direction that no lower ones see.
+/// Deciding derivatives, and the direction along which no lower ones change.
 type Decided = (Vec<OutputDerivative>, Option<UnseenDirection>);
 
-/// What decides at the first of two points, if it does at the second as well.
+/// Deciding derivatives and unobserved direction at the first of two points, confirmed at the second.
 ///
 /// # Errors
-/// Reason why nothing is explained, in words.
+/// Reason for a missing explanation, in words.
 fn decided(
     model: &SystemModel,
     compiled: &Compiled,
@@ -115,7 +115,7 @@ fn decided(
     }
 }
 
-/// Segment and experiment of a run; `None` where the model has one of each.
+/// Segment and experiment of a run; `None` if the model has one of each.
 fn place(model: &SystemModel, run: usize) -> Option<String> {
     let segments = model.segments.len().max(1);
     let experiment = (model.experiments > 1).then(|| format!("experiment {}", run / segments + 1));
@@ -228,8 +228,8 @@ fn vector_on<'a, S: Scalars>(
     }
 }
 
-/// Assumptions of the verdict on an unknown with the verdicts without them, the operations that these took,
-/// and what was not tried.
+/// Assumptions of the verdict on an unknown with the verdicts without them; the number of operations spent;
+/// sentences on assumptions that were not tried.
 fn assumptions(
     model: &SystemModel,
     judged: &Judgement,

@@ -1,4 +1,4 @@
-//! The next positions of a scheme: plain data.
+//! Next positions of a scheme: plain data.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use serde::Serialize;
 /// Name and version of the JSON layout.
 pub const NEXT_SCHEMA: &str = "obsdeg.next/1";
 
-/// Positions that a scheme gains most by.
+/// Positions by which a scheme gains most.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NextPositions {
     /// Layout of this answer: `obsdeg.next/1`.
@@ -25,45 +25,45 @@ pub struct NextPositions {
     pub geometry: Geometry,
     /// Unknown terms of the gyro model.
     pub terms: String,
-    /// Positions of the scheme, before those that are added; empty where a calibration is the start.
+    /// Positions of the scheme before the added ones; empty after a calibration.
     pub positions: Vec<String>,
     /// True if the covariance of a calibration is known beforehand: the added positions are a run of their
     /// own.
     pub after_calibration: bool,
-    /// Days since the calibration, in which the coefficients aged; null without ageing.
+    /// Days of ageing since the calibration; null without ageing.
     pub days: Option<f64>,
     /// Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ageing: BTreeMap<String, f64>,
-    /// Requalification after each number of days asked for; left out without one.
+    /// Requalification after each requested number of days; left out without days.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub schedule: Vec<Requalification>,
     /// Candidates for the added positions, within the gimbal limits.
     pub candidates: Vec<String>,
-    /// Candidates that the gimbals do not reach.
+    /// Candidates beyond the gimbal limits.
     pub beyond_gimbals: Vec<String>,
-    /// Number of positions that are added.
+    /// Number of added positions.
     pub added: usize,
-    /// Coefficients that must be observable and that are compared.
+    /// Coefficients that must be observable and are compared.
     pub required: Vec<String>,
     /// Conditions of the measurement.
     pub conditions: MeasurementReport,
-    /// State without more positions; null if it cannot be computed.
+    /// State before the added positions; null for a scheme without positions.
     pub before: Option<Standing>,
     /// Best extensions, best first.
     pub found: Vec<Extension>,
-    /// Number of extensions that are as good as the first, the first included.
+    /// Number of extensions as good as the first, including the first.
     pub as_good: u64,
-    /// Least dwell at the positions of the first extension, the same at each, with which every requirement is
-    /// met; null if none is stated, or if no dwell up to 16 times the stated one meets them.
+    /// Shortest dwell, equal at all positions of the first extension, with which every requirement is met;
+    /// null without requirements, or if no dwell up to 16 times the stated one meets them.
     pub meets: Option<Meeting>,
-    /// Number of extensions that were compared.
+    /// Number of extensions compared.
     pub examined: u64,
-    /// True if every extension by the candidates was compared: the first is the best of all.
+    /// True if every extension by the candidates was compared, so that the first is the best of all.
     pub proven: bool,
     /// True if the comparison was stopped early.
     pub interrupted: bool,
-    /// Requirements on unknowns outside `required`, which this answer does not judge.
+    /// Requirements on unknowns outside `required`: this answer does not judge them.
     pub not_judged: Vec<String>,
     /// Bound on the probability that the verdicts of one extension are wrong.
     pub error_bound: f64,
@@ -74,14 +74,14 @@ pub struct NextPositions {
 /// State of the required coefficients.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Standing {
-    /// Required coefficients that neither samples nor what is known beforehand bound.
+    /// Required coefficients that neither the samples nor prior knowledge determine.
     pub not_observable: Vec<String>,
     /// Largest observable degree of a required coefficient; null if one has none.
     pub worst_degree: Option<usize>,
     /// Outcome of the requirements.
     pub requirements: Requirements,
-    /// Largest sigma, with a bench the largest total uncertainty, of the required drift coefficients that are
-    /// bounded; null if there is none.
+    /// Largest sigma (with a bench: total uncertainty) of the determined required drift coefficients; null if
+    /// none is determined.
     pub worst: Option<Worst>,
     /// Duration of all positions and slews, in s.
     pub total_s: f64,
@@ -109,28 +109,28 @@ pub struct AddedPosition {
     pub candidate: String,
     /// Euler angles alpha, beta, gamma in degrees, as text.
     pub angles: String,
-    /// Axis (North, Up, East) of the half turn that leads to the position, where slews take time; left out
-    /// for other turns.
+    /// Axis (North, Up, East) of the half turn to the position; left out for other turns, and if slews take no
+    /// time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_turn_about: Option<[f64; 3]>,
 }
 
-/// What brings the coefficients back to their requirements after a number of days.
+/// Requalification after a number of days: runs that meet the requirements again.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Requalification {
     /// Days since the calibration.
     pub days: f64,
     /// State of the aged coefficients without a measurement.
     pub before: Standing,
-    /// Fewest positions, of the stated dwell, with which every requirement is met: 0 if they are met without
-    /// a measurement; null if no extension by up to the number of added positions meets them.
+    /// Smallest number of positions with the stated dwell that meets every requirement: 0 if they are met
+    /// without a measurement; null if no extension by up to `added` positions meets them.
     pub fewest: Option<usize>,
-    /// Best extension of that many positions; null for 0.
+    /// Best extension with the fewest positions; null if `fewest` is 0 or null.
     pub best: Option<Extension>,
-    /// Shortest run of up to the number of added positions, with one dwell at each, that meets every
-    /// requirement; null for 0 positions, and if none meets them with 16 times the stated dwell.
+    /// Shortest run of up to `added` positions, with an equal dwell at each, that meets every requirement;
+    /// null if `fewest` is 0, or if no run meets them with 16 times the stated dwell.
     pub quickest: Option<Quickest>,
-    /// Number of extensions that were compared: all by the candidates.
+    /// Number of extensions compared: all by the candidates.
     pub examined: u64,
 }
 
@@ -145,7 +145,7 @@ pub struct Quickest {
     pub total_s: f64,
 }
 
-/// Dwell that meets the requirements.
+/// Shortest dwell that meets the requirements.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Meeting {
     /// Dwell at each added position, in s, in whole seconds.

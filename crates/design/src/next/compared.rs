@@ -1,4 +1,4 @@
-//! Extensions of a scheme, and what makes one better than another.
+//! Extensions of a scheme, and their order.
 
 use std::cmp::Ordering;
 
@@ -14,9 +14,9 @@ use crate::design::{Candidates, DesignError, MOST_EXTENSIONS, half_turn};
 /// Candidates of an extension, each with true for the other direction of a half turn.
 pub(super) type Sequence = Vec<(usize, bool)>;
 
-/// What extensions are compared under.
+/// Setting of a comparison.
 pub(super) struct Compared<'a> {
-    /// The scheme that is extended.
+    /// Scheme to extend.
     pub(super) start: &'a Scheme,
     pub(super) conditions: &'a Conditions,
     pub(super) candidates: &'a Candidates,
@@ -24,7 +24,7 @@ pub(super) struct Compared<'a> {
     pub(super) options: &'a NextOptions,
 }
 
-/// An extension with all that it is compared by.
+/// Extension with the values that decide its order.
 #[derive(Debug, Clone)]
 pub(super) struct Extended {
     pub(super) sequence: Sequence,
@@ -32,14 +32,14 @@ pub(super) struct Extended {
     pub(super) standing: Standing,
     /// Degrees of the required coefficients.
     pub(super) degrees: Vec<Option<usize>>,
-    /// Largest uncertainty over its requirement, where one is stated, else the largest sigma.
+    /// Largest ratio of uncertainty to requirement; without requirements the largest sigma.
     value: f64,
-    /// True if the limits of time are kept.
+    /// True if the extension is within the limits of time.
     possible: bool,
     pub(super) error_bound: f64,
 }
 
-/// State of a scheme.
+/// State before the added positions.
 pub(super) struct Before {
     pub(super) standing: Standing,
     pub(super) degrees: Vec<Option<usize>>,
@@ -77,7 +77,7 @@ impl Compared<'_> {
     /// where the order counts.
     ///
     /// # Errors
-    /// [`DesignError::Extensions`] where they are too many.
+    /// [`DesignError::Extensions`] if there are too many.
     pub(super) fn sequences(&self) -> Result<Vec<Sequence>, DesignError> {
         let all = 0..self.candidates.attitudes.len();
         let mut out: Vec<Sequence> = vec![Vec::new()];
@@ -104,7 +104,7 @@ impl Compared<'_> {
         Ok(out)
     }
 
-    /// The slew to a candidate, where slews take time.
+    /// Slew to a candidate; `None` if slews take no time.
     fn slew(&self, before: &[(usize, bool)], candidate: usize) -> Option<Slew> {
         let rate = self.conditions.slew_rate_deg_s?;
         let from = match before.last() {
@@ -120,7 +120,7 @@ impl Compared<'_> {
         self.slew(before, candidate).is_some_and(|slew| slew.reversed().is_some())
     }
 
-    /// The scheme with more positions at its end, each of this dwell.
+    /// Scheme with added positions at its end, each with this dwell.
     fn scheme(&self, sequence: &Sequence, dwell_s: f64) -> (Scheme, Vec<AddedPosition>) {
         let mut scheme = self.start.clone();
         let mut added = Vec::new();
@@ -175,7 +175,7 @@ impl Compared<'_> {
         })
     }
 
-    /// State of the required coefficients, their degrees, and the value that is compared.
+    /// State of the required coefficients, their degrees, and the value for comparison.
     fn standing(&self, attained: &Attained) -> Result<(Standing, Vec<Option<usize>>, f64), DesignError> {
         let (names, units) = (attained.plan.platform.names(), attained.plan.platform.units());
         let columns: Vec<usize> =
@@ -185,7 +185,7 @@ impl Compared<'_> {
         let mut requirements = attained.requirements(self.conditions)?;
         if self.options.beforehand.is_some() {
             requirements.basis = Basis::PredictedWithPrior;
-            // all rest on the calibration, which the answer says
+            // every coefficient rests on the calibration, as the answer states
             requirements.on_prior.clear();
         }
         let mut worst: Option<Worst> = None;
@@ -217,7 +217,7 @@ impl Compared<'_> {
         Ok((standing, degrees, value))
     }
 
-    /// The state without more positions; after a calibration that of its covariance.
+    /// State before the added positions; after a calibration the state given by its covariance.
     pub(super) fn before(&self) -> Result<Option<Before>, DesignError> {
         if let Some(known) = &self.options.beforehand {
             return self.of_covariance(known).map(Some);
@@ -230,7 +230,7 @@ impl Compared<'_> {
         Ok(Some(Before { standing, degrees }))
     }
 
-    /// The state of the coefficients by a covariance alone; psi has none.
+    /// State of the coefficients given by a covariance alone.
     fn of_covariance(&self, known: &KnownCovariance) -> Result<Before, DesignError> {
         let platform = Platform::new(Scheme { positions: any_position(), ..self.start.clone() })?;
         let (names, units) = (platform.names(), platform.units());
@@ -258,16 +258,16 @@ impl Compared<'_> {
         Ok(Before { standing, degrees: vec![None; self.required.len()] })
     }
 
-    /// The least dwell of an extension with which every requirement is met.
+    /// Shortest dwell of an extension that meets every requirement.
     pub(super) fn meets(&self, of: &Extended) -> Result<Option<Meeting>, DesignError> {
         self.meets_within(of, LONGEST * self.conditions.dwell_s)
     }
 
-    /// The least dwell up to a longest one, in whole seconds.
+    /// Shortest dwell up to `longest` that meets every requirement, in whole seconds.
     fn meets_within(&self, of: &Extended, longest: f64) -> Result<Option<Meeting>, DesignError> {
         let met = |r: &Requirements| r.stated > 0 && r.all_met();
         let at = |dwell: f64| match self.at(&of.sequence, dwell) {
-            // more steps than a plan has are no dwell
+            // a dwell with more steps than a plan allows is not possible
             Err(DesignError::Conditions(SimulationError::TooManySteps { .. })) => Ok(None),
             other => other.map(|e| Some(e).filter(|e| e.possible && met(&e.standing.requirements))),
         };
@@ -291,8 +291,8 @@ impl Compared<'_> {
         Ok(Some(Meeting { dwell_s: long, total_s: best.standing.total_s }))
     }
 
-    /// The extension that meets every requirement in the least time, if it is less than `below`: every one is
-    /// tried with a dwell that would make it a second shorter than the shortest so far.
+    /// Extension that meets every requirement in the shortest time, if it is shorter than `below`. Every
+    /// extension is tried with dwells that make it at least a second shorter than the shortest so far.
     pub(super) fn quickest(
         &self,
         all: &[Extended],

@@ -1,6 +1,6 @@
-//! The next positions of a scheme, or after a calibration: every extension by one or two candidates is
-//! compared, first by its verdicts, then by the largest total uncertainty over its requirement. After a
-//! calibration whose coefficients aged, what brings them back to their requirements.
+//! Next positions of a scheme, or after a calibration. Every extension by one or two candidates is compared,
+//! first by its verdicts, then by the largest ratio of total uncertainty to requirement. For coefficients that
+//! aged since a calibration: runs that meet the requirements again.
 
 mod answer;
 mod compared;
@@ -23,16 +23,16 @@ use self::compared::{Before, Compared, Extended};
 use self::options::any_position;
 use crate::design::{Candidates, DesignError, asked};
 
-/// Extensions that were compared, best first.
+/// Compared extensions, best first.
 struct Listed {
     found: Vec<Extended>,
     examined: u64,
     interrupted: bool,
 }
 
-/// Compares extensions of `base`, whose positions come first (without a covariance beforehand), under
-/// `conditions`; added positions have the dwell of these. `going` says whether to go on, by the number of
-/// extensions compared so far and of all: a comparison that is stopped gives the best so far.
+/// Compares extensions of `base` under `conditions`. Without a prior covariance the positions of `base` come
+/// first. Added positions have the dwell of `conditions`. `going` receives the number of extensions compared
+/// so far and in total; if it returns false, the answer holds the best extensions so far.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -95,13 +95,13 @@ pub fn next(
     })
 }
 
-/// Requirements that `conditions` leave out of those that are stated.
+/// Stated requirements that are missing in `conditions`.
 fn not_judged(stated: &Conditions, conditions: &Conditions) -> Vec<String> {
     let judged = |a: &&Assignment| conditions.requirements.iter().any(|r| concerns(&a.name, &r.name));
     stated.requirements.iter().filter(|a| !judged(a)).map(|a| a.name.clone()).collect()
 }
 
-/// All extensions that keep the limits, best first.
+/// All extensions within the limits, best first.
 fn listed(compared: &Compared<'_>, going: &(dyn Fn(u64, u64) -> bool + Sync)) -> Result<Listed, DesignError> {
     let sequences = compared.sequences()?;
     let (all, done) = (sequences.len() as u64, AtomicU64::new(0));
@@ -165,7 +165,7 @@ fn schedule(
     options.days.iter().map(of_day).collect()
 }
 
-/// The covariance of the calibration after some days.
+/// Covariance of the calibration after some days of ageing.
 fn aged(start: &Scheme, options: &NextOptions, days: f64) -> Result<Option<KnownCovariance>, DesignError> {
     let Some(known) = &options.beforehand else { return Err(DesignError::NoCalibration) };
     let platform = Platform::new(Scheme { positions: any_position(), ..start.clone() })?;
@@ -176,13 +176,13 @@ fn aged(start: &Scheme, options: &NextOptions, days: f64) -> Result<Option<Known
     Ok(Some(known.aged(|name| names.iter().position(|n| n == name).map(|c| walks[c]), days)))
 }
 
-/// The scheme that is extended: after a calibration one without positions.
+/// Scheme to extend; after a calibration it has no positions.
 fn start(base: &Scheme, options: &NextOptions) -> Scheme {
     let positions = if options.beforehand.is_some() { Vec::new() } else { base.positions.clone() };
     Scheme { positions, latitude: latitude_of(base), combinations: Vec::new(), ..base.clone() }
 }
 
-/// The required coefficients.
+/// Names of the required coefficients, after checks of the options.
 fn check(base: &Scheme, options: &NextOptions, candidates: &Candidates) -> Result<Vec<String>, DesignError> {
     if base.unknowns == Unknowns::Drift {
         return Err(DesignError::Drift);
@@ -223,7 +223,7 @@ fn none_fits(options: &NextOptions) -> DesignError {
     DesignError::NoExtension { limits: limits.join(" and ") }
 }
 
-/// An extension as it is listed, beside the state before it.
+/// Extension as listed in the answer, with its changes relative to the state before.
 fn extension(e: Extended, before: Option<&Before>, required: &[String]) -> Extension {
     let was = |c: usize| before.and_then(|b| b.degrees[c]);
     let was_open = |c: usize| before.is_none_or(|b| b.standing.not_observable.contains(&required[c]));

@@ -87,7 +87,7 @@ impl Attained {
         Self::beside(scheme, conditions, None, seed)
     }
 
-    /// The accuracy of `scheme` by what `conditions` state and a covariance that is known beforehand.
+    /// Accuracy of `scheme` under `conditions`, with a covariance that is known beforehand.
     ///
     /// # Errors
     /// [`SimulationError`].
@@ -286,7 +286,7 @@ fn filtered(plan: &Plan, sigma: Vec<f64>, rows: &DMatrix<f64>) -> Result<EndCova
     Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma, rows)?)?))
 }
 
-/// Covariance of a filter at its start, biases behind the unknowns; `rows` are known beforehand.
+/// Covariance of a filter at its start, biases behind the unknowns; `rows` are the information known beforehand.
 fn filter_prior(
     plan: &Plan,
     mut sigma: Vec<f64>,

@@ -101,12 +101,12 @@ pub enum SimulationError {
         /// Quantity that cannot be resolved.
         what: String,
     },
-    /// A covariance that is known beforehand and that says nothing here.
+    /// Covariance known beforehand that does not fit the scheme.
     #[error(
         "the covariance of the calibration beforehand: {why}; expected that of an answer of obsdeg calibrate on coefficients of the scheme"
     )]
     KnownCovariance {
-        /// What is wrong with it.
+        /// Reason, as the end of a sentence.
         why: String,
     },
     /// A condition beyond its range.

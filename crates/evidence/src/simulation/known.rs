@@ -10,23 +10,23 @@ use crate::prediction::Prediction;
 /// Covariance of coefficients that is known beforehand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownCovariance {
-    /// Coefficients, or combinations of them as an answer names them: rows and columns of the covariance.
-    /// What a scheme does not have is left out.
+    /// Coefficients, or combinations of coefficients as named by an answer: rows and columns of the
+    /// covariance. Names that a scheme does not have are ignored.
     pub names: Vec<String>,
     /// Covariance in products of the shown units of row and column (shape n x n).
     pub covariance: Vec<Vec<f64>>,
 }
 
 impl KnownCovariance {
-    /// Standard deviation of a coefficient in its shown unit; `None` where it is not among the names.
+    /// Standard deviation of a coefficient in its shown unit; `None` if it is not among the names.
     pub fn sigma(&self, name: &str) -> Option<f64> {
         let k = self.names.iter().position(|n| n == name)?;
         Some(self.covariance.get(k)?.get(k)?.max(0.0).sqrt())
     }
 
-    /// The covariance after a number of days in which coefficients walk at random: `P + q^2 t` for each, with
-    /// `q` by name in the unit of the coefficient per sqrt(day). Names without a `q` are left out: those of
-    /// combinations.
+    /// Covariance after a number of days with a random walk of the coefficients: `q^2 t` is added to each
+    /// variance, with `q` by name in the unit of the coefficient per sqrt(day). Names without a `q`
+    /// (combinations) are left out.
     pub fn aged(&self, walk: impl Fn(&str) -> Option<f64>, days: f64) -> Self {
         let kept: Vec<(usize, f64)> =
             self.names.iter().enumerate().filter_map(|(k, name)| Some((k, walk(name)?))).collect();
@@ -42,7 +42,7 @@ impl KnownCovariance {
     }
 
     /// Root of the information on the unknowns of a plan in SI units (m x unknowns): rows of measurements of
-    /// unit noise. psi is that of another run, so that combinations with psi are left out.
+    /// unit noise. psi belongs to another run, so combinations with psi are left out.
     ///
     /// # Errors
     /// [`SimulationError::KnownCovariance`] if no name is a coefficient of the plan, or the covariance is not
