@@ -512,37 +512,41 @@ def next_measurement(
     progress: Progress | bool | None = None,
     **options: Unpack[options.NextMeasurement],
 ) -> NextPositions:
-    """Which position to measure next, or which two: all extensions of a scheme by candidates, compared.
+    """Finds the next one or two positions to measure: compares all extensions of a scheme by candidates.
 
     Parameters
     ----------
     scheme : Scheme or path
-        The scheme that is extended, with its conditions and requirements.
+        Scheme to extend, with its conditions and requirements.
     added : int
-        Number of positions that are added: 1 or 2.
+        Number of added positions: 1 or 2.
     candidates : str, positions, Scheme or path
-        ``"cardinal"`` (default), ``"grid:45"`` [deg], or a scheme whose positions are chosen from.
+        Candidate attitudes: ``"cardinal"`` (default), ``"grid:45"`` [deg], or a scheme with the positions to
+        choose from.
     after : Calibration
-        A calibration that is known beforehand: the added positions are a run of their own.
+        Previous calibration. The added positions are then a separate run.
     days : iterable of float
-        Days since that calibration, ascending, in which the coefficients aged as ``[ageing]`` of the scheme states: ``schedule`` says what
-        brings them back to their requirements after each; the rest is of the last.
+        Days since the calibration, ascending. The coefficients age as stated by ``[ageing]`` of the scheme.
+        ``schedule`` has the runs that meet the requirements again after each number of days; the other fields
+        hold for the last.
     digits : int or None
-        As of :func:`analyze`.
+        Same as for :func:`analyze`.
     progress : callable or bool
-        Hears how far the comparison is; True for a bar of tqdm. Where it returns False, the comparison ends with the best so far.
+        Called with the progress; True shows a bar of tqdm. If it returns False, the comparison ends with the
+        best extensions so far.
     **options
-        In :class:`obsdeg.options.NextMeasurement`: ``observable``, ``requirement``, ``dwell`` [s], ``max_time`` [s], ``carry``, ...
+        Options, see :class:`obsdeg.options.NextMeasurement`: ``observable``, ``requirement``, ``dwell`` [s],
+        ``max_time`` [s], ``carry``, ...
 
     Returns
     -------
     NextPositions
-        ``found``, best first, ``before``, ``meets``: the dwell that meets the requirements.
+        ``found`` (extensions, best first), ``before``, and ``meets`` (dwell that meets the requirements).
 
     Raises
     ------
     ProblemError
-        What is wrong, with its place.
+        Invalid request; the message gives the place.
 
     Examples
     --------

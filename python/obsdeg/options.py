@@ -146,8 +146,8 @@ class Analyze(Seeded, Positions, total=False):
     """Changes of the estimates per unit of each error that a scheme does not estimate, by the weights of the record
     that the scheme states [default: False]."""
     why: Names
-    """Unknowns whose verdicts are explained: what decides each, which assumptions it rests on, and the changes that make it observable or
-    lower its degree, in order of cost, each tried."""
+    """Unknowns whose verdicts are explained: deciding derivatives, assumptions, and the changes that make each
+    observable or lower its degree, in order of cost, each tried."""
     certificate: bool
     """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
     reduced: bool
@@ -276,12 +276,12 @@ class Measure(Seeded, total=False):
 
 
 class NextMeasurement(Seeded, Assumed, Measured, GyroNoise, total=False):
-    """The options of :func:`obsdeg.next_measurement` beside those that it names itself."""
+    """Options of :func:`obsdeg.next_measurement`."""
 
     observable: Names
     """Coefficients or families that must be observable and are compared [default: all]."""
     keep: int
-    """How many extensions are listed [default: 10]."""
+    """Number of listed extensions [default: 10]."""
     max_time: Real
     """Largest total time with slews in s."""
     max_slew: Real

@@ -1,6 +1,6 @@
-//! Explanations of single verdicts: every change that is said to help is made in the text of the scheme or
-//! model and judged from there, and no other single change of its kinds helps; assumptions are taken away in
-//! the text too.
+//! Explanations of single verdicts. Every listed improvement is made in the text of the scheme or model and
+//! judged from there, and no unlisted single change of the same kinds helps. Assumptions are removed in the
+//! text too.
 
 use obsdeg_core::analysis::{AnalysisOptions, analyze, explain};
 use obsdeg_core::model::{Carry, Scheme, cardinal_names, scheme_file};
@@ -42,7 +42,7 @@ fn after(scheme: &Scheme, changes: &[Change]) -> Degrees {
     }
 }
 
-/// What is wrong with an improvement, by the verdicts before it and after it.
+/// Errors of an improvement, from the verdicts before and after it.
 fn wrong(name: &str, improvement: &Improvement, before: &Degrees, after: &Degrees) -> Vec<String> {
     let mut out = Vec::new();
     let (was, is) = (degree(before, name), degree(after, name));
@@ -88,7 +88,7 @@ fn singles(scheme: &Scheme, before: &Degrees, name: &str) -> Vec<Change> {
         .collect()
 }
 
-/// What is wrong with the improvements of an explanation: those that are listed, and those that are not.
+/// Errors of the improvements of an explanation, listed and missing ones.
 fn improvements(scheme: &Scheme, before: &Degrees, why: &Why) -> Vec<String> {
     let mut out = Vec::new();
     for improvement in &why.remedies {
@@ -112,7 +112,7 @@ fn improvements(scheme: &Scheme, before: &Degrees, why: &Why) -> Vec<String> {
     out
 }
 
-/// The scheme without an assumption, by the condition that stands instead, and the name of the unknown there.
+/// The scheme under the condition that replaces an assumption.
 fn relaxed(scheme: &Scheme, a: &Assumption, condition: &str) -> Option<Scheme> {
     let text = scheme_file::write(scheme);
     let line = |key: &str, value: Option<&str>| {
@@ -138,7 +138,7 @@ fn relaxed(scheme: &Scheme, a: &Assumption, condition: &str) -> Option<Scheme> {
     Some(scheme_file::read(&changed).unwrap_or_else(|e| panic!("{e:?}\n{changed}")))
 }
 
-/// What is wrong with the assumptions of an explanation.
+/// Errors of the assumptions of an explanation.
 fn assumptions(scheme: &Scheme, why: &Why) -> Vec<String> {
     let mut out = Vec::new();
     for a in &why.assumptions {
@@ -162,7 +162,7 @@ fn assumptions(scheme: &Scheme, why: &Why) -> Vec<String> {
     out
 }
 
-/// Explains two unknowns of each of some random schemes; the number of improvements.
+/// Explains two unknowns of each random scheme. Returns the number of improvements.
 fn random_schemes(count: usize, seed: u64) -> usize {
     let mut rng = SplitMix64::new(seed);
     let mut tried = 0;
@@ -193,7 +193,7 @@ fn what_is_said_to_help_does_in_500_schemes() {
     assert!(random_schemes(500, 22) > 4000);
 }
 
-/// Explains unknowns of every `step`th model: the worst and one more; the number of improvements.
+/// Explains two unknowns of every `step`th model: the worst and one more. Returns the number of improvements.
 fn of_models(step: usize) -> usize {
     let mut tried = 0;
     for (i, (name, value, text)) in models().into_iter().enumerate().filter(|(i, _)| i % step == 0) {
@@ -225,7 +225,7 @@ fn of_models(step: usize) -> usize {
     tried
 }
 
-/// The JSON of a model without an assumption; `None` where that takes more than a name at another place.
+/// JSON of a model without an assumption; `None` if more than one name would have to move.
 fn without(model: &Value, a: &Assumption) -> Option<String> {
     let input = a.kind == AssumptionKind::KnownInput;
     if input && !(model["input_assumption"].is_null() && model["unknown_input_max_derivative"].is_null()) {
@@ -281,7 +281,7 @@ fn what_is_said_to_help_in_all_models_does() {
 }
 
 /// The paper's two positions by hand. D_FZ - wN psi_y has degree 1 (17), so that the two go together:
-/// psi_y = 1/wN for D_FZ = 1. One of them known, or a measured azimuth, tells the other. D_FY needs Z1''
+/// psi_y = 1/wN for D_FZ = 1. One known value, or a measured azimuth, gives the other. D_FY needs Z1''
 /// (16): eps_y of the two positions, D_FY +- D_IY.
 #[test]
 fn two_positions_by_hand() {
@@ -313,7 +313,7 @@ fn two_positions_by_hand() {
     assert_eq!(why.unseen.expect("a direction").components.len(), 1);
 }
 
-/// Names that are no unknown are refused with those that could be meant.
+/// Names that are not unknowns are refused with similar names.
 #[test]
 fn names_are_checked() {
     let asked = ["analyze", "--angles", "NUE", "--why", "D_FW", "--solutions", "off"];

@@ -14,7 +14,7 @@ use crate::remedies::degrees_of_scheme;
 
 const LATITUDE: f64 = 28.2;
 
-/// A question with all that an answer rests on.
+/// Comparison task: scheme, terms, conditions and options.
 struct Task {
     scheme: Scheme,
     terms: &'static str,
@@ -75,16 +75,16 @@ fn task(seed: u64) -> Task {
     Task { scheme, terms, conditions, options }
 }
 
-/// Sigmas of the coefficients in deg/h (per g) by all samples of a scheme; `None` where a wider prior widens
-/// them.
+/// Sigmas of the coefficients in deg/h (per g) by all samples of a scheme; `None` for a coefficient whose sigma
+/// grows with a wider prior.
 fn least_squares(t: &Task, scheme: &Scheme) -> Vec<Option<f64>> {
     let (rows, psis) = measurements(t, scheme);
     let (narrow, wide) = (sigmas(t, &rows, psis, 1e2, None), sigmas(t, &rows, psis, 1e4, None));
     narrow.iter().zip(&wide).map(|(a, b)| (*b < 1.05 * a).then_some(*b)).collect()
 }
 
-/// Sigmas with a prior of so many rad on psi and 1000 times as many deg/h on coefficients, or a covariance of
-/// these.
+/// Sigmas with a prior sigma of `prior` rad on psi and of 1000 `prior` deg/h on the coefficients, or with the
+/// covariance `known` of the coefficients.
 fn sigmas(
     t: &Task,
     rows: &[DVector<f64>],
@@ -157,7 +157,7 @@ fn measurements(t: &Task, scheme: &Scheme) -> (Vec<DVector<f64>>, usize) {
     (rows, psis)
 }
 
-/// What an extension is compared by, better first.
+/// Values that decide the order of extensions.
 #[derive(Debug, Clone, PartialEq)]
 struct Judged {
     /// Required coefficients that no derivative determines.
@@ -330,7 +330,7 @@ fn half_turns_go_both_ways() {
     assert!(found.examined > 16, "{}", found.examined);
 }
 
-/// What is not about further positions is refused.
+/// Options that do not apply to further positions are refused.
 #[test]
 fn options_of_further_positions() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -344,7 +344,7 @@ fn options_of_further_positions() {
     refused(&["design", file, "--next", "2", "--candidates", "grid:10"], &["at most 20000"]);
 }
 
-/// A calibration whose coefficients aged, and what is required of them.
+/// Calibration with aged coefficients, and their requirements.
 struct Aged {
     task: Task,
     /// Covariance of the calibration (deg/h, deg/h/g).
@@ -492,7 +492,7 @@ fn requalification_is_that_of_brute_force_in_500_tasks() {
     requalification_is_that_of_brute_force(0..500);
 }
 
-/// A number of a standard normal distribution.
+/// Random number of the standard normal distribution.
 fn normal(rng: &mut SplitMix64) -> f64 {
     let mut unit = || (rng.below(1 << 53) as f64 + 0.5) / (1u64 << 53) as f64;
     (-2.0 * unit().ln()).sqrt() * (std::f64::consts::TAU * unit()).cos()

@@ -1,6 +1,6 @@
-//! Explanations against the simulated motion: the derivatives that are said to decide an unknown do, none of
-//! them can be left out, and no derivative up to the stated order changes along the direction that is said to
-//! be unseen, while those that are said to see it do.
+//! Explanations against the simulated motion: the deciding derivatives determine the unknown, and none of them
+//! can be left out. Along the unseen direction no derivative up to the stated order changes, and the listed
+//! derivatives of the next order do.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::analysis::{AnalysisOptions, analyze, explain};
@@ -85,7 +85,7 @@ fn check(draw: &Draw, why: &Why, names: &[String]) -> usize {
     1
 }
 
-/// Explanations of every unknown of schemes that are drawn.
+/// Checks the explanations of every unknown of random schemes.
 fn explanations(count: usize, kind: Angles) -> usize {
     let mut checked = 0;
     for draw in cases(kind, 3, count, &[]) {
