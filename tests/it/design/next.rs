@@ -309,18 +309,18 @@ fn half_turns_go_both_ways() {
     let mut half_turns = 0;
     for e in found.found.iter().filter(|e| e.then.not_observable.is_empty()) {
         let mut sequence = vec![0, 2];
-        let mut ways = vec![0];
+        let mut paths = vec![0];
         for p in &e.positions {
             let from = *sequence.last().expect("a position");
             let to = names.iter().position(|n| *n == p.candidate).expect("a candidate");
-            let along = |w: &brute::Way| {
+            let along = |w: &brute::SlewPath| {
                 p.half_turn_about.is_none_or(|a| (0..3).all(|k| (a[k] - w.about[k]).abs() < 1e-9))
             };
-            ways.push(brute.ways[from][to].iter().position(along).expect("a way"));
+            paths.push(brute.paths[from][to].iter().position(along).expect("a slew path"));
             half_turns += usize::from(p.half_turn_about.is_some());
             sequence.push(to);
         }
-        let own = brute.sigmas(&sequence, &ways).into_iter().fold(0.0, f64::max);
+        let own = brute.sigmas(&sequence, &paths).into_iter().fold(0.0, f64::max);
         let sigma = e.then.worst.as_ref().expect("a sigma").sigma_dph;
         assert!((sigma / own - 1.0).abs() < 1e-4, "{sigma} {own} {e:?}");
         checked += 1;

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::analysis::{AnalysisOptions, analyze, explain};
 use obsdeg_core::why::{OutputDerivative, Why};
 
-use super::draw::{Angles, Draw, cases};
+use super::draw::{Angles, RandomScheme, cases};
 use super::platform::Case;
 use super::text::{self, READINGS};
 
@@ -39,7 +39,7 @@ fn distance(rows: &[DVector<f64>], column: usize, columns: usize) -> f64 {
     rest.norm()
 }
 
-fn check(draw: &Draw, why: &Why, names: &[String]) -> usize {
+fn check(draw: &RandomScheme, why: &Why, names: &[String]) -> usize {
     let case = draw.case();
     let about = format!("{why:#?}\n{draw:?}");
     let column = names.iter().position(|n| *n == why.name).expect("an unknown");
