@@ -514,9 +514,9 @@ class Why(Record):
     unknown is not observable, or if `not_explained` has the reason.
     """
     unseen: UnseenDirection | None
-    """Direction that proves why no lower order is enough, or why none is; null for degree 0."""
+    """Unobserved direction: proof that no lower order, or no order at all, is enough; null for degree 0."""
     symmetries: list[str]
-    """Changes of all unknowns that leave every output as it is and change the unknown, in words; empty for schemes."""
+    """Symmetries that change the unknown and leave every output unchanged, in words; empty for schemes."""
     assumptions: list[Assumption]
     """Assumptions of the verdict, each with the verdicts without it."""
     remedies: list[Improvement]
@@ -2099,15 +2099,13 @@ class Standing(Record):
     __slots__ = ()
 
     not_observable: list[str]
-    """Required coefficients that neither samples nor what is known beforehand bound."""
+    """Required coefficients that neither the samples nor prior knowledge determine."""
     worst_degree: int | None
     """Largest observable degree of a required coefficient; null if one has none."""
     requirements: Requirements
     """Outcome of the requirements."""
     worst: Worst | None
-    """Largest sigma, with a bench the largest total uncertainty, of the required drift coefficients that are bounded; null if there is
-    none.
-    """
+    """Largest sigma (with a bench: total uncertainty) of the determined required drift coefficients; null if none is determined."""
     total_s: float
     """Duration of all positions and slews, in s."""
 
@@ -2124,7 +2122,7 @@ class AddedPosition(Record):
     angles: str
     """Euler angles alpha, beta, gamma in degrees, as text."""
     half_turn_about: tuple[float, float, float] | None
-    """Axis (North, Up, East) of the half turn that leads to the position, where slews take time; left out for other turns."""
+    """Axis (North, Up, East) of the half turn to the position; left out for other turns, and if slews take no time."""
 
 
 class Extension(Record):
@@ -2156,7 +2154,7 @@ class Quickest(Record):
 
 
 class Requalification(Record):
-    """What brings the coefficients back to their requirements after a number of days."""
+    """Requalification after a number of days: runs that meet the requirements again."""
 
     __slots__ = ()
 
@@ -2165,21 +2163,21 @@ class Requalification(Record):
     before: Standing
     """State of the aged coefficients without a measurement."""
     fewest: int | None
-    """Fewest positions, of the stated dwell, with which every requirement is met: 0 if they are met without a measurement; null if no
-    extension by up to the number of added positions meets them.
+    """Smallest number of positions with the stated dwell that meets every requirement: 0 if they are met without a measurement; null if
+    no extension by up to `added` positions meets them.
     """
     best: Extension | None
-    """Best extension of that many positions; null for 0."""
+    """Best extension with the fewest positions; null if `fewest` is 0 or null."""
     quickest: Quickest | None
-    """Shortest run of up to the number of added positions, with one dwell at each, that meets every requirement; null for 0 positions,
-    and if none meets them with 16 times the stated dwell.
+    """Shortest run of up to `added` positions, with an equal dwell at each, that meets every requirement; null if `fewest` is 0, or if
+    no run meets them with 16 times the stated dwell.
     """
     examined: int
-    """Number of extensions that were compared: all by the candidates."""
+    """Number of extensions compared: all by the candidates."""
 
 
 class Meeting(Record):
-    """Dwell that meets the requirements."""
+    """Shortest dwell that meets the requirements."""
 
     __slots__ = ()
 
@@ -2190,7 +2188,7 @@ class Meeting(Record):
 
 
 class NextPositions(Shape):
-    """Positions that a scheme gains most by."""
+    """Positions by which a scheme gains most."""
 
     schema: str
     """Layout of this answer: `obsdeg.next/1`."""
@@ -2203,43 +2201,43 @@ class NextPositions(Shape):
     terms: str
     """Unknown terms of the gyro model."""
     positions: list[str]
-    """Positions of the scheme, before those that are added; empty where a calibration is the start."""
+    """Positions of the scheme before the added ones; empty after a calibration."""
     after_calibration: bool
     """True if the covariance of a calibration is known beforehand: the added positions are a run of their own."""
     days: float | None
-    """Days since the calibration, in which the coefficients aged; null without ageing."""
+    """Days of ageing since the calibration; null without ageing."""
     ageing: dict[str, float] | None
     """Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day)."""
     schedule: list[Requalification]
-    """Requalification after each number of days asked for; left out without one."""
+    """Requalification after each requested number of days; left out without days."""
     candidates: list[str]
     """Candidates for the added positions, within the gimbal limits."""
     beyond_gimbals: list[str]
-    """Candidates that the gimbals do not reach."""
+    """Candidates beyond the gimbal limits."""
     added: int
-    """Number of positions that are added."""
+    """Number of added positions."""
     required: list[str]
-    """Coefficients that must be observable and that are compared."""
+    """Coefficients that must be observable and are compared."""
     conditions: MeasurementReport
     """Conditions of the measurement."""
     before: Standing | None
-    """State without more positions; null if it cannot be computed."""
+    """State before the added positions; null for a scheme without positions."""
     found: list[Extension]
     """Best extensions, best first."""
     as_good: int
-    """Number of extensions that are as good as the first, the first included."""
+    """Number of extensions as good as the first, including the first."""
     meets: Meeting | None
-    """Least dwell at the positions of the first extension, the same at each, with which every requirement is met; null if none is
-    stated, or if no dwell up to 16 times the stated one meets them.
+    """Shortest dwell, equal at all positions of the first extension, with which every requirement is met; null without requirements, or
+    if no dwell up to 16 times the stated one meets them.
     """
     examined: int
-    """Number of extensions that were compared."""
+    """Number of extensions compared."""
     proven: bool
-    """True if every extension by the candidates was compared: the first is the best of all."""
+    """True if every extension by the candidates was compared, so that the first is the best of all."""
     interrupted: bool
     """True if the comparison was stopped early."""
     not_judged: list[str]
-    """Requirements on unknowns outside `required`, which this answer does not judge."""
+    """Requirements on unknowns outside `required`: this answer does not judge them."""
     error_bound: float
     """Bound on the probability that the verdicts of one extension are wrong."""
     seed: int
