@@ -312,7 +312,7 @@ fn record() -> String {
 /// With a model, an option either concerns models or is refused; no option is ignored.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 16] = [
+    const TAKEN: [&str; 17] = [
         "ascii",
         "certificate",
         "count-limit",
@@ -328,6 +328,7 @@ fn a_model_refuses_what_is_about_schemes() {
         "solutions",
         "symbolic-limit",
         "table",
+        "why",
         "work-limit",
     ];
     let folder = folder();

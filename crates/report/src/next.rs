@@ -140,7 +140,7 @@ fn validity(n: &NextPositions) -> Vec<String> {
     }
     if n.after_calibration {
         out.push(
-            "the added positions are a run of its own after the calibration, with a psi of its own".into(),
+            "the added positions are a separate run after the calibration, with a psi of its own".into(),
         );
     }
     out.push(format!(

@@ -341,7 +341,10 @@ fn options_of_further_positions() {
     refused(&["design", file, "--next", "3"], &["1 to 2"]);
     refused(&["design", file, "--next", "1", "--refine"], &["--refine does nothing with --next"]);
     refused(&["design", file, "--next", "1", "--after", file], &["expected the calibration.json"]);
-    refused(&["design", file, "--next", "2", "--candidates", "grid:10"], &["at most 20000"]);
+    refused(
+        &["design", file, "--next", "2", "--candidates", "grid:45"],
+        &["43264 extensions", "at most 20000"],
+    );
 }
 
 /// Calibration with aged coefficients, and their requirements.
