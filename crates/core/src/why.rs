@@ -28,7 +28,7 @@ pub fn no_unknown(name: &str, unknowns: &[String]) -> String {
 /// Explanation of the verdict on one unknown.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Why {
-    /// Name of the unknown.
+    /// Name of the unknown that the explanation concerns.
     pub name: String,
     /// Verdict: observable, inseparable, not excited, or not resolved up to the bound on the order.
     pub status: Status,
@@ -57,7 +57,7 @@ pub struct Why {
     pub verdicts: usize,
 }
 
-/// Derivative of an output.
+/// Time derivative of an output.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct OutputDerivative {
     /// Output: `Z1` (north), `Z2` (up), `Z3` (east) in local geographic axes, `Za` of a measured azimuth,
@@ -94,36 +94,36 @@ pub struct Component {
     pub coefficient: Option<String>,
 }
 
-/// Kind of an assumption.
+/// Kind of an assumption of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AssumptionKind {
-    /// Carry between positions.
+    /// Carry between positions of the scheme.
     Carry,
     /// Latitude: generic, or the stated one.
     Latitude,
-    /// Angles of the positions.
+    /// Angles of the positions of the scheme.
     Angles,
-    /// Measured azimuth.
+    /// Azimuth as a measured output.
     Azimuth,
-    /// Position of the scheme.
+    /// Presence of a position in the scheme.
     Position,
-    /// Output of the model.
+    /// Presence of an output in the model.
     Output,
     /// Known initial value of a state.
     KnownStart,
-    /// Known constant.
+    /// Known constant of the model.
     KnownConstant,
-    /// Known input.
+    /// Known input of the model.
     KnownInput,
-    /// Constraint.
+    /// Constraint that the model states.
     Constraint,
 }
 
 /// Assumption of a verdict, and verdicts without it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Assumption {
-    /// Kind of the assumption.
+    /// Kind of the assumption, such as carry.
     pub kind: AssumptionKind,
     /// Assumption as stated: `platform`, `48.2 deg`, `p2`, `x1`.
     pub stated: String,

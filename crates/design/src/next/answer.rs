@@ -30,7 +30,7 @@ pub struct NextPositions {
     /// True if the covariance of a calibration is known beforehand: the added positions are a run of their
     /// own.
     pub after_calibration: bool,
-    /// Days of ageing since the calibration; null without ageing.
+    /// Number of days of ageing since the calibration; null without ageing.
     pub days: Option<f64>,
     /// Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -87,7 +87,7 @@ pub struct Standing {
     pub total_s: f64,
 }
 
-/// Extension of a scheme.
+/// Extension of a scheme by one or two positions.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Extension {
     /// Added positions, in order.
@@ -109,8 +109,8 @@ pub struct AddedPosition {
     pub candidate: String,
     /// Euler angles alpha, beta, gamma in degrees, as text.
     pub angles: String,
-    /// Axis (North, Up, East) of the half turn to the position; left out for other turns, and if slews take no
-    /// time.
+    /// Axis of the half turn to the position: dimensionless components North, Up, East; left out for other
+    /// turns, and if slews take no time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_turn_about: Option<[f64; 3]>,
 }
@@ -118,7 +118,7 @@ pub struct AddedPosition {
 /// Requalification after a number of days: runs that meet the requirements again.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Requalification {
-    /// Days since the calibration.
+    /// Number of days since the calibration.
     pub days: f64,
     /// State of the aged coefficients without a measurement.
     pub before: Standing,
