@@ -136,6 +136,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["design", "--minimum"],
         &["design", "examples/lotka-volterra/model.toml", "--measure", "states, parameters"],
         &["design", "--minimum", "--terms", "gyros", "--carry", "inertial"],
+        &["design", five, "--next", "1"],
     ] {
         answer(&json(&[line, &["--format", "json"]].concat()), &line.join(" "));
     }

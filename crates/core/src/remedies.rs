@@ -202,8 +202,8 @@ impl<S: Scalars> Directions<S> {
         Some(std::iter::once(column).chain(rest).collect())
     }
 
-    /// True if the set is the support of an unobservable direction of minimal support: with all other unknowns
-    /// held still, one direction remains, and it changes every unknown of the set.
+    /// True if the set is the support of an unobservable direction of minimal support: with all other
+    /// unknowns held still, one direction remains, and it changes every unknown of the set.
     pub(crate) fn is_support(&self, set: &[usize]) -> bool {
         let mut still = <S::Space as RowSpace>::new(self.field.clone(), self.count);
         let others = (0..self.units.len()).filter(|c| !set.contains(c));

@@ -114,7 +114,7 @@ pub enum AssumptionKind {
     KnownStart,
     /// Known constant of the model.
     KnownConstant,
-    /// Known input of the model.
+    /// Known input function of the model.
     KnownInput,
     /// Constraint that the model states.
     Constraint,

@@ -4,7 +4,6 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::remedies::Change;
 use obsdeg_core::why::{Assumption, AssumptionKind, Improvement, OutputDerivative, UnseenDirection, Why};
 
-use crate::analysis::null_vector;
 use crate::document::{Block, left, right};
 use crate::resolve::changes;
 use crate::words::{self, names};
@@ -74,7 +73,7 @@ fn unseen(name: &str, u: &UnseenDirection) -> String {
     let what = match &u.components[..] {
         [_] => format!("a change of {name} alone changes"),
         all if all.iter().all(|c| c.coefficient.is_some()) => {
-            format!("a change along {} changes", null_vector(all).text)
+            format!("a change along {} changes", words::null_vector(all))
         }
         all => format!("a joint change of {} changes", names(all.iter().map(|c| c.name.as_str()))),
     };

@@ -75,8 +75,8 @@ fn task(seed: u64) -> Task {
     Task { scheme, terms, conditions, options }
 }
 
-/// Sigmas of the coefficients in deg/h (per g) by all samples of a scheme; `None` for a coefficient whose sigma
-/// grows with a wider prior.
+/// Sigmas of the coefficients in deg/h (per g) by all samples of a scheme; `None` for a coefficient whose
+/// sigma grows with a wider prior.
 fn least_squares(t: &Task, scheme: &Scheme) -> Vec<Option<f64>> {
     let (rows, psis) = measurements(t, scheme);
     let (narrow, wide) = (sigmas(t, &rows, psis, 1e2, None), sigmas(t, &rows, psis, 1e4, None));

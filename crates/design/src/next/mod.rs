@@ -1,6 +1,6 @@
 //! Next positions of a scheme, or after a calibration. Every extension by one or two candidates is compared,
-//! first by its verdicts, then by the largest ratio of total uncertainty to requirement. For coefficients that
-//! aged since a calibration: runs that meet the requirements again.
+//! first by its verdicts, then by the largest ratio of total uncertainty to requirement. For coefficients
+//! that aged since a calibration: runs that meet the requirements again.
 
 mod answer;
 mod compared;

@@ -286,7 +286,8 @@ fn filtered(plan: &Plan, sigma: Vec<f64>, rows: &DMatrix<f64>) -> Result<EndCova
     Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma, rows)?)?))
 }
 
-/// Covariance of a filter at its start, biases behind the unknowns; `rows` are the information known beforehand.
+/// Covariance of a filter at its start, biases behind the unknowns; `rows` are the information known
+/// beforehand.
 fn filter_prior(
     plan: &Plan,
     mut sigma: Vec<f64>,
