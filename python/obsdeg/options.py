@@ -275,7 +275,7 @@ class Measure(Seeded, total=False):
     """Limit of the work of a verdict, in millions of operations [default: 600]; the search may take fifty times as much."""
 
 
-class NextMeasurement(Seeded, Assumed, Measured, GyroNoise, total=False):
+class NextMeasurement(Seeded, Assumed, Terms, Measured, total=False):
     """Options of :func:`obsdeg.next_measurement`."""
 
     observable: Names

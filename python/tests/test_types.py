@@ -75,7 +75,8 @@ def answers() -> Iterator[obsdeg.Answer]:
     yield obsdeg.design(4, observable="D_F", carry="inertial", bench={"K0": 20})
     yield obsdeg.analyze(angles=PAPER, why=["D_FZ", "D_FY"])
     yield obsdeg.analyze("examples/sir/model.toml", why="k")
-    yield obsdeg.next_measurement("examples/bench-day/scheme.toml", slew_rate=2)
+    one = obsdeg.Scheme(["NUE"], carry="inertial", latitude=48)
+    yield obsdeg.next_measurement(one, candidates=obsdeg.Scheme(["NDW"]), slew_rate=2)
     bench_day = obsdeg.calibrate("examples/bench-day/scheme.toml", "examples/bench-day/record.csv")
     storage = "examples/year-of-storage/scheme.toml"
     yield obsdeg.next_measurement(storage, candidates=obsdeg.Scheme(["NUE", "USE", "NWU", "DNE"]), after=bench_day, days=[30, 365])

@@ -42,7 +42,7 @@ pub struct FurtherOptions {
 const DAYS: Range = Range { low: 0.01, high: 36_500.0, unit: "days" };
 
 /// Options of `design` that also apply to further positions.
-const APPLICABLE: [&str; 25] = [
+const APPLICABLE: [&str; 24] = [
     "seed",
     "days",
     "next",
@@ -51,9 +51,6 @@ const APPLICABLE: [&str; 25] = [
     "latitude",
     "terms",
     "axes",
-    "path",
-    "measured_azimuth",
-    "geometry",
     "keep",
     "observable",
     "max_time",
@@ -65,19 +62,11 @@ const APPLICABLE: [&str; 25] = [
     "dwell",
     "step",
     "noise",
+    "accelerometer_instability",
+    "accelerometer_correlation_time",
     "azimuth_noise",
     "drift_noise",
     "prior",
-];
-
-/// Noise options, which also apply to further positions.
-const NOISE: [&str; 6] = [
-    "accelerometer_instability",
-    "accelerometer_correlation_time",
-    "angle_random_walk",
-    "rate_random_walk",
-    "bias_instability",
-    "correlation_time",
 ];
 
 /// Comparison of all extensions of the scheme in a file.
@@ -94,7 +83,7 @@ pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Resul
     let of_parts = !files.merge.is_empty() || files.resume.is_some();
     let given = stated(a)?;
     let names = given.keys().map(String::as_str).chain(of_parts.then_some("merge"));
-    if let Some(other) = names.into_iter().find(|name| !APPLICABLE.contains(name) && !NOISE.contains(name)) {
+    if let Some(other) = names.into_iter().find(|name| !APPLICABLE.contains(name)) {
         return Err(Problem::input(format!("--{} does nothing with --next", other.replace('_', "-"))));
     }
     for days in &a.further.days {
