@@ -14,7 +14,7 @@ use obsdeg_design::design::{
     WalkOptions, Walks, asked as asked_conditions, certify_optimum, check_certifiable, design_merged,
     design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
-use obsdeg_design::next::NextPositions;
+use obsdeg_design::next::{NextOptions, NextPositions};
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
@@ -26,7 +26,7 @@ use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
 use crate::measure::{MeasureOptions, SetRequirements, measured};
-use crate::next::{FurtherOptions, further};
+use crate::next::{FurtherOptions, calibrated, check_further, further};
 use crate::problem::Problem;
 use crate::source::Source;
 use crate::text;
@@ -394,7 +394,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         return Ok(Designed::Outputs(Box::new(found)));
     }
     if a.further.next.is_some() || files.after.is_some() {
-        return Ok(Designed::Next(Box::new(further(a, files, host)?)));
+        return Ok(Designed::Next(Box::new(next_positions(a, files, host)?)));
     }
     let asked = known(a, files)?;
     let files = &SearchFiles { merge: files.merge.clone(), ..asked.files(files) };
@@ -486,8 +486,29 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
 }
 
+/// Further positions of the scheme in a file.
+fn next_positions(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<NextPositions, Problem> {
+    let of_parts = !files.merge.is_empty() || files.resume.is_some();
+    let given = stated(a)?;
+    let names: Vec<&str> = given.keys().map(String::as_str).chain(of_parts.then_some("merge")).collect();
+    let added = check_further(&a.further, &names, files.conditions_file.is_some(), files.after.is_some())?;
+    let (base, candidates, conditions) = assumed(a, files)?;
+    let options = NextOptions {
+        candidates,
+        added,
+        required: a.wanted.observable.clone(),
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        keep: a.keep.unwrap_or(10).into(),
+        beforehand: files.after.as_ref().map(calibrated).transpose()?,
+        days: a.further.days.clone(),
+        seed: a.seed,
+    };
+    further(&base, &conditions, &options, host)
+}
+
 /// Scheme with the assumptions of the search, candidates, and conditions.
-pub(crate) fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candidates, Conditions), Problem> {
+fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candidates, Conditions), Problem> {
     let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
     if let Some(file) = &files.conditions_file {
         base = file.scheme()?;
@@ -601,7 +622,7 @@ fn no_json(e: serde_json::Error) -> Problem {
 }
 
 /// Options without those that have their default, as JSON.
-pub(crate) fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Problem> {
+fn stated(a: &Search) -> Result<serde_json::Map<String, Value>, Problem> {
     let object = |a: &Search| serde_json::to_value(a).map_err(no_json);
     let (all, none) = (object(a)?, object(&Search::default())?);
     let differs = |(name, value): &(&String, &Value)| none.get(name) != Some(value);

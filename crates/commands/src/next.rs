@@ -4,14 +4,14 @@ use std::ops::RangeInclusive;
 
 use clap::Args;
 use obsdeg_calibration::answer::CovarianceTable;
+use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges::Range;
 use obsdeg_design::next::{NextOptions, NextPositions, next};
-use obsdeg_evidence::simulation::KnownCovariance;
+use obsdeg_evidence::simulation::{Conditions, KnownCovariance};
 use serde::{Deserialize, Serialize};
 
 use crate::arguments::{check_whole, whole};
 use crate::conditions::within;
-use crate::design::{Search, SearchFiles, assumed, stated};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
 use crate::source::Source;
@@ -69,55 +69,56 @@ const APPLICABLE: [&str; 24] = [
     "prior",
 ];
 
-/// Comparison of all extensions of the scheme in a file.
-pub(crate) fn further(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<NextPositions, Problem> {
-    let Some(added) = a.further.next else {
+/// Checks the options of a comparison. `names` are the stated options of `design`; `is_scheme` is true with a
+/// scheme file, `is_after` with a calibration. Returns the number of added positions.
+pub(crate) fn check_further(
+    options: &FurtherOptions,
+    names: &[&str],
+    is_scheme: bool,
+    is_after: bool,
+) -> Result<usize, Problem> {
+    let Some(added) = options.next else {
         return Err(Problem::input(
             "--after is the start of further positions; expected --next 1 or --next 2",
         ));
     };
     check_whole("--next", added as u64, &ADDED)?;
-    if files.conditions_file.is_none() {
+    if !is_scheme {
         return Err(Problem::input("--next extends a scheme; expected a scheme file"));
     }
-    let of_parts = !files.merge.is_empty() || files.resume.is_some();
-    let given = stated(a)?;
-    let names = given.keys().map(String::as_str).chain(of_parts.then_some("merge"));
-    if let Some(other) = names.into_iter().find(|name| !APPLICABLE.contains(name)) {
+    if let Some(other) = names.iter().find(|name| !APPLICABLE.contains(*name)) {
         return Err(Problem::input(format!("--{} does nothing with --next", other.replace('_', "-"))));
     }
-    for days in &a.further.days {
+    for days in &options.days {
         DAYS.check("--days", *days).map_err(|e| Problem::input(e.to_string()))?;
     }
-    if !a.further.days.is_empty() && files.after.is_none() {
+    if !options.days.is_empty() && !is_after {
         return Err(Problem::input("--days counts from a calibration; expected --after FILE"));
     }
-    if a.further.days.windows(2).any(|pair| pair[0] >= pair[1]) {
+    if options.days.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(Problem::input("--days: expected days in ascending order, as in 30,90,365"));
     }
-    let (base, candidates, conditions) = assumed(a, files)?;
-    if !a.further.days.is_empty() && base.ageing.is_empty() {
+    Ok(added)
+}
+
+/// Comparison of all extensions of a scheme.
+pub(crate) fn further(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &NextOptions,
+    host: &Host<'_>,
+) -> Result<NextPositions, Problem> {
+    if !options.days.is_empty() && base.ageing.is_empty() {
         return Err(Problem::input(
             "--days needs the ageing of the coefficients; expected a table [ageing] in the scheme file, such as D_F = 0.002",
         ));
     }
-    let options = NextOptions {
-        candidates,
-        added,
-        required: a.wanted.observable.clone(),
-        total_s: a.wanted.max_time,
-        slew_s: a.wanted.max_slew,
-        keep: a.keep.unwrap_or(10).into(),
-        beforehand: files.after.as_ref().map(calibrated).transpose()?,
-        days: a.further.days.clone(),
-        seed: a.seed,
-    };
     let going = |done, all| (host.going)(Now::of("comparing extensions", done, all));
-    Ok(next(&base, &conditions, &options, &going)?)
+    Ok(next(base, conditions, options, &going)?)
 }
 
 /// Covariance of a calibration, rescaled by its residuals.
-fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
+pub(crate) fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
     let wrong = |found: &str| {
         Problem::input(format!(
             "{}: {found}; expected the calibration.json that `obsdeg calibrate -o` wrote of a scheme",

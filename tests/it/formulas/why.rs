@@ -1,6 +1,6 @@
 //! Explanations against the simulated motion: the deciding derivatives determine the unknown, and none of
-//! them can be left out. Along the unseen direction no derivative up to the stated order changes, and the listed
-//! derivatives of the next order do.
+//! them can be left out. Along the unseen direction no derivative up to the stated order changes, and the
+//! listed derivatives of the next order do.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::analysis::{AnalysisOptions, analyze, explain};
