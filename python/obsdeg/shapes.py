@@ -408,7 +408,7 @@ class Remedies(Record):
 
 
 class OutputDerivative(Record):
-    """Derivative of an output."""
+    """Time derivative of an output."""
 
     __slots__ = ()
 
@@ -450,9 +450,10 @@ AssumptionKind = Literal[
     "known_input",
     "constraint",
 ]
-"""Kind of an assumption. carry: Carry between positions. latitude: Latitude: generic, or the stated one. angles: Angles of the
-positions. azimuth: Measured azimuth. position: Position of the scheme. output: Output of the model. known_start: Known initial value
-of a state. known_constant: Known constant. known_input: Known input. constraint: Constraint.
+"""Kind of an assumption of a verdict. carry: Carry between positions of the scheme. latitude: Latitude: generic, or the stated one.
+angles: Angles of the positions of the scheme. azimuth: Azimuth as a measured output. position: Presence of a position in the scheme.
+output: Presence of an output in the model. known_start: Known initial value of a state. known_constant: Known constant of the model.
+known_input: Known input function of the model. constraint: Constraint that the model states.
 """
 
 
@@ -473,7 +474,7 @@ class Assumption(Record):
     __slots__ = ()
 
     kind: AssumptionKind
-    """Kind of the assumption."""
+    """Kind of the assumption, such as carry."""
     stated: str
     """Assumption as stated: `platform`, `48.2 deg`, `p2`, `x1`."""
     otherwise: list[Otherwise]
@@ -503,7 +504,7 @@ class Why(Record):
     __slots__ = ()
 
     name: str
-    """Name of the unknown."""
+    """Name of the unknown that the explanation concerns."""
     status: Status
     """Verdict: observable, inseparable, not excited, or not resolved up to the bound on the order."""
     degree: int | None
@@ -2122,11 +2123,13 @@ class AddedPosition(Record):
     angles: str
     """Euler angles alpha, beta, gamma in degrees, as text."""
     half_turn_about: tuple[float, float, float] | None
-    """Axis (North, Up, East) of the half turn to the position; left out for other turns, and if slews take no time."""
+    """Axis of the half turn to the position: dimensionless components North, Up, East; left out for other turns, and if slews take no
+    time.
+    """
 
 
 class Extension(Record):
-    """Extension of a scheme."""
+    """Extension of a scheme by one or two positions."""
 
     __slots__ = ()
 
@@ -2159,7 +2162,7 @@ class Requalification(Record):
     __slots__ = ()
 
     days: float
-    """Days since the calibration."""
+    """Number of days since the calibration."""
     before: Standing
     """State of the aged coefficients without a measurement."""
     fewest: int | None
@@ -2205,7 +2208,7 @@ class NextPositions(Shape):
     after_calibration: bool
     """True if the covariance of a calibration is known beforehand: the added positions are a run of their own."""
     days: float | None
-    """Days of ageing since the calibration; null without ageing."""
+    """Number of days of ageing since the calibration; null without ageing."""
     ageing: dict[str, float] | None
     """Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day)."""
     schedule: list[Requalification]
