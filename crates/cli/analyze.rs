@@ -24,6 +24,7 @@ Examples:
   obsdeg analyze scheme.toml -o verdicts.json           JSON by the ending; .csv, .md, .tex as well
   obsdeg analyze model.toml                             any system x' = f(x, u, p, t), z = h
   obsdeg analyze examples/*/scheme.toml -o all.csv      several, one after another
+  obsdeg analyze --angles NUE --angles NDW --why D_FZ   why it is not observable, and what would change that
   obsdeg analyze --angles NUE --angles NDW --figures pictures
   obsdeg analyze scheme.toml --certificate c.json       the proof, for obsdeg verify and other checkers
 
@@ -108,7 +109,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 
 /// Verdicts without solutions, one line each; printed while another process uses the symbolic engine.
 fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> EarlyVerdicts {
-    let asked = Analyze { solutions: false, formulas: false, ..asked.clone() };
+    let asked = Analyze { solutions: false, formulas: false, why: Vec::new(), ..asked.clone() };
     let read = Arc::clone(read);
     Box::new(move || {
         let found = analyze(&asked, &read, &mut Host::silent());

@@ -70,6 +70,11 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE", num_args = 1.., help_heading = "Parts", conflicts_with_all = ["minimum", "part"])]
     merge: Vec<PathBuf>,
 
+    /// With --next: the answer of `obsdeg calibrate` (calibration.json) that is known beforehand. The added
+    /// positions are then a run of their own, with the conditions of the scheme
+    #[arg(long, value_name = "FILE", help_heading = "Further positions", requires = "next")]
+    after: Option<PathBuf>,
+
     #[command(flatten)]
     met: RequireMet,
 
@@ -108,6 +113,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         conditions_file: a.scheme.as_deref().map(|file| read(file, "scheme")).transpose()?,
         candidates_file: candidates.map(|file| read(Path::new(file), "scheme")).transpose()?,
         merge: a.merge.iter().map(|path| part(path)).collect::<Result<Vec<Source>, _>>()?,
+        after: a.after.as_deref().map(|file| read(file, "calibration")).transpose()?,
         resume: a.asked.part.and_then(|_| a.output.target.existing()).map(part).transpose()?,
     };
     let bar = Bar::start(a.output.target.quiet);
@@ -140,6 +146,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         Designed::Outputs(found) => {
             a.met.check(None)?;
             a.output.write_folder(&*found, "sensors.json", || Ok::<_, Failure>(Vec::new()))
+        }
+        Designed::Next(found) => {
+            let first = || found.found.first().map(|f| &f.then.requirements);
+            a.met.check(first())?;
+            a.output.write_folder(&*found, "next.json", || Ok::<_, Failure>(Vec::new()))?;
+            a.met.decide(first())
         }
         Designed::Part(part) => write_part(&part, a),
     }

@@ -15,6 +15,7 @@ const GYROS: Section = Some("Gyro noise");
 const WANTED: Section = Some("What is wanted");
 const SEARCH: Section = Some("Search");
 const PARTS: Section = Some("Parts");
+const FURTHER: Section = Some("Further positions");
 const MODELS: Section = Some("Models");
 const SOLUTIONS: Section = Some("Solutions");
 const CONTROLS: Section = Some("Controls");
@@ -113,6 +114,9 @@ const LINES: &[(&str, Section, &str)] = &[
     ("part", PARTS, "Search part I of N of all sequences, and write it to the file of -o"),
     ("merge", PARTS, "Put parts together to the answer of the whole; they know their options"),
     ("check", PARTS, "With --merge: search N blocks of the parts again, chosen at random"),
+    ("next", FURTHER, "Find the 1 or 2 positions by which the scheme gains most"),
+    ("after", FURTHER, "With --next: calibration.json that is known beforehand"),
+    ("days", FURTHER, "With --after: days of ageing since then, such as 30,90,365"),
     ("measure", MODELS, "Candidates for outputs of a model: states, or \"x1, x1 + x3\""),
     ("own_outputs", MODELS, "The outputs of the model stay, and candidates are added"),
     ("cost", MODELS, "Cost of a candidate: x1=2.5 (default: 1)"),
@@ -125,6 +129,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("solutions", SOLUTIONS, "Expressions and numbers of solutions: on or off"),
     ("omitted", SOLUTIONS, "Classes of errors that are not estimated: on or off"),
     ("sensitivities", SOLUTIONS, "Changes of the estimates per unit of such errors"),
+    ("why", SOLUTIONS, "Explain the verdict on an unknown, and what would improve it"),
     ("frame", SOLUTIONS, "Axes of Z in solutions: n or platform"),
     ("formulas", SOLUTIONS, "Print Z, its derivatives, psi and eps as formulas"),
     ("symbolic_limit", SOLUTIONS, "Work of the symbolic engine for one formula; 0: none"),

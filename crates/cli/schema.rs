@@ -8,6 +8,7 @@ use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
 use obsdeg_design::design::{Design, OptimumCertificate, Part, Walks};
+use obsdeg_design::next::NextPositions;
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
@@ -51,6 +52,8 @@ enum SchemaKind {
     Walks,
     /// The JSON of `obsdeg design` of a model
     Sensors,
+    /// The JSON of `obsdeg design --next`
+    Next,
     /// Scheme files
     Scheme,
     /// The JSON of `obsdeg analyze` of a model
@@ -89,6 +92,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         SchemaKind::Part => written::<Part>(),
         SchemaKind::Walks => written::<Walks>(),
         SchemaKind::Sensors => written::<Sensors>(),
+        SchemaKind::Next => written::<NextPositions>(),
         SchemaKind::Scheme => schema_for!(SchemeFile),
         SchemaKind::System => written::<SystemAnalysis>(),
         SchemaKind::SystemRun => written::<SystemRun>(),

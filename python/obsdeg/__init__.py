@@ -6,7 +6,7 @@
 1
 
 Functions: :func:`analyze`, :func:`simulate`, :func:`crosscheck`, :func:`compare`, :func:`design`,
-    :func:`measure`, :func:`calibrate` and :func:`report`
+    :func:`measure`, :func:`next_measurement`, :func:`calibrate` and :func:`report`
 take a :class:`Scheme` or a :class:`Model`. :func:`allan` estimates the noise of sensors at rest. :func:`load`
 reads models of other tools. :mod:`obsdeg.campaign` runs searches and sweeps of many tasks.
 
@@ -25,7 +25,7 @@ from typing import Any
 from . import options as options
 from . import shapes as shapes
 from ._calibrate import allan, calibrate
-from ._commands import analyze, compare, crosscheck, design, load, measure, paper, report, simulate
+from ._commands import analyze, compare, crosscheck, design, load, measure, next_measurement, paper, report, simulate
 from ._files import Text
 from ._model import Model
 from ._obsdeg import ProblemError, __version__
@@ -40,6 +40,7 @@ from ._results import (
     Design,
     Judgement,
     Judgements,
+    NextPositions,
     Part,
     Report,
     SensorNoise,
@@ -65,6 +66,7 @@ __all__ = [
     "Judgement",
     "Judgements",
     "Model",
+    "NextPositions",
     "Part",
     "ProblemError",
     "Record",
@@ -89,6 +91,7 @@ __all__ = [
     "design",
     "load",
     "measure",
+    "next_measurement",
     "options",
     "paper",
     "report",

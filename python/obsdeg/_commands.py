@@ -22,6 +22,7 @@ from ._results import (
     CrossCheck,
     Design,
     Judgements,
+    NextPositions,
     Part,
     Progress,
     Report,
@@ -496,6 +497,78 @@ def measure(
     log: list[Rounded] = []
     given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
     answer: Sensors = ask((Sensors,), "design", given, log, progress)
+    return answer
+
+
+@named(options.NextMeasurement)
+def next_measurement(
+    scheme: Platform | File,
+    added: int = 1,
+    *,
+    candidates: Any = None,
+    after: Calibration | None = None,
+    days: Iterable[float] | None = None,
+    digits: int | None = DIGITS,
+    progress: Progress | bool | None = None,
+    **options: Unpack[options.NextMeasurement],
+) -> NextPositions:
+    """Finds the next one or two positions to measure: compares all extensions of a scheme by candidates.
+
+    Parameters
+    ----------
+    scheme : Scheme or path
+        Scheme to extend, with its conditions and requirements.
+    added : int
+        Number of added positions: 1 or 2.
+    candidates : str, positions, Scheme or path
+        Candidate attitudes: ``"cardinal"`` (default), ``"grid:45"`` [deg], or a scheme with the positions to
+        choose from.
+    after : Calibration
+        Previous calibration. The added positions are then a separate run.
+    days : iterable of float
+        Days since the calibration, ascending. The coefficients age as stated by ``[ageing]`` of the scheme.
+        ``schedule`` has the runs that meet the requirements again after each number of days; the other fields
+        hold for the last.
+    digits : int or None
+        Same as for :func:`analyze`.
+    progress : callable or bool
+        Called with the progress; True shows a bar of tqdm. If it returns False, the comparison ends with the
+        best extensions so far.
+    **options
+        Options, see :class:`obsdeg.options.NextMeasurement`: ``observable``, ``requirement``, ``dwell`` [s],
+        ``max_time`` [s], ``carry``, ...
+
+    Returns
+    -------
+    NextPositions
+        ``found`` (extensions, best first), ``before``, and ``meets`` (dwell that meets the requirements).
+
+    Raises
+    ------
+    ProblemError
+        Invalid request; the message gives the place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme(["NUE", "NDW"])
+    >>> best = obsdeg.next_measurement(pair, observable="D_F", dwell=100)[0]
+    >>> [r.name for r in best.resolves]
+    ['D_FZ']
+    """
+    asked: dict[str, Any] = {**options, "next": added}
+    files: dict[str, Any] = {}
+    log: list[Rounded] = []
+    if isinstance(candidates, str) and (candidates == "cardinal" or candidates.startswith("grid:")):
+        asked["candidates"] = candidates
+    elif candidates is not None:
+        files["candidates_file"] = source(candidates, digits, log, "candidates")
+    if days is not None:
+        asked["days"] = [float(x) for x in days]
+    if after is not None:
+        files["after"] = {"name": "after", "text": after.json()}
+    given = request(asked, digits, log, conditions_file=source(scheme, digits, log, "scheme"), **files)
+    answer: NextPositions = ask((NextPositions,), "design", given, log, progress)
     return answer
 
 

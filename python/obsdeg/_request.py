@@ -68,6 +68,7 @@ READ: dict[str, Callable[[Any], Any]] = {
     "gimbal": _texts,
     "observable": _texts,
     "profile": _texts,
+    "why": _texts,
     "angle_random_walk": _per_axis,
     "rate_random_walk": _per_axis,
     "bias_instability": _per_axis,

@@ -528,6 +528,18 @@ class Sensors(Named[shapes.SensorUnknown], Answer, shapes.Sensors):
     _main = "front"
 
 
+class NextPositions(Answer, shapes.NextPositions):
+    """Extensions of a scheme by one or two positions, best first: ``found[0]`` is the best."""
+
+    _main = "found"
+
+    def __len__(self) -> int:
+        return len(self._dict()["found"])
+
+    def __getitem__(self, index: int) -> shapes.Extension:
+        return self.found[index]
+
+
 class Part(Answer, shapes.Part):
     """A part of a search, to be merged with the others by ``design(merge=...)``."""
 
@@ -609,6 +621,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.comparison/2": Comparison,
     "obsdeg.design/2": Design,
     "obsdeg.walks/1": Walks,
+    "obsdeg.next/1": NextPositions,
     "obsdeg.sensors/1": Sensors,
     "obsdeg.part/2": Part,
     "obsdeg.simulation/2": Simulation,

@@ -145,6 +145,9 @@ class Analyze(Seeded, Positions, total=False):
     sensitivities: bool
     """Changes of the estimates per unit of each error that a scheme does not estimate, by the weights of the record
     that the scheme states [default: False]."""
+    why: Names
+    """Unknowns whose verdicts are explained: deciding derivatives, assumptions, and the changes that make each
+    observable or lower its degree, in order of cost, each tried."""
     certificate: bool
     """``certificate.json`` among the files of the answer: the witness of the verdicts on one scheme."""
     reduced: bool
@@ -270,6 +273,23 @@ class Measure(Seeded, total=False):
     """The highest order of derivatives to look at in a model that has no proven end."""
     work_limit: int
     """Limit of the work of a verdict, in millions of operations [default: 600]; the search may take fifty times as much."""
+
+
+class NextMeasurement(Seeded, Assumed, Terms, Measured, total=False):
+    """Options of :func:`obsdeg.next_measurement`."""
+
+    observable: Names
+    """Coefficients or families that must be observable and are compared [default: all]."""
+    keep: int
+    """Number of listed extensions [default: 10]."""
+    max_time: Real
+    """Largest total time with slews in s."""
+    max_slew: Real
+    """Longest slew to an added position in s."""
+    slew_rate: Real
+    """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
+    gimbal: Names
+    """How far gimbals turn in degrees: ``["alpha=-90:90"]``."""
 
 
 class Report(Seeded, Assumed, Filtered, total=False):

@@ -407,6 +407,130 @@ class Remedies(Record):
     """Number of changed schemes or models that the exact engine judged."""
 
 
+class OutputDerivative(Record):
+    """Time derivative of an output."""
+
+    __slots__ = ()
+
+    output: str
+    """Output: `Z1` (north), `Z2` (up), `Z3` (east) in local geographic axes, `Za` of a measured azimuth, or the name of an output of a
+    model.
+    """
+    order: int
+    """Order of the derivative by time."""
+    place: str | None
+    """Position of the scheme, or segment or experiment of the model (`segment 2`, `experiment 1`); null for a model with one of each."""
+
+
+class UnseenDirection(Record):
+    """Direction in which unknowns change together while no output derivative up to an order changes. Every component is needed: in a
+    direction of fewer of these unknowns a derivative changes.
+    """
+
+    __slots__ = ()
+
+    up_to_order: int
+    """Highest order of the output derivatives that do not change."""
+    at_every_order: bool
+    """True if no derivative of any order changes."""
+    components: list[Component]
+    """Unknowns that change, with the coefficients of the direction; the unknown itself first, with 1."""
+    seen_by: list[OutputDerivative]
+    """Derivatives of the next order, out of `determined_by`, that change along the direction; empty if the unknown is not observable."""
+
+AssumptionKind = Literal[
+    "carry",
+    "latitude",
+    "angles",
+    "azimuth",
+    "position",
+    "output",
+    "known_start",
+    "known_constant",
+    "known_input",
+    "constraint",
+]
+"""Kind of an assumption of a verdict. carry: Carry between positions of the scheme. latitude: Latitude: generic, or the stated one.
+angles: Angles of the positions of the scheme. azimuth: Azimuth as a measured output. position: Presence of a position in the scheme.
+output: Presence of an output in the model. known_start: Known initial value of a state. known_constant: Known constant of the model.
+known_input: Known input function of the model. constraint: Constraint that the model states.
+"""
+
+
+class Otherwise(Record):
+    """Verdict under another condition."""
+
+    __slots__ = ()
+
+    condition: str
+    """Condition that replaces the assumption: `inertial`, `pole`, `without it`, `unknown`."""
+    degree: int | None
+    """Observable degree of the unknown under the condition; null if it is not observable."""
+
+
+class Assumption(Record):
+    """Assumption of a verdict, and verdicts without it."""
+
+    __slots__ = ()
+
+    kind: AssumptionKind
+    """Kind of the assumption, such as carry."""
+    stated: str
+    """Assumption as stated: `platform`, `48.2 deg`, `p2`, `x1`."""
+    otherwise: list[Otherwise]
+    """Verdicts under other conditions."""
+    decides: bool
+    """True if the degree differs under one of the other conditions: the verdict rests on the assumption."""
+
+
+class Improvement(Record):
+    """Change that makes an unknown observable or lowers its degree."""
+
+    __slots__ = ()
+
+    changes: list[Change]
+    """Changes, one or two that are needed together."""
+    degree: int
+    """Observable degree of the unknown with the changes."""
+    resolves: list[Resolved]
+    """Other unknowns that are observable with the changes and not without them, without those whose value is given."""
+    loses: list[str]
+    """Unknowns that are observable without the changes and not with them: possible under another carry only."""
+
+
+class Why(Record):
+    """Explanation of the verdict on one unknown."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the unknown that the explanation concerns."""
+    status: Status
+    """Verdict: observable, inseparable, not excited, or not resolved up to the bound on the order."""
+    degree: int | None
+    """Observable degree of the unknown; null if it is not observable."""
+    determined_by: list[OutputDerivative]
+    """Output derivatives that determine the unknown, with the constraints and the known quantities (of a scheme: the unknown is a linear
+    combination of the derivatives); none of the derivatives can be left out. Other sets of derivatives may do the same. Empty if the
+    unknown is not observable, or if `not_explained` has the reason.
+    """
+    unseen: UnseenDirection | None
+    """Unobserved direction: proof that no lower order, or no order at all, is enough; null for degree 0."""
+    symmetries: list[str]
+    """Symmetries that change the unknown and leave every output unchanged, in words; empty for schemes."""
+    assumptions: list[Assumption]
+    """Assumptions of the verdict, each with the verdicts without it."""
+    remedies: list[Improvement]
+    """Changes that make the unknown observable, or lower its degree, each tried by the exact engine. In order of cost: a value known,
+    one more position, one more output, another carry, two changes; those of one kind by the degree that they lead to. Two changes are
+    listed only if no single one makes the unknown observable.
+    """
+    not_explained: list[str]
+    """Parts of the explanation that are missing and changes that were not tried, one sentence each; empty if there are none."""
+    verdicts: int
+    """Number of changed schemes or models that the exact engine judged."""
+
+
 class Locus(Record):
     """Condition on generic angles, and its effect on the verdicts."""
 
@@ -883,6 +1007,8 @@ class Analysis(Shape):
     """
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
+    why: list[Why]
+    """Explanations of the verdicts that `--why` names; left out without it."""
     degenerate_loci: list[Locus] | None
     """Conditions on generic angles under which a verdict changes; null if they were not computed."""
     degenerate_loci_incomplete: str | None
@@ -1109,6 +1235,8 @@ class SystemAnalysis(Shape):
     """Sides of the branches of abs and sign on which the verdicts hold."""
     to_resolve: Remedies
     """Changes that make the unobservable unknowns observable."""
+    why: list[Why]
+    """Explanations of the verdicts that `--why` names; left out without it."""
     note: str | None
     """Reason why solving expressions were not sought, or not all of them; null otherwise."""
     solution_maps: list[str]
@@ -1962,6 +2090,159 @@ class Sensors(Shape):
     """Bound on the probability that the degrees of a judged set are wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None
     """Margin of the rank decisions on all candidates together, in real numbers; null for a model judged in prime fields."""
+    seed: int
+    """Seed of all random choices."""
+
+
+class Standing(Record):
+    """State of the required coefficients."""
+
+    __slots__ = ()
+
+    not_observable: list[str]
+    """Required coefficients that neither the samples nor prior knowledge determine."""
+    worst_degree: int | None
+    """Largest observable degree of a required coefficient; null if one has none."""
+    requirements: Requirements
+    """Outcome of the requirements."""
+    worst: Worst | None
+    """Largest sigma (with a bench: total uncertainty) of the determined required drift coefficients; null if none is determined."""
+    total_s: float
+    """Duration of all positions and slews, in s."""
+
+
+class AddedPosition(Record):
+    """Position that is added to a scheme."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the position in the extended scheme."""
+    candidate: str
+    """Candidate: directions of X_p, Y_p and Z_p, angles, or a name."""
+    angles: str
+    """Euler angles alpha, beta, gamma in degrees, as text."""
+    half_turn_about: tuple[float, float, float] | None
+    """Axis of the half turn to the position: dimensionless components North, Up, East; left out for other turns, and if slews take no
+    time.
+    """
+
+
+class Extension(Record):
+    """Extension of a scheme by one or two positions."""
+
+    __slots__ = ()
+
+    positions: list[AddedPosition]
+    """Added positions, in order."""
+    resolves: list[Resolved]
+    """Required coefficients that become observable, with their degrees."""
+    lowers: list[Resolved]
+    """Required coefficients whose degree becomes lower, with the new degrees."""
+    then: Standing
+    """State with the added positions."""
+
+
+class Quickest(Record):
+    """Shortest run that meets the requirements."""
+
+    __slots__ = ()
+
+    positions: list[AddedPosition]
+    """Positions of the run, in order."""
+    dwell_s: float
+    """Dwell at each position, in s, in whole seconds."""
+    total_s: float
+    """Duration of the run with its slews, in s."""
+
+
+class Requalification(Record):
+    """Requalification after a number of days: runs that meet the requirements again."""
+
+    __slots__ = ()
+
+    days: float
+    """Number of days since the calibration."""
+    before: Standing
+    """State of the aged coefficients without a measurement."""
+    fewest: int | None
+    """Smallest number of positions with the stated dwell that meets every requirement: 0 if they are met without a measurement; null if
+    no extension by up to `added` positions meets them.
+    """
+    best: Extension | None
+    """Best extension with the fewest positions; null if `fewest` is 0 or null."""
+    quickest: Quickest | None
+    """Shortest run of up to `added` positions, with an equal dwell at each, that meets every requirement; null if `fewest` is 0, or if
+    no run meets them with 16 times the stated dwell.
+    """
+    examined: int
+    """Number of extensions compared: all by the candidates."""
+
+
+class Meeting(Record):
+    """Shortest dwell that meets the requirements."""
+
+    __slots__ = ()
+
+    dwell_s: float
+    """Dwell at each added position, in s, in whole seconds."""
+    total_s: float
+    """Duration of all positions and slews with this dwell, in s."""
+
+
+class NextPositions(Shape):
+    """Positions by which a scheme gains most."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.next/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    carry: Carry
+    """Carry: quantity that continues from one position to the next."""
+    geometry: Geometry
+    """Mounting of the gyros and accelerometers."""
+    terms: str
+    """Unknown terms of the gyro model."""
+    positions: list[str]
+    """Positions of the scheme before the added ones; empty after a calibration."""
+    after_calibration: bool
+    """True if the covariance of a calibration is known beforehand: the added positions are a run of their own."""
+    days: float | None
+    """Number of days of ageing since the calibration; null without ageing."""
+    ageing: dict[str, float] | None
+    """Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day)."""
+    schedule: list[Requalification]
+    """Requalification after each requested number of days; left out without days."""
+    candidates: list[str]
+    """Candidates for the added positions, within the gimbal limits."""
+    beyond_gimbals: list[str]
+    """Candidates beyond the gimbal limits."""
+    added: int
+    """Number of added positions."""
+    required: list[str]
+    """Coefficients that must be observable and are compared."""
+    conditions: MeasurementReport
+    """Conditions of the measurement."""
+    before: Standing | None
+    """State before the added positions; null for a scheme without positions."""
+    found: list[Extension]
+    """Best extensions, best first."""
+    as_good: int
+    """Number of extensions as good as the first, including the first."""
+    meets: Meeting | None
+    """Shortest dwell, equal at all positions of the first extension, with which every requirement is met; null without requirements, or
+    if no dwell up to 16 times the stated one meets them.
+    """
+    examined: int
+    """Number of extensions compared."""
+    proven: bool
+    """True if every extension by the candidates was compared, so that the first is the best of all."""
+    interrupted: bool
+    """True if the comparison was stopped early."""
+    not_judged: list[str]
+    """Requirements on unknowns outside `required`: this answer does not judge them."""
+    error_bound: float
+    """Bound on the probability that the verdicts of one extension are wrong."""
     seed: int
     """Seed of all random choices."""
 

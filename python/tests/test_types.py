@@ -73,6 +73,13 @@ def answers() -> Iterator[obsdeg.Answer]:
     parts = [obsdeg.design(4, observable="D_F", carry="inertial", part=(i, 2)) for i in (1, 2)]
     yield obsdeg.design(4, observable="D_F", carry="inertial", merge=parts)
     yield obsdeg.design(4, observable="D_F", carry="inertial", bench={"K0": 20})
+    yield obsdeg.analyze(angles=PAPER, why=["D_FZ", "D_FY"])
+    yield obsdeg.analyze("examples/sir/model.toml", why="k")
+    one = obsdeg.Scheme(["NUE"], carry="inertial", latitude=48)
+    yield obsdeg.next_measurement(one, candidates=obsdeg.Scheme(["NDW"]), slew_rate=2)
+    bench_day = obsdeg.calibrate("examples/bench-day/scheme.toml", "examples/bench-day/record.csv")
+    storage = "examples/year-of-storage/scheme.toml"
+    yield obsdeg.next_measurement(storage, candidates=obsdeg.Scheme(["NUE", "USE", "NWU", "DNE"]), after=bench_day, days=[30, 365])
 
 
 def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Iterator[str]:
@@ -168,11 +175,14 @@ def said(command: str) -> set[str]:
 @pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report"])
 def test_options_are_those_of_the_commands(command: str) -> None:
     mine = set(getattr(options, command.title()).__annotations__)
-    files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume"}
+    files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume", "after"}
     named = {"positions", "candidates", "part"} if command == "design" else set()
     if command == "design":
         # `measure` uses the same command with a model
         named |= {"measure", "own_outputs", *options.Measure.__annotations__}
+        # and `next_measurement` with a scheme
+        named |= {"next", "days"}
+        assert set(options.NextMeasurement.__annotations__) <= mine
     assert mine | named == said(command) - files
 
 

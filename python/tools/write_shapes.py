@@ -23,6 +23,7 @@ SCHEMAS = [
     "design",
     "walks",
     "sensors",
+    "next",
     "part",
     "simulation",
     "system-run",

@@ -68,6 +68,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "axes" => &["accelerometers", "gyros", "body", "x"],
         "path" => &["one-axis", "gimbals", "x"],
         "max-turn" => &["90", "180", "0.001", "0", "x"],
+        "why" => &["D_FX", "psi_y", "x", "nothing", ""],
+        "next" => &["1", "2", "3", "x"],
         "combination" => &[
             "D_IX - D_IY",
             "psi_y + D_FX",
@@ -310,7 +312,7 @@ fn record() -> String {
 /// With a model, an option either concerns models or is refused; no option is ignored.
 #[test]
 fn a_model_refuses_what_is_about_schemes() {
-    const TAKEN: [&str; 16] = [
+    const TAKEN: [&str; 17] = [
         "ascii",
         "certificate",
         "count-limit",
@@ -326,6 +328,7 @@ fn a_model_refuses_what_is_about_schemes() {
         "solutions",
         "symbolic-limit",
         "table",
+        "why",
         "work-limit",
     ];
     let folder = folder();
@@ -382,8 +385,10 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     let mut out = vec![command.to_string()];
     // one `design` in four selects outputs of a model
     let of_model = command == "design" && rng.below(4) == 0;
+    let of_next = command == "design" && rng.below(6) == 0;
     let always: &[&str] = match command {
         "design" if of_model => &["measure"],
+        "design" if of_next => &["next", "step"],
         "design" => &["positions", "restarts", "step"],
         "report" => &["output", "runs"],
         _ => &[],
@@ -408,6 +413,9 @@ fn line(command: &str, options: &BTreeMap<String, bool>, rng: &mut SplitMix64) -
     out.extend((0..several.min(operands.len())).map(|_| pick(rng, operands)));
     if of_model {
         out.push(pick(rng, &["m.toml", "m.toml", "s.toml"]));
+    }
+    if of_next && !of_model {
+        out.push(pick(rng, &["s.toml", "t.toml", "m.toml"]));
     }
     if command == "calibrate" {
         out.push(pick(rng, &["r.csv", "-", "none.csv"]));

@@ -6,13 +6,13 @@ use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, each with the largest number of lines of its `-h`.
 const COMMANDS: [(&str, usize); 14] = [
-    ("analyze", 50),
+    ("analyze", 51),
     ("simulate", 65),
     ("crosscheck", 70),
     ("calibrate", 51),
     ("allan", 24),
     ("compare", 46),
-    ("design", 79),
+    ("design", 83),
     ("report", 60),
     ("paper", 18),
     ("verify", 15),

@@ -54,6 +54,7 @@ mod solutions;
 mod structure;
 mod validator;
 mod whole_platform;
+mod why;
 mod workbench;
 mod workbench_links;
 mod workbench_page;

@@ -16,9 +16,9 @@ use crate::models::models;
 /// Seed of the verdicts, different from that of the remedies.
 const SEED: u64 = 7;
 
-type Degrees = Vec<(String, Option<usize>)>;
+pub(crate) type Degrees = Vec<(String, Option<usize>)>;
 
-fn degree(all: &Degrees, name: &str) -> Option<usize> {
+pub(crate) fn degree(all: &Degrees, name: &str) -> Option<usize> {
     all.iter().find(|q| q.0 == name).and_then(|q| q.1)
 }
 
@@ -88,7 +88,7 @@ fn unit(field: &Field, column: usize, columns: usize) -> Vec<u64> {
 }
 
 /// Degrees of a scheme with some known values, from its derivative rows.
-fn degrees_of_scheme(scheme: &Scheme, known: &[&str]) -> Degrees {
+pub(crate) fn degrees_of_scheme(scheme: &Scheme, known: &[&str]) -> Degrees {
     let platform = Platform::new(scheme.clone()).expect("a scheme");
     let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(SEED)).expect("a field");
     let sample = values.sample(platform.scheme(), 1);
@@ -116,7 +116,7 @@ fn degrees_of_scheme(scheme: &Scheme, known: &[&str]) -> Degrees {
 }
 
 /// The scheme with the changes of a remedy, written and read again, and the names of the known values.
-fn changed_scheme<'a>(scheme: &Scheme, changes: &'a [Change]) -> (Scheme, Vec<&'a str>) {
+pub(crate) fn changed_scheme<'a>(scheme: &Scheme, changes: &'a [Change]) -> (Scheme, Vec<&'a str>) {
     let mut text = scheme_file::write(scheme);
     let mut known = Vec::new();
     for change in changes {
@@ -135,7 +135,7 @@ fn changed_scheme<'a>(scheme: &Scheme, changes: &'a [Change]) -> (Scheme, Vec<&'
     (scheme_file::read(&text).unwrap_or_else(|e| panic!("{e:?}\n{text}")), known)
 }
 
-fn judged_scheme(scheme: &Scheme) -> (Remedies, Degrees) {
+pub(crate) fn judged_scheme(scheme: &Scheme) -> (Remedies, Degrees) {
     let options = AnalysisOptions { seed: SEED, solutions: false, ..AnalysisOptions::default() };
     let a = analyze(scheme, options, None).expect("an analysis");
     (a.to_resolve, a.quantities.into_iter().map(|q| (q.name, q.degree)).collect())
@@ -173,7 +173,7 @@ fn of_scheme(scheme: &Scheme) -> Vec<String> {
 }
 
 /// Random scheme of one to four positions.
-fn random_scheme(rng: &mut SplitMix64) -> Scheme {
+pub(crate) fn random_scheme(rng: &mut SplitMix64) -> Scheme {
     fn pick<'a>(rng: &mut SplitMix64, list: &[&'a str]) -> &'a str {
         list[rng.below(list.len() as u64) as usize]
     }
@@ -223,7 +223,7 @@ fn remedies_of_500_random_schemes_are_true() {
 }
 
 /// JSON of a model with the changes of a remedy.
-fn changed_model(model: &Value, changes: &[Change]) -> String {
+pub(crate) fn changed_model(model: &Value, changes: &[Change]) -> String {
     let mut model = model.clone();
     let has = |model: &Value, key: &str, name: &str| {
         model[key].as_array().is_some_and(|list| list.iter().any(|x| x == name))
@@ -263,7 +263,7 @@ fn changed_model(model: &Value, changes: &[Change]) -> String {
     model.to_string()
 }
 
-fn judged_model(text: &str) -> Degrees {
+pub(crate) fn judged_model(text: &str) -> Degrees {
     let model = json::read(text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let judged = judge(&model, SEED, None).expect("a verdict");
     let names = judged.layout.unknowns.iter().enumerate().filter(|(c, _)| judged.shown(&model, *c));
@@ -317,7 +317,7 @@ fn a_search_for_symmetries_leaves_work_for_changes() {
     }
 }
 
-fn p1_p2() -> Scheme {
+pub(crate) fn p1_p2() -> Scheme {
     scheme_file::read("[[position]]\nattitude = \"NUE\"\n[[position]]\nattitude = \"NDW\"\n")
         .expect("a scheme")
 }

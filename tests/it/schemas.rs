@@ -8,7 +8,7 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// Kinds of `obsdeg schema`.
-const KINDS: [&str; 20] = [
+const KINDS: [&str; 21] = [
     "allan",
     "analysis",
     "audit",
@@ -19,6 +19,7 @@ const KINDS: [&str; 20] = [
     "design",
     "model",
     "model-certificate",
+    "next",
     "optimum-certificate",
     "part",
     "scheme",
@@ -135,6 +136,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["design", "--minimum"],
         &["design", "examples/lotka-volterra/model.toml", "--measure", "states, parameters"],
         &["design", "--minimum", "--terms", "gyros", "--carry", "inertial"],
+        &["design", five, "--next", "1"],
     ] {
         answer(&json(&[line, &["--format", "json"]].concat()), &line.join(" "));
     }

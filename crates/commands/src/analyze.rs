@@ -8,8 +8,10 @@ use obsdeg_core::certificate::{CertificateError, certify, certify_model};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{
-    COUNT_LIMIT, RELATION_LIMIT, ReducedError, SystemAnalysis, SystemOptions, analyze_system, reduced,
+    COUNT_LIMIT, RELATION_LIMIT, ReducedError, SystemAnalysis, SystemOptions, analyze_system, explain_system,
+    reduced,
 };
+use obsdeg_core::why::no_unknown;
 use obsdeg_evidence::simulation::{Conditions, SchemeAnalysis, sensitivities};
 use obsdeg_report::{Answer, Document, File, Several, Table};
 use serde::{Deserialize, Serialize};
@@ -75,6 +77,11 @@ pub struct Analyze {
     #[arg(long, help_heading = "Solutions")]
     pub sensitivities: bool,
 
+    /// Explain the verdict on an unknown: what decides it, which assumptions it rests on, and the changes
+    /// that make it observable or lower its degree, in order of cost, each tried; repeatable
+    #[arg(long, value_name = "NAME", help_heading = "Solutions")]
+    pub why: Vec<String>,
+
     /// True if `certificate.json` is among the files of the answer; on the command line `--certificate` names
     /// the file.
     #[arg(skip)]
@@ -102,6 +109,7 @@ impl Default for Analyze {
             formulas: false,
             omitted: true,
             sensitivities: false,
+            why: Vec::new(),
             certificate: false,
             reduced: false,
         }
@@ -303,9 +311,15 @@ pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
     Ok(Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
+/// Error of `--why` with a name that is not an unknown.
+fn not_an_unknown(name: &str, unknowns: Vec<String>) -> Problem {
+    Problem::input(format!("--why: {}", no_unknown(name, &unknowns)))
+}
+
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
     let &Analyze { seed, solutions, formulas, frame, omitted, count_limit, relation_limit, order, .. } =
         options;
+    let why = &options.why;
     Ok(match input {
         Input::Scheme(scheme) => {
             // a record that cannot be predicted is an error before anything is solved
@@ -315,7 +329,12 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
                 .transpose()?;
             let options = AnalysisOptions { seed, solutions, formulas, frame, omitted };
             let worker = host.worker.as_deref_mut();
-            let verdicts = obsdeg_core::analysis::analyze(scheme, options, worker)?;
+            let mut verdicts = obsdeg_core::analysis::analyze(scheme, options, worker)?;
+            for name in why {
+                let found = obsdeg_core::analysis::explain(scheme, &verdicts, name, seed)?;
+                let names = verdicts.quantities.iter().map(|q| q.name.clone());
+                verdicts.why.push(found.ok_or_else(|| not_an_unknown(name, names.collect()))?);
+            }
             Judged::Scheme(Box::new(SchemeAnalysis { verdicts, sensitivities: of_record }))
         }
         Input::Model(file) => {
@@ -323,7 +342,13 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             let relation_limit = relation_limit.unwrap_or(RELATION_LIMIT);
             let order = order.map(Into::into);
             let options = SystemOptions { seed, solutions, count_limit, relation_limit, order };
-            let found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
+            let mut found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
+            for name in why {
+                let explained = explain_system(&file.model, &found, name, options);
+                let explained = explained.map_err(|e| file.wrong(&e))?;
+                let names = found.quantities.iter().map(|q| q.name.clone());
+                found.why.push(explained.ok_or_else(|| not_an_unknown(name, names.collect()))?);
+            }
             Judged::Model(Box::new(found))
         }
     })

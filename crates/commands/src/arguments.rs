@@ -21,7 +21,7 @@ use crate::text;
 pub(crate) const SEED: u64 = 1;
 
 /// Options that concern a model as well as a scheme.
-const OF_BOTH: [&str; 19] = [
+const OF_BOTH: [&str; 20] = [
     "files",
     "scheme",
     "model",
@@ -35,6 +35,7 @@ const OF_BOTH: [&str; 19] = [
     "format",
     "table",
     "certificate",
+    "why",
     "ascii",
     "output",
     "force",

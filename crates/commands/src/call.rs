@@ -274,6 +274,7 @@ fn answered<W: OutputForm>(
                 Designed::Schemes(found) => W::whole(*found, true, |f| f.files()),
                 Designed::Walks(found) => W::whole(*found, true, |f| Ok(f.files())),
                 Designed::Outputs(found) => W::whole(*found, true, none),
+                Designed::Next(found) => W::whole(*found, true, none),
                 Designed::Part(part) => {
                     let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
                     W::text(json + "\n", part.complete)

@@ -14,6 +14,7 @@ use obsdeg_design::design::{
     WalkOptions, Walks, asked as asked_conditions, certify_optimum, check_certifiable, design_merged,
     design_part, is_walk, scheme_found, scheme_of_walk, walks,
 };
+use obsdeg_design::next::{NextOptions, NextPositions};
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
@@ -25,6 +26,7 @@ use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_
 use crate::conditions::{MeasurementOptions, within};
 use crate::host::{Host, Now};
 use crate::measure::{MeasureOptions, SetRequirements, measured};
+use crate::next::{FurtherOptions, calibrated, check_further, further};
 use crate::problem::Problem;
 use crate::source::Source;
 use crate::text;
@@ -56,7 +58,7 @@ const CRITERIA: [Word<CriterionName>; 5] = [
 
 /// Request of `design`: candidates, requirements, criterion and limits of the search.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
-#[command(group(ArgGroup::new("asked").args(["positions", "minimum"])))]
+#[command(group(ArgGroup::new("asked").args(["positions", "minimum", "next"])))]
 #[serde(default)]
 pub struct Search {
     /// Seed of all random choices; the result does not depend on the number of threads
@@ -160,6 +162,11 @@ pub struct Search {
     #[command(flatten)]
     #[serde(flatten)]
     pub outputs: MeasureOptions,
+
+    /// Of a scheme: what is added to its positions.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub further: FurtherOptions,
 }
 
 /// Requirements on a scheme: observable coefficients, degrees, immunity, criterion, times, gimbals.
@@ -238,6 +245,7 @@ impl Default for Search {
             wanted: WantedOptions::default(),
             measurement: MeasurementOptions::default(),
             outputs: MeasureOptions::default(),
+            further: FurtherOptions::default(),
         }
     }
 }
@@ -297,6 +305,8 @@ pub struct SearchFiles {
     pub merge: Vec<Source>,
     /// Interrupted part that is continued.
     pub resume: Option<Source>,
+    /// The calibration after which further positions are sought.
+    pub after: Option<Source>,
 }
 
 /// Result of a search.
@@ -311,6 +321,8 @@ pub enum Designed {
     Part(Box<Part>),
     /// Sets of outputs of a model.
     Outputs(Box<Sensors>),
+    /// Further positions of a scheme.
+    Next(Box<NextPositions>),
 }
 
 /// Found schemes, with the base scheme and the conditions of the search.
@@ -381,6 +393,9 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     if let Some(found) = of_model(a, files, host)? {
         return Ok(Designed::Outputs(Box::new(found)));
     }
+    if a.further.next.is_some() || files.after.is_some() {
+        return Ok(Designed::Next(Box::new(next_positions(a, files, host)?)));
+    }
     let asked = known(a, files)?;
     let files = &SearchFiles { merge: files.merge.clone(), ..asked.files(files) };
     let a = &asked.options;
@@ -407,29 +422,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
     a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
     a.check.map_or(Ok(()), |blocks| check_whole("--check", blocks, &CHECKED))?;
-    let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
-    if let Some(file) = &files.conditions_file {
-        base = file.scheme()?;
-        // a dwell that all positions share becomes the default dwell of the scheme
-        let mut dwells = base.positions.iter().map(|p| p.dwell.map(|d| d.seconds()));
-        let first = dwells.next().flatten();
-        if base.simulation.dwell_s.is_none() && dwells.all(|d| d == first) {
-            base.simulation.dwell_s = first;
-        }
-    }
-    a.assumptions.apply(&mut base);
-    if let Some(terms) = a.terms.unknowns()? {
-        base.unknowns = terms;
-    }
-    for limit in &a.wanted.gimbal {
-        base.gimbals.limit(limit).map_err(|e| Problem::input(format!("--gimbal: {e}")))?;
-    }
-    // the options concern unknowns that every position has
-    let any = std::array::from_fn(|_| Angle::from_degrees(0));
-    let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
-    a.measurement.concern(std::iter::once(&with_any))?;
-    let mut conditions = a.measurement.conditions(&base);
-    conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
+    let (base, candidates, conditions) = assumed(a, files)?;
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let round = a.round.as_deref().unwrap_or("5");
     let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
@@ -491,6 +484,55 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         a.certificate.then(|| proof(&base, &conditions, &options, &found, &progress)).transpose()?;
     let conditions = asked_conditions(&base, &conditions, &options.required)?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
+}
+
+/// Further positions of the scheme in a file.
+fn next_positions(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<NextPositions, Problem> {
+    let of_parts = !files.merge.is_empty() || files.resume.is_some();
+    let given = stated(a)?;
+    let names: Vec<&str> = given.keys().map(String::as_str).chain(of_parts.then_some("merge")).collect();
+    let added = check_further(&a.further, &names, files.conditions_file.is_some(), files.after.is_some())?;
+    let (base, candidates, conditions) = assumed(a, files)?;
+    let options = NextOptions {
+        candidates,
+        added,
+        required: a.wanted.observable.clone(),
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        keep: a.keep.unwrap_or(10).into(),
+        beforehand: files.after.as_ref().map(calibrated).transpose()?,
+        days: a.further.days.clone(),
+        seed: a.seed,
+    };
+    further(&base, &conditions, &options, host)
+}
+
+/// Scheme with the assumptions of the search, candidates, and conditions.
+fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candidates, Conditions), Problem> {
+    let (mut base, candidates) = candidates(&a.candidates, files.candidates_file.as_ref())?;
+    if let Some(file) = &files.conditions_file {
+        base = file.scheme()?;
+        // a dwell that all positions share becomes the default dwell of the scheme
+        let mut dwells = base.positions.iter().map(|p| p.dwell.map(|d| d.seconds()));
+        let first = dwells.next().flatten();
+        if base.simulation.dwell_s.is_none() && dwells.all(|d| d == first) {
+            base.simulation.dwell_s = first;
+        }
+    }
+    a.assumptions.apply(&mut base);
+    if let Some(terms) = a.terms.unknowns()? {
+        base.unknowns = terms;
+    }
+    for limit in &a.wanted.gimbal {
+        base.gimbals.limit(limit).map_err(|e| Problem::input(format!("--gimbal: {e}")))?;
+    }
+    // the options concern unknowns that every position has
+    let any = std::array::from_fn(|_| Angle::from_degrees(0));
+    let with_any = Scheme { positions: Scheme::of_angles([any]).positions, ..base.clone() };
+    a.measurement.concern(std::iter::once(&with_any))?;
+    let mut conditions = a.measurement.conditions(&base);
+    conditions.slew_rate_deg_s = a.wanted.slew_rate.or(conditions.slew_rate_deg_s);
+    Ok((base, candidates, conditions))
 }
 
 /// Options that a search for outputs of a model takes.
@@ -570,6 +612,7 @@ impl Asked {
             candidates_file: given.candidates_file.clone().or_else(|| self.candidates_file.clone()),
             merge: Vec::new(),
             resume: given.resume.clone(),
+            after: None,
         }
     }
 }

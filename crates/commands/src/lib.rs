@@ -25,6 +25,7 @@ mod crosscheck;
 mod design;
 mod host;
 mod measure;
+mod next;
 mod paper;
 mod problem;
 mod report;
@@ -45,6 +46,7 @@ pub use design::{
 };
 pub use host::{Host, Now};
 pub use measure::MeasureOptions;
+pub use next::FurtherOptions;
 pub use paper::{Paper, paper};
 pub use problem::{Kind, Place, Problem};
 pub use report::{CalibrationFile, Report, Reviewed, origin, report};

@@ -49,3 +49,4 @@ pub mod omitted;
 pub mod remedies;
 pub mod solution;
 pub mod system;
+pub mod why;

@@ -168,6 +168,49 @@ impl<S: Scalars> Directions<S> {
         open.iter().copied().filter(resolved).collect()
     }
 
+    /// Unknowns of an unobservable direction of minimal support that changes the unknown `column`, which
+    /// comes first. Several orders are tried, and the shortest direction is returned. `None` if no direction
+    /// changes the unknown. As many other unknowns as possible are held still, until one direction remains.
+    pub(crate) fn shortest(&self, column: usize) -> Option<Vec<usize>> {
+        let forward: Vec<usize> = (0..self.units.len()).filter(|&c| c != column).collect();
+        let shift = forward.len() / 2;
+        let turned = [&forward[shift..], &forward[..shift]].concat();
+        let backward = |list: &[usize]| list.iter().rev().copied().collect::<Vec<_>>();
+        let orders = [forward.clone(), backward(&forward), turned.clone(), backward(&turned)];
+        let of = |order: Vec<usize>| self.support_through(column, &order);
+        orders.into_iter().filter_map(of).min_by_key(Vec::len)
+    }
+
+    fn support_through(&self, column: usize, order: &[usize]) -> Option<Vec<usize>> {
+        let mut still = <S::Space as RowSpace>::new(self.field.clone(), self.count);
+        if still.contains(&self.units[column]) {
+            return None;
+        }
+        for &c in order.iter().filter(|_| self.count > 1) {
+            if still.contains(&self.units[c]) {
+                continue;
+            }
+            let mut more = still.clone();
+            more.insert(&self.units[c]);
+            if !more.contains(&self.units[column]) {
+                still = more;
+            }
+        }
+        let mut rest: Vec<usize> =
+            order.iter().copied().filter(|&c| !still.contains(&self.units[c])).collect();
+        rest.sort_unstable();
+        Some(std::iter::once(column).chain(rest).collect())
+    }
+
+    /// True if the set is the support of an unobservable direction of minimal support: with all other
+    /// unknowns held still, one direction remains, and it changes every unknown of the set.
+    pub(crate) fn is_support(&self, set: &[usize]) -> bool {
+        let mut still = <S::Space as RowSpace>::new(self.field.clone(), self.count);
+        let others = (0..self.units.len()).filter(|c| !set.contains(c));
+        others.for_each(|c| _ = still.insert(&self.units[c]));
+        still.rank() + 1 == self.count && set.iter().all(|&c| !still.contains(&self.units[c]))
+    }
+
     /// Tries pairs of one candidate of `left` and one of `right` (of one list if `right` is missing), the
     /// pair that resolves most open unknowns first. `judge` receives their indices and returns the unknowns
     /// that the engine finds resolved, or `None` at the end of its work. Returns false if candidates were
@@ -221,5 +264,29 @@ impl<S: Scalars> Information<S> {
             space.insert(other.space.row(k));
         });
         Self { space, given: [self.given.as_slice(), &other.given].concat() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_exact::{Echelon, Field};
+
+    use super::*;
+
+    /// x0 + x1 + x2 and x2 + x3 are observable: directions (1,-1,0,0), (1,0,-1,1), (0,1,-1,1).
+    #[test]
+    fn directions_of_minimal_support_by_hand() {
+        let f = Field::new((1 << 60) + 33);
+        let mut space = Echelon::new(f, 5);
+        space.insert(&[1, 1, 1, 0, 0]);
+        space.insert(&[0, 0, 1, 1, 0]);
+        let directions = Directions::of(f, &space);
+        assert_eq!(directions.shortest(0), Some(vec![0, 1]));
+        assert_eq!(directions.shortest(3).map(|s| s.len()), Some(3));
+        assert_eq!(directions.shortest(4), Some(vec![4]));
+        assert!(directions.is_support(&[0, 1]) && directions.is_support(&[2, 1, 3]));
+        assert!(!directions.is_support(&[0, 1, 2, 3]) && !directions.is_support(&[0, 2]));
+        space.insert(&[1, 0, 0, 0, 0]);
+        assert_eq!(Directions::of(f, &space).shortest(0), None);
     }
 }

@@ -13,9 +13,10 @@
 //! ```
 //!
 //! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information
-//! of their samples. [`sensors`] chooses outputs of a model. [`review`] gathers verdicts, a run,
-//! evidence, sweeps and alternatives for a report.
+//! of their samples. [`next`] chooses further positions of a scheme, [`sensors`] outputs of a model.
+//! [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
 
 pub mod design;
+pub mod next;
 pub mod review;
 pub mod sensors;

@@ -7,7 +7,7 @@ use obsdeg_core::solution::Formula;
 use obsdeg_evidence::simulation::SchemeAnalysis;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
-use crate::{Answer, gimbals, latex, omitted, resolve, stated, words};
+use crate::{Answer, gimbals, latex, omitted, resolve, stated, why, words};
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
@@ -140,7 +140,9 @@ impl Answer for Analysis {
 
     fn document(&self) -> Document {
         let [unknowns, combinations] = verdicts(self);
-        let mut blocks = vec![positions(&self.positions), unknowns];
+        let mut blocks = vec![positions(&self.positions)];
+        blocks.extend(why::blocks(&self.why));
+        blocks.push(unknowns);
         blocks.extend((!self.combinations.is_empty()).then_some(combinations));
         blocks.extend(Block::list_if_any(words::ACCURACY, words::accuracy(self)));
         blocks.extend(Block::formulas(

@@ -29,6 +29,7 @@ mod gimbals;
 mod html;
 mod latex;
 mod markdown;
+mod next;
 mod omitted;
 mod panels;
 #[cfg(feature = "pdf")]
@@ -50,6 +51,7 @@ mod tables;
 mod vector;
 mod visible;
 mod walks;
+mod why;
 mod words;
 
 pub use budget::budget_csv;

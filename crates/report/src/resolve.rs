@@ -324,7 +324,7 @@ impl<'a> RemedyGroup<'a> {
 
 /// Changes that are made together, in the imperative: `add a position NWU and one USE`. Added positions have
 /// no numbers, since lines are alternatives.
-fn changes(list: &[Change]) -> String {
+pub(crate) fn changes(list: &[Change]) -> String {
     let mut before = "";
     let mut one = |c: &Change| {
         let (verb, what) = match c {

@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
 use crate::document::{Block, Document, Typeset, left, number, right};
-use crate::{Answer, latex, resolve, words};
+use crate::{Answer, latex, resolve, why, words};
 
 /// Length in bytes up to which a solving expression is printed.
 const READABLE: usize = 240;
@@ -171,7 +171,8 @@ impl Answer for SystemAnalysis {
         let mut columns = vec![left("unknown"), left("kind")];
         columns.extend(units.then(|| left("unit")));
         columns.extend([left("status"), right("degree"), left("explanation")]);
-        let mut blocks = vec![Block::table("Verdicts", columns, rows)];
+        let mut blocks = why::blocks(&self.why);
+        blocks.push(Block::table("Verdicts", columns, rows));
         let solved = order.iter().filter_map(|q| {
             let solution = q.solution.as_ref()?;
             let (text, latex) = match solution.len() {

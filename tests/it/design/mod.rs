@@ -8,6 +8,7 @@ mod correlated;
 mod divide;
 mod free;
 mod gimbals;
+mod next;
 mod orders;
 mod part_edits;
 mod parts;

@@ -7,6 +7,7 @@ mod platform;
 mod tex;
 mod text;
 mod value;
+mod why;
 
 use std::collections::BTreeMap;
 

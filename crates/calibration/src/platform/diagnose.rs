@@ -47,9 +47,9 @@ pub(crate) struct MeasurementResidual {
     pub free: f64,
     /// Difference from the prediction by all other measurements, normalised.
     pub normalised: f64,
-    /// Innovation: difference from the prediction by the measurements before it, normalised. With a right model
-    /// innovations are independent unit normals, also after an estimate from the same record; nearly zero if
-    /// the measurements before it do not predict it.
+    /// Innovation: difference from the prediction by the measurements before it, normalised. With a right
+    /// model innovations are independent unit normals, also after an estimate from the same record; nearly
+    /// zero if the measurements before it do not predict it.
     pub innovation: f64,
 }
 
@@ -112,7 +112,7 @@ impl Diagnosed {
             let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
             let each = smoothed.left_out.iter().zip(variances).zip(keys).zip(&whitened);
             for (((left, r_of), key), innovation) in each {
-                out.all.push(Left {
+                out.all.push(MeasurementResidual {
                     run: r,
                     key: *key,
                     residual: r_of * left.u,
@@ -153,7 +153,7 @@ impl Diagnosed {
     }
 
     /// Sum of squares and degrees of freedom of some measurements.
-    pub(super) fn sums(&self, of: impl Fn(&Left) -> bool) -> (f64, f64) {
+    pub(super) fn sums(&self, of: impl Fn(&MeasurementResidual) -> bool) -> (f64, f64) {
         let some = self.all.iter().filter(|l| of(l));
         some.fold((0.0, 0.0), |(chi, free), l| (chi + l.square(), free + l.free))
     }

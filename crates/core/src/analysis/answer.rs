@@ -16,6 +16,9 @@ use crate::solution::loci::Locus;
 use crate::solution::print::{SolutionTerm, StationLabel};
 use crate::solution::solve::{FoundBy, Solved, Verification};
 use crate::solution::solver::Frame;
+use crate::why::Why;
+
+pub use crate::why::Component;
 
 /// Analysis of one scheme: verdicts, solutions and remedies.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -60,6 +63,9 @@ pub struct Analysis {
     pub omitted: Option<OmittedVerdicts>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
+    /// Explanations of the verdicts that `--why` names; left out without it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub why: Vec<Why>,
     /// Conditions on generic angles under which a verdict changes; null if they were not computed.
     pub degenerate_loci: Option<Vec<Locus>>,
     /// Reason why `degenerate_loci` may lack some, or was not computed although angles are generic; null if
@@ -190,15 +196,6 @@ pub struct CombinationReport {
     pub accuracy_order: Option<usize>,
     /// Solving expression of the combination; null if there is none.
     pub solution: Option<Solution>,
-}
-
-/// Component of a null vector.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Component {
-    /// Name of the unknown, as in the model.
-    pub name: String,
-    /// Coefficient of the unknown in the null vector; null if it was not computed.
-    pub coefficient: Option<String>,
 }
 
 /// Verdicts of the scheme under another carry.

@@ -3,10 +3,12 @@
 mod answer;
 mod carries;
 mod remedies;
+mod why;
 
 use obsdeg_symbolic::{Worker, WorkerError};
 
 pub use answer::*;
+pub use why::explain;
 
 pub use crate::findings::AnalysisError;
 
@@ -28,7 +30,7 @@ use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
 use crate::solution::loci::{DegenerateLoci, loci};
 use crate::solution::print::{StationLabel, stations, terms, text};
-use crate::solution::solver::{Frame, Functional, Solver};
+use crate::solution::solver::{Frame, Functional, Solver, Sparse};
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.analysis/1";
@@ -139,6 +141,7 @@ pub fn analyze(
         carries,
         omitted,
         to_resolve,
+        why: Vec::new(),
         degenerate_loci: found.loci,
         degenerate_loci_incomplete: incomplete_loci,
         formulas,
@@ -245,9 +248,14 @@ fn combination_report(c: &CombinationFinding, printer: &mut Printer<'_>) -> Comb
 }
 
 fn null_report(platform: &Platform, v: &NullVector) -> Vec<Component> {
+    components(platform, &v.support, v.components.as_ref())
+}
+
+/// The components of a null vector by name, with their coefficients where these were computed.
+fn components(platform: &Platform, support: &[usize], found: Option<&Sparse>) -> Vec<Component> {
     let name = |c: usize| platform.names()[c].clone();
-    let Some(components) = &v.components else {
-        return v.support.iter().map(|&c| Component { name: name(c), coefficient: None }).collect();
+    let Some(components) = found else {
+        return support.iter().map(|&c| Component { name: name(c), coefficient: None }).collect();
     };
     let printed = readable(components.iter().map(|(_, k)| k.clone()).collect());
     let pairs = components.iter().zip(printed);

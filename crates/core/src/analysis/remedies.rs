@@ -8,7 +8,7 @@ use crate::degree::findings::Findings;
 use crate::degree::staircase::Degrees;
 use crate::model::attitude::{cardinal, cardinal_names};
 use crate::model::platform::{Platform, RandomValues};
-use crate::model::{Position, Unknowns};
+use crate::model::{Position, Scheme, Unknowns};
 use crate::remedies::{Change, Directions, Information, Remedies, Remedy, Resolved};
 
 /// Largest number of unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half
@@ -20,7 +20,7 @@ const MOST_KNOWN: usize = 64;
 const MOST_PAIRS: usize = 12;
 
 /// Bases of `V_0, V_1, ...` in the two fields of a verdict.
-type Stairs = [Vec<Echelon>; 2];
+pub(super) type Stairs = [Vec<Echelon>; 2];
 
 /// Search for remedies of one scheme.
 struct SchemeRemedySearch<'a> {
@@ -70,13 +70,28 @@ pub(super) fn remedies(
     search.out
 }
 
+/// A scheme with more cardinal attitudes at its end; `None` where a name is no cardinal attitude.
+pub(super) fn with_attitudes(scheme: &Scheme, attitudes: &[&str]) -> Option<Scheme> {
+    let mut out = scheme.clone();
+    for attitude in attitudes {
+        out.positions.push(Position {
+            name: scheme.free_name(out.positions.len() + 1),
+            angles: cardinal(attitude)?,
+            dwell: None,
+            rotation: None,
+            slew: None,
+        });
+    }
+    Some(out)
+}
+
 /// The bases of a scheme in both fields.
-fn stairs(platform: &Platform, values: &[RandomValues; 2]) -> Stairs {
+pub(super) fn stairs(platform: &Platform, values: &[RandomValues; 2]) -> Stairs {
     [0, 1].map(|i| staircase(platform, &values[i].sample(platform.scheme(), 1)).1)
 }
 
 /// Degrees of all unknowns where the values of some are known; `None` where two fields do not agree.
-fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>>> {
+pub(super) fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>>> {
     let of = |stairs: &Vec<Echelon>| {
         let columns = stairs.first().map_or(0, Echelon::columns);
         let mut degree = vec![None; columns];
@@ -163,20 +178,10 @@ impl SchemeRemedySearch<'_> {
         }
     }
 
-    /// The scheme with more cardinal attitudes at its end; `None` where they cannot be added, for instance
-    /// beyond a gimbal limit.
+    /// The platform of the scheme with more cardinal attitudes at its end; `None` where they cannot be added,
+    /// for instance beyond a gimbal limit.
     fn with(&self, attitudes: &[&str]) -> Option<Platform> {
-        let mut scheme = self.platform.scheme().clone();
-        for attitude in attitudes {
-            scheme.positions.push(Position {
-                name: self.platform.scheme().free_name(scheme.positions.len() + 1),
-                angles: cardinal(attitude)?,
-                dwell: None,
-                rotation: None,
-                slew: None,
-            });
-        }
-        Platform::new(scheme).ok()
+        Platform::new(with_attitudes(self.platform.scheme(), attitudes)?).ok()
     }
 
     fn attitude(&self, attitudes: &[&str]) -> Vec<Change> {

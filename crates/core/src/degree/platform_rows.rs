@@ -79,6 +79,14 @@ impl PlatformRows {
     }
 }
 
+impl PlatformRows {
+    /// Station and component of every row of an order, in the order of [`emit`](DerivativeRows::emit).
+    pub(crate) fn labels(&self, order: usize) -> Vec<(usize, usize)> {
+        let chain = || self.chain.iter().filter(|r| r.order == order);
+        (0..self.blocks.len()).flat_map(|i| chain().map(move |r| (i, r.component))).collect()
+    }
+}
+
 impl DerivativeRows for PlatformRows {
     type Field = Field;
 

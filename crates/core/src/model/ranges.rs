@@ -46,6 +46,8 @@ pub const PRIOR: Range = range(1e-9, 1e9, "");
 pub const VALUE: Range = range(-1e6, 1e6, "");
 /// Size (one sigma) of an error that is not estimated, in the unit of the error.
 pub const BENCH: Range = range(0.0, 1e9, "");
+/// Random walk of a coefficient between calibrations, in the unit of the coefficient per sqrt(day).
+pub const AGEING: Range = range(0.0, 1e9, "");
 /// Required standard deviation.
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 

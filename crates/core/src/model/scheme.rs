@@ -108,6 +108,9 @@ pub struct Scheme {
     /// Sizes (one sigma) of errors that are not estimated, by error or family, in ug, ppm, arcsec,
     /// deg/h/g^2.
     pub bench: BTreeMap<String, f64>,
+    /// Random walk of coefficients between calibrations, by coefficient or family, in the unit of the
+    /// coefficient per sqrt(day).
+    pub ageing: BTreeMap<String, f64>,
     /// Limits of the gimbals.
     pub gimbals: Gimbals,
     /// Slew path between positions that state none; `None` if the scheme states no path.
@@ -382,7 +385,10 @@ impl Scheme {
     /// Checks numbers and the names that they are for.
     fn validate_numbers(&self) -> Result<(), SchemeError> {
         let lists = self.simulation.lists().map(|(key, list, _)| (format!("simulation.{key}"), list));
-        for (key, list) in lists.into_iter().chain([("requirements".into(), &self.requirements)]) {
+        for (key, list) in lists
+            .into_iter()
+            .chain([("requirements".into(), &self.requirements), ("ageing".into(), &self.ageing)])
+        {
             if let Some(name) = list.keys().find(|name| !settings::may_be_unknown(name)) {
                 return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
             }
@@ -391,13 +397,15 @@ impl Scheme {
             return Err(SchemeError::BenchName { key: format!("bench.{name}"), name: excerpt(name) });
         }
         let bench = self.bench.iter().map(|(name, x)| (format!("bench.{name}"), *x, ranges::BENCH));
+        let ageing = self.ageing.iter().map(|(name, x)| (format!("ageing.{name}"), *x, ranges::AGEING));
         let required = self.requirements.iter();
         let required = required.map(|(name, x)| (format!("requirements.{name}"), *x, ranges::REQUIREMENT));
         let slews = self.positions.iter().enumerate().filter_map(|(i, p)| {
             let rate = p.slew.as_ref()?.rate_deg_s?;
             Some((format!("position.{i}.slew.rate_deg_s"), rate, ranges::SLEW_RATE_DEG_S))
         });
-        for (key, x, range) in self.simulation.numbers().into_iter().chain(required).chain(bench).chain(slews)
+        for (key, x, range) in
+            self.simulation.numbers().into_iter().chain(required).chain(bench).chain(ageing).chain(slews)
         {
             range.check(key, x)?;
         }

@@ -170,20 +170,22 @@ pub(crate) fn null_space(
         .into_iter()
         .map(|v| {
             let support = support(&v);
-            let components = null_components(solver, &support);
+            let components = null_components(solver, &support, usize::MAX);
             NullVector { vector: v, support, components }
         })
         .collect()
 }
 
-fn null_components(solver: &mut Solver<'_>, support: &[usize]) -> Option<Sparse> {
+/// Components of the null vector of the derivatives up to `order` on a minimal support, in the order of the
+/// support; the first is one. `None` if they could not be computed.
+pub(crate) fn null_components(solver: &mut Solver<'_>, support: &[usize], order: usize) -> Option<Sparse> {
     let lead = support[0];
     let first = solver.tables.first();
     let mut basis = Echelon::new(first.sample.roots.field, support.len() - 1);
     // independent rows on the support without its lead determine the vector
     let restricted = |j: usize| -> Vec<u64> { support[1..].iter().map(|&c| first.rows[j][c]).collect() };
     let used: Vec<usize> =
-        (0..solver.tables.observable_rows).filter(|&j| basis.insert(&restricted(j))).collect();
+        solver.tables.rows_up_to(order).into_iter().filter(|&j| basis.insert(&restricted(j))).collect();
     let (values, _) = solver.coefficients(&LinearSystem::null_vector(&used, support, lead))?;
     let rest = support[1..].iter().copied().zip(values);
     Some(std::iter::once((lead, Coefficient::one())).chain(rest).collect())

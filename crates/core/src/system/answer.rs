@@ -18,6 +18,7 @@ use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};
 use crate::remedies::Remedies;
+use crate::why::Why;
 
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
@@ -92,6 +93,9 @@ pub struct SystemAnalysis {
     pub branch_sides: Vec<BranchSide>,
     /// Changes that make the unobservable unknowns observable.
     pub to_resolve: Remedies,
+    /// Explanations of the verdicts that `--why` names; left out without it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub why: Vec<Why>,
     /// Reason why solving expressions were not sought, or not all of them; null otherwise.
     pub note: Option<String>,
     /// Maps that take every solution to another with the same outputs: `negate q1, q2`, `swap k1 and k2`.
@@ -463,6 +467,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         branches: Vec::new(),
         branch_sides: judged.sides.clone(),
         to_resolve: Remedies::default(),
+        why: Vec::new(),
         note: None,
         solution_maps: Vec::new(),
         counting_order: None,

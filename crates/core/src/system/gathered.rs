@@ -51,6 +51,50 @@ impl Gathered {
     }
 }
 
+/// Rows of every output of a model at two points, run by run: of each segment of each experiment.
+pub(super) enum RunRows {
+    /// In two prime fields.
+    Primes([Vec<PointRows<Field>>; 2]),
+    /// In real numbers of 192 and 308 digits.
+    Digits(Vec<PointRows<Reals<10>>>, Vec<PointRows<Reals<16>>>),
+}
+
+/// Gathers the rows of every output of a judged model, run by run, and the order of the roots of unity of the
+/// fields. `attempt` selects other points.
+///
+/// # Errors
+/// [`ModelError`], of work beyond the limit too.
+pub(super) fn gather_runs(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    attempt: usize,
+) -> Result<(RunRows, u64), ModelError> {
+    let seed = judged.findings.seed;
+    let layout = &judged.layout;
+    match judged.certainty {
+        SystemCertainty::Primes(_) => {
+            let apart = if compiled.dag.is_rational() { None } else { written_apart(compiled) };
+            let compiled = apart.as_ref().unwrap_or(compiled);
+            let points = FieldChoice { model, compiled, layout, orders: layout.unknowns.len() };
+            let mut spent = Spent::default();
+            let mut at = |i: usize| {
+                let name = format!("rows of outputs, attempt {attempt}, field {i}");
+                let mut rng = model.random(seed, &name);
+                let field =
+                    points.field(&mut rng, &mut model.random(seed, &format!("{name}, points")), &mut spent);
+                rows_at(model, compiled, layout, field, &mut rng)
+            };
+            Ok((RunRows::Primes([at(0)?, at(1)?]), points.root_order()))
+        }
+        SystemCertainty::Digits(_) => {
+            let mut rng = model.random(seed, &format!("rows of outputs, attempt {attempt}"));
+            let first = rows_at(model, compiled, layout, Reals::<10>, &mut rng)?;
+            Ok((RunRows::Digits(first, rows_at(model, compiled, layout, Reals::<16>, &mut rng)?), 1))
+        }
+    }
+}
+
 /// Judges all outputs of a model together, and gathers the rows of each at two points. `attempt` selects
 /// other points; `bound` overrides the highest order.
 ///
@@ -64,29 +108,10 @@ pub fn gather(
 ) -> Result<Gathered, ModelError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, bound)?;
-    let (mut spent, mut root_order) = (Spent::default(), 1);
-    let rows = match judged.certainty {
-        SystemCertainty::Primes(_) => {
-            let apart = if compiled.dag.is_rational() { None } else { written_apart(&compiled) };
-            let compiled = apart.as_ref().unwrap_or(&compiled);
-            let layout = &judged.layout;
-            let points = FieldChoice { model, compiled, layout, orders: layout.unknowns.len() };
-            root_order = points.root_order();
-            let mut at = |i: usize| {
-                let name = format!("rows of outputs, attempt {attempt}, field {i}");
-                let mut rng = model.random(seed, &name);
-                let field =
-                    points.field(&mut rng, &mut model.random(seed, &format!("{name}, points")), &mut spent);
-                rows_at(model, compiled, layout, field, &mut rng)
-            };
-            OutputRows::Primes(Box::new([at(0)?, at(1)?]))
-        }
-        SystemCertainty::Digits(_) => {
-            let mut rng = model.random(seed, &format!("rows of outputs, attempt {attempt}"));
-            let layout = &judged.layout;
-            let first = rows_at(model, &compiled, layout, Reals::<10>, &mut rng)?;
-            OutputRows::Digits(Box::new((first, rows_at(model, &compiled, layout, Reals::<16>, &mut rng)?)))
-        }
+    let (runs, root_order) = gather_runs(model, &compiled, &judged, attempt)?;
+    let rows = match runs {
+        RunRows::Primes([first, second]) => OutputRows::Primes(Box::new([merged(first)?, merged(second)?])),
+        RunRows::Digits(first, second) => OutputRows::Digits(Box::new((merged(first)?, merged(second)?))),
     };
     let last = match &rows {
         OutputRows::Primes(points) => last_order(&points[0]),
@@ -97,6 +122,10 @@ pub fn gather(
     let claim = Claim { order: root_order, ..claim_of(&compiled, &judged.layout, last + 1) };
     let decisions = (last + 2) * (1 + 2 * runs) + 2 * unknowns;
     Ok(Gathered { judged, rows, claim, decisions })
+}
+
+fn merged<S: Values>(runs: Vec<PointRows<S>>) -> Result<PointRows<S>, ModelError> {
+    PointRows::merged(runs).ok_or_else(|| refuse("a model without outputs".into()))
 }
 
 /// Highest order of a row.
@@ -110,10 +139,10 @@ fn rows_at<S: Values>(
     layout: &Layout,
     field: S,
     rng: &mut SplitMix64,
-) -> Result<PointRows<S>, ModelError> {
+) -> Result<Vec<PointRows<S>>, ModelError> {
     let work = Work::new(model.work_limit);
     let rows = SystemRows::apart(model, compiled, layout, field, rng, &work);
-    match rows.map(SystemRows::by_output) {
+    match rows.map(SystemRows::by_run) {
         Ok(Some(rows)) => Ok(rows),
         Err(reason) if work.refused().is_none() => Err(singular::<S>(model, compiled, reason)),
         _ => Err(work.refused().unwrap_or_else(|| refuse("the limit of work".into()))),

@@ -48,6 +48,7 @@ mod text;
 mod twins;
 mod undecided;
 pub(crate) mod values;
+mod why;
 pub(crate) mod work;
 
 pub use answer::*;
@@ -65,4 +66,5 @@ pub use model::{
 pub use reduced::{Reduced, ReducedError, reduced};
 pub use rows::{Layout, OwnRows, PointRows, Unknown};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
+pub use why::explain_system;
 pub use work::WorkLimit;

@@ -12,6 +12,7 @@ use super::values::Values;
 use super::work::{Spent, product};
 use crate::language::{Expression, Node};
 use crate::remedies::{Change, Directions, Information, MOST_PAIRED, Remedies, Remedy, Resolved};
+use crate::why::{Improvement, is_lower};
 
 /// Largest number of verdicts on single changes of a model of up to `UNKNOWNS` unknowns; half as many on
 /// pairs. For larger models the number falls as the square of the unknowns, since the work of a verdict
@@ -21,6 +22,8 @@ const MOST_VERDICTS: usize = 24;
 const UNKNOWNS: usize = 60;
 /// Largest number of verdicts of a model whose functions are evaluated in many digits.
 const MOST_IN_DIGITS: usize = 12;
+/// Largest number of changes tried for one unknown.
+const MOST_EXPLAINED: usize = 200;
 /// Largest number of values tried for unknowns that determine each other.
 const MOST_ALIKE: usize = 6;
 
@@ -303,6 +306,78 @@ impl ModelRemedySearch<'_> {
         }
         Some(found.into_iter().map(|(c, _)| c).collect())
     }
+}
+
+/// Changes of a model that make one unknown observable or lower its degree (one known value, or one more
+/// state as an output), sentences on changes that were not tried, and the number of verdicts. At most
+/// `MOST_EXPLAINED` changes are tried.
+pub(super) fn improvements(
+    model: &SystemModel,
+    judged: &Judgement,
+    (column, before): (usize, u64),
+    order: Option<usize>,
+) -> (Vec<Improvement>, Vec<String>, usize) {
+    let unknowns = &judged.layout.unknowns;
+    let degree = judged.verdict_on(column).degree;
+    let shown = |c: &usize| judged.shown(model, *c);
+    let is_open = |c: &usize| judged.verdict_on(*c).degree.is_none() || *c == column;
+    let open = (0..unknowns.len()).filter(shown).filter(is_open).collect();
+    let mut roles: Vec<(Role, Vec<usize>)> = Vec::new();
+    for u in (0..unknowns.len()).filter(shown).map(|c| &unknowns[c]) {
+        if roles.iter().all(|(role, _)| *role != u.role) {
+            roles.push((u.role, Vec::new()));
+        }
+    }
+    let left = model.work_limit.operations().saturating_sub(before);
+    let out = Remedies::default();
+    let (ended, elsewhere) = (false, false);
+    let mut search = ModelRemedySearch {
+        model,
+        judged,
+        order,
+        open,
+        roles,
+        budget: MOST_EXPLAINED,
+        left,
+        ended,
+        elsewhere,
+        out,
+    };
+    let is_state = |role: &Role| matches!(role, Role::State(_));
+    let roles: Vec<Role> = search.roles.iter().map(|r| r.0).collect();
+    // with constraints, a changed model was judged only for values that are not observable
+    let judged_there = |role: &&Role| {
+        let own = |c: &usize| unknowns[*c].role == **role && *c != column;
+        model.constraints.is_empty() || search.open.iter().any(own)
+    };
+    let values = roles.iter().filter(|role| **role != unknowns[column].role).filter(judged_there);
+    let values = values.map(|role| search.known(*role));
+    let outputs = roles.iter().filter(|role| is_state(role)).map(|role| search.output(*role));
+    let changes: Vec<Change> = values.chain(outputs).collect();
+    let (count, mut tried) = (changes.len(), 0);
+    for change in changes.into_iter().take(MOST_EXPLAINED) {
+        if search.judge(vec![change]).is_none() {
+            break;
+        }
+        tried += 1;
+    }
+    if search.elsewhere {
+        let text = "known values and outputs: the constraints hold in several ways, and with a change verdicts are those of another one";
+        return (Vec::new(), vec![text.into()], search.out.verdicts);
+    }
+    let not_tried = (tried < count).then(|| {
+        let left = count - tried;
+        format!("{left} of {count} known values and outputs: at most {tried} are tried{}", search.option())
+    });
+    let name = &unknowns[column].name;
+    let improvement = |r: Remedy| {
+        let after = r.resolves.iter().find(|x| x.name == *name)?.degree;
+        let resolves = r.resolves.into_iter().filter(|x| x.name != *name).collect();
+        let found = Improvement { changes: r.changes, degree: after, resolves, loses: r.loses };
+        is_lower(Some(after), degree).then_some(found)
+    };
+    let found = search.out.remedies.into_iter().filter_map(improvement).collect();
+    (found, Vec::from_iter(not_tried), search.out.verdicts)
 }
 
 /// The model with some changes, without requested combinations.

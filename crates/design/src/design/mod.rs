@@ -26,7 +26,7 @@ pub use observable::slew_sequences::{WalkOptions, Walks, is_walk, scheme_of_walk
 pub use observable::symmetry::Symmetry;
 pub use request::candidates::Candidates;
 pub use request::error::{DesignError, PartError};
-pub use request::limits::EXHAUSTIVE;
+pub use request::limits::{EXHAUSTIVE, MOST_EXTENSIONS};
 pub use request::options::{CriterionName, DesignOptions, Immune};
 pub use run::driver::design;
 pub use run::merged::design_merged;
@@ -36,6 +36,7 @@ pub use run::optimum::{
 };
 pub use run::part::{Block, Level, PART_SCHEMA, Part, design_part, design_starts};
 pub use run::task::asked;
+pub(crate) use run::winner::half_turn;
 pub use run::winner::scheme as scheme_found;
 pub use search::best::Best;
 pub use search::constraints::Constraints;

@@ -13,6 +13,7 @@ use super::batch::{Batch, batch};
 use super::conditions::{Conditions, PRIOR, REQUIRED, is_rate, resolve, si_per_shown};
 use super::error::SimulationError;
 use super::floor::wide_prior;
+use super::known::KnownCovariance;
 use super::plan::Plan;
 use super::seen::{no_prior, predict};
 use super::start::RunStart;
@@ -45,7 +46,9 @@ pub struct Attained {
     known: EndCovariance,
     /// Prior standard deviations of the unknowns, in SI units: stated, or so wide that they do not matter.
     prior: Vec<f64>,
-    /// True if random drift or biases require a filter.
+    /// Rows of information known beforehand with its covariance (m x n, SI units).
+    rows: DMatrix<f64>,
+    /// True if random drift, biases or such rows require a filter.
     noisy: bool,
     /// Changes of the estimates by one sigma of every error of the bench (n x errors, SI units); no columns
     /// without a bench.
@@ -81,24 +84,42 @@ impl Attained {
     /// # Errors
     /// [`SimulationError`].
     pub fn new(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Self, SimulationError> {
+        Self::beside(scheme, conditions, None, seed)
+    }
+
+    /// Accuracy of `scheme` under `conditions`, with a covariance that is known beforehand.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn beside(
+        scheme: &Scheme,
+        conditions: &Conditions,
+        beforehand: Option<&KnownCovariance>,
+        seed: u64,
+    ) -> Result<Self, SimulationError> {
         let conditions = conditions.as_stated();
         let plan = Plan::new(scheme, &conditions)?;
         let prediction = predict(&plan, seed)?;
         let stated = stated_prior(&plan, &conditions)?;
-        let noisy = conditions.drift_noise.amount() > 0.0 || plan.is_noisy();
+        let rows = match beforehand {
+            Some(known) => known.rows(&plan, &prediction)?,
+            None => DMatrix::zeros(0, plan.unknowns()),
+        };
+        let noisy = conditions.drift_noise.amount() > 0.0 || plan.is_noisy() || beforehand.is_some();
         let wide = if noisy { wide_prior(&plan, &conditions)? } else { no_prior(&plan)? };
         let prior = |narrower: f64| -> Vec<f64> {
             stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect()
         };
         let with = |narrower: f64| -> Result<EndCovariance, SimulationError> {
             let sigma = prior(narrower);
-            if noisy { filtered(&plan, sigma) } else { by_information(&plan, sigma) }
+            if noisy { filtered(&plan, sigma, &rows) } else { by_information(&plan, sigma) }
         };
         let known = with(1.0)?;
         let determined: Vec<bool> = prediction.unknowns.iter().map(|u| u.determined_at_end).collect();
         let n = determined.len();
         let mut by_prior = vec![false; n];
-        if stated.iter().any(Option::is_some) && determined.contains(&false) {
+        let some_prior = stated.iter().any(Option::is_some) || beforehand.is_some();
+        if some_prior && determined.contains(&false) {
             let narrow = with(NARROWER)?;
             for c in (0..n).filter(|&c| !determined[c]) {
                 let [wide, narrow] = [known.variance(&[(c, 1.0)])?, narrow.variance(&[(c, 1.0)])?];
@@ -112,7 +133,8 @@ impl Attained {
         }
         let (totals, prior) = (sigmas.clone(), prior(1.0));
         let contributions = DMatrix::zeros(n, 0);
-        let mut out = Self { prior, plan, prediction, sigmas, totals, by_prior, known, noisy, contributions };
+        let mut out =
+            Self { prior, rows, plan, prediction, sigmas, totals, by_prior, known, noisy, contributions };
         if !conditions.bench.is_empty() {
             out.add_bench(&conditions)?;
         }
@@ -142,7 +164,7 @@ impl Attained {
     /// [`SimulationError`].
     pub fn influence(&self, model: &OmittedModel) -> Result<Influence, SimulationError> {
         if self.noisy {
-            weights::by_filter(&self.plan, model, filter_prior(&self.plan, self.prior.clone())?)
+            weights::by_filter(&self.plan, model, filter_prior(&self.plan, self.prior.clone(), &self.rows)?)
         } else {
             weights::by_information(&self.plan, model, &self.prior)
         }
@@ -260,12 +282,25 @@ fn by_information(plan: &Plan, prior: Vec<f64>) -> Result<EndCovariance, Simulat
 }
 
 /// Covariance at the end of a filter, with random drift and biases.
-fn filtered(plan: &Plan, sigma: Vec<f64>) -> Result<EndCovariance, SimulationError> {
-    Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma)?)?))
+fn filtered(plan: &Plan, sigma: Vec<f64>, rows: &DMatrix<f64>) -> Result<EndCovariance, SimulationError> {
+    Ok(EndCovariance::Filter(last_covariance(&plan.stages, filter_prior(plan, sigma, rows)?)?))
 }
 
-/// Covariance of a filter at its start, biases behind the unknowns.
-fn filter_prior(plan: &Plan, mut sigma: Vec<f64>) -> Result<Covariance, SimulationError> {
+/// Covariance of a filter at its start, biases behind the unknowns; `rows` are the information known
+/// beforehand.
+fn filter_prior(
+    plan: &Plan,
+    mut sigma: Vec<f64>,
+    rows: &DMatrix<f64>,
+) -> Result<Covariance, SimulationError> {
+    let n = sigma.len();
     sigma.extend(plan.bias_sigmas());
+    if rows.nrows() > 0 {
+        let mut information = SquareRootInformation::prior(&sigma)?;
+        let mut wide = DMatrix::zeros(rows.nrows(), sigma.len());
+        wide.view_mut((0, 0), (rows.nrows(), n)).copy_from(rows);
+        information.add(&wide)?;
+        return Ok(Covariance::new("P0", &information.covariance()?, Form::Ud)?);
+    }
     RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)
 }

@@ -101,6 +101,14 @@ pub enum SimulationError {
         /// Quantity that cannot be resolved.
         what: String,
     },
+    /// Covariance known beforehand that does not fit the scheme.
+    #[error(
+        "the covariance of the calibration beforehand: {why}; expected that of an answer of obsdeg calibrate on coefficients of the scheme"
+    )]
+    KnownCovariance {
+        /// Reason, as the end of a sentence.
+        why: String,
+    },
     /// A condition beyond its range.
     #[error(transparent)]
     Range(#[from] obsdeg_core::model::ranges::RangeError),

@@ -72,6 +72,11 @@ pub struct SchemeFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::BENCH)))]
     pub(super) bench: Numbers,
+    /// Ageing: random walk of the coefficients between calibrations, by coefficient or family, as in D_F =
+    /// 0.002, in the unit of the coefficient per sqrt(day). A coefficient that is left out does not age.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::AGEING)))]
+    pub(super) ageing: Numbers,
     /// Gimbal limits; free gimbals when left out. For positions beyond, the answer lists angles of the same
     /// attitude within the limits.
     #[serde(default)]

@@ -233,6 +233,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         simulation: r.settings(&file.simulation)?,
         requirements: r.numbers("requirements", &file.requirements),
         bench: r.numbers("bench", &file.bench),
+        ageing: r.numbers("ageing", &file.ageing),
         ..Scheme::default()
     };
     if let Some(record) = &file.record {

@@ -49,6 +49,7 @@ pub fn write(scheme: &Scheme) -> String {
     settings(&mut out, &scheme.simulation);
     numbers(&mut out, "requirements", &scheme.requirements);
     numbers(&mut out, "bench", &scheme.bench);
+    numbers(&mut out, "ageing", &scheme.ageing);
     let mut gimbals = String::new();
     for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(scheme.gimbals.limits) {
         if let Some(ends) = limit {
@@ -339,6 +340,7 @@ mod tests {
                 simulation,
                 requirements,
                 bench: if mirrored { [("K0".into(), 20.0), ("latitude".into(), 0.5)].into() } else { [].into() },
+                ageing: if mirrored { [("D_F".into(), 0.002)].into() } else { [].into() },
                 gimbals: Gimbals { limits: [None, limits, None] },
                 recording: if combination { recording } else { Recording::default() },
             }

@@ -11,7 +11,7 @@ use super::super::model::{Compiled, SystemModel};
 use super::super::taylor::Singular;
 use super::super::values::Values;
 use super::super::work::{Step, Work, product};
-use super::{AdditionalRuns, Layout, PointBuilder, Rows, SystemRows, cost_of, rows_of};
+use super::{AdditionalRuns, Layout, PointBuilder, SystemRows, cost_of, rows_of};
 
 /// Rows of an output: order, and differential of a derivative by the unknowns.
 pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
@@ -51,25 +51,20 @@ impl<'a, S: Values> SystemRows<'a, S> {
         Self::drawn(&builder, work, rng, AdditionalRuns { others: 0, apart: true })
     }
 
-    /// All rows of every output; `None` if `work` refused them.
-    pub(in crate::system) fn by_output(mut self) -> Option<PointRows<S>> {
+    /// All rows of every output, run by run; `None` if `work` refused them.
+    pub(in crate::system) fn by_run(mut self) -> Option<Vec<PointRows<S>>> {
         let (field, columns) = (self.field.clone(), self.lanes);
-        let count = self.runs.first().map_or(0, |run| run.outputs.len());
-        let mut all = S::Space::new(field.clone(), columns);
-        let mut known = Rows::<S>::new();
-        for row in self.runs.iter().flat_map(|run| &run.known) {
-            if all.insert(row) {
-                known.push(row.clone());
-            }
-        }
-        let (mut outputs, mut ended) = (vec![OwnRows::<S>::new(); count], true);
-        let mut gap = self.gap.and(all.gap());
+        let mut out = Vec::with_capacity(self.runs.len());
         for run in 0..self.runs.len() {
+            let mut all = S::Space::new(field.clone(), columns);
+            let mut known = self.runs[run].known.clone();
+            known.retain(|row| all.insert(row));
+            let (mut outputs, mut ended) = (vec![OwnRows::<S>::new(); self.runs[run].outputs.len()], true);
             let spaces = self.follow(run, &mut outputs, &mut ended)?;
-            gap = spaces.iter().fold(gap, |gap, space| gap.and(space.gap()));
+            let gap = spaces.iter().fold(self.gap.and(all.gap()), |gap, space| gap.and(space.gap()));
+            out.push(PointRows { field: field.clone(), columns, known, outputs, ended, gap });
         }
-        outputs.iter_mut().for_each(|rows| rows.sort_by_key(|(order, _)| *order));
-        Some(PointRows { field, columns, known, outputs, ended, gap })
+        Some(out)
     }
 
     /// Adds the rows of a run to those of its outputs. Returns their spans in this run; `None` if the work
@@ -105,5 +100,23 @@ impl<'a, S: Values> SystemRows<'a, S> {
         }
         *ended &= done.iter().all(|done| *done);
         Some(spaces)
+    }
+}
+
+impl<S: Scalars> PointRows<S> {
+    /// The rows of several runs together, the rows of each output by their order.
+    pub(in crate::system) fn merged(runs: Vec<Self>) -> Option<Self> {
+        let first = runs.first()?;
+        let (field, columns) = (first.field.clone(), first.columns);
+        let mut all = S::Space::new(field.clone(), columns);
+        let known = runs.iter().flat_map(|run| &run.known).filter(|row| all.insert(row)).cloned().collect();
+        let gap = runs.iter().fold(all.gap(), |gap, run| gap.and(run.gap));
+        let ended = runs.iter().all(|run| run.ended);
+        let mut outputs = vec![OwnRows::<S>::new(); first.outputs.len()];
+        for (output, own) in runs.into_iter().flat_map(|run| run.outputs.into_iter().enumerate()) {
+            outputs[output].extend(own);
+        }
+        outputs.iter_mut().for_each(|rows| rows.sort_by_key(|(order, _)| *order));
+        Some(Self { field, columns, known, outputs, ended, gap })
     }
 }

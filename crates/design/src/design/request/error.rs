@@ -6,7 +6,7 @@ use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::SimulationError;
 
 use crate::design::nearest::Nearest;
-use crate::design::request::limits::{MAX_CANDIDATES, MAX_TURNING, MAX_UNKNOWNS};
+use crate::design::request::limits::{MAX_CANDIDATES, MAX_TURNING, MAX_UNKNOWNS, MOST_EXTENSIONS};
 
 /// Error of a design.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -34,6 +34,30 @@ pub enum DesignError {
     Positions {
         /// Number of positions that was asked for.
         found: usize,
+    },
+    /// Number of added positions other than 1 and 2.
+    #[error("{found} more positions; expected 1 or 2")]
+    Added {
+        /// Number of added positions that was asked for.
+        found: usize,
+    },
+    /// More extensions of a scheme than are compared.
+    #[error(
+        "{found} extensions or more; expected at most {}: fewer candidates, or one more position",
+        MOST_EXTENSIONS
+    )]
+    Extensions {
+        /// Number of extensions, or a lower bound on it.
+        found: usize,
+    },
+    /// Number of days without a calibration from which they count.
+    #[error("days are counted from a calibration; expected one beforehand")]
+    NoCalibration,
+    /// No extension within the limits of time.
+    #[error("no extension by the candidates keeps the limits: {limits}")]
+    NoExtension {
+        /// Limits, in words.
+        limits: String,
     },
     /// Unknown `drift` in place of coefficients: the drift is constant at a single position only.
     #[error("a design needs coefficients; found the unknowns `drift` (use terms such as F,I,O,S)")]

@@ -106,6 +106,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         positions: _,
         combinations: _,
         recording: _,
+        ageing: _,
         carry,
         latitude,
         geometry,
