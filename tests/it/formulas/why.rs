@@ -2,7 +2,7 @@
 //! them can be left out. Along the unseen direction no derivative up to the stated order changes, and the
 //! listed derivatives of the next order do.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use obsdeg_core::analysis::{AnalysisOptions, analyze, explain};
 use obsdeg_core::why::{OutputDerivative, Why};
 
@@ -28,15 +28,19 @@ fn row(case: &Case, names: &[String], d: &OutputDerivative) -> DVector<f64> {
 /// Distance of the unit vector of an unknown from the span of rows.
 fn distance(rows: &[DVector<f64>], column: usize, columns: usize) -> f64 {
     let unit = DVector::from_fn(columns, |c, _| f64::from(u8::from(c == column)));
-    if rows.is_empty() {
-        return 1.0;
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    // twice, since one pass loses digits where rows are nearly dependent
+    let rest = |v: &DVector<f64>, basis: &[DVector<f64>]| {
+        let once = |v: DVector<f64>| basis.iter().fold(v, |rest, b| &rest - b * b.dot(&rest));
+        once(once(v.clone()))
+    };
+    for row in rows {
+        let own = rest(&row.normalize(), &basis);
+        if own.norm() > ZERO {
+            basis.push(own.normalize());
+        }
     }
-    let matrix = DMatrix::from_columns(rows);
-    let svd = matrix.svd(true, false);
-    let basis = svd.u.expect("asked for");
-    let kept = (0..basis.ncols()).filter(|&k| svd.singular_values[k] > ZERO);
-    let rest = kept.fold(unit.clone(), |rest, k| &rest - basis.column(k) * basis.column(k).dot(&unit));
-    rest.norm()
+    rest(&unit, &basis).norm()
 }
 
 fn check(draw: &RandomScheme, why: &Why, names: &[String]) -> usize {
