@@ -36,7 +36,7 @@ pub fn hearing<T>(
     run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
 }
 
-/// Runs `work` until `wanted` is false, then returns `None`. [`parts`] carries this to other threads.
+/// Runs `work` until `wanted` is false, then returns `None`. [`crate::parallel`] carries this to other threads.
 pub fn while_wanted<T>(wanted: Arc<AtomicBool>, work: impl FnOnce() -> T) -> Option<T> {
     run(Cancellation::Flag(wanted), work)
 }
