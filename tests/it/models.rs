@@ -662,9 +662,9 @@ fn the_input_chooses_the_primes() {
 }
 
 /// Three solutions for w2 and c of `hiv_latent`, by hand: y2 = x4 obeys
-/// `(D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u` with K = k1 + w1 and the known u = b x1 x4. So c,
-/// w2 and K are the roots of one polynomial, in any order, and the right side is attainable with each order.
-/// Numerical integration with all six orders gives the same outputs.
+/// `(D + c)(D + w2)(D + K) x4 = k2 q2 (D + K) u + k1 k2 q1 u` with K = k1 + w1 and the known u = b x1 x4. So
+/// c, w2 and K are the roots of one polynomial, in any order, and the right side is attainable with each
+/// order. Numerical integration with all six orders gives the same outputs.
 #[test]
 fn three_solutions_that_give_the_same_outputs() {
     let (_, _, text) = models().into_iter().find(|m| m.0 == "hiv_latent").expect("a reference");
