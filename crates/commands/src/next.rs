@@ -31,9 +31,9 @@ pub struct FurtherOptions {
     #[arg(long, value_name = "1|2", value_parser = whole::<usize>(ADDED))]
     pub next: Option<usize>,
 
-    /// With --after: days since the calibration, such as 30,90,365. The coefficients age as stated by
-    /// [ageing] of the scheme. For each number of days: the fewest positions (up to --next) and the shortest
-    /// run that meet every requirement again. The listed extensions are for the last number of days
+    /// With --after: days since the calibration, such as 30,90,365. The coefficients age as the
+    /// ageing table of the scheme states. For each number of days: the fewest positions (up to --next) and
+    /// the shortest run that meet every requirement again. The listed extensions are for the last number of days
     #[arg(long, value_name = "DAYS", value_delimiter = ',', value_parser = within(DAYS))]
     pub days: Vec<f64>,
 }
