@@ -163,7 +163,7 @@ pub struct Search {
     #[serde(flatten)]
     pub outputs: MeasureOptions,
 
-    /// Of a scheme: what is added to its positions.
+    /// Positions to add to a scheme.
     #[command(flatten)]
     #[serde(flatten)]
     pub further: FurtherOptions,

@@ -31,9 +31,9 @@ pub struct FurtherOptions {
     #[arg(long, value_name = "1|2", value_parser = whole::<usize>(ADDED))]
     pub next: Option<usize>,
 
-    /// With --after: days since the calibration, such as 30,90,365. The coefficients age as the
-    /// ageing table of the scheme states. For each number of days: the fewest positions (up to --next) and
-    /// the shortest run that meet every requirement again. The listed extensions are for the last number of days
+    /// With --after: days since the calibration, such as 30,90,365. The coefficients age as the ageing table
+    /// of the scheme states. For each number of days: the fewest positions (up to --next) and the shortest
+    /// run that meet every requirement again. The listed extensions are for the last number of days
     #[arg(long, value_name = "DAYS", value_delimiter = ',', value_parser = within(DAYS))]
     pub days: Vec<f64>,
 }
@@ -110,7 +110,8 @@ pub(crate) fn further(
 ) -> Result<NextPositions, Problem> {
     if !options.days.is_empty() && base.ageing.is_empty() {
         return Err(Problem::input(
-            "--days needs the ageing of the coefficients; expected a table [ageing] in the scheme file, such as D_F = 0.002",
+            "--days needs the ageing of the coefficients; expected a table [ageing] in the scheme file, such \
+             as D_F = 0.002",
         ));
     }
     let going = |done, all| (host.going)(Now::of("comparing extensions", done, all));

@@ -144,10 +144,13 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             let place = format!("column `{column}`{}, {lines}", of(record, records));
             match kind_of_cells {
                 CellKind::Code => format!(
-                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside {them}, and {were} left out; if that is a code of missing values, state `missing = [{value}]` under [record]"
+                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside {them}, and \
+                     {were} left out; if that is a code of missing values, state `missing = [{value}]` under \
+                     [record]"
                 ),
                 CellKind::Stuck => format!(
-                    "{place}: {count} {cells} {repeat} the value {value} of the row before to the last digit, and {were} left out; check whether the output is stuck"
+                    "{place}: {count} {cells} {repeat} the value {value} of the row before to the last \
+                     digit, and {were} left out; check whether the output is stuck"
                 ),
             }
         }
@@ -252,7 +255,9 @@ fn left_open(c: &Calibration) -> Option<String> {
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };
     Some(format!(
-        "at these drifts {who} all unknowns open: over what the positions determine weakly or not at all, {why}. No sigma describes the errors then, so no estimate is given. State priors of psi and of the drifts as small as is true (`priors` under [simulation]), or add positions"
+        "at these drifts {who} all unknowns open: over what the positions determine weakly or not at all, \
+         {why}. No sigma describes the errors then, so no estimate is given. State priors of psi and of the \
+         drifts as small as is true (`priors` under [simulation]), or add positions"
     ))
 }
 

@@ -135,7 +135,9 @@ fn validity(n: &NextPositions) -> Vec<String> {
     }
     if !n.schedule.is_empty() {
         out.push(
-            "fewest positions and shortest runs: every extension was compared, with one dwell at all positions of a run".into(),
+            "fewest positions and shortest runs: every extension was compared, with one dwell at all \
+             positions of a run"
+                .into(),
         );
     }
     if n.after_calibration {

@@ -382,8 +382,8 @@ pub(crate) fn silent(of: &Omitted) -> String {
 /// Sentences of a calibration on errors that it does not estimate.
 pub(crate) fn calibration(of: &Omitted) -> Vec<String> {
     let mut out = vec![format!(
-        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a chance of at most {:.1} % \
-         where nothing is wrong",
+        "{} errors that are not estimated were tried on the residuals, each by a score test; a suspicion has a \
+         chance of at most {:.1} % where nothing is wrong",
         of.tried,
         100.0 * SUSPECT
     )];

@@ -1,5 +1,5 @@
-//! First lines. Of `analyze`: the answer in one sentence, and remedies for unknowns that are not observable.
-//! Of `compare`: the position to drop.
+//! First lines: for `analyze` the answer in one sentence, with remedies for unknowns that are not observable;
+//! for `compare` the position to drop.
 
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status;

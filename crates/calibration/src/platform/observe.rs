@@ -921,7 +921,8 @@ pub(crate) fn observe(
             hint: match by {
                 By::Label | By::Both | By::Static => "its label does not occur".into(),
                 By::Timeline => format!(
-                    "the record is of {:.3} to {:.3} s, the scheme of 0 to {:.3} s (a column `position` says what is where)",
+                    "the record is of {:.3} to {:.3} s, the scheme of 0 to {:.3} s (a column `position` says \
+                     what is where)",
                     out.span.0,
                     out.span.1,
                     plan.duration_s()

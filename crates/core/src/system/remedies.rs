@@ -75,19 +75,7 @@ pub(super) fn remedies(
     // all verdicts, and the search for symmetries before them, take at most the limit of one verdict
     let left = model.work_limit.operations().saturating_sub(before);
     let budget = (MOST_VERDICTS * UNKNOWNS * UNKNOWNS / (n * n)).min(in_digits);
-    let out = Remedies::default();
-    let mut search = ModelRemedySearch {
-        model,
-        judged,
-        order,
-        open,
-        roles,
-        budget,
-        left,
-        ended: false,
-        elsewhere: false,
-        out,
-    };
+    let mut search = ModelRemedySearch::new((model, judged, order), (open, roles), (budget, left));
     match (judged.fields, &judged.span) {
         (Some([field, _]), Some(span)) => search.all(&Directions::of(field, span)),
         _ => {
@@ -113,7 +101,17 @@ pub(super) fn remedies(
     search.out
 }
 
-impl ModelRemedySearch<'_> {
+impl<'a> ModelRemedySearch<'a> {
+    /// Search among `open` columns and `roles`, within a number of verdicts and of operations.
+    fn new(
+        (model, judged, order): (&'a SystemModel, &'a Judgement, Option<usize>),
+        (open, roles): (Vec<usize>, Vec<(Role, Vec<usize>)>),
+        (budget, left): (usize, u64),
+    ) -> Self {
+        let out = Remedies::default();
+        Self { model, judged, order, open, roles, budget, left, ended: false, elsewhere: false, out }
+    }
+
     /// Tries single changes, then pairs for unknowns that no single change resolves.
     fn all<S: Values>(&mut self, directions: &Directions<S>) {
         let open = self.open.len();
@@ -329,20 +327,7 @@ pub(super) fn improvements(
         }
     }
     let left = model.work_limit.operations().saturating_sub(before);
-    let out = Remedies::default();
-    let (ended, elsewhere) = (false, false);
-    let mut search = ModelRemedySearch {
-        model,
-        judged,
-        order,
-        open,
-        roles,
-        budget: MOST_EXPLAINED,
-        left,
-        ended,
-        elsewhere,
-        out,
-    };
+    let mut search = ModelRemedySearch::new((model, judged, order), (open, roles), (MOST_EXPLAINED, left));
     let is_state = |role: &Role| matches!(role, Role::State(_));
     let roles: Vec<Role> = search.roles.iter().map(|r| r.0).collect();
     // with constraints, a changed model was judged only for values that are not observable
@@ -362,7 +347,8 @@ pub(super) fn improvements(
         tried += 1;
     }
     if search.elsewhere {
-        let text = "known values and outputs: the constraints hold in several ways, and with a change verdicts are those of another one";
+        let text = "known values and outputs: the constraints hold in several ways, and with a change \
+                    verdicts are those of another one";
         return (Vec::new(), vec![text.into()], search.out.verdicts);
     }
     let not_tried = (tried < count).then(|| {

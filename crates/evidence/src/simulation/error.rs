@@ -103,7 +103,8 @@ pub enum SimulationError {
     },
     /// Covariance known beforehand that does not fit the scheme.
     #[error(
-        "the covariance of the calibration beforehand: {why}; expected that of an answer of obsdeg calibrate on coefficients of the scheme"
+        "the covariance of the calibration beforehand: {why}; expected that of an answer of obsdeg calibrate \
+         on coefficients of the scheme"
     )]
     KnownCovariance {
         /// Reason, as the end of a sentence.

@@ -107,8 +107,13 @@ impl AlternativeSearch<'_> {
         let best = prepared.search(self.progress).exchange(k, &given, restarts, options.seed);
         self.out.examined += best.examined;
         self.out.unfinished |= !best.complete;
-        let found = prepared.task.all_found(&prepared.evaluator, &best.found)?;
-        Ok(best.found.into_iter().zip(found).next())
+        for scored in best.found {
+            // the verdict may confirm none of the first sequences
+            if let Some(found) = prepared.task.found(&prepared.evaluator, &scored)? {
+                return Ok(Some((scored, found)));
+            }
+        }
+        Ok(None)
     }
 
     /// Finds the shortest dwell with which the nearest scheme meets the requirements: by factors of

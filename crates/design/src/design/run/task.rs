@@ -320,7 +320,7 @@ impl<'a> Task<'a> {
 
     /// Scheme of a sequence with its exact verdict; `None` if the verdict, the requirements or the immunity
     /// of the sequence are not as required.
-    fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
+    pub(crate) fn found(&self, evaluator: &Evaluator, scored: &Scored) -> Result<Option<Found>, DesignError> {
         let attitudes: Vec<Euler> =
             scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
         let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
