@@ -20,7 +20,7 @@
 //! };
 //! let job = Job::Derive { dynamics: oscillator, order: 2 };
 //! let request = Request { symbols: vec!["w".into()], generators: vec![], angles: vec![], job };
-//! a missing program is an error, without further effect
+//! // a missing program is an error, without further effect
 //! let config = WorkerConfig {
 //!     program: "no/such/program".into(),
 //!     arguments: vec![],
