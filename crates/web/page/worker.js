@@ -7,16 +7,18 @@ function going(now) {
   return true;
 }
 
-// four bytes from five digits to base 85, both least significant first
+// 13 bits from two digits to base 91, both least significant first; no digit is `"`, `<` or the backslash
 function bytes(text) {
   const start = text.indexOf(' ') + 1, out = new Uint8Array(Number(text.slice(0, start)));
-  for (let i = start, at = 0; i < text.length; i += 5, at += 4) {
-    let number = 0;
-    for (let k = 4; k >= 0; k--) {
-      const c = text.charCodeAt(i + k);
-      number = number * 85 + (c === 125 ? 92 : c === 126 ? 60 : c) - 40;
-    }
-    for (let k = 0; k < 4 && at + k < out.length; k++) out[at + k] = Math.floor(number / 256 ** k) % 256;
+  const digit = (i) => {
+    const c = text.charCodeAt(i);
+    return c - 33 - (c > 34) - (c > 60) - (c > 92);
+  };
+  let held = 0, bits = 0, at = 0;
+  for (let i = start; i < text.length; i += 2) {
+    held |= (digit(i) + 91 * digit(i + 1)) << bits;
+    bits += 13;
+    for (; bits >= 8; bits -= 8, held >>= 8) out[at++] = held & 255;
   }
   return out;
 }

@@ -131,23 +131,25 @@ fn packed(bytes: &[u8]) -> Result<Vec<u8>, BuildError> {
     write().map_err(|reason| BuildError::File { path: "packing".into(), reason })
 }
 
-/// Bytes as text, five characters for four bytes (base64: 5.33). Four bytes are a number, least significant
-/// byte first; its five digits to the base 85 follow, least significant first. Digits are the characters from
-/// `(` on, with `}` for the backslash and `~` for `<`. The number of bytes stands before them.
+/// Bytes as text, two characters for 13 bits (base64: 2.17). Bits are taken least significant first; each 13
+/// are a number, whose two digits to the base 91 follow, least significant first. Digits are the printable
+/// characters from `!` on without `"`, `<` and the backslash. The number of bytes stands before them.
 fn as_text(bytes: &[u8]) -> String {
     let mut out = format!("{} ", bytes.len());
-    for chunk in bytes.chunks(4) {
-        let mut number = chunk.iter().rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
-        for _ in 0..5 {
-            let digit = (number % 85) as u8 + b'(';
-            out.push(char::from(if digit == b'\\' {
-                b'}'
-            } else if digit == b'<' {
-                b'~'
-            } else {
-                digit
-            }));
-            number /= 85;
+    let digit = |number: u32| {
+        let code = number as u8 + b'!';
+        char::from([b'"', b'<', b'\\'].iter().fold(code, |code, not| code + u8::from(code >= *not)))
+    };
+    let (mut held, mut bits) = (0u32, 0);
+    // zeros complete the last number
+    for byte in bytes.iter().copied().chain([0, 0]) {
+        held |= u32::from(byte) << bits;
+        bits += 8;
+        if bits >= 13 {
+            let number = held & 0x1fff;
+            out.extend([digit(number % 91), digit(number / 91)]);
+            held >>= 13;
+            bits -= 13;
         }
     }
     out
