@@ -1,4 +1,6 @@
 //! Error terms of gyros, torquers and accelerometers, and the selection of unknown terms.
+//!
+//! `family`, `source`, `shape`, `order` and `unit` have a default, so a new term compiles without its own.
 
 use std::fmt;
 use std::str::FromStr;
@@ -202,7 +204,7 @@ impl Term {
         }
     }
 
-    /// Number of components that a coefficient multiplies.
+    /// Number of components that a coefficient multiplies: the factors of the term; 2 by default.
     pub const fn order(self) -> usize {
         match self {
             Self::F | Self::K0 => 0,
@@ -220,7 +222,7 @@ impl Term {
         }
     }
 
-    /// Unit of the coefficients.
+    /// Unit of the coefficients; deg/h/g^2 by default.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::F => "deg/h",

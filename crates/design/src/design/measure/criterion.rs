@@ -1,4 +1,8 @@
-//! Criteria of optimal design, from the information of a sequence.
+//! Criteria of optimal design, from the information of a sequence: functions of the covariance alone.
+//!
+//! The same criteria are bounded from above in `certificate/scheme`, from below in `certificate/bound`, and
+//! excluded by pairs of positions in `search/screen`. `of_attained` and `by_root` end in a default, the
+//! criterion worst.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::Carry;
