@@ -119,6 +119,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("days", FURTHER, "With --after: days of ageing since then, such as 30,90,365"),
     ("measure", MODELS, "Candidates for outputs of a model: states, or \"x1, x1 + x3\""),
     ("own_outputs", MODELS, "The outputs of the model stay, and candidates are added"),
+    ("unique", MODELS, "Every required unknown must have one solution"),
     ("cost", MODELS, "Cost of a candidate: x1=2.5 (default: 1)"),
     ("order", MODELS, "Highest order of derivatives where a model has no proven end"),
     ("count_limit", MODELS, "Work of counting the solutions of a model (default: 3)"),

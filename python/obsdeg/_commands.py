@@ -460,15 +460,15 @@ def measure(
         The model.
     candidates : str or iterable of str
         Candidate quantities: ``"states"``, ``"outputs"``, ``"inputs"``, ``"parameters"``, ``"candidates"``
-        (those of the file), names and expressions such as ``"x1 + x3"`` [default: candidates if the file has
+        (those of the file), ``"experiment"`` (the same outputs from another start), names and expressions such as ``"x1 + x3"`` [default: candidates if the file has
         any, else states].
     own_outputs : bool
         True: candidates are added to the outputs of the model. By default they replace the outputs.
     progress : callable or bool
         Called ten times a second; True shows a bar of tqdm. If it returns False, the search ends.
     **options
-        Options, see :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``cost``, ``keep``,
-        ``order``, ``work_limit``, ``seed``.
+        Options, see :class:`obsdeg.options.Measure`: ``observable``, ``max_degree``, ``unique``, ``cost``,
+        ``keep``, ``order``, ``work_limit``, ``seed``.
 
     Returns
     -------

@@ -265,6 +265,8 @@ class Measure(Seeded, total=False):
     """Unknowns that must be observable [default: all]."""
     max_degree: int | ByName
     """Largest degree, of all required unknowns or by name: ``4``, ``{"k1": 4}``."""
+    unique: bool
+    """True: every required unknown must have one solution (globally identifiable); a number that is not decided counts as several."""
     cost: ByName
     """Costs of candidates by their names, above 0 [default: those of the file, or 1]: ``{"x1": 2.5}``."""
     keep: int

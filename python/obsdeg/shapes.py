@@ -1949,14 +1949,18 @@ class Walks(Shape):
 
 
 class SensorCandidate(Record):
-    """Quantity that can be measured."""
+    """Quantity that can be measured, or one more experiment."""
 
     __slots__ = ()
 
     name: str
     """Name: that of a state, input or parameter, the key in the file, or the expression itself."""
+    experiment: bool
+    """True for one more experiment: the outputs of a set, measured again from another start."""
+    tells: bool
+    """True if the candidate depends on an unknown; if false it adds nothing to any set."""
     expression: str
-    """Expression of the candidate, as written."""
+    """Expression of the candidate, as written; empty for an experiment."""
     unit: str
     """Unit, as in the model file."""
     description: str
@@ -1980,6 +1984,23 @@ class Unattainable(Record):
     """Name of the unknown, as in the model."""
     degree: int | None
     """Observable degree if all candidates are measured; null if it is not observable."""
+    number_of_solutions: NumberOfSolutions | None
+    """Number of solutions if all candidates are measured; null if one solution is not required, or if its degree already excludes the
+    unknown.
+    """
+
+
+class CountedSets(Record):
+    """Sets whose solutions were counted, at the seed of the answer, as `analyze` counts them."""
+
+    __slots__ = ()
+
+    counted: int
+    """Number of sets whose solutions were counted."""
+    undecided: int
+    """Number of these under which the number of solutions of some required unknown is not decided. They count as failing: a cheaper set
+    than those in `front` may leave one solution.
+    """
 
 
 class FrontSet(Record):
@@ -2055,7 +2076,11 @@ class Sensors(Shape):
     max_degree: list[str]
     """Largest degrees that were asked for, as written: `6`, `k1=4`."""
     unattainable: list[Unattainable]
-    """Unknowns asked for that all candidates together leave unobservable, or observable with a larger degree than asked for."""
+    """Unknowns asked for that all candidates together leave unobservable, observable with a larger degree than asked for, or without the
+    one solution that is required.
+    """
+    one_solution: CountedSets | None
+    """Counts of solutions, by which every set leaves one for every required unknown; null if this is not required."""
     least_degree: int | None
     """Worst degree of the required unknowns if all candidates are measured; null if none is required."""
     front: list[FrontSet]

@@ -182,8 +182,8 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "certificate" | "reduced" => &["new.json", "s.toml", ".", ""],
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "sensitivities" | "minimum" | "refine" | "divide" | "meet"
-        | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "own-outputs" | "dry-run"
-        | "ascii" | "texts" => {
+        | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "own-outputs" | "unique"
+        | "dry-run" | "ascii" | "texts" => {
             return None;
         }
         _ => number,
@@ -191,8 +191,18 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
 }
 
 /// Options of a design that concern models.
-const OF_MODELS: [&str; 9] =
-    ["cost", "own-outputs", "order", "work-limit", "keep", "observable", "max-degree", "seed", "format"];
+const OF_MODELS: [&str; 10] = [
+    "cost",
+    "own-outputs",
+    "unique",
+    "order",
+    "work-limit",
+    "keep",
+    "observable",
+    "max-degree",
+    "seed",
+    "format",
+];
 
 /// Arguments without an option name.
 fn operands(command: &str) -> &'static [&'static str] {

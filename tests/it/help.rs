@@ -12,7 +12,7 @@ const COMMANDS: [(&str, usize); 14] = [
     ("calibrate", 51),
     ("allan", 24),
     ("compare", 46),
-    ("design", 83),
+    ("design", 84),
     ("report", 60),
     ("paper", 18),
     ("verify", 15),

@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::system::{Candidate, SystemModel, json, judge, model_file};
-use obsdeg_design::sensors::{FrontSet, SensorError, SensorOptions, Sensors, sensors};
+use obsdeg_core::system::{
+    Candidate, Identifiability, NumberOfSolutions, SystemModel, SystemOptions, analyze_system, json, judge,
+    model_file,
+};
+use obsdeg_design::sensors::{FrontSet, SensorError, SensorOptions, SensorSet, Sensors, sensors};
 
 use crate::models::models;
 use crate::program::{refused, run, stderr, stdout};
@@ -26,15 +29,22 @@ fn degrees(model: &SystemModel, candidates: &[Candidate], set: usize, own: bool)
     let names = |m: &SystemModel| -> Vec<String> {
         let judged = judge(m, SEED, Some(0)).expect("names");
         let shown = (0..judged.layout.unknowns.len()).filter(|c| judged.shown(m, *c));
-        shown.map(|c| judged.layout.unknowns[c].name.clone()).collect()
+        let unknowns = shown.map(|c| &judged.layout.unknowns[c]);
+        // those of one more experiment are not reported
+        let own = unknowns.filter(|u| u.experiment.is_none_or(|e| e < model.experiments.max(1)));
+        own.map(|u| u.name.clone()).collect()
+    };
+    let plain = |name: String| match name.strip_suffix("@1").filter(|_| model.experiments <= 1) {
+        Some(plain) => plain.to_string(),
+        None => name,
     };
     if measuring.outputs.is_empty() {
-        return names(&whole).into_iter().map(|name| (name, None)).collect();
+        return names(&whole).into_iter().map(|name| (plain(name), None)).collect();
     }
     let judged = judge(&measuring, SEED, None).unwrap_or_else(|e| panic!("{}: {e}", model.name));
     let of = |name: String| {
         let degree = judged.verdict(&measuring, &name).and_then(|v| v.degree);
-        (name, degree)
+        (plain(name), degree)
     };
     names(&measuring).into_iter().map(of).collect()
 }
@@ -291,6 +301,127 @@ fn sets_of_special_models_are_those_of_exhaustion() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// One more experiment as a candidate beside states and expressions, by the verdicts of `analyze` on every
+/// set.
+#[test]
+fn sets_with_one_more_experiment_are_those_of_exhaustion() {
+    let mut wrong = Vec::new();
+    for (text, list) in SPECIAL {
+        let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+        let candidates = model.candidates_of(&format!("{list}, experiment")).expect("candidates");
+        assert!(candidates.last().is_some_and(|c| c.experiment));
+        for own in [false, true] {
+            wrong.extend(differences(&model, &candidates, own));
+        }
+    }
+    for model in reference(2).into_iter().step_by(2) {
+        wrong.extend(differences(&model, &model.candidates_of("states, experiment").expect("some"), false));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// By hand: `x' = -V x/(K + x)` and `y = x` need y, y', y'' for x, V and K; from two starts y and y' of each
+/// are four equations for x, x@2, V and K.
+#[test]
+fn a_second_start_spares_a_derivative() {
+    let text = "name='enzyme'\nparameters=['V','K']\n[states]\nx='-V*x/(K+x)'\n[outputs]\ny='x'\n[candidates]\n\
+                x='x'\nagain={experiment=true, cost=3, description='another start'}";
+    let model = model_file::read(text).expect("a model");
+    let options =
+        SensorOptions { candidates: model.candidates_of("candidates").expect("some"), ..Default::default() };
+    let found = sensors(&model, &options, &|_| true).expect("sets");
+    let front: Vec<_> = found.front.iter().map(|f| (f.outputs.join(" "), f.cost, f.degree)).collect();
+    assert_eq!(front, [("x".into(), 1.0, 2), ("x again".into(), 4.0, 1)]);
+    assert_eq!(found.quantities.iter().map(|q| q.name.as_str()).collect::<Vec<_>>(), ["x", "V", "K"]);
+    for (wrong, message) in [
+        ("again={experiment=true, expression='x'}", "either an expression, or experiment = true"),
+        ("again={experiment=false}", "either an expression, or experiment = true"),
+        ("one={experiment=true}\ntwo={experiment=true}", "more than one experiment"),
+    ] {
+        let text = format!("{}\n[candidates]\n{wrong}", text.split("\n[cand").next().expect("a model"));
+        let read = model_file::read(&text).map(|m| m.candidates_of("candidates"));
+        let e = read.map_or_else(|e| e.to_string(), |c| c.expect_err("refused").to_string());
+        assert!(e.contains(message), "{e}");
+    }
+}
+
+/// By hand: of two constants a and b, `a + b` and `a*b` leave two solutions (exchanged), `a*a` two signs of
+/// a; `a + b` with `a*a` leaves two, all three leave one. `a` with any other leaves one.
+#[test]
+fn one_solution_is_a_requirement() {
+    let text = "name='pair'\n[states]\na='0'\nb='0'\n[outputs]\ny='a'";
+    let model = model_file::read(text).expect("a model");
+    let sets = |list: &str, unique: bool, costs: &[f64]| {
+        let mut candidates = model.candidates_of(list).expect("candidates");
+        candidates.iter_mut().zip(costs).for_each(|(c, cost)| c.cost = *cost);
+        let options = SensorOptions { candidates, unique, ..SensorOptions::default() };
+        let found = sensors(&model, &options, &|_| true).expect("sets");
+        assert_eq!(found.one_solution.as_ref().map(|c| c.undecided), unique.then_some(0));
+        (found.sets.iter().map(|s| s.outputs.join(" ")).collect::<Vec<_>>(), found)
+    };
+    let (list, ones) = ("a + b, a*b, a*a", [1.0; 3]);
+    assert_eq!(sets(list, false, &ones).0, ["a + b a*b", "a + b a*a", "a*b a*a"]);
+    assert_eq!(sets(list, true, &ones).0, ["a + b a*b a*a"]);
+    let found = sets("a + b, a*b, a*a, a", true, &[1.0, 1.0, 1.0, 9.0]);
+    assert_eq!(found.0, ["a + b a*b a*a", "a + b a", "a*b a"]);
+    assert_eq!(found.1.front[0].one_of_each.len(), 3);
+    let found = sets("a*a, b*b", true, &[1.0; 2]).1;
+    let never: Vec<_> =
+        found.unattainable.iter().map(|u| (u.name.as_str(), &u.number_of_solutions)).collect();
+    let two = Some(NumberOfSolutions::Counted(2));
+    assert_eq!((never, found.required.len()), (vec![("a", &two), ("b", &two)], 0));
+}
+
+/// Sets with one solution by the numbers that `analyze` counts under every set, and numbers that are not
+/// decided.
+#[test]
+fn sets_with_one_solution_are_those_of_exhaustion() {
+    let mut several = 0;
+    for (text, list) in [
+        (
+            "name='flip'\nparameters=['ka','ke','V']\n[states]\na='-ka*a'\nc='ka*a/V-ke*c'\n[outputs]\ny='c'",
+            "c, a, ka + ke, V, ke*ke",
+        ),
+        (
+            "name='two'\nparameters=['k12','k21','k1','k2']\n[states]\na='k21*b-(k12+k1)*a'\n\
+             b='k12*a-(k21+k2)*b'\n[outputs]\ny='a'",
+            "a, b, k1 + k2, k1*k2, k12",
+        ),
+        ("name='squares'\nparameters=['p','q']\n[states]\nx='-p^2*x+q'\n[outputs]\ny='x'", "x, p, p*q, q"),
+    ] {
+        let model = model_file::read(text).expect("a model");
+        let candidates = model.candidates_of(list).expect("candidates");
+        let one = |set: usize| {
+            let chosen: Vec<Candidate> = members(set).map(|c| candidates[c].clone()).collect();
+            let (measuring, _) = model.measuring(&chosen, false);
+            let found =
+                (set > 0).then(|| analyze_system(&measuring, SystemOptions::default()).expect("judged"));
+            found.is_some_and(|f| {
+                f.quantities.iter().all(|q| q.identifiability == Identifiability::GloballyIdentifiable)
+            })
+        };
+        let all: Vec<bool> = (0..1 << candidates.len()).map(one).collect();
+        let least = |s: &usize| all[*s] && members(*s).all(|c| !all[s & !(1 << c)]);
+        let minimal: Vec<usize> = (0..all.len()).filter(least).collect();
+        let place =
+            |name: &String| candidates.iter().position(|c| c.named.name == *name).expect("a candidate");
+        let options = SensorOptions { candidates: candidates.clone(), keep: 99, ..SensorOptions::default() };
+        let set = |s: &SensorSet| s.outputs.iter().map(|name| 1 << place(name)).sum::<usize>();
+        let sets = |unique: bool| {
+            let found =
+                sensors(&model, &SensorOptions { unique, ..options.clone() }, &|_| true).expect("sets");
+            let mut sets: Vec<usize> = found.sets.iter().map(set).collect();
+            sets.sort_unstable();
+            (sets, found)
+        };
+        let (found, answer) = sets(true);
+        assert_eq!(found, minimal, "{text}");
+        assert!(answer.required.len() == answer.quantities.len() && !minimal.is_empty(), "{text}");
+        several += usize::from(sets(false).0 != minimal);
+    }
+    assert!(several >= 2, "{several} of the models have sets with several solutions");
+}
+
 fn named(name: &str) -> SystemModel {
     let mut all = models().into_iter();
     let (_, _, text) = all.find(|m| m.0 == name).expect("a reference model");
@@ -407,6 +538,10 @@ fn what_cannot_be_is_said() {
     let none = SensorOptions { candidates: Vec::new(), ..options.clone() };
     assert!(matches!(sensors(&model, &none, &|_| true), Err(SensorError::Candidates { found: 0 })));
     assert!(matches!(sensors(&model, &options, &|_| false), Err(SensorError::Interrupted)));
+    let candidates = model.candidates_of("3, b, t, unused").expect("candidates");
+    let found = sensors(&model, &SensorOptions { candidates, ..options }, &|_| true).expect("sets");
+    let tells: Vec<bool> = found.candidates.iter().map(|c| c.tells).collect();
+    assert_eq!(tells, [false, true, false, true]);
 }
 
 const SIR: &str = "examples/sir/model.toml";
@@ -430,6 +565,10 @@ fn options_of_the_other_kind_are_refused() {
     refused(&["design", scheme, "--measure", "states"], &["--measure is about models", "is a scheme"]);
     refused(&["design", SIR, "--measure", "nowhere"], &["nowhere", "candidate"]);
     refused(&["design", SIR, "--measure", "S +"], &["the candidate S +"]);
+    let unique = run(&["design", SIR, "--measure", "S, I, R, beta, experiment", "--unique"]);
+    let text = stdout(&unique);
+    assert!(unique.status.success() && text.contains("one solution of every required unknown"), "{text}");
+    refused(&["design", scheme, "--unique"], &["--measure is about models", "is a scheme"]);
     refused(&["design", SIR, "--measure", "candidates"], &["the model has none"]);
     refused(&["design", SIR, "--cost", "q=1"], &["there is no such candidate; expected one of"]);
     refused(&["design", SIR, "--cost", "S=0"], &["found 0; expected a cost above 0"]);

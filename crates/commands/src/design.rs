@@ -536,8 +536,18 @@ fn assumed(a: &Search, files: &SearchFiles) -> Result<(Scheme, Candidates, Condi
 }
 
 /// Options that a search for outputs of a model takes.
-const OF_MODELS: [&str; 9] =
-    ["seed", "keep", "observable", "max_degree", "measure", "own_outputs", "cost", "order", "work_limit"];
+const OF_MODELS: [&str; 10] = [
+    "seed",
+    "keep",
+    "observable",
+    "max_degree",
+    "measure",
+    "own_outputs",
+    "unique",
+    "cost",
+    "order",
+    "work_limit",
+];
 
 /// Sets of outputs, if a model or candidates for its outputs are given; `None` for schemes.
 fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<Sensors>, Problem> {

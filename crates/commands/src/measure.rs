@@ -31,6 +31,11 @@ pub struct MeasureOptions {
     #[arg(long)]
     pub own_outputs: bool,
 
+    /// Every unknown that must be observable must have one solution (globally identifiable), as `analyze`
+    /// counts solutions; a number that is not decided counts as several
+    #[arg(long)]
+    pub unique: bool,
+
     /// Cost of a candidate, above 0 (default: that of the file, or 1): x1=2.5. Sets are compared by the sum
     #[arg(long, value_name = "NAME=COST", value_parser = cost)]
     #[serde(with = "text::list")]
@@ -88,6 +93,7 @@ pub(crate) fn measured(
         own_outputs: a.own_outputs,
         required: wanted.required.to_vec(),
         max_degree: wanted.max_degree.clone(),
+        unique: a.unique,
         keep: wanted.keep,
         order: a.order.map(Into::into),
         seed: wanted.seed,

@@ -1,6 +1,7 @@
 //! Sets of outputs of a model.
 
-use obsdeg_design::sensors::{FrontSet, SensorUnknown, Sensors, Unattainable};
+use obsdeg_core::system::NumberOfSolutions;
+use obsdeg_design::sensors::{CountedSets, FrontSet, SensorUnknown, Sensors, Unattainable};
 
 use crate::Answer;
 use crate::document::{Block, Document, left, right};
@@ -13,6 +14,15 @@ const MEMBERS: usize = 24;
 /// Number with the word that it counts: `1 output`, `2 outputs`.
 fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// Outputs of a set, counted, with the experiment if it is one of them.
+fn counted(s: &Sensors, outputs: &[String]) -> String {
+    let experiment = |name: &&String| s.candidates.iter().any(|c| c.experiment && c.name == **name);
+    match outputs.iter().filter(experiment).count() {
+        0 => count(outputs.len(), "output"),
+        more => format!("{} and {more} more experiment", count(outputs.len() - more, "output")),
+    }
 }
 
 /// Outputs of a set.
@@ -38,7 +48,7 @@ fn has_costs(s: &Sensors) -> bool {
 fn price(s: &Sensors, f: &FrontSet) -> String {
     match has_costs(s) {
         true => format!("cost {}", cost(f.cost)),
-        false => count(f.outputs.len(), "output"),
+        false => counted(s, &f.outputs),
     }
 }
 
@@ -92,9 +102,13 @@ fn sentences(s: &Sensors) -> Vec<String> {
         ));
     }
     if !s.unattainable.is_empty() {
-        let word = |u: &Unattainable| match u.degree {
-            Some(k) => format!("{} (degree {k} with all candidates)", u.name),
-            None => format!("{} (not observable with all candidates)", u.name),
+        let word = |u: &Unattainable| match (u.degree, &u.number_of_solutions) {
+            (_, Some(NumberOfSolutions::Counted(k))) => {
+                format!("{} ({k} solutions with all candidates)", u.name)
+            }
+            (_, Some(_)) => format!("{} (number of solutions not decided with all candidates)", u.name),
+            (Some(k), None) => format!("{} (degree {k} with all candidates)", u.name),
+            (None, None) => format!("{} (not observable with all candidates)", u.name),
         };
         let list: Vec<String> = s.unattainable.iter().map(word).collect();
         out.push(format!("No set of the candidates reaches {}", list.join(", ")));
@@ -158,6 +172,24 @@ fn validity(s: &Sensors) -> Vec<String> {
         ),
         _ => "minimal sets were not searched".into(),
     });
+    let idle: Vec<&str> = s.candidates.iter().filter(|c| !c.tells).map(|c| c.name.as_str()).collect();
+    if !idle.is_empty() {
+        let verb = if idle.len() == 1 { "depends" } else { "depend" };
+        out.push(format!("{} {verb} on no unknown: measuring adds nothing to any set", idle.join(", ")));
+    }
+    if let Some(CountedSets { counted, undecided }) = &s.one_solution {
+        out.push(format!(
+            "one solution of every required unknown is required: solutions under {} counted as `analyze` counts them",
+            count(*counted, "set")
+        ));
+        if *undecided > 0 {
+            out.push(format!(
+                "under {} the number of solutions is not decided; these sets count as failing, so that a cheaper \
+                 one may leave one solution",
+                count(*undecided, "set")
+            ));
+        }
+    }
     if !s.closed {
         out.push(format!(
             "derivatives of some outputs are computed up to order {} without a proven end: \

@@ -6,18 +6,22 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::error::ModelError;
-use super::model::{Candidate, Named, Place, PlacedExpression, SystemModel};
+use super::model::{Candidate, MAX_EXPERIMENTS, Named, Place, PlacedExpression, SystemModel};
 use super::reader::{Entry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, parse_components};
 
 /// Words for groups of candidates, with their meanings.
-pub const CANDIDATE_WORDS: [(&str, &str); 5] = [
+pub const CANDIDATE_WORDS: [(&str, &str); 6] = [
     ("states", "every state"),
     ("outputs", "every output of the model"),
     ("inputs", "every unknown input"),
     ("parameters", "every parameter: its value becomes known"),
     ("candidates", "those of the table [candidates] of the file"),
+    (EXPERIMENT, "one more experiment: the same outputs, from another start"),
 ];
+
+/// Word, and name, of the candidate that is one more experiment.
+const EXPERIMENT: &str = "experiment";
 
 impl SystemModel {
     /// Candidates from a list such as `states` or `x1, x2, x1 + x3`: words of [`CANDIDATE_WORDS`], names and
@@ -33,6 +37,13 @@ impl SystemModel {
         }
         let mut seen = std::collections::HashSet::new();
         out.retain(|c| seen.insert(c.named.name.clone()));
+        if out.iter().filter(|c| c.experiment).count() > 1 {
+            return Err(wrong(list.trim(), "more than one experiment; expected at most one more"));
+        }
+        if out.iter().any(|c| c.experiment) && self.experiments >= MAX_EXPERIMENTS {
+            let message = format!("the model has {MAX_EXPERIMENTS} experiments, and no more are possible");
+            return Err(wrong(list.trim(), &message));
+        }
         match out.is_empty() {
             false => Ok(out),
             true => {
@@ -50,6 +61,12 @@ impl SystemModel {
             "parameters" => self.parameters.iter().map(named).collect(),
             "outputs" => outputs().collect(),
             "candidates" => self.candidates.clone(),
+            EXPERIMENT => vec![Candidate {
+                named: Named { name: EXPERIMENT.into(), ..Named::default() },
+                parts: Vec::new(),
+                experiment: true,
+                cost: 1.0,
+            }],
             expression => return self.candidate(expression).map(|c| vec![c]),
         };
         match found.is_empty() {
@@ -96,6 +113,7 @@ impl SystemModel {
         Ok(Candidate {
             named: Named { name: text.into(), ..Named::default() },
             parts: read.entries.into_iter().map(part).collect(),
+            experiment: false,
             cost: 1.0,
         })
     }
@@ -120,7 +138,8 @@ impl SystemModel {
     }
 
     /// The model with candidates as its outputs, beside its own outputs if `own`, and the outputs of each
-    /// candidate; without requested combinations.
+    /// candidate; without requested combinations. With an experiment among the candidates it has one more,
+    /// which differs from the last one by its start only.
     pub fn measuring(&self, candidates: &[Candidate], own: bool) -> (Self, Vec<Range<usize>>) {
         let mut out = Self { combinations: Vec::new(), candidates: Vec::new(), ..self.clone() };
         if !own {
@@ -129,6 +148,10 @@ impl SystemModel {
         let mut ranges = Vec::new();
         for (i, candidate) in candidates.iter().enumerate() {
             let start = out.outputs.len();
+            if candidate.experiment {
+                out.experiments = out.experiments.max(1) + 1;
+                out.own.extend(self.own.last().cloned());
+            }
             for (k, part) in candidate.parts.iter().enumerate() {
                 let name = format!("candidate {}.{}", i + 1, k + 1);
                 out.outputs.push((Named { name, ..Named::default() }, part.clone()));
@@ -148,19 +171,32 @@ impl ModelReader<'_> {
         let table = value.get_ref().as_table();
         let (mut inner, mut cost) = (value.get_ref(), 1.0);
         if let Some(t) = table {
-            self.known_keys(&what, t, &span, &["expression", "cost", "unit", "description"])?;
-            let none = || self.at(span.clone(), what.clone(), "no expression; expected one".into());
-            inner = t.get("expression").ok_or_else(none)?;
+            self.known_keys(&what, t, &span, &["expression", "experiment", "cost", "unit", "description"])?;
+            let experiment = match t.get("experiment") {
+                None => false,
+                Some(Value::Boolean(true)) if !t.contains_key("expression") => true,
+                Some(_) => {
+                    let message = "expected either an expression, or experiment = true".into();
+                    return Err(self.at(span, what, message));
+                }
+            };
             cost = match t.get("cost") {
                 None => 1.0,
                 Some(Value::Integer(n)) => *n as f64,
                 Some(Value::Float(x)) => *x,
                 Some(_) => f64::NAN,
             };
+            let none = || self.at(span.clone(), what.clone(), "no expression; expected one".into());
+            if experiment {
+                check_cost(cost).map_err(|message| self.at(span, what, message))?;
+                let named = self.named(name, table);
+                return Ok(Candidate { named, parts: Vec::new(), experiment, cost });
+            }
+            inner = t.get("expression").ok_or_else(none)?;
         }
         check_cost(cost).map_err(|message| self.at(span.clone(), what.clone(), message))?;
         let found = self.formulas(&what, inner, span)?;
-        Ok(Candidate { named: self.named(name, table), parts: found.parts, cost })
+        Ok(Candidate { named: self.named(name, table), parts: found.parts, experiment: false, cost })
     }
 
     /// All candidates of the file, in its order.
@@ -191,7 +227,7 @@ fn wrong(what: &str, message: &str) -> ModelError {
 }
 
 fn one(named: Named, part: PlacedExpression) -> Candidate {
-    Candidate { named, parts: vec![part], cost: 1.0 }
+    Candidate { named, parts: vec![part], experiment: false, cost: 1.0 }
 }
 
 /// Candidate that is the quantity of this name.

@@ -1,7 +1,7 @@
 //! Rows of every output of a model at two points. Verdicts on any set of outputs are ranks of these rows.
 
 use obsdeg_exact::certainty::{Claim, error_bound};
-use obsdeg_exact::{Field, Reals, SplitMix64};
+use obsdeg_exact::{Field, Reals, Scalars, SplitMix64};
 
 use super::addition::written_apart;
 use super::error::ModelError;
@@ -31,6 +31,8 @@ pub struct Gathered {
     claim: Claim,
     /// Number of decisions of the verdicts on one set of outputs.
     decisions: usize,
+    /// Number of outputs of the model.
+    outputs: usize,
 }
 
 impl Gathered {
@@ -40,6 +42,20 @@ impl Gathered {
         let decisions = self.decisions.saturating_mul(sets);
         let bound = || error_bound(&Claim { decisions, ..self.claim }, 2);
         matches!(self.rows, OutputRows::Primes(_)).then(bound)
+    }
+
+    /// True if an output of `measured` depends on an unknown, beyond what constraints and known starts tell.
+    pub fn tells(&self, measured: &std::ops::Range<usize>) -> bool {
+        fn any<S: Scalars>(rows: &PointRows<S>, outputs: usize, measured: &std::ops::Range<usize>) -> bool {
+            rows.outputs
+                .iter()
+                .enumerate()
+                .any(|(i, own)| measured.contains(&(i % outputs)) && !own.is_empty())
+        }
+        match &self.rows {
+            OutputRows::Primes(points) => any(&points[0], self.outputs, measured),
+            OutputRows::Digits(points) => any(&points.0, self.outputs, measured),
+        }
     }
 
     /// True if the end of the rows of every output is proven.
@@ -109,23 +125,28 @@ pub fn gather(
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, bound)?;
     let (runs, root_order) = gather_runs(model, &compiled, &judged, attempt)?;
+    let segments = compiled.segments.len().max(1);
     let rows = match runs {
-        RunRows::Primes([first, second]) => OutputRows::Primes(Box::new([merged(first)?, merged(second)?])),
-        RunRows::Digits(first, second) => OutputRows::Digits(Box::new((merged(first)?, merged(second)?))),
+        RunRows::Primes([first, second]) => {
+            OutputRows::Primes(Box::new([merged(first, segments)?, merged(second, segments)?]))
+        }
+        RunRows::Digits(first, second) => {
+            OutputRows::Digits(Box::new((merged(first, segments)?, merged(second, segments)?)))
+        }
     };
     let last = match &rows {
         OutputRows::Primes(points) => last_order(&points[0]),
         OutputRows::Digits(points) => last_order(&points.0),
     };
-    let runs = compiled.segments.len().max(1) * model.experiments.max(1);
+    let runs = segments * model.experiments.max(1);
     let unknowns = judged.layout.unknowns.len();
     let claim = Claim { order: root_order, ..claim_of(&compiled, &judged.layout, last + 1) };
     let decisions = (last + 2) * (1 + 2 * runs) + 2 * unknowns;
-    Ok(Gathered { judged, rows, claim, decisions })
+    Ok(Gathered { judged, rows, claim, decisions, outputs: model.outputs.len() })
 }
 
-fn merged<S: Values>(runs: Vec<PointRows<S>>) -> Result<PointRows<S>, ModelError> {
-    PointRows::merged(runs).ok_or_else(|| refuse("a model without outputs".into()))
+fn merged<S: Values>(runs: Vec<PointRows<S>>, segments: usize) -> Result<PointRows<S>, ModelError> {
+    PointRows::merged(runs, segments).ok_or_else(|| refuse("a model without outputs".into()))
 }
 
 /// Highest order of a row.

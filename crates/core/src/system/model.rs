@@ -84,13 +84,15 @@ pub enum Constant {
     Value(PlacedExpression),
 }
 
-/// Quantity that could be measured.
+/// Quantity that could be measured, or one more experiment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Candidate {
     /// Name, unit and description: of an expression its text.
     pub named: Named,
-    /// Expressions of its entries: one, or those of a vector.
+    /// Expressions of its entries: one, or those of a vector; none for an experiment.
     pub parts: Vec<PlacedExpression>,
+    /// True for one more experiment: the same outputs, from another start.
+    pub experiment: bool,
     /// Cost of measuring it, above 0, dimensionless.
     pub cost: f64,
 }

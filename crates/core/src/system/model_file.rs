@@ -89,8 +89,9 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     combinations: Vec<Spanned<String>>,
-    /// Quantities that could be measured, for `obsdeg design`: an expression, or a table with expression,
-    /// cost (1 when left out), unit, description. They are no outputs.
+    /// Quantities that could be measured, for `obsdeg design`: an expression, or a table with expression (or
+    /// `experiment = true`: the same outputs from another start), cost (1 when left out), unit, description.
+    /// They are no outputs.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     candidates: BTreeMap<String, Spanned<Value>>,

@@ -1,6 +1,6 @@
 //! The answer on sets of outputs: plain data, serialisable.
 
-use obsdeg_core::system::DigitsReport;
+use obsdeg_core::system::{DigitsReport, NumberOfSolutions};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -25,9 +25,12 @@ pub struct Sensors {
     pub required: Vec<String>,
     /// Largest degrees that were asked for, as written: `6`, `k1=4`.
     pub max_degree: Vec<String>,
-    /// Unknowns asked for that all candidates together leave unobservable, or observable with a larger degree
-    /// than asked for.
+    /// Unknowns asked for that all candidates together leave unobservable, observable with a larger degree
+    /// than asked for, or without the one solution that is required.
     pub unattainable: Vec<Unattainable>,
+    /// Counts of solutions, by which every set leaves one for every required unknown; null if this is not
+    /// required.
+    pub one_solution: Option<CountedSets>,
     /// Worst degree of the required unknowns if all candidates are measured; null if none is required.
     pub least_degree: Option<usize>,
     /// Front of cost against the largest degree: per cost the set with the smallest, if it is smaller than
@@ -68,12 +71,16 @@ pub struct Sensors {
     pub seed: u64,
 }
 
-/// Quantity that can be measured.
+/// Quantity that can be measured, or one more experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SensorCandidate {
     /// Name: that of a state, input or parameter, the key in the file, or the expression itself.
     pub name: String,
-    /// Expression of the candidate, as written.
+    /// True for one more experiment: the outputs of a set, measured again from another start.
+    pub experiment: bool,
+    /// True if the candidate depends on an unknown; if false it adds nothing to any set.
+    pub tells: bool,
+    /// Expression of the candidate, as written; empty for an experiment.
     pub expression: String,
     /// Unit, as in the model file.
     pub unit: String,
@@ -98,6 +105,19 @@ pub struct Unattainable {
     pub name: String,
     /// Observable degree if all candidates are measured; null if it is not observable.
     pub degree: Option<usize>,
+    /// Number of solutions if all candidates are measured; null if one solution is not required, or if its
+    /// degree already excludes the unknown.
+    pub number_of_solutions: Option<NumberOfSolutions>,
+}
+
+/// Sets whose solutions were counted, at the seed of the answer, as `analyze` counts them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct CountedSets {
+    /// Number of sets whose solutions were counted.
+    pub counted: usize,
+    /// Number of these under which the number of solutions of some required unknown is not decided. They
+    /// count as failing: a cheaper set than those in `front` may leave one solution.
+    pub undecided: usize,
 }
 
 /// Set of outputs that are measured together.

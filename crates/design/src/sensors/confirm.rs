@@ -47,7 +47,8 @@ fn judged_alike(task: &SensorTask<'_>, set: Set, found: &[u16]) -> Result<Option
     let (model, _) = task.model.measuring(&chosen, options.own_outputs);
     let Ok(judged) = judge(&model, options.seed, options.order) else { return Ok(None) };
     for (u, &found) in task.asked.iter().zip(found) {
-        let own = judged.verdict(&model, &u.name).and_then(|v| v.degree);
+        let name = u.name_in(task.model, &model);
+        let own = judged.verdict(&model, &name).and_then(|v| v.degree);
         if own != degree(found) {
             let word = |d: Option<usize>| d.map_or_else(|| "none".to_string(), |d| d.to_string());
             let reason = format!(

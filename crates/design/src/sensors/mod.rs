@@ -21,18 +21,22 @@ mod confirm;
 mod cuts;
 mod ranks;
 mod search;
+mod unique;
 
 use obsdeg_core::system::{
-    Candidate, Gathered, Judgement, ModelError, OutputRows, Role, SystemModel, check_cost, gather,
+    Candidate, Gathered, Judgement, ModelError, OutputRows, Role, SystemModel, Unknown, check_cost, gather,
 };
 use obsdeg_exact::parallel;
 
-pub use answer::{FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable};
+pub use answer::{
+    CountedSets, FrontSet, SCHEMA, SensorCandidate, SensorSet, SensorUnknown, Sensors, Unattainable,
+};
 use confirm::Confirmation;
 use cuts::{cost_of, members};
 use ranks::NONE;
 pub use ranks::{Ordered, Ranks, Set};
 use search::{CheapestSet, Goal, SetSearch, StopReason};
+use unique::{UniqueSolutions, is_one};
 
 /// Largest number of candidates.
 pub const MAX_SENSORS: usize = 64;
@@ -56,6 +60,8 @@ pub struct SensorOptions {
     pub required: Vec<String>,
     /// Largest degrees: of one unknown, or of all (`None`).
     pub max_degree: Vec<(Option<String>, usize)>,
+    /// True if every required unknown must have one solution.
+    pub unique: bool,
     /// Largest number of minimal sets in the list.
     pub keep: usize,
     /// Highest order of derivatives; `None` for the bound of the model.
@@ -71,6 +77,7 @@ impl Default for SensorOptions {
             own_outputs: false,
             required: Vec::new(),
             max_degree: Vec::new(),
+            unique: false,
             keep: 10,
             order: None,
             seed: 1,
@@ -129,10 +136,21 @@ pub enum SensorError {
 }
 
 /// Unknown whose degree is computed.
+#[derive(Clone)]
 struct TargetUnknown {
     name: String,
     unit: String,
     column: usize,
+    /// True if every experiment has its own.
+    in_experiment: bool,
+}
+
+impl TargetUnknown {
+    /// Name in a model that may have one more experiment than `model`.
+    fn name_in(&self, model: &SystemModel, measuring: &SystemModel) -> String {
+        let more = model.experiments <= 1 && measuring.experiments > 1 && self.in_experiment;
+        format!("{}{}", self.name, if more { FIRST } else { "" })
+    }
 }
 
 /// Finds sets of outputs. `going` receives the number of sets judged; the search ends when it returns
@@ -150,8 +168,8 @@ pub fn sensors(
     let mut disagreed = None;
     for attempt in 0..ATTEMPTS {
         let gathered = gather(&whole, options.seed, options.order, attempt)?;
-        let owners = owners(whole.outputs.len(), &ranges);
-        let asked = unknowns(&whole, &gathered.judged);
+        let owners = owners(&whole, &ranges, options);
+        let asked = unknowns(model, &whole, &gathered.judged);
         let columns: Vec<usize> = asked.iter().map(|u| u.column).collect();
         let [first, second]: [Box<dyn Ranks>; 2] = match &gathered.rows {
             OutputRows::Primes(points) => {
@@ -166,8 +184,15 @@ pub fn sensors(
         let n = gathered.judged.layout.unknowns.len() as u64;
         let most = (LIMITS * model.work_limit.operations() / (n * n * n / 2 + 1)).max(LEAST);
         let search = SetSearch::new(&*first, costs.clone(), asked.len(), most, going);
-        let mut task =
-            SensorTask { model, options, gathered: &gathered, asked, search, required: Vec::new() };
+        let mut task = SensorTask {
+            model,
+            options,
+            gathered: &gathered,
+            asked,
+            search,
+            ranges: &ranges,
+            required: Vec::new(),
+        };
         let answer = task.answer()?;
         match task.differs(&*second) {
             None if first.is_clear() && second.is_clear() => return Ok(answer),
@@ -197,14 +222,20 @@ fn checked(candidates: &[Candidate]) -> Result<Vec<u64>, SensorError> {
     candidates.iter().map(cost).collect()
 }
 
-/// Candidate of each output, as a set; the empty set for the own outputs of the model.
-fn owners(outputs: usize, ranges: &[std::ops::Range<usize>]) -> Vec<Set> {
+/// Candidates that the rows of each output need, as a set, experiment by experiment: the one that is
+/// measured, and of the last experiment the one that adds it. The set is empty for the own outputs of the
+/// model.
+fn owners(whole: &SystemModel, ranges: &[std::ops::Range<usize>], options: &SensorOptions) -> Vec<Set> {
     let owner = |i: usize| ranges.iter().position(|range| range.contains(&i)).map_or(0, |c| 1 << c);
-    (0..outputs).map(owner).collect()
+    let experiments = whole.experiments.max(1);
+    let added = options.candidates.iter().position(|c| c.experiment).map_or(0, |c| 1 << c);
+    let of = |e: usize| if e + 1 == experiments { added } else { 0 };
+    (0..experiments).flat_map(|e| (0..whole.outputs.len()).map(move |i| of(e) | owner(i))).collect()
 }
 
-/// Unknowns of the model with their units.
-fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<TargetUnknown> {
+/// Unknowns of the model with their units, by their columns in the rows of `whole`, which may have one more
+/// experiment.
+fn unknowns(model: &SystemModel, whole: &SystemModel, judged: &Judgement) -> Vec<TargetUnknown> {
     let unit = |role: Role| match role {
         Role::State(i) => model.states[i].named.unit.clone(),
         Role::Parameter(i) => model.parameters[i].unit.clone(),
@@ -212,8 +243,21 @@ fn unknowns(model: &SystemModel, judged: &Judgement) -> Vec<TargetUnknown> {
         _ => String::new(),
     };
     let all = judged.layout.unknowns.iter().enumerate().filter(|(c, _)| judged.shown(model, *c));
-    all.map(|(column, u)| TargetUnknown { name: u.name.clone(), unit: unit(u.role), column }).collect()
+    let own = all.filter(|(_, u)| u.experiment.is_none_or(|e| e < model.experiments.max(1)));
+    let more = model.experiments <= 1 && whole.experiments > 1;
+    let name = |name: &String| match name.strip_suffix(FIRST).filter(|_| more) {
+        Some(name) => name.into(),
+        None => name.clone(),
+    };
+    let of = |(column, u): (usize, &Unknown)| {
+        let in_experiment = u.experiment.is_some();
+        TargetUnknown { name: name(&u.name), unit: unit(u.role), column, in_experiment }
+    };
+    own.map(of).collect()
 }
+
+/// End of the name of an unknown of the first of several experiments.
+const FIRST: &str = "@1";
 
 fn names(set: Set, options: &SensorOptions) -> Vec<String> {
     members(set).map(|c| options.candidates[c].named.name.clone()).collect()
@@ -230,6 +274,8 @@ struct SensorTask<'a> {
     gathered: &'a Gathered,
     asked: Vec<TargetUnknown>,
     search: SetSearch<'a>,
+    /// Outputs of each candidate, among those of all.
+    ranges: &'a [std::ops::Range<usize>],
     /// Required unknowns: indices among all.
     required: Vec<usize>,
 }
@@ -278,12 +324,34 @@ impl SensorTask<'_> {
         let reached = self.search.degrees(everything).map_err(|_| SensorError::Interrupted)?.to_vec();
         let (reach, never): (Vec<usize>, Vec<usize>) =
             required.into_iter().partition(|u| reached[*u] <= limits[*u]);
-        reach.iter().for_each(|&u| self.search.limits[u] = Some(limits[u]));
+        let name = |u: usize| self.asked[u].name.clone();
+        let out_of_reach =
+            |u: usize| Unattainable { name: name(u), degree: degree(reached[u]), number_of_solutions: None };
+        let mut out: Vec<Unattainable> = never.into_iter().map(out_of_reach).collect();
         self.required = reach;
-        let never = never.into_iter();
-        Ok(never
-            .map(|u| Unattainable { name: self.asked[u].name.clone(), degree: degree(reached[u]) })
-            .collect())
+        if self.options.unique {
+            out.extend(self.require_one_solution(&reached));
+        }
+        self.required.iter().for_each(|&u| self.search.limits[u] = Some(limits[u]));
+        Ok(out)
+    }
+
+    /// Requires one solution of every required unknown; those that all candidates leave with several, or with
+    /// a number that is not decided, are left out and listed.
+    fn require_one_solution(&mut self, reached: &[u16]) -> Vec<Unattainable> {
+        let mut unique = UniqueSolutions::new(self.model, self.options);
+        let required: Vec<TargetUnknown> = self.required.iter().map(|&u| self.asked[u].clone()).collect();
+        let numbers = unique.numbers(self.search.all, &required);
+        let (one, more): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.required).into_iter().zip(numbers).partition(|(_, n)| is_one(n));
+        self.required = one.into_iter().map(|(u, _)| u).collect();
+        unique.required = self.required.iter().map(|&u| self.asked[u].clone()).collect();
+        self.search.unique = Some(unique);
+        let of = |(u, number_of_solutions): (usize, _)| {
+            let (name, degree) = (self.asked[u].name.clone(), degree(reached[u]));
+            Unattainable { name, degree, number_of_solutions }
+        };
+        more.into_iter().map(of).collect()
     }
 
     fn set(&self, set: Set, degree: u16) -> SensorSet {
@@ -347,6 +415,8 @@ impl SensorTask<'_> {
             let all = observable.len() == self.required.len();
             out.push(SensorCandidate {
                 name: candidate.named.name.clone(),
+                experiment: candidate.experiment,
+                tells: candidate.experiment || self.gathered.tells(&self.ranges[c]),
                 expression: candidate.parts.first().map_or_else(String::new, |p| p.text.clone()),
                 unit: candidate.named.unit.clone(),
                 description: candidate.named.description.clone(),
@@ -406,6 +476,11 @@ impl SensorTask<'_> {
                 })
                 .collect(),
             unattainable,
+            one_solution: self
+                .search
+                .unique
+                .as_ref()
+                .map(|unique| CountedSets { counted: unique.counted(), undecided: unique.undecided() }),
             least_degree: least.and_then(degree),
             front: front.into_iter().map(|f| f.1).collect(),
             sets: listed,
@@ -449,6 +524,7 @@ impl StopReason {
             Self::Work => {
                 "more sets would be judged than the limit of work allows; a larger --work-limit allows more"
             }
+            Self::Counts => "the solutions under more sets would be counted than the limit allows",
             Self::Nodes => {
                 "there are too many ways to choose from the groups of candidates that the proofs need"
             }

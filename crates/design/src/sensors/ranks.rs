@@ -22,8 +22,8 @@ pub trait Ranks: Sync {
     }
 }
 
-/// Row with its order, its candidate as a set (the empty set: present under every set), and its index
-/// among all rows.
+/// Row with its order, the candidates that must all be in a set for the row to be present (empty: present
+/// under every set), and its index among all rows.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     order: usize,
@@ -44,7 +44,7 @@ pub struct Ordered<S: Scalars> {
 }
 
 impl<S: Scalars> Ordered<S> {
-    /// Sorts the rows of all outputs. `owners` is the candidate of each output, as a set; `asked` are
+    /// Sorts the rows of all outputs. `owners` are the candidates that each output needs, a set; `asked` are
     /// the columns of the unknowns in question.
     pub fn new(point: &PointRows<S>, owners: &[Set], asked: &[usize]) -> Self {
         let mut all: Vec<(usize, Set, &[S::Element])> =
@@ -72,7 +72,7 @@ impl<S: Scalars> Ordered<S> {
             let (now, later) = rows.split_at(rows.partition_point(|row| row.order == order));
             rows = later;
             let mut grew = false;
-            for row in now.iter().filter(|row| row.owner == 0 || row.owner & set != 0) {
+            for row in now.iter().filter(|row| row.owner & !set == 0) {
                 if basis.is_full() {
                     break;
                 }

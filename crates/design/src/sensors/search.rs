@@ -7,6 +7,7 @@ use obsdeg_exact::parallel;
 
 use super::cuts::{Cheapest, Transversals, cost_of, members, smallest};
 use super::ranks::{NONE, Ranks, Set};
+use super::unique::UniqueSolutions;
 
 /// Largest number of nodes of a search for a cheapest set.
 const NODES: u64 = 4_000_000;
@@ -36,6 +37,8 @@ pub(crate) enum Goal {
 pub(crate) enum StopReason {
     /// Limit of work: more sets would be judged than it allows.
     Work,
+    /// Limit of counted solutions.
+    Counts,
     /// Limit of nodes: too many sets hit all cuts.
     Nodes,
     /// Interruption by the caller.
@@ -111,6 +114,8 @@ pub(crate) struct SetSearch<'a> {
     pub(crate) all: Set,
     /// Largest degree allowed for each unknown in question; `None` if it is not required.
     pub(crate) limits: Vec<Option<u16>>,
+    /// Numbers of solutions, if every required unknown must have one.
+    pub(crate) unique: Option<UniqueSolutions<'a>>,
     /// Degrees under every set that was judged.
     pub(crate) judged: HashMap<Set, Box<[u16]>>,
     /// Maximal failing sets that were found, for any goal.
@@ -130,11 +135,30 @@ impl<'a> SetSearch<'a> {
     ) -> Self {
         let all = if costs.len() >= 64 { Set::MAX } else { (1 << costs.len()) - 1 };
         let limits = vec![None; unknowns];
-        Self { ranks, costs, all, limits, judged: HashMap::new(), failing: Vec::new(), left: most, going }
+        let (judged, failing) = (HashMap::new(), Vec::new());
+        Self { ranks, costs, all, limits, unique: None, judged, failing, left: most, going }
     }
 
-    /// Judges sets that are not judged yet, on all cores.
+    /// Judges sets that are not judged yet, on all cores, and counts solutions where they are required.
     pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), StopReason> {
+        self.judge_degrees(sets)?;
+        let Some(mut unique) = self.unique.take() else { return Ok(()) };
+        let mut counted = Ok(());
+        for &set in sets.iter().filter(|set| self.worst_of(**set) < NONE) {
+            if !unique.count(set) {
+                counted = Err(StopReason::Counts);
+            } else if !(self.going)(self.judged.len() as u64) {
+                counted = Err(StopReason::Interrupted);
+            }
+            if counted.is_err() {
+                break;
+            }
+        }
+        self.unique = Some(unique);
+        counted
+    }
+
+    fn judge_degrees(&mut self, sets: &[Set]) -> Result<(), StopReason> {
         let mut new: Vec<Set> = sets.iter().copied().filter(|s| !self.judged.contains_key(s)).collect();
         new.sort_unstable();
         new.dedup();
@@ -180,7 +204,9 @@ impl<'a> SetSearch<'a> {
     /// True if a judged set reaches a goal.
     fn reaches(&self, set: Set, goal: Goal) -> bool {
         match goal {
-            Goal::All(most) => self.worst_of(set) <= most,
+            Goal::All(most) => {
+                self.worst_of(set) <= most && self.unique.as_ref().is_none_or(|unique| unique.holds(set))
+            }
             Goal::One(u, most) => self.judged.get(&set).is_some_and(|degrees| degrees[u] <= most),
         }
     }

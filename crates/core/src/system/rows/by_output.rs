@@ -25,8 +25,8 @@ pub struct PointRows<S: Scalars> {
     pub columns: usize,
     /// Differentials of the constraints, which count as rows of order 0 of every set.
     pub known: Vec<Vec<S::Element>>,
-    /// Rows per output, low orders first, without those that depend on other rows of no higher order of the
-    /// same output and run.
+    /// Rows per experiment and output, those of the first experiment first; of each low orders first, without
+    /// those that depend on other rows of no higher order of the same output and run.
     pub outputs: Vec<OwnRows<S>>,
     /// True if the end of the rows of every output is proven.
     pub ended: bool,
@@ -104,17 +104,19 @@ impl<'a, S: Values> SystemRows<'a, S> {
 }
 
 impl<S: Scalars> PointRows<S> {
-    /// The rows of several runs together, the rows of each output by their order.
-    pub(in crate::system) fn merged(runs: Vec<Self>) -> Option<Self> {
+    /// The rows of several runs together: per experiment of `segments` runs, and output, by their order.
+    pub(in crate::system) fn merged(runs: Vec<Self>, segments: usize) -> Option<Self> {
         let first = runs.first()?;
         let (field, columns) = (first.field.clone(), first.columns);
         let mut all = S::Space::new(field.clone(), columns);
         let known = runs.iter().flat_map(|run| &run.known).filter(|row| all.insert(row)).cloned().collect();
         let gap = runs.iter().fold(all.gap(), |gap, run| gap.and(run.gap));
         let ended = runs.iter().all(|run| run.ended);
-        let mut outputs = vec![OwnRows::<S>::new(); first.outputs.len()];
-        for (output, own) in runs.into_iter().flat_map(|run| run.outputs.into_iter().enumerate()) {
-            outputs[output].extend(own);
+        let mut outputs = vec![OwnRows::<S>::new(); first.outputs.len() * (runs.len() / segments)];
+        for (run, rows) in runs.into_iter().enumerate() {
+            let experiment = run / segments;
+            let own = outputs.iter_mut().skip(experiment * rows.outputs.len());
+            own.zip(rows.outputs).for_each(|(all, rows)| all.extend(rows));
         }
         outputs.iter_mut().for_each(|rows| rows.sort_by_key(|(order, _)| *order));
         Some(Self { field, columns, known, outputs, ended, gap })
