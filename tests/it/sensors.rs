@@ -245,7 +245,7 @@ fn sets_of_all_reference_models_are_those_of_exhaustion() {
 
 /// Models with all features of rows: inputs, segments with jumps, experiments, known starts, constraints,
 /// functions, vectors, and candidates with costs that are expressions.
-const SPECIAL: [(&str, &str); 8] = [
+const SPECIAL: [(&str, &str); 9] = [
     (
         "name='input'\nparameters=['k']\n[states]\na='-k*a+w'\nb='a-b'\n[unknown_inputs]\nw={polynomial=1}\n\
          [outputs]\ny='b'",
@@ -270,6 +270,11 @@ const SPECIAL: [(&str, &str); 8] = [
         "name='known'\nparameters=['k','m']\n[states]\na={equation='-k*a*b', initial='2'}\n\
          b={equation='k*a-m*b', initial='known'}\nc='m*a*c'\n[outputs]\ny='b'",
         "states, a*b",
+    ),
+    // at the start the second candidate says no more than the first, its derivative does
+    (
+        "name='special'\nparameters=['k','l']\n[states]\na={equation='k', initial='0'}\n[outputs]\ny='a'",
+        "k, k + a*l, a",
     ),
     (
         "name='constraint'\nconstraints=['x^2+y^2=1']\nparameters=['k']\n[states]\nx='-k*y'\ny='k*x'\nz='x*z'\n\

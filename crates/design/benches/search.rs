@@ -196,7 +196,7 @@ fn sets_of_states(bencher: Bencher<'_, '_>) {
     let OutputRows::Primes(points) = &gathered.rows else { return };
     let columns: Vec<usize> = (0..points[0].columns).collect();
     let owners: Vec<Set> = (0..states.len()).map(|c| 1 << c).collect();
-    let ranks = Ordered::new(&points[0], &owners, &columns);
+    let ranks = Ordered::new(&points[0], &owners, &columns, true);
     let sets: Vec<Set> = (0..1 << states.len()).collect();
     bencher.counter(ItemsCount::new(sets.len())).bench(|| {
         let degrees = |set: &Set| ranks.degrees(*set).iter().map(|d| usize::from(*d)).max();

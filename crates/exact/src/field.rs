@@ -23,6 +23,9 @@ impl Field {
     /// Number of products of two elements that may be added to a settled sum: `p 2^64 + 8 p^2 < 2 p
     /// 2^64`.
     pub const LAZY: usize = 8;
+    /// Number of products of two elements that may be added to a settled sum before
+    /// [`Field::settle_many`]: `p 2^64 + 56 p^2 < 2^125 + 56 * 2^122 = 2^128`.
+    pub const MANY: usize = 56;
 
     /// The field of the prime `p`; the caller must pass an odd prime between 2^60 and 2^61.
     pub fn new(p: u64) -> Self {
@@ -51,7 +54,13 @@ impl Field {
     fn redc(&self, t: u128) -> u64 {
         let m = (t as u64).wrapping_mul(self.neg_inv);
         let r = ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64;
-        if r >= self.p { r - self.p } else { r }
+        self.once(r)
+    }
+
+    /// Reduces a number below `2p`: by a minimum, because a branch is mispredicted half of the time.
+    #[inline]
+    fn once(&self, a: u64) -> u64 {
+        a.min(a.wrapping_sub(self.p))
     }
 
     /// The image of an unsigned integer.
@@ -78,14 +87,14 @@ impl Field {
     /// `a + b`.
     #[inline]
     pub fn add(&self, a: u64, b: u64) -> u64 {
-        let s = a + b;
-        if s >= self.p { s - self.p } else { s }
+        self.once(a + b)
     }
 
     /// `a - b`.
     #[inline]
     pub fn sub(&self, a: u64, b: u64) -> u64 {
-        if a >= b { a - b } else { a + self.p - b }
+        let d = a.wrapping_sub(b);
+        d.min(d.wrapping_add(self.p))
     }
 
     /// `-a`.
@@ -167,6 +176,27 @@ impl Field {
         self.redc(self.settle(sum))
     }
 
+    /// The element of a settled sum, or of a sum of at most [`Field::LAZY`] products: `8 p^2 < p 2^64`.
+    #[inline]
+    pub fn reduce_settled(&self, sum: u128) -> u64 {
+        self.redc(sum)
+    }
+
+    /// Brings a settled sum plus at most [`Field::MANY`] products below `p 2^64`: a settled sum.
+    #[inline]
+    pub fn settle_many(&self, sum: u128) -> u128 {
+        let below = |high: u64, bound: u64| high.min(high.wrapping_sub(bound));
+        let high = (sum >> 64) as u64; // below 2^64 < 16 p
+        let high = [8, 4, 2, 1].iter().fold(high, |high, k| below(high, k * self.p));
+        u128::from(high) << 64 | u128::from(sum as u64)
+    }
+
+    /// The element of a settled sum plus at most [`Field::MANY`] products.
+    #[inline]
+    pub fn reduce_many(&self, sum: u128) -> u64 {
+        self.redc(self.settle_many(sum))
+    }
+
     /// `start + sum a_i b_i`, with one reduction at the end.
     #[inline]
     pub fn dot(&self, start: u64, terms: impl IntoIterator<Item = (u64, u64)>) -> u64 {
@@ -197,6 +227,10 @@ mod tests {
         BigUint::from(a)
     }
 
+    fn big128(a: u128) -> BigUint {
+        BigUint::from(a)
+    }
+
     proptest! {
         #[test]
         fn agrees_with_big_integers(a in any::<u64>(), b in any::<u64>()) {
@@ -205,6 +239,7 @@ mod tests {
             prop_assert_eq!(big(f.to_u64(f.mul(x, y))), big(a) * big(b) % big(P));
             prop_assert_eq!(big(f.to_u64(f.add(x, y))), (big(a) + big(b)) % big(P));
             prop_assert_eq!(f.add(f.sub(x, y), y), x);
+            prop_assert_eq!(f.sub(x, y), f.add(x, f.neg(y)));
             if a % P != 0 {
                 prop_assert_eq!(f.mul(x, f.inv(x)), f.one());
             }
@@ -227,6 +262,22 @@ mod tests {
             let n = 1000;
             let slow = (0..n).fold(m, |acc, _| f.add(acc, f.mul(m, m)));
             assert_eq!(f.dot(m, (0..n).map(|_| (m, m))), slow);
+            // the largest sums: of products alone, and of a settled sum with products
+            let few = (0..Field::LAZY).fold(0, |sum, _| sum + f.lazy(m, m));
+            assert_eq!(f.reduce_settled(few), f.dot(0, (0..Field::LAZY).map(|_| (m, m))));
+            let largest = (u128::from(p) << 64) - 1;
+            let many = (0..Field::MANY).fold(largest, |sum, _| sum + f.lazy(m, m));
+            let settled = f.settle_many(many);
+            assert_eq!((settled <= largest, big128(settled) % big(p)), (true, big128(many) % big(p)));
+            assert_eq!(f.reduce_many(many), f.reduce_settled(settled));
+            // around the multiples of the modulus that are subtracted
+            for k in 0..8u128 {
+                let at = k * (u128::from(p) << 64);
+                for sum in [at, at + 1, at + largest, at.saturating_sub(1)] {
+                    let settled = f.settle_many(sum);
+                    assert_eq!((settled <= largest, big128(settled) % big(p)), (true, big128(sum) % big(p)));
+                }
+            }
         }
     }
 }

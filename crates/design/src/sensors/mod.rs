@@ -174,11 +174,14 @@ pub fn sensors(
         let [first, second]: [Box<dyn Ranks>; 2] = match &gathered.rows {
             OutputRows::Primes(points) => {
                 let [p, q] = &**points;
-                [Box::new(Ordered::new(p, &owners, &columns)), Box::new(Ordered::new(q, &owners, &columns))]
+                let one_run = model.experiments <= 1 && model.segments.len() <= 1;
+                let generic = one_run && gathered.judged.layout.closed;
+                [p, q].map(|p| Box::new(Ordered::new(p, &owners, &columns, generic)) as Box<dyn Ranks>)
             }
             OutputRows::Digits(points) => {
                 let (p, q) = &**points;
-                [Box::new(Ordered::new(p, &owners, &columns)), Box::new(Ordered::new(q, &owners, &columns))]
+                let first = Ordered::new(p, &owners, &columns, false);
+                [Box::new(first), Box::new(Ordered::new(q, &owners, &columns, false))]
             }
         };
         let n = gathered.judged.layout.unknowns.len() as u64;
