@@ -174,7 +174,7 @@ pub fn sensors(
         let [first, second]: [Box<dyn Ranks>; 2] = match &gathered.rows {
             OutputRows::Primes(points) => {
                 let [p, q] = &**points;
-                let one_run = model.experiments <= 1 && model.segments.len() <= 1;
+                let one_run = whole.experiments <= 1 && whole.segments.len() <= 1;
                 let generic = one_run && gathered.judged.layout.closed;
                 [p, q].map(|p| Box::new(Ordered::new(p, &owners, &columns, generic)) as Box<dyn Ranks>)
             }
