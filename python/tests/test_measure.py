@@ -6,6 +6,7 @@ import itertools
 
 import obsdeg
 import pytest
+from obsdeg.shapes import NumberOfSolutionsCounted
 
 CHAIN = """
 name = "chain"
@@ -70,3 +71,15 @@ def test_what_is_wrong() -> None:
         obsdeg.measure(chain(), "a", cost={"b": 2})
     with pytest.raises(obsdeg.ProblemError, match="measure is about models"):
         obsdeg.measure(obsdeg.Scheme([(0, 0, 0)]), "states")  # type: ignore[arg-type]
+
+
+def test_one_more_experiment_and_one_solution() -> None:
+    """By hand: two starts spare a derivative; `x^2` and `x*V` leave the sign of x, V and K open."""
+    enzyme = obsdeg.Model(states={"x": "-V*x/(K+x)"}, parameters=["V", "K"], outputs={"y": "x"})
+    found = obsdeg.measure(enzyme, ["x", "experiment"], cost={"experiment": 3})
+    assert [(s.outputs, s.cost, s.degree) for s in found.front] == [(["x"], 1.0, 2), (["x", "experiment"], 4.0, 1)]
+    unique = obsdeg.measure(enzyme, ["x^2", "x*V"], unique=True)
+    two = {u.name: u.number_of_solutions for u in unique.unattainable}
+    assert unique.required == [] and all(isinstance(n, NumberOfSolutionsCounted) and n.counted == 2 for n in two.values())
+    assert list(two) == ["x", "V", "K"]
+    assert obsdeg.measure(enzyme, ["x^2", "x"], unique=True).sets[0].outputs == ["x"]
