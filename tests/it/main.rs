@@ -19,6 +19,7 @@ mod examples;
 mod expressions;
 
 #[cfg(unix)]
+mod figures;
 mod files;
 mod formulas;
 mod front_door;

@@ -7,7 +7,7 @@ use obsdeg_core::solution::Formula;
 use obsdeg_evidence::simulation::SchemeAnalysis;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
-use crate::{Answer, gimbals, latex, omitted, resolve, stated, why, words};
+use crate::{Answer, Explanation, gimbals, latex, omitted, resolve, stated, why, words};
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
@@ -136,6 +136,10 @@ impl Answer for SchemeAnalysis {
 impl Answer for Analysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
+    }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        self.why.iter().map(Explanation::new).collect()
     }
 
     fn document(&self) -> Document {

@@ -16,7 +16,7 @@ fn count(n: usize, what: &str) -> String {
 }
 
 /// Outputs of a set.
-fn set(outputs: &[String]) -> String {
+pub(crate) fn set(outputs: &[String]) -> String {
     match outputs.is_empty() {
         true => "none".into(),
         false => outputs.join(", "),
@@ -30,7 +30,7 @@ fn cost(cost: f64) -> String {
 }
 
 /// True if a cost differs from one.
-fn has_costs(s: &Sensors) -> bool {
+pub(crate) fn has_costs(s: &Sensors) -> bool {
     s.candidates.iter().any(|c| c.cost != 1.0)
 }
 
@@ -43,7 +43,7 @@ fn price(s: &Sensors, f: &FrontSet) -> String {
 }
 
 /// Unknowns that the sets make observable: `all 34 unknowns`, `k1, k2`.
-fn about(s: &Sensors) -> String {
+pub(crate) fn about(s: &Sensors) -> String {
     let (required, all) = (s.required.len(), s.quantities.len());
     match required {
         n if n == all => format!("all {}", count(n, "unknown")),

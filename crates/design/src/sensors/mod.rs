@@ -316,6 +316,10 @@ impl SensorTask<'_> {
     /// Cheapest set for every unknown.
     fn of_unknowns(&mut self, stopped: &mut Option<StopReason>) -> Vec<SensorUnknown> {
         let reached = self.search.degrees(self.search.all).map(<[u16]>::to_vec).unwrap_or_default();
+        let own = match self.options.own_outputs {
+            true => self.search.degrees(0).map(<[u16]>::to_vec).unwrap_or_default(),
+            false => Vec::new(),
+        };
         let mut out = Vec::new();
         for u in 0..self.asked.len() {
             let least = reached.get(u).copied().unwrap_or(NONE);
@@ -328,7 +332,9 @@ impl SensorTask<'_> {
             }
             let (name, unit) = (self.asked[u].name.clone(), self.asked[u].unit.clone());
             let required = self.required.contains(&u);
-            out.push(SensorUnknown { name, unit, required, cheapest, least_degree: degree(least) });
+            let own_degree = own.get(u).copied().and_then(degree);
+            let least_degree = degree(least);
+            out.push(SensorUnknown { name, unit, required, cheapest, own_degree, least_degree });
         }
         out
     }
