@@ -2034,8 +2034,8 @@ class SensorUnknown(Record):
     the search ended before.
     """
     own_degree: int | None
-    """Observable degree of the unknown with the outputs of the model alone; null if it is not observable, or if sets replace the
-    outputs.
+    """Observable degree of the unknown with the outputs of the model alone; null if it is not observable, if sets replace the outputs,
+    or if the search ended before.
     """
     least_degree: int | None
     """Observable degree of the unknown if all candidates are measured; null if it is not observable."""
@@ -2260,7 +2260,7 @@ class NextPositions(Shape):
     """Best extensions, best first."""
     by_candidate: list[CandidateGain]
     """State with each single candidate added, best first; left out where two positions are added. Candidates beyond the limits of time
-    are missing.
+    are missing, and those not compared before an interruption.
     """
     as_good: int
     """Number of extensions as good as the first, including the first."""

@@ -155,6 +155,7 @@ impl Scale {
 fn subject(n: &NextPositions) -> String {
     match (n.after_calibration, n.positions.len()) {
         (true, _) => format!("one position after a calibration, {} carry", n.carry),
+        (false, 0) => format!("a single position, {} carry", n.carry),
         (false, k) => format!("one more position after {k}, {} carry", n.carry),
     }
 }
@@ -187,7 +188,8 @@ fn attitudes(n: &NextPositions) -> Globe {
     }
     let missing = n.candidates.len() - n.by_candidate.len();
     if missing > 0 {
-        notes.push(format!("Not drawn: {missing} candidates beyond the limits of time."));
+        let or = if n.interrupted { ", or not compared before the interruption" } else { "" };
+        notes.push(format!("Not drawn: {missing} candidates beyond the limits of time{or}."));
     }
     Globe {
         title: [format!("What {} gives", subject(n))]
@@ -209,7 +211,12 @@ fn degrees(n: &NextPositions) -> String {
     }
     let before = !columns.is_empty();
     let open = |c: &CandidateGain| c.degrees.iter().filter(|d| d.is_none()).count();
-    let more = !n.after_calibration && n.by_candidate.iter().any(|c| c.not_observable < open(c));
+    let more = n.by_candidate.iter().any(|c| c.not_observable < open(c));
+    let note = match (more, n.after_calibration) {
+        (false, _) => "",
+        (true, true) => "Degrees by the added position alone, without the calibration.",
+        (true, false) => "Degrees by the positions: neither samples during slews nor prior knowledge count.",
+    };
     columns.extend(n.by_candidate.iter().enumerate().map(|(i, c)| CellColumn {
         name: &c.candidate,
         degrees: &c.degrees,
@@ -221,11 +228,7 @@ fn degrees(n: &NextPositions) -> String {
         row_label: "coefficient",
         columns,
         column_label: "added position (X_p Y_p Z_p), best first".into(),
-        note: if more {
-            "Degrees of the positions alone: samples during slews determine more.".into()
-        } else {
-            String::new()
-        },
+        note: note.into(),
     }
     .svg()
 }

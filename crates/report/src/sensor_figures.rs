@@ -1,6 +1,6 @@
 //! Figures of sets of outputs: the front, and the degrees with each candidate.
 
-use obsdeg_design::sensors::{SensorUnknown, Sensors};
+use obsdeg_design::sensors::{SensorCandidate, SensorUnknown, Sensors};
 
 use crate::ReportError;
 use crate::cells::{CellColumn, Cells};
@@ -78,12 +78,12 @@ fn degrees(s: &Sensors) -> String {
     let (own, all) = (of(|q| q.own_degree), of(|q| q.least_degree));
     let beside = !s.own_outputs.is_empty();
     let mut columns = Vec::new();
-    if beside {
+    // a search that ended early may have judged neither the model nor a candidate
+    let judged: Vec<&SensorCandidate> = s.candidates.iter().filter(|c| !c.degrees.is_empty()).collect();
+    if beside && !judged.is_empty() {
         columns.push(CellColumn { name: "none", degrees: &own, is_apart: false });
     }
-    // a search that was stopped has judged no candidate
-    let judged = s.candidates.iter().filter(|c| !c.degrees.is_empty());
-    columns.extend(judged.enumerate().map(|(i, c)| CellColumn {
+    columns.extend(judged.iter().enumerate().map(|(i, c)| CellColumn {
         name: &c.name,
         degrees: &c.degrees,
         is_apart: beside && i == 0,

@@ -59,7 +59,7 @@ pub struct NextPositions {
     /// Best extensions, best first.
     pub found: Vec<Extension>,
     /// State with each single candidate added, best first; left out where two positions are added. Candidates
-    /// beyond the limits of time are missing.
+    /// beyond the limits of time are missing, and those not compared before an interruption.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub by_candidate: Vec<CandidateGain>,
     /// Number of extensions as good as the first, including the first.

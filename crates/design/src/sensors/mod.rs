@@ -341,7 +341,9 @@ impl SensorTask<'_> {
 
     /// Candidates, each with the degrees under it alone.
     fn candidates(&mut self) -> Vec<SensorCandidate> {
-        let alone: Vec<Set> = (0..self.options.candidates.len()).map(|c| 1 << c).collect();
+        let alone = (0..self.options.candidates.len()).map(|c| 1 << c);
+        // with its own outputs the model itself is judged too, before the limit of work is reached
+        let alone: Vec<Set> = alone.chain(self.options.own_outputs.then_some(0)).collect();
         let judged = self.search.judge(&alone).is_ok();
         let mut out = Vec::new();
         for (c, candidate) in self.options.candidates.iter().enumerate() {
