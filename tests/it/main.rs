@@ -60,3 +60,4 @@ mod workbench;
 mod workbench_links;
 mod workbench_page;
 mod workbench_positions;
+mod workbench_why;

@@ -131,6 +131,10 @@ impl Answer for SchemeAnalysis {
     fn sentences(&self) -> Vec<String> {
         self.verdicts.sentences()
     }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        self.verdicts.explanations()
+    }
 }
 
 impl Answer for Analysis {
