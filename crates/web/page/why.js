@@ -74,7 +74,7 @@ async function nextPosition() {
     return [add, p.candidate, String(then.worst_degree ?? '\u2013'), String(then.not_observable.length), then.worst ? `${two(then.worst.sigma_dph)} (${then.worst.name})` : ''];
   });
   const texts = said.sentences.map((text) => element('p', { textContent: `${text}.` }));
-  box.replaceChildren(...texts, tableOf(['', 'X_p Y_p Z_p', 'largest degree', 'undetermined', 'worst sigma [deg/h, per g]'], rows));
+  box.replaceChildren(...texts, tableOf(['position', 'X_p Y_p Z_p', 'largest degree', 'undetermined', 'worst sigma [deg/h, per g]'], rows));
 }
 
 function wireWhy() {
