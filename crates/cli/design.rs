@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use clap::{Arg, Args};
 use obsdeg_commands::{Designed, Host, Search, SearchFiles, Source, design, is_word};
 use obsdeg_design::design::Part;
+use obsdeg_report::{next_figures, sensor_figures};
 use obsdeg_verify::{Replay, verify_with};
 
 use crate::arguments::RequireMet;
@@ -44,6 +45,10 @@ differ (--terms all) the criterion is d or margin; where torquer errors act on s
 found by exchange. With slews half turns are tried in both directions: NUE (-N) NDW is the one that is \
 right-handed about South. The folder of -o holds design.json, winner.toml (a scheme file), its positions as \
 a picture, and the front of total time against the criterion as a figure. Ctrl-C ends with the best so far.
+
+With --measure the folder of -o holds sensors.json and two figures: front (number or cost of the outputs \
+against the largest degree) and degrees (each unknown by candidate). With --next it holds next.json, and with \
+--next 1 attitudes (a map of what each candidate gives) and degrees (each coefficient by candidate).
 
 Of a model the answer is which of the candidates to measure: minimal sets, the front of their number or cost \
 against the largest degree, and the cheapest set of each unknown, each with its proof.
@@ -145,12 +150,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         }
         Designed::Outputs(found) => {
             a.met.check(None)?;
-            a.output.write_folder(&*found, "sensors.json", || Ok::<_, Failure>(Vec::new()))
+            a.output.write_folder(&*found, "sensors.json", || sensor_figures(&found))
         }
         Designed::Next(found) => {
             let first = || found.found.first().map(|f| &f.then.requirements);
             a.met.check(first())?;
-            a.output.write_folder(&*found, "next.json", || Ok::<_, Failure>(Vec::new()))?;
+            a.output.write_folder(&*found, "next.json", || next_figures(&found))?;
             a.met.decide(first())
         }
         Designed::Part(part) => write_part(&part, a),

@@ -474,7 +474,7 @@ def measure(
     -------
     Sensors
         ``front`` from the cheapest set to the set with the smallest degree, ``sets``, ``quantities``, and
-        their proofs.
+        their proofs. ``files()`` has the front and the degrees with each candidate as figures.
 
     Raises
     ------
@@ -541,7 +541,9 @@ def next_measurement(
     Returns
     -------
     NextPositions
-        ``found`` (extensions, best first), ``before``, and ``meets`` (dwell that meets the requirements).
+        ``found`` (extensions, best first), ``before``, and ``meets`` (dwell that meets the requirements). With
+        one added position ``by_candidate`` has every candidate, and ``files()`` has them as figures: a map of
+        the attitudes, and the degrees with each.
 
     Raises
     ------

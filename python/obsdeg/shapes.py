@@ -2054,6 +2054,10 @@ class SensorUnknown(Record):
     """Cheapest set that makes the unknown observable, of the smallest degree at this cost; null if all candidates together do not, or if
     the search ended before.
     """
+    own_degree: int | None
+    """Observable degree of the unknown with the outputs of the model alone; null if it is not observable, if sets replace the outputs,
+    or if the search ended before.
+    """
     least_degree: int | None
     """Observable degree of the unknown if all candidates are measured; null if it is not observable."""
 
@@ -2204,6 +2208,27 @@ class Requalification(Record):
     """Number of extensions compared: all by the candidates."""
 
 
+class CandidateGain(Record):
+    """State of the required coefficients with one candidate added."""
+
+    __slots__ = ()
+
+    candidate: str
+    """Candidate: directions of X_p, Y_p and Z_p, angles, or a name."""
+    angles: str
+    """Euler angles alpha, beta, gamma in degrees, as text."""
+    not_observable: int
+    """Number of required coefficients that neither the samples nor prior knowledge determine."""
+    ratio: float | None
+    """Largest ratio of uncertainty to requirement, dimensionless; null without requirements, or if no coefficient with a requirement is
+    determined.
+    """
+    worst: Worst | None
+    """Largest sigma (with a bench: total uncertainty) of the determined required drift coefficients; null if none is determined."""
+    degrees: list[int | None]
+    """Observable degrees in the order of `required`; null for a coefficient that is not observable."""
+
+
 class Meeting(Record):
     """Shortest dwell that meets the requirements."""
 
@@ -2230,6 +2255,8 @@ class NextPositions(Shape):
     """Unknown terms of the gyro model."""
     positions: list[str]
     """Positions of the scheme before the added ones; empty after a calibration."""
+    position_angles: list[str]
+    """Euler angles alpha, beta, gamma of each of the `positions` in degrees, as text; of one with a rotation at its start."""
     after_calibration: bool
     """True if the covariance of a calibration is known beforehand: the added positions are a run of their own."""
     days: float | None
@@ -2250,8 +2277,16 @@ class NextPositions(Shape):
     """Conditions of the measurement."""
     before: Standing | None
     """State before the added positions; null for a scheme without positions."""
+    degrees_before: list[int | None]
+    """Observable degrees before the added positions, in the order of `required`: null for a coefficient that is not observable; empty
+    for a scheme without positions and after a calibration.
+    """
     found: list[Extension]
     """Best extensions, best first."""
+    by_candidate: list[CandidateGain]
+    """State with each single candidate added, best first; left out where two positions are added. Candidates beyond the limits of time
+    are missing, and those not compared before an interruption.
+    """
     as_good: int
     """Number of extensions as good as the first, including the first."""
     meets: Meeting | None

@@ -34,6 +34,13 @@ def degree(outputs: tuple[str, ...]) -> int | None:
     return None if None in degrees else max(d for d in degrees if d is not None)
 
 
+def test_figures_are_files() -> None:
+    files = obsdeg.measure(chain(), "states").files()
+    assert sorted(files) == ["degrees.png", "degrees.svg", "front.png", "front.svg"]
+    assert files["front.png"].startswith(b"\x89PNG")
+    assert all(f">{name}<".encode() in files["degrees.svg"] for name in "abckm")
+
+
 def test_sets_are_those_of_verdicts_on_all() -> None:
     found = obsdeg.measure(chain(), "states")
     sets = [s for n in (1, 2, 3) for s in itertools.combinations("abc", n)]

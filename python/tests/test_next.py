@@ -37,6 +37,15 @@ def test_a_model_is_explained() -> None:
     assert why.remedies[0].changes[0].name == "k"
 
 
+def test_figures_are_files() -> None:
+    found = obsdeg.next_measurement(obsdeg.Scheme(["NUE", "NDW"]), dwell=500)
+    files = found.files()
+    assert sorted(files) == ["attitudes.png", "attitudes.svg", "degrees.png", "degrees.svg"]
+    assert len(found.by_candidate) == 24
+    assert all(f"<title>{c.candidate}: ".encode() in files["attitudes.svg"] for c in found.by_candidate)
+    assert obsdeg.next_measurement(obsdeg.Scheme(["NUE"]), 2, dwell=500, keep=1).files() == {}
+
+
 def test_the_next_position_is_the_best_of_all() -> None:
     candidates = ["NUE", "USE", "SDE", "DES"]
     pair = obsdeg.Scheme(["NUE", "NDW"], carry="inertial", latitude=48)

@@ -281,18 +281,32 @@ fn a_text_that_is_wrong_is_told() {
     assert!(of("```sh\nobsdeg --version\nfalse\ntrue\n```\n").0.len() == 1);
 }
 
-/// The picture on the first page is identical to the one that its command draws.
+/// Pictures of the book: the command that draws each, and its name.
+const PICTURES: [(&str, &str); 4] = [
+    ("obsdeg crosscheck --angles 0,0,0 --angles 180,0,0", "slopes"),
+    ("obsdeg design examples/mapk/model.toml", "front"),
+    ("obsdeg design examples/nfkb/model.toml --own-outputs", "degrees"),
+    ("obsdeg design examples/bench-day/scheme.toml --next 1", "attitudes"),
+];
+
+/// Pictures of the book are identical to those that their commands draw.
 #[test]
-fn the_picture_is_the_one_that_is_drawn() {
+fn pictures_are_those_that_are_drawn() {
     let desk = CommandFolder::new();
-    desk.run("obsdeg crosscheck --angles 0,0,0 --angles 180,0,0 -o drawn", 0).expect("drawn");
-    let drawn = fs::read_to_string(desk.folder.path().join("drawn/slopes.svg")).expect("readable");
-    let shown = root().join("book/src/slopes.svg");
-    if std::env::var_os("UPDATE_BOOK").is_some() {
-        fs::write(&shown, &drawn).expect("written");
+    for (command, name) in PICTURES {
+        desk.run(&format!("{command} -o drawn-{name}"), 0).expect("drawn");
+        let drawn = desk.folder.path().join(format!("drawn-{name}/{name}.svg"));
+        let drawn = fs::read_to_string(drawn).expect("readable");
+        let shown = root().join(format!("book/src/{name}.svg"));
+        if std::env::var_os("UPDATE_BOOK").is_some() {
+            fs::write(&shown, &drawn).expect("written");
+        }
+        // a plain assertion: `assert_eq` would print the whole picture
+        assert!(
+            fs::read_to_string(&shown).expect("readable") == drawn,
+            "UPDATE_BOOK=1 draws {shown:?} again"
+        );
     }
-    // a plain assertion: `assert_eq` would print the whole picture
-    assert!(fs::read_to_string(&shown).expect("readable") == drawn, "UPDATE_BOOK=1 draws it again");
 }
 
 /// The summary lists every chapter exactly once and nothing else.

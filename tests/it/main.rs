@@ -19,6 +19,7 @@ mod examples;
 mod expressions;
 
 #[cfg(unix)]
+mod figures;
 mod files;
 mod formulas;
 mod front_door;
@@ -59,3 +60,4 @@ mod workbench;
 mod workbench_links;
 mod workbench_page;
 mod workbench_positions;
+mod workbench_why;

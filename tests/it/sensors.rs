@@ -434,14 +434,15 @@ fn named(name: &str) -> SystemModel {
 }
 
 /// One state of the MAPK cascade makes all 34 unknowns observable with degree 33 at most; two states need
-/// degree 16, three 11, four 8, all 12 states 3.
+/// degree 16, three 11, four 8, all 12 states 4.
 #[test]
 fn states_of_the_mapk_cascade() {
     let model = named("mapk_6out");
     let options = SensorOptions { candidates: states(&model), ..SensorOptions::default() };
     let found = sensors(&model, &options, &|_| true).expect("sets");
     let front: Vec<(usize, usize)> = found.front.iter().map(|f| (f.outputs.len(), f.degree)).collect();
-    assert_eq!(front[..4], [(1, 33), (2, 16), (3, 11), (4, 8)]);
+    assert_eq!(front, [(1, 33), (2, 16), (3, 11), (4, 8), (5, 6), (6, 5), (7, 4)]);
+    assert_eq!(found.least_degree, Some(4));
     assert_eq!((found.required.len(), found.minimal_sets), (34, Some(12)));
     assert!(found.error_bound.is_some_and(|bound| bound < 1e-12) && found.confirmed_sets > 10);
     // proof for the pair by the verdicts of `analyze`: any single state leaves a degree above 16
@@ -455,6 +456,38 @@ fn states_of_the_mapk_cascade() {
     let least = found.quantities.iter().find(|q| q.name == "a00").expect("an unknown");
     assert!(found_one.front.iter().all(|f| f.degree <= 8) && found_one.required == ["a00"]);
     assert_eq!(found_one.least_degree, least.least_degree);
+}
+
+/// The READMEs of the examples state the fronts of their models: number, degree and set in each row.
+#[test]
+fn the_fronts_of_the_examples_are_those_of_their_readmes() {
+    let read = |path: &str| {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(path);
+        std::fs::read_to_string(path).expect("readable")
+    };
+    let front = |path: &str| {
+        let model = model_file::read(&read(path)).expect("a model");
+        let options = SensorOptions { candidates: states(&model), ..SensorOptions::default() };
+        sensors(&model, &options, &|_| true).expect("sets")
+    };
+    let found = front("mapk/model.toml");
+    let row = |f: &FrontSet| format!("| {} | {} | {} |", f.outputs.len(), f.degree, f.outputs.join(", "));
+    let rows: Vec<String> = found.front.iter().map(row).collect();
+    let readme = read("mapk/README.md");
+    let stated: Vec<&str> =
+        readme.lines().filter(|l| l.starts_with("| ") && !l.contains("-")).skip(1).collect();
+    assert_eq!(rows, stated);
+    let numbers = |s: &Sensors| s.front.iter().map(|f| (f.outputs.len(), f.degree)).collect::<Vec<_>>();
+    assert_eq!(numbers(&front("mapk/benchmark.toml")), numbers(&found));
+    let found = front("nfkb/model.toml");
+    assert_eq!((found.required.len(), found.minimal_sets), (44, Some(1)));
+    assert_eq!(found.sets[0].outputs, ["x3", "x8", "x9", "x12", "x15"]);
+    let stated = [(5, 15), (6, 10), (7, 7), (12, 3)];
+    assert!(stated.iter().all(|p| numbers(&found).contains(p)), "{:?}", numbers(&found));
+    let model = model_file::read(&read("nfkb/model.toml")).expect("a model");
+    let options = SensorOptions { candidates: states(&model), own_outputs: true, ..SensorOptions::default() };
+    let beside = sensors(&model, &options, &|_| true).expect("sets");
+    assert_eq!((beside.front[0].outputs.join(", "), beside.front[0].degree), ("x8, x15".into(), 7));
 }
 
 /// No three of the 15 states of a model of NF-kB (Lipniacki 2004, doi:10.1016/j.jtbi.2004.01.001, with

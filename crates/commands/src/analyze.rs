@@ -13,7 +13,7 @@ use obsdeg_core::system::{
 };
 use obsdeg_core::why::no_unknown;
 use obsdeg_evidence::simulation::{Conditions, SchemeAnalysis, sensitivities};
-use obsdeg_report::{Answer, Document, File, Several, Table};
+use obsdeg_report::{Answer, Document, Explanation, File, Several, Table};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -160,6 +160,13 @@ impl Answer for Judged {
             Self::Model(a) => a.sentences(),
         }
     }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        match self {
+            Self::Scheme(a) => a.explanations(),
+            Self::Model(a) => a.explanations(),
+        }
+    }
 }
 
 /// Answers on all inputs: the answer itself for one input, a list with names for several.
@@ -220,6 +227,13 @@ impl Answer for Judgements {
     fn sentences(&self) -> Vec<String> {
         match self {
             Self::One(one) => one.sentences(),
+            Self::Several(_) => Vec::new(),
+        }
+    }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        match self {
+            Self::One(one) => one.explanations(),
             Self::Several(_) => Vec::new(),
         }
     }

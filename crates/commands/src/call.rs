@@ -2,7 +2,8 @@
 
 use obsdeg_calibration::record::Record;
 use obsdeg_report::{
-    Answer, File, Format, Layout, ReviewFormat, csv, fragment, picture_folder, position_figure, written,
+    Answer, Explanation, File, Format, Layout, ReviewFormat, csv, fragment, next_figures, picture_folder,
+    position_figure, sensor_figures, written,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -175,6 +176,8 @@ pub struct InJson {
     pub text: String,
     /// The answer in sentences ([`Answer::sentences`]).
     pub sentences: Vec<String>,
+    /// Explanations of single verdicts in words ([`Answer::explanations`]).
+    pub explanations: Vec<Explanation>,
     /// True if the command line would exit with 0.
     pub passed: bool,
 }
@@ -190,11 +193,12 @@ impl OutputForm for JsonOnly {
         passed: bool,
         _: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Self::Out, Problem> {
-        Ok(InJson { text: obsdeg_report::json(&answer)?, sentences: answer.sentences(), passed })
+        let (sentences, explanations) = (answer.sentences(), answer.explanations());
+        Ok(InJson { text: obsdeg_report::json(&answer)?, sentences, explanations, passed })
     }
 
     fn text(text: String, passed: bool) -> Result<Self::Out, Problem> {
-        Ok(InJson { text, sentences: Vec::new(), passed })
+        Ok(InJson { text, sentences: Vec::new(), explanations: Vec::new(), passed })
     }
 }
 
@@ -273,8 +277,8 @@ fn answered<W: OutputForm>(
             match design(&asked.options, &asked.files, host)? {
                 Designed::Schemes(found) => W::whole(*found, true, |f| f.files()),
                 Designed::Walks(found) => W::whole(*found, true, |f| Ok(f.files())),
-                Designed::Outputs(found) => W::whole(*found, true, none),
-                Designed::Next(found) => W::whole(*found, true, none),
+                Designed::Outputs(found) => W::whole(*found, true, |s| Ok(sensor_figures(s)?)),
+                Designed::Next(found) => W::whole(*found, true, |n| Ok(next_figures(n)?)),
                 Designed::Part(part) => {
                     let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
                     W::text(json + "\n", part.complete)

@@ -7,7 +7,7 @@ use obsdeg_core::solution::Formula;
 use obsdeg_evidence::simulation::SchemeAnalysis;
 
 use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
-use crate::{Answer, gimbals, latex, omitted, resolve, stated, why, words};
+use crate::{Answer, Explanation, gimbals, latex, omitted, resolve, stated, why, words};
 
 fn positions(positions: &[PositionReport]) -> Block {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
@@ -131,11 +131,19 @@ impl Answer for SchemeAnalysis {
     fn sentences(&self) -> Vec<String> {
         self.verdicts.sentences()
     }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        self.verdicts.explanations()
+    }
 }
 
 impl Answer for Analysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
+    }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        self.why.iter().map(Explanation::new).collect()
     }
 
     fn document(&self) -> Document {

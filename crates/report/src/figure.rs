@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, OnceLock};
 
+use kuva::plot::LabelStyle;
 use kuva::prelude::{
-    BandPlot, Heatmap, Layout, LegendPosition, LinePlot, Plot, ReferenceLine, SvgBackend, TickFormat,
+    BandPlot, Heatmap, Layout, LegendPosition, LinePlot, Plot, ReferenceLine, ScatterPlot, SvgBackend,
+    TickFormat,
 };
 use kuva::render::figure::Figure as Grid;
 use resvg::{tiny_skia, usvg};
@@ -58,6 +60,13 @@ pub(crate) struct Band {
     pub(crate) points: Vec<(f64, f64, f64)>,
 }
 
+/// A point with a text above at its right.
+#[derive(Debug, Clone)]
+pub(crate) struct NamedPoint {
+    pub(crate) name: String,
+    pub(crate) at: (f64, f64),
+}
+
 /// Axes with curves, bands and marks.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Figure {
@@ -66,6 +75,7 @@ pub(crate) struct Figure {
     pub(crate) y_label: String,
     pub(crate) bands: Vec<Band>,
     pub(crate) lines: Vec<Line>,
+    pub(crate) points: Vec<NamedPoint>,
     /// Positions of vertical lines, which separate positions.
     pub(crate) marks: Vec<f64>,
     /// Range of the horizontal axis; `None` for that of the data.
@@ -112,7 +122,21 @@ impl Figure {
             };
             Plot::from(if l.label.is_empty() { plot } else { plot.with_legend(shown(&l.label)) })
         });
-        bands.chain(lines).collect()
+        bands.chain(lines).chain(self.named_points()).collect()
+    }
+
+    /// Points with their names; `None` without points.
+    fn named_points(&self) -> Option<Plot> {
+        const SIZE: f64 = 4.5;
+        // above the line to the right; nearer than a leader line would be drawn
+        let right = LabelStyle::Arrow { offset_x: 3.5, offset_y: 6.0 };
+        let plot = ScatterPlot::new()
+            .with_data(self.points.iter().map(|p| p.at))
+            .with_color(BLUE)
+            .with_size(SIZE)
+            .with_labels(self.points.iter().map(|p| shown(&p.name)))
+            .with_label_style(right);
+        (!self.points.is_empty()).then(|| Plot::from(plot))
     }
 
     fn layout(&self, plots: &[Plot]) -> Layout {
@@ -251,6 +275,20 @@ pub(crate) fn heat(
         .with_height(180.0 + 28.0 * rows.len() as f64)
         .with_font_family(FONT);
     numbered(&kuva::render_to_svg(plots, layout))
+}
+
+/// Shade of blue for 0 (light) to 1 (dark), which also orders the values in grey.
+pub(crate) fn shade(t: f64) -> [u8; 3] {
+    const STOPS: [[f64; 3]; 3] = [[226.0, 239.0, 248.0], [63.0, 147.0, 199.0], [0.0, 45.0, 84.0]];
+    let t = 2.0 * if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
+    let (from, to, s) = if t < 1.0 { (STOPS[0], STOPS[1], t) } else { (STOPS[1], STOPS[2], t - 1.0) };
+    std::array::from_fn(|i| (from[i] + (to[i] - from[i]) * s).round() as u8)
+}
+
+/// Colour of a text on a colour: black or white.
+pub(crate) fn ink([r, g, b]: [u8; 3]) -> &'static str {
+    let light = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
+    if light > 140.0 { BLACK } else { "#ffffff" }
 }
 
 /// Blue over white to orange, for 0 to 1.

@@ -17,6 +17,7 @@ mod audit;
 mod budget;
 mod calibration;
 mod calibration_figures;
+mod cells;
 mod compare;
 mod crosscheck;
 mod csv_text;
@@ -26,10 +27,12 @@ mod excess;
 mod figure;
 mod figures;
 mod gimbals;
+mod globe;
 mod html;
 mod latex;
 mod markdown;
 mod next;
+mod next_figures;
 mod omitted;
 mod panels;
 #[cfg(feature = "pdf")]
@@ -39,6 +42,7 @@ mod records_read;
 mod resolve;
 mod review;
 mod rows;
+mod sensor_figures;
 mod sensor_noise;
 mod sensors;
 mod series;
@@ -61,13 +65,16 @@ pub use document::Document;
 pub use excess::Excess;
 pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
+pub use next_figures::next_figures;
 pub use poses::position_figure;
+pub use sensor_figures::sensor_figures;
 pub use sensor_noise::sensor_noise_figures;
 pub use series::{series_csv, series_parquet};
 pub use system_calibration::{system_calibration_figures, system_residuals_csv};
 pub use table::in_ascii;
 pub use tables::Table;
 pub use visible::visible;
+pub use why::Explanation;
 
 use std::fmt;
 use std::str::FromStr;
@@ -197,6 +204,11 @@ pub trait Answer: serde::Serialize {
 
     /// Answer in sentences that can stand alone, the answer itself first; empty for results without such.
     fn sentences(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Explanations of single verdicts in words, as asked for; empty for results without such.
+    fn explanations(&self) -> Vec<Explanation> {
         Vec::new()
     }
 

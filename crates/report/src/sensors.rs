@@ -26,7 +26,7 @@ fn counted(s: &Sensors, outputs: &[String]) -> String {
 }
 
 /// Outputs of a set.
-fn set(outputs: &[String]) -> String {
+pub(crate) fn set(outputs: &[String]) -> String {
     match outputs.is_empty() {
         true => "none".into(),
         false => outputs.join(", "),
@@ -40,7 +40,7 @@ fn cost(cost: f64) -> String {
 }
 
 /// True if a cost differs from one.
-fn has_costs(s: &Sensors) -> bool {
+pub(crate) fn has_costs(s: &Sensors) -> bool {
     s.candidates.iter().any(|c| c.cost != 1.0)
 }
 
@@ -53,7 +53,7 @@ fn price(s: &Sensors, f: &FrontSet) -> String {
 }
 
 /// Unknowns that the sets make observable: `all 34 unknowns`, `k1, k2`.
-fn about(s: &Sensors) -> String {
+pub(crate) fn about(s: &Sensors) -> String {
     let (required, all) = (s.required.len(), s.quantities.len());
     match required {
         n if n == all => format!("all {}", count(n, "unknown")),

@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
 use crate::document::{Block, Document, Typeset, left, number, right};
-use crate::{Answer, latex, resolve, why, words};
+use crate::{Answer, Explanation, latex, resolve, why, words};
 
 /// Length in bytes up to which a solving expression is printed.
 const READABLE: usize = 240;
@@ -145,6 +145,10 @@ fn branch(a: &SystemAnalysis) -> String {
 impl Answer for SystemAnalysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
+    }
+
+    fn explanations(&self) -> Vec<Explanation> {
+        self.why.iter().map(Explanation::new).collect()
     }
 
     fn document(&self) -> Document {

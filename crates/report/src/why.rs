@@ -3,6 +3,7 @@
 use obsdeg_core::degree::Status;
 use obsdeg_core::remedies::Change;
 use obsdeg_core::why::{Assumption, AssumptionKind, Improvement, OutputDerivative, UnseenDirection, Why};
+use serde::Serialize;
 
 use crate::document::{Block, left, right};
 use crate::resolve::changes;
@@ -14,36 +15,63 @@ pub(crate) fn blocks(all: &[Why]) -> Vec<Block> {
 }
 
 fn of(why: &Why) -> Vec<Block> {
-    let mut lines = Vec::new();
-    let decided = why.determined_by.iter().map(derivative).collect::<Vec<_>>();
-    if !decided.is_empty() {
-        let words = match decided.len() {
-            1 => "determines it",
-            _ => "determine it; without any one of these they do not",
-        };
-        lines.push(format!("{} {words}", decided.join(", ")));
-    }
-    lines.extend(why.unseen.as_ref().map(|u| unseen(&why.name, u)));
-    lines.extend(why.symmetries.iter().map(|words| format!("no output changes with this: {words}")));
-    lines.extend(assumptions(&why.assumptions, why.degree));
-    lines.extend(why.not_explained.iter().map(|text| format!("not tried: {text}")));
-    let mut out = vec![Block::list(heading(why), lines)];
-    let improves = match why.degree {
-        Some(_) => format!("What lowers the degree of {}, in order of cost", why.name),
-        None => format!("What makes {} observable, in order of cost", why.name),
+    let Explanation { heading, lines, improvements, columns, rows, no_change } = Explanation::new(why);
+    let [change, degree, more, loses] = columns;
+    let columns = [left(change), right(degree), left(more), left(loses)];
+    let improvements = match rows.is_empty() {
+        true => Block::list(improvements, vec![no_change.into()]),
+        false => Block::table(improvements, columns, rows.into_iter().map(Vec::from)),
     };
-    let rows: Vec<Vec<String>> = groups(&why.remedies).iter().map(|group| row(group)).collect();
-    if rows.is_empty() {
-        let none = match why.degree {
+    vec![Block::list(heading, lines), improvements]
+}
+
+/// Explanation of one verdict in words.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Explanation {
+    /// Verdict as a heading: `Why D_FZ is not observable`.
+    pub heading: String,
+    /// Deciding derivatives, the unobserved direction, assumptions, and parts that are missing: one sentence
+    /// each, without a full stop.
+    pub lines: Vec<String>,
+    /// Heading of the changes.
+    pub improvements: String,
+    /// Headings of the columns of `rows`.
+    pub columns: [&'static str; 4],
+    /// Changes that make the unknown observable or lower its degree, in order of cost: the change, the
+    /// degree with it, other unknowns that become observable, unknowns that cease to be.
+    pub rows: Vec<[String; 4]>,
+    /// Reason why there are no `rows`; empty if there are some.
+    pub no_change: &'static str,
+}
+
+impl Explanation {
+    pub(crate) fn new(why: &Why) -> Self {
+        let mut lines = Vec::new();
+        let decided = why.determined_by.iter().map(derivative).collect::<Vec<_>>();
+        if !decided.is_empty() {
+            let words = match decided.len() {
+                1 => "determines it",
+                _ => "determine it; without any one of these they do not",
+            };
+            lines.push(format!("{} {words}", decided.join(", ")));
+        }
+        lines.extend(why.unseen.as_ref().map(|u| unseen(&why.name, u)));
+        lines.extend(why.symmetries.iter().map(|words| format!("no output changes with this: {words}")));
+        lines.extend(assumptions(&why.assumptions, why.degree));
+        lines.extend(why.not_explained.iter().map(|text| format!("not tried: {text}")));
+        let improvements = match why.degree {
+            Some(_) => format!("What lowers the degree of {}, in order of cost", why.name),
+            None => format!("What makes {} observable, in order of cost", why.name),
+        };
+        let rows: Vec<_> = groups(&why.remedies).iter().map(|group| row(group)).collect();
+        let no_change = match why.degree {
+            _ if !rows.is_empty() => "",
             Some(0) => "nothing has to: the outputs themselves determine it",
             _ => "no change that was tried",
         };
-        out.push(Block::list(improves, vec![none.into()]));
-    } else {
-        let columns = [left("change"), right("degree"), left("makes observable as well"), left("loses")];
-        out.push(Block::table(improves, columns, rows));
+        let columns = ["change", "degree", "makes observable as well", "loses"];
+        Self { heading: heading(why), lines, improvements, columns, rows, no_change }
     }
-    out
 }
 
 fn heading(why: &Why) -> String {
@@ -152,7 +180,7 @@ fn groups(all: &[Improvement]) -> Vec<Vec<&Improvement>> {
     out
 }
 
-fn row(group: &[&Improvement]) -> Vec<String> {
+fn row(group: &[&Improvement]) -> [String; 4] {
     let first = group[0];
     let several: Vec<&str> = group
         .iter()
@@ -171,7 +199,7 @@ fn row(group: &[&Improvement]) -> Vec<String> {
     };
     let resolves = names(first.resolves.iter().map(|r| r.name.as_str()));
     let loses = names(first.loses.iter().map(String::as_str));
-    vec![change, words::degree(Some(first.degree)), resolves, loses]
+    [change, words::degree(Some(first.degree)), resolves, loses]
 }
 
 #[cfg(test)]

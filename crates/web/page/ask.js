@@ -80,6 +80,7 @@ function askRest() {
       verdicts.requirements = requirements;
     }
     drawVerdicts();
+    explainAgain();
     const solved = await behind.ask('verdicts', [{ sources: named }], { lane: 'solutions' }).catch(failed);
     if (solved?.answer && still()) {
       const { answer, math } = solved;

@@ -94,6 +94,8 @@ async function judgeText() {
   const area = $('text'), { problem, answer, math, sentences } = found;
   area.setAttribute('aria-invalid', problem ? 'true' : 'false');
   $('text-problem').replaceChildren();
+  $('text-why').hidden = true;
+  $('text-why').replaceChildren();
   if (problem) {
     const { place, message } = problem;
     $('text-problem').append(place ? `Line ${place.line}, column ${place.column}: ${message} ` : message);
@@ -113,8 +115,9 @@ async function judgeText() {
     return;
   }
   const named = (q) => {
-    const e = element('span');
-    putMath(e, math[q.name ?? q.expression], q.name ?? q.expression);
+    const e = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
+    putName(e, math[q.name ?? q.expression], q.name ?? q.expression);
+    e.addEventListener('click', () => explain($('text-why'), { name: writing.name, text }, q.name ?? q.expression));
     return e;
   };
   const solved = (s) => {

@@ -116,6 +116,7 @@ async function begin() {
   wireView();
   wireStrip();
   wireDesign();
+  wireWhy();
   wireTour();
   wireFiles();
   wireTabs();

@@ -64,7 +64,8 @@ function drawVerdicts() {
     if (tr.className !== kind) tr.className = kind;
     if (tr.dataset.name !== name) tr.dataset.name = name;
     cell(tr, 0, 'links');
-    putName(cell(tr, 1), verdicts.now.math[name], name);
+    const head = cell(tr, 1);
+    putName(q.combined ? noWhy(head) : whyButton(head), verdicts.now.math[name], name);
     const degree = cell(tr, 2, 'degree');
     const text = q.degree ?? '\u2013', was = differs ? ` was ${verdictOf(before)}` : '';
     if (degree.textContent !== text + was) degree.replaceChildren(String(text), ...(was ? [element('small', { textContent: was })] : []));

@@ -17,13 +17,14 @@ const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/page.css");
 const WORKER: &str = include_str!("../page/worker.js");
 /// Scripts of the page, in the order in which they run.
-const SCRIPTS: [&str; 10] = [
+const SCRIPTS: [&str; 11] = [
     include_str!("../page/engine.js"),
     include_str!("../page/geometry.js"),
     include_str!("../page/scheme.js"),
     include_str!("../page/positions.js"),
     include_str!("../page/view.js"),
     include_str!("../page/table.js"),
+    include_str!("../page/why.js"),
     include_str!("../page/ask.js"),
     include_str!("../page/design.js"),
     include_str!("../page/tour.js"),

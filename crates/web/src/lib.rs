@@ -12,14 +12,17 @@ extern "C" {
 }
 
 /// Answers a command by its name, with options and files as JSON. The answer is
-/// `{"text", "sentences", "passed"}`: `text` is that of the command line with `--format json`, `sentences`
-/// are its first lines. A failure is `{"problem": {"kind", "message", "place"}}`.
+/// `{"text", "sentences", "explanations", "passed"}`: `text` is that of the command line with
+/// `--format json`, `sentences` are its first lines, `explanations` those of single verdicts (`why`) in
+/// words. A failure is `{"problem": {"kind", "message", "place"}}`.
 #[wasm_bindgen]
 pub fn call(command: &str, request: &str) -> String {
     let hears = |now: Now| going(&serde_json::to_string(&now).unwrap_or_default());
     let mut host = Host { worker: None, going: &hears };
     match obsdeg_commands::call_json(command, request, &mut host) {
-        Ok(a) => json!({ "text": a.text, "sentences": a.sentences, "passed": a.passed }),
+        Ok(a) => json!({
+            "text": a.text, "sentences": a.sentences, "explanations": a.explanations, "passed": a.passed
+        }),
         Err(problem) => json!({ "problem": problem_json(&problem) }),
     }
     .to_string()

@@ -27,6 +27,9 @@ pub struct NextPositions {
     pub terms: String,
     /// Positions of the scheme before the added ones; empty after a calibration.
     pub positions: Vec<String>,
+    /// Euler angles alpha, beta, gamma of each of the `positions` in degrees, as text; of one with a rotation
+    /// at its start.
+    pub position_angles: Vec<String>,
     /// True if the covariance of a calibration is known beforehand: the added positions are a run of their
     /// own.
     pub after_calibration: bool,
@@ -50,8 +53,15 @@ pub struct NextPositions {
     pub conditions: MeasurementReport,
     /// State before the added positions; null for a scheme without positions.
     pub before: Option<Standing>,
+    /// Observable degrees before the added positions, in the order of `required`: null for a coefficient that
+    /// is not observable; empty for a scheme without positions and after a calibration.
+    pub degrees_before: Vec<Option<usize>>,
     /// Best extensions, best first.
     pub found: Vec<Extension>,
+    /// State with each single candidate added, best first; left out where two positions are added. Candidates
+    /// beyond the limits of time are missing, and those not compared before an interruption.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub by_candidate: Vec<CandidateGain>,
     /// Number of extensions as good as the first, including the first.
     pub as_good: u64,
     /// Shortest dwell, equal at all positions of the first extension, with which every requirement is met;
@@ -98,6 +108,25 @@ pub struct Extension {
     pub lowers: Vec<Resolved>,
     /// State with the added positions.
     pub then: Standing,
+}
+
+/// State of the required coefficients with one candidate added.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CandidateGain {
+    /// Candidate: directions of X_p, Y_p and Z_p, angles, or a name.
+    pub candidate: String,
+    /// Euler angles alpha, beta, gamma in degrees, as text.
+    pub angles: String,
+    /// Number of required coefficients that neither the samples nor prior knowledge determine.
+    pub not_observable: usize,
+    /// Largest ratio of uncertainty to requirement, dimensionless; null without requirements, or if no
+    /// coefficient with a requirement is determined.
+    pub ratio: Option<f64>,
+    /// Largest sigma (with a bench: total uncertainty) of the determined required drift coefficients; null if
+    /// none is determined.
+    pub worst: Option<Worst>,
+    /// Observable degrees in the order of `required`; null for a coefficient that is not observable.
+    pub degrees: Vec<Option<usize>>,
 }
 
 /// Position that is added to a scheme.

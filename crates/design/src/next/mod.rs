@@ -6,10 +6,11 @@ mod answer;
 mod compared;
 mod options;
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use obsdeg_core::model::settings::{Assignment, concerns};
-use obsdeg_core::model::{Platform, Scheme, Unknowns};
+use obsdeg_core::model::{Platform, Scheme, Unknowns, angles_text};
 use obsdeg_core::remedies::Resolved;
 use obsdeg_evidence::simulation::{
     Conditions, KnownCovariance, MeasurementReport, general_first, latitude_of, resolve,
@@ -63,6 +64,7 @@ pub fn next(
     let meets = compared.meets(first)?;
     let error_bound = first.error_bound;
     let before = compared.before()?;
+    let by_candidate = if options.added == 1 { by_candidate(&found) } else { Vec::new() };
     found.truncate(options.keep.max(1));
     let found = found.into_iter().map(|e| extension(e, before.as_ref(), &required)).collect();
     let of_conditions = Scheme { positions: any_position(), ..start.clone() };
@@ -73,6 +75,7 @@ pub fn next(
         geometry: base.geometry,
         terms: base.unknowns.to_string(),
         positions: start.positions.iter().map(|p| p.name.clone()).collect(),
+        position_angles: start.positions.iter().map(|p| angles_text(&p.angles)).collect(),
         after_calibration: options.beforehand.is_some(),
         days: options.days.last().copied(),
         ageing: if options.days.is_empty() { Default::default() } else { base.ageing.clone() },
@@ -83,6 +86,11 @@ pub fn next(
         required: required.clone(),
         conditions: MeasurementReport::new(&of_conditions, conditions),
         found,
+        by_candidate,
+        degrees_before: match (&before, &options.beforehand) {
+            (Some(before), None) => before.degrees.clone(),
+            _ => Vec::new(),
+        },
         before: before.map(|b| b.standing),
         as_good,
         meets,
@@ -115,6 +123,25 @@ fn listed(compared: &Compared<'_>, going: &(dyn Fn(u64, u64) -> bool + Sync)) ->
     let mut found: Vec<Extended> = judged.into_iter().flatten().filter(Extended::is_possible).collect();
     found.sort_by(Extended::order);
     Ok(Listed { found, examined, interrupted })
+}
+
+/// Best extension by each candidate, in the order of the extensions, which add one position each.
+fn by_candidate(found: &[Extended]) -> Vec<CandidateGain> {
+    let mut seen = BTreeSet::new();
+    let firsts = found.iter().filter(|e| seen.insert(e.sequence[0].0));
+    firsts
+        .map(|e| {
+            let (position, standing) = (&e.positions[0], &e.standing);
+            CandidateGain {
+                candidate: position.candidate.clone(),
+                angles: position.angles.clone(),
+                not_observable: standing.not_observable.len(),
+                ratio: standing.requirements.worst.as_ref().map(|w| 1.0 / w.margin),
+                worst: standing.worst.clone(),
+                degrees: e.degrees.clone(),
+            }
+        })
+        .collect()
 }
 
 /// Requalification after each number of days.

@@ -164,6 +164,9 @@ pub struct SensorUnknown {
     /// Cheapest set that makes the unknown observable, of the smallest degree at this cost; null if all
     /// candidates together do not, or if the search ended before.
     pub cheapest: Option<SensorSet>,
+    /// Observable degree of the unknown with the outputs of the model alone; null if it is not observable,
+    /// if sets replace the outputs, or if the search ended before.
+    pub own_degree: Option<usize>,
     /// Observable degree of the unknown if all candidates are measured; null if it is not observable.
     pub least_degree: Option<usize>,
 }

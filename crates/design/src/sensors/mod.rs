@@ -387,6 +387,10 @@ impl SensorTask<'_> {
     /// Cheapest set for every unknown.
     fn of_unknowns(&mut self, stopped: &mut Option<StopReason>) -> Vec<SensorUnknown> {
         let reached = self.search.degrees(self.search.all).map(<[u16]>::to_vec).unwrap_or_default();
+        let own = match self.options.own_outputs {
+            true => self.search.degrees(0).map(<[u16]>::to_vec).unwrap_or_default(),
+            false => Vec::new(),
+        };
         let mut out = Vec::new();
         for u in 0..self.asked.len() {
             let least = reached.get(u).copied().unwrap_or(NONE);
@@ -399,14 +403,18 @@ impl SensorTask<'_> {
             }
             let (name, unit) = (self.asked[u].name.clone(), self.asked[u].unit.clone());
             let required = self.required.contains(&u);
-            out.push(SensorUnknown { name, unit, required, cheapest, least_degree: degree(least) });
+            let own_degree = own.get(u).copied().and_then(degree);
+            let least_degree = degree(least);
+            out.push(SensorUnknown { name, unit, required, cheapest, own_degree, least_degree });
         }
         out
     }
 
     /// Candidates, each with the degrees under it alone.
     fn candidates(&mut self) -> Vec<SensorCandidate> {
-        let alone: Vec<Set> = (0..self.options.candidates.len()).map(|c| 1 << c).collect();
+        let alone = (0..self.options.candidates.len()).map(|c| 1 << c);
+        // with its own outputs the model itself is judged too, before the limit of work is reached
+        let alone: Vec<Set> = alone.chain(self.options.own_outputs.then_some(0)).collect();
         let judged = self.search.judge(&alone).is_ok();
         let mut out = Vec::new();
         for (c, candidate) in self.options.candidates.iter().enumerate() {

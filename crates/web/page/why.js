@@ -1,0 +1,90 @@
+// Explanations of single verdicts, and the next position of the scheme.
+
+/** The button that shows the name of an unknown in a cell and explains its verdict. */
+function whyButton(td) {
+  let button = td.querySelector('button.why');
+  if (!button) {
+    button = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
+    delete td.dataset.of;
+    td.replaceChildren(button);
+  }
+  return button;
+}
+
+/** Removes the button from a cell. */
+function noWhy(td) {
+  if (!td.querySelector('button.why')) return td;
+  delete td.dataset.of;
+  td.replaceChildren();
+  return td;
+}
+
+const questionOf = (named, name) => JSON.stringify([named, name]);
+
+/** Explains the verdict on an unknown of a text; the answer replaces the content of a box. `more` has options. */
+async function explain(box, named, name, more = {}) {
+  const question = questionOf(named, name);
+  box.hidden = false;
+  box.dataset.name = name;
+  box.dataset.question = question;
+  if (!box.children.length) box.append(element('p', { className: 'soft', textContent: `Explaining the verdict on ${name}\u2026` }));
+  box.classList.add('stale');
+  const request = { sources: [named], why: [name], solutions: false, ...more };
+  const said = await behind.ask('call', ['analyze', request], { lane: box.id }).catch((problem) => ({ problem }));
+  if (!said || box.hidden || box.dataset.question !== question) return;
+  box.classList.remove('stale');
+  const close = element('button', { type: 'button', textContent: 'Close' });
+  close.addEventListener('click', () => { box.hidden = true; box.replaceChildren(); });
+  const [e] = said.explanations ?? [];
+  const head = element('div', { className: 'titled' }, element('h3', { textContent: e?.heading ?? name }), close);
+  if (!e) return void box.replaceChildren(head, element('p', { textContent: said.problem?.message ?? '' }));
+  const lines = element('ul', {}, ...e.lines.map((textContent) => element('li', { textContent })));
+  const changes = e.rows.length ? tableOf(e.columns, e.rows, e.improvements) : element('p', { textContent: `${e.improvements}: ${e.no_change}.` });
+  box.replaceChildren(head, lines, changes);
+  box.scrollIntoView({ block: 'nearest' });
+}
+
+/** Explains the verdict on an unknown of the scheme. */
+const explainScheme = (name) => explain($('why'), source(state.scheme), name, { omitted: false });
+
+/** Asks again for an open explanation of an earlier scheme. */
+function explainAgain() {
+  const box = $('why');
+  if (!box.hidden && box.dataset.question !== questionOf(source(state.scheme), box.dataset.name)) explainScheme(box.dataset.name);
+}
+
+/** Compares the 24 cardinal attitudes as the next position, and offers the best three. */
+async function nextPosition() {
+  const box = $('next'), scheme = copy(state.scheme);
+  box.hidden = false;
+  box.replaceChildren(element('p', { className: 'soft', textContent: 'Comparing the 24 cardinal attitudes\u2026' }));
+  const request = { next: 1, keep: 3, conditions_file: source(scheme) };
+  const said = await behind.ask('call', ['design', request], { lane: 'next' }).catch((problem) => ({ problem }));
+  if (!said || box.hidden || JSON.stringify(scheme) !== JSON.stringify(state.scheme)) return;
+  if (said.problem) return void box.replaceChildren(element('p', { textContent: said.problem.message }));
+  const { found } = JSON.parse(said.text);
+  const rows = found.map(({ positions: [p], then }) => {
+    const add = element('button', { type: 'button', textContent: 'Add' });
+    add.setAttribute('aria-label', `Add ${p.candidate} as the last position`);
+    add.addEventListener('click', () => edit((s) => {
+      const slew = p.half_turn_about && { about: p.half_turn_about, angle_deg: 180 };
+      (s.position ??= []).push({ ...positionOf(p.angles, s.gimbals), ...(slew ? { slew } : {}) });
+      state.selected = s.position.length - 1;
+    }));
+    return [add, p.candidate, String(then.worst_degree ?? '\u2013'), String(then.not_observable.length), then.worst ? `${two(then.worst.sigma_dph)} (${then.worst.name})` : ''];
+  });
+  const texts = said.sentences.map((text) => element('p', { textContent: `${text}.` }));
+  box.replaceChildren(...texts, tableOf(['position', 'X_p Y_p Z_p', 'largest degree', 'undetermined', 'worst sigma [deg/h, per g]'], rows));
+}
+
+function wireWhy() {
+  $('verdicts').addEventListener('click', (e) => {
+    const name = e.target.closest('button.why')?.closest('tr').dataset.name;
+    if (name) explainScheme(name);
+  });
+  $('next-position').addEventListener('click', nextPosition);
+  listeners.push(() => {
+    $('next').hidden = true;
+    $('why').classList.add('stale');
+  });
+}
