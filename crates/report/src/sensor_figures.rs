@@ -55,8 +55,8 @@ fn front(s: &Sensors) -> Figure {
         title: format!("Cheapest sets of outputs for {}", about(s)),
         x_label: "largest degree [derivatives of the outputs]".into(),
         y_label: format!(
-            "{} of the {}outputs{}",
-            if costs { "cost" } else { "number" },
+            "{} {}outputs{}",
+            if costs { "cost of the" } else { "number of" },
             if s.own_outputs.is_empty() { "" } else { "further " },
             if s.candidates.iter().any(|c| c.experiment) { " and the experiment" } else { "" }
         ),
