@@ -7,7 +7,7 @@ use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::degree::{DerivativeRows, PlatformRows};
 use obsdeg_core::model::{Carry, Platform, RandomValues, Scheme, cardinal_names, scheme_file};
 use obsdeg_core::remedies::{Change, Remedies, Remedy};
-use obsdeg_core::system::{SystemOptions, analyze_system, json, judge};
+use obsdeg_core::system::{SystemOptions, analyze_system, json, judge, model_file};
 use obsdeg_exact::{Field, SplitMix64};
 use serde_json::Value;
 
@@ -337,6 +337,18 @@ fn remedies_of_two_positions() {
     assert!(remedies.unresolved.is_empty() && remedies.not_tried.is_empty());
     let inertial = remedies.remedies.iter().find(|r| matches!(r.changes[..], [Change::Carry { .. }]));
     assert_eq!(inertial.map(|r| r.loses.clone()), Some(vec!["D_SZ".to_string()]));
+}
+
+/// A state with a known start is no unknown, but as an output it tells more: the rate b of `z' = -b z`.
+#[test]
+fn states_with_known_starts_are_tried_as_outputs() {
+    let text = "name='chain'\nparameters=['a','b']\n[states]\nz={equation='-b*z', initial='1'}\nv='-a*v'\n\
+                [outputs]\ny='v'";
+    let model = model_file::read(text).expect("a model");
+    let found = analyze_system(&model, SystemOptions::default()).expect("judged").to_resolve;
+    let output = Change::Output { state: "z".into() };
+    let remedy = found.remedies.iter().find(|r| r.changes == [output.clone()]).expect("z as an output");
+    assert_eq!((remedy.resolves[0].name.as_str(), remedy.resolves[0].degree), ("b", 1));
 }
 
 /// A wrong remedy is caught: another degree, another unknown, an attitude that the scheme already has,

@@ -377,6 +377,25 @@ fn one_solution_is_a_requirement() {
     assert_eq!((never, found.required.len()), (vec![("a", &two), ("b", &two)], 0));
 }
 
+/// Where the number of solutions under all candidates is not decided, a set without one of them decides it:
+/// another output never adds a solution.
+#[test]
+fn fewer_candidates_may_decide() {
+    let text = "name='u'\nparameters=['p0','p1','p2']\n[states]\nx0='x0*p0^-1*p1*p2^2'\nx1='x1*p0^2*p1^-1'\n\
+                [outputs]\ny='p0'\n[candidates]\nc0='x1^2*p0^-1*p1*p2^3'\nc1='x0^3*p0^3*p1^-1*p2^-1'\n\
+                c2='p0^2*p2^3'\nc3='x0^3*p0*p1^3*p2^-2'";
+    let model = model_file::read(text).expect("a model");
+    let options = SensorOptions {
+        candidates: model.candidates.clone(),
+        required: vec!["p0".into(), "p1".into()],
+        unique: true,
+        ..SensorOptions::default()
+    };
+    let found = sensors(&model, &options, &|_| true).expect("sets");
+    assert!(found.unattainable.is_empty(), "{:?}", found.unattainable);
+    assert_eq!(found.front[0].outputs, ["c0", "c1", "c2"]);
+}
+
 /// Sets with one solution by the numbers that `analyze` counts under every set, and numbers that are not
 /// decided.
 #[test]

@@ -86,11 +86,13 @@ impl Binner {
         Self { length_s, sigmas, now: Vec::new() }
     }
 
-    /// Adds a sample; returns the bin that it ends.
+    /// Adds a sample; returns the bin that it ends. All samples of a bin have the same channels: a channel
+    /// that misses some would have another middle, and at a fast drift another value.
     pub fn push(&mut self, sample: Sample, spikes: &mut Vec<Spike>) -> Option<Bin> {
         // a small margin, so that samples every 10 s are bins of 10 s
         let ends = self.now.first().is_some_and(|first| {
-            sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
+            let other = first.z.iter().zip(&sample.z).any(|(a, b)| a.is_some() != b.is_some());
+            other || sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
         });
         let bin = if ends { self.end(spikes) } else { None };
         self.now.push(sample);
@@ -229,6 +231,22 @@ mod tests {
         assert!((a.value - b.value).abs() < 2e-5, "{} {}", a.value, b.value);
         let sigma = (b.scatter / b.free as f64).sqrt();
         assert!((sigma / 1e-3 - 1.0).abs() < 0.1, "{sigma}");
+    }
+
+    /// A fast ramp with missing cells: every bin has the value of the ramp at its middle.
+    #[test]
+    fn missing_cells_move_no_middle() {
+        let two = |i: u64| {
+            let (t, there) = (5.0 * i as f64, |missing: bool| (!missing).then_some(7.0 * i as f64));
+            Sample { z: [there(i % 7 == 0), there(i % 5 == 1), None, None], ..sample(i, t, 0.0) }
+        };
+        let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3; 2]), Vec::new());
+        let mut bins: Vec<Bin> = (0..60).filter_map(|i| binner.push(two(i), &mut spikes)).collect();
+        bins.extend(binner.end(&mut spikes));
+        assert!(bins.len() > 30 && spikes.is_empty());
+        for (bin, mean) in bins.iter().flat_map(|b| b.channels.iter().flatten().map(move |m| (b, m))) {
+            assert!((mean.value - 7.0 * bin.t / 5.0).abs() < 1e-9, "{bin:?}");
+        }
     }
 
     /// A sample with its own sigma is a bin of its own; gaps make no bins.

@@ -500,7 +500,7 @@ fn next_positions(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Ne
         total_s: a.wanted.max_time,
         slew_s: a.wanted.max_slew,
         keep: a.keep.unwrap_or(10).into(),
-        beforehand: files.after.as_ref().map(calibrated).transpose()?,
+        beforehand: files.after.as_ref().map(|after| calibrated(after, &base)).transpose()?,
         days: a.further.days.clone(),
         seed: a.seed,
     };

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use clap::Args;
+use obsdeg_calibration::Setup;
 use obsdeg_calibration::answer::CovarianceTable;
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges::Range;
@@ -114,12 +115,19 @@ pub(crate) fn further(
              as D_F = 0.002",
         ));
     }
+    if !options.days.is_empty() && conditions.requirements.is_empty() {
+        return Err(Problem::input(
+            "--days asks when requirements are met again; expected a requirement, by --requirement or a table \
+             [requirements] in the scheme file",
+        ));
+    }
     let going = |done, all| (host.going)(Now::of("comparing extensions", done, all));
     Ok(next(base, conditions, options, &going)?)
 }
 
-/// Covariance of a calibration, rescaled by its residuals.
-pub(crate) fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
+/// Covariance of a calibration of the platform of `base`, rescaled by its residuals. Positions, carry,
+/// azimuth and terms of the calibration may be others; mounting and latitude may not.
+pub(crate) fn calibrated(source: &Source, base: &Scheme) -> Result<KnownCovariance, Problem> {
     let wrong = |found: &str| {
         Problem::input(format!(
             "{}: {found}; expected the calibration.json that `obsdeg calibrate -o` wrote of a scheme",
@@ -130,6 +138,18 @@ pub(crate) fn calibrated(source: &Source) -> Result<KnownCovariance, Problem> {
     let schema = value.get("schema").and_then(|s| s.as_str()).unwrap_or_default();
     if schema.split('/').next() != Some("obsdeg.calibration") {
         return Err(wrong("no calibration of a scheme"));
+    }
+    let setup = value.get("setup").cloned().unwrap_or_default();
+    let setup: Setup = serde_json::from_value(setup)
+        .map_err(|e| wrong(&format!("a calibration of another version ({e})")))?;
+    let own = Setup::of(base);
+    let same = Setup { geometry: setup.geometry, latitude_deg: setup.latitude_deg, ..own.clone() };
+    if let [_, ..] = &own.differences(&same)[..] {
+        let other = own.differences(&same).join("; ");
+        return Err(Problem::input(format!(
+            "{}: a calibration of another platform or place: {other}; expected that of the scheme",
+            source.name
+        )));
     }
     let table = value.get("covariance").cloned().unwrap_or_default();
     let table: CovarianceTable = serde_json::from_value(table)

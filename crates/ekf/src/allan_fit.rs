@@ -24,11 +24,15 @@ pub const RESOLVED: f64 = 3.0;
 pub const LIMIT: f64 = 0.95;
 /// Quantile of the unit normal distribution at [`LIMIT`].
 const LIMIT_SIGMAS: f64 = 1.644_853_626_951_472_2;
-/// Ratio of cluster times above which estimates count as independent: their correlation is below a few
-/// percent.
-const APART: usize = 256;
 /// Number of lags per cluster in the sums over lags; covariances are smooth in between.
 const PER_CLUSTER: usize = 16;
+/// Largest number of lags per cluster of the larger size. Where the sizes are farther apart, the covariance
+/// of white noise is sampled too coarsely, but it is negligible; that of a random walk is smooth over the
+/// larger cluster, and without it the matrix of many sizes would not be positive definite.
+const MOST_PER_CLUSTER: usize = 4096;
+/// Fractions by which covariances between sizes are reduced, in turn, until their matrix is positive
+/// definite.
+const REDUCED: [f64; 4] = [0.0, 1e-3, 1e-2, 1e-1];
 /// Largest number of passes over the weights.
 const PASSES: usize = 60;
 /// Largest number of doublings of a squared coefficient in search of its limit, and of halvings of the
@@ -98,16 +102,14 @@ fn covariances(m: usize, other: usize, lag: i64) -> [f64; TERMS] {
 /// it is `sum_ab x_a x_b S_ab`.
 fn pair(lengths: &[usize], m: usize, other: usize) -> [[f64; TERMS]; TERMS] {
     let mut out = [[0.0; TERMS]; TERMS];
-    if m.max(other) > APART * m.min(other) {
-        return out;
-    }
     let differences = |n: usize, m: usize| (n + 1).saturating_sub(2 * m) as i64;
     let count: f64 =
         [m, other].map(|m| lengths.iter().map(|&n| differences(n, m)).sum::<i64>() as f64).iter().product();
     if count == 0.0 {
         return out;
     }
-    let (wide, stride) = (4 * m.max(other) as i64, (m.min(other) / PER_CLUSTER).max(1));
+    let stride = (m.min(other) / PER_CLUSTER).max(m.max(other) / MOST_PER_CLUSTER).max(1);
+    let wide = 4 * m.max(other) as i64;
     let (first, last) = (-2 * other as i64 - wide, 2 * m as i64 + wide);
     for lag in (first..=last).step_by(stride) {
         let pairs = |&n: &usize| {
@@ -198,7 +200,12 @@ impl FitProblem<'_> {
     /// Least squares for the noises `kept` with weights by squared coefficients `by`.
     fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solution> {
         let n = self.points.len();
-        let root = Cholesky::new(self.covariance(&by.map(|x| x.max(0.0))))?.l();
+        let covariance = self.covariance(&by.map(|x| x.max(0.0)));
+        let reduced = |part: &f64| {
+            let entry = |i, j| covariance[(i, j)] * if i == j { 1.0 } else { 1.0 - part };
+            Cholesky::new(DMatrix::from_fn(n, n, entry))
+        };
+        let root = REDUCED.iter().find_map(reduced)?.l();
         let design = DMatrix::from_fn(n, kept.len(), |i, j| shapes(self.points[i].samples)[kept[j]]);
         let y = DVector::from_iterator(n, self.points.iter().map(|p| p.variance));
         let (a, b) = (root.solve_lower_triangular(&design)?, root.solve_lower_triangular(&y)?);
@@ -412,6 +419,32 @@ mod tests {
             lines += 1;
         }
         assert_eq!(lines, 24);
+    }
+
+    /// White noise and a random walk of 20,000 and 100,000 samples: sizes up to 4096 times apart, whose
+    /// covariances make a positive definite matrix.
+    #[test]
+    fn long_records_are_fitted() {
+        for (n, walk) in [(20_000, 0.1), (100_000, 0.01), (100_000, 1.0)] {
+            let mut random = Pcg64Mcg::seed_from_u64(n as u64);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let mut bias = 0.0;
+            let samples: Vec<f64> = (0..n)
+                .map(|_| {
+                    bias += walk * normal();
+                    bias + normal()
+                })
+                .collect();
+            let sizes = (0..).map(|k| 1 << k).take_while(|m| 4 * m <= n);
+            let stretches = [samples];
+            let points: Vec<AllanPoint> =
+                sizes.map(|m| overlapping_variance(&stretches, m).expect("long enough")).collect();
+            let found = fit(&points, &[n], 0.95).expect("a fit");
+            for (term, truth) in [(0, 1.0), (2, walk)] {
+                let (x, sigma) = found.terms[term].found.expect("resolved");
+                assert!((x - truth).abs() < 4.0 * sigma && sigma < 0.2 * truth, "{n} {term}: {x} {sigma}");
+            }
+        }
     }
 
     /// Degrees of freedom of white noise at clusters of one sample: (3 (N - 1)/2 - 2 (N - 2)/N) 4/9 for N =

@@ -45,7 +45,11 @@ fn sentences(n: &NextPositions) -> Vec<String> {
     let Some(first) = n.found.first() else { return Vec::new() };
     let more = gains(n, first);
     let more = if more.is_empty() { String::new() } else { format!(": this {}", more.join(", ")) };
-    let mut out = vec![format!("Add {}{more}", positions(first))];
+    let met = n.before.as_ref().is_some_and(|b| b.requirements.stated > 0 && b.requirements.all_met());
+    let mut out: Vec<String> = Vec::new();
+    out.extend(met.then(|| "Every requirement is met without a further position".into()));
+    let add = if met { "Most is gained by" } else { "Add" };
+    out.push(format!("{add} {}{more}", positions(first)));
     if first.then.requirements.stated > 0 {
         out.push(stated::capital(&stated::requirements(&first.then.requirements)));
     }

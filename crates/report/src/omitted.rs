@@ -13,6 +13,8 @@ use obsdeg_evidence::simulation::si_per_shown;
 use crate::document::{Block, left, number, right};
 use crate::words;
 
+/// Largest number of changes that are listed of a silent error.
+const CHANGES: usize = 3;
 /// Largest number of budgets that a document prints in full: those with the least margin, or with the largest
 /// share of the bench.
 const BUDGETS: usize = 3;
@@ -369,8 +371,16 @@ pub(crate) fn silent(of: &Omitted) -> String {
     let change = |c: &ChangePerUnit, unit: &str| {
         format!("changes {} by {} {} per {unit}", c.unknown, number(c.per_unit), c.unit)
     };
+    // unknowns without a number, such as the scale factor that takes an error of third order up
+    let named = |name: &String| format!("changes {name}");
     let one = |s: &SilentError| {
-        let changes: Vec<String> = s.sensitivities.iter().map(|c| change(c, &s.unit)).collect();
+        let mut changes: Vec<String> = match s.sensitivities.is_empty() {
+            false => s.sensitivities.iter().map(|c| change(c, &s.unit)).collect(),
+            true => s.changes.iter().map(named).collect(),
+        };
+        let more = changes.len().saturating_sub(CHANGES);
+        changes.truncate(CHANGES);
+        changes.extend((more > 0).then(|| format!("{more} more changes in JSON")));
         format!("{} ({})", s.name, changes.join(", "))
     };
     let more = of.silent.len().saturating_sub(SILENT);

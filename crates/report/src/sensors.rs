@@ -85,7 +85,10 @@ fn sentences(s: &Sensors) -> Vec<String> {
         });
     } else {
         let reason = if s.required.is_empty() { "" } else { ": the search ended before a set was found" };
-        let none = "No set of the candidates makes an unknown that was asked for observable";
+        let none = match s.one_solution {
+            None => "No set of the candidates makes an unknown that was asked for observable",
+            Some(_) => "No set of the candidates leaves one solution of an unknown that was asked for",
+        };
         out.push(if reason.is_empty() {
             none.into()
         } else {
@@ -124,7 +127,10 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
     };
     let goal = match f.below {
         Some(below) => format!("with degrees of at most {below}{asked}"),
-        None => format!("that makes them observable{asked}"),
+        None => format!(
+            "that {}{asked}",
+            s.one_solution.as_ref().map_or("makes them observable", |_| "leaves one solution")
+        ),
     };
     let (mut shown, mut members) = (Vec::new(), 0);
     for group in &f.one_of_each {
@@ -143,11 +149,17 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
         0 => String::new(),
         n => format!("; the {} of this kind that cost less fail one by one", count(n, "set")),
     };
+    let undecided = match &s.one_solution {
+        Some(CountedSets { undecided: 1.., .. }) => {
+            "; a set with a number of solutions that is not decided counts as failing, which proves nothing about it"
+        }
+        _ => "",
+    };
     match shown.is_empty() {
         true => format!("{}: nothing is cheaper", price(s, f)),
         false => format!(
             "{}: every set {goal} contains a candidate of {}{more}, because all candidates outside any of \
-             these groups fail together{judged}",
+             these groups fail together{judged}{undecided}",
             price(s, f),
             shown.join(", of ")
         ),
@@ -260,7 +272,11 @@ impl Answer for Sensors {
         }
         let rows = self.quantities.iter().map(unknown_row);
         let header = [left("unknown"), left("cheapest set"), right("degree"), right("degree with all")];
-        blocks.push(Block::table("Cheapest set of each unknown", header, rows));
+        let name = match self.one_solution {
+            None => "Cheapest set of each unknown",
+            Some(_) => "Cheapest set that makes each unknown observable, with any number of solutions",
+        };
+        blocks.push(Block::table(name, header, rows));
         let rows = self.candidates.iter().map(|c| {
             let mut row = vec![c.name.clone()];
             row.extend(costs.then(|| cost(c.cost)));

@@ -347,6 +347,27 @@ fn options_of_further_positions() {
     );
 }
 
+/// A calibration of another latitude is refused, and days without a requirement.
+#[test]
+fn a_calibration_of_another_place_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_string();
+    let day = "examples/bench-day";
+    let out = path("out");
+    let (scheme, record) = (format!("{day}/scheme.toml"), format!("{day}/record.csv"));
+    let run = crate::program::run(&["calibrate", &scheme, &record, "-o", &out]);
+    assert!(run.status.success(), "{}", crate::program::stderr(&run));
+    let after = path("out/calibration.json");
+    let text = "latitude_deg = 10\n[ageing]\nD = 0.001\n[[position]]\nattitude = \"NUE\"\n";
+    std::fs::write(path("s.toml"), text).expect("written");
+    let asked = ["design", &path("s.toml"), "--next", "1", "--after", &after];
+    refused(&asked, &["another platform or place", "latitude"]);
+    let base = std::fs::read_to_string(&scheme).expect("a scheme");
+    let latitude = base.lines().find(|l| l.starts_with("latitude")).unwrap_or("latitude_deg = 28.2");
+    std::fs::write(path("s.toml"), text.replace("latitude_deg = 10", latitude)).expect("written");
+    refused(&[&asked[..], &["--days", "30"]].concat(), &["expected a requirement"]);
+}
+
 /// Calibration with aged coefficients, and their requirements.
 struct Aged {
     task: Task,

@@ -36,7 +36,7 @@ pub(super) const BENT: f64 = 1.0;
 /// Largest curvature, in sigma, at which records and priors determine the estimates.
 const MOST: f64 = 20.0;
 /// Reciprocal of the fraction of repeated estimates that may fail to converge.
-const FAILED: usize = 10;
+const FAILED: usize = 40;
 /// Fewest repeated estimates, and their number per unknown.
 const REFITS: (usize, usize) = (80, 4);
 /// Largest product of bins, squared unknowns and repeated estimates.

@@ -157,7 +157,7 @@ fn alarms(kinds: &[Kind], seeds: std::ops::Range<u64>) -> u64 {
 
 /// Largest number of false alarms of `records` that is no evidence (one in a thousand, normal bound) against
 /// the stated probability.
-fn most(records: u64) -> u64 {
+pub(crate) fn most(records: u64) -> u64 {
     let expected = levels::FAMILY * records as f64;
     (expected + 3.1 * (expected * (1.0 - levels::FAMILY)).sqrt()).ceil() as u64
 }

@@ -54,6 +54,26 @@ fn a_gross_cell_is_named_and_left_out() {
     }
 }
 
+/// Empty cells in bins of two rows, at drifts of 25 to 36 deg/h: the row that remains does not count as the
+/// middle of the bin.
+#[test]
+fn empty_cells_leave_the_others_right() {
+    let drift = [[36.0, -30.0, 25.0], [12.0, -14.0, 9.0], [-8.0, 11.0, 13.0], [10.0, 7.0, -12.0]];
+    let bench = Bench { step_s: 5.0, drift, ..bench() };
+    let text = csv(&bench.record());
+    let row = |(k, line): (usize, &str)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if k % 37 == 5 {
+            cells[2 + k / 37 % 3] = "";
+        }
+        cells.join(",")
+    };
+    let lines: Vec<String> = text.lines().enumerate().map(row).collect();
+    let c = of_csv(&bench, "F,I,O,S", lines.join("\n")).expect("calibrated");
+    is_near(&bench, &c, "empty cells");
+    assert!(c.consistent && c.outliers.is_empty(), "{:?} {:?}", c.findings, c.outliers);
+}
+
 /// Codes of missing values are reported. If the file states them, they are empty cells, which are counted
 /// like NaN.
 #[test]

@@ -139,7 +139,13 @@ impl<'a> ModelRemedySearch<'a> {
             self.out.not_tried.push(text);
         }
         let states = self.roles.iter().map(|r| r.0).filter(|r| matches!(r, Role::State(_)));
-        self.two(directions, &states.collect::<Vec<_>>());
+        self.two(directions, &states.chain(self.started()).collect::<Vec<_>>());
+    }
+
+    /// States whose start is known. They are no unknowns, but as outputs their course tells more.
+    fn started(&self) -> impl Iterator<Item = Role> + use<'a> {
+        let states = self.model.states.iter().enumerate();
+        states.filter(|(_, s)| s.start != StateStart::Unknown).map(|(i, _)| Role::State(i))
     }
 
     /// Single changes in the order of the search: one value of every set of unknowns that determine each
@@ -169,7 +175,8 @@ impl<'a> ModelRemedySearch<'a> {
             roles.sort_by_key(|r| matches!(r, Role::State(_)));
         }
         let alike = |k: usize| sets.iter().filter_map(move |(_, roles)| roles.get(k)).map(|r| self.known(*r));
-        let outputs = states.iter().map(|(_, role)| self.output(*role));
+        let outputs =
+            states.iter().map(|(_, role)| *role).chain(self.started()).map(|role| self.output(role));
         alike(0).chain(outputs).chain((1..MOST_ALIKE).flat_map(alike)).collect()
     }
 
@@ -337,7 +344,8 @@ pub(super) fn improvements(
     };
     let values = roles.iter().filter(|role| **role != unknowns[column].role).filter(judged_there);
     let values = values.map(|role| search.known(*role));
-    let outputs = roles.iter().filter(|role| is_state(role)).map(|role| search.output(*role));
+    let states = roles.iter().copied().filter(is_state).chain(search.started());
+    let outputs = states.map(|role| search.output(role));
     let changes: Vec<Change> = values.chain(outputs).collect();
     let (count, mut tried) = (changes.len(), 0);
     for change in changes.into_iter().take(MOST_EXPLAINED) {

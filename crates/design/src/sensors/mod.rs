@@ -344,11 +344,12 @@ impl SensorTask<'_> {
     fn require_one_solution(&mut self, reached: &[u16]) -> Vec<Unattainable> {
         let mut unique = UniqueSolutions::new(self.model, self.options);
         let required: Vec<TargetUnknown> = self.required.iter().map(|&u| self.asked[u].clone()).collect();
-        let numbers = unique.numbers(self.search.all, &required);
+        let numbers = unique.numbers_of_all(self.search.all, &required);
         let (one, more): (Vec<_>, Vec<_>) =
             std::mem::take(&mut self.required).into_iter().zip(numbers).partition(|(_, n)| is_one(n));
         self.required = one.into_iter().map(|(u, _)| u).collect();
         unique.required = self.required.iter().map(|&u| self.asked[u].clone()).collect();
+        unique.one_under(self.search.all);
         self.search.unique = Some(unique);
         let of = |(u, number_of_solutions): (usize, _)| {
             let (name, degree) = (self.asked[u].name.clone(), degree(reached[u]));

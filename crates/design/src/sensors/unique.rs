@@ -44,6 +44,34 @@ impl<'a> UniqueSolutions<'a> {
         of.iter().map(number).collect()
     }
 
+    /// Numbers of solutions of unknowns under all candidates. A number that is not decided there is one if a
+    /// set without one candidate leaves one solution.
+    pub(crate) fn numbers_of_all(
+        &mut self,
+        all: Set,
+        of: &[TargetUnknown],
+    ) -> Vec<Option<NumberOfSolutions>> {
+        let mut out = self.numbers(all, of);
+        let is_open = |n: &Option<NumberOfSolutions>| matches!(n, Some(NumberOfSolutions::Undecided(_)));
+        for left_out in members(all) {
+            if !out.iter().any(is_open) {
+                break;
+            }
+            let fewer = self.numbers(all & !(1 << left_out), of);
+            for (own, fewer) in out.iter_mut().zip(fewer) {
+                if is_open(own) && is_one(&fewer) {
+                    *own = fewer;
+                }
+            }
+        }
+        out
+    }
+
+    /// Notes that all candidates leave one solution of every required unknown.
+    pub(crate) fn one_under(&mut self, all: Set) {
+        self.one.push(all);
+    }
+
     /// True if every required unknown is known to have one solution under a set.
     pub(crate) fn holds(&self, set: Set) -> bool {
         self.one.iter().any(|own| own & !set == 0)
