@@ -238,7 +238,7 @@ mod tests {
     fn missing_cells_move_no_middle() {
         let two = |i: u64| {
             let (t, there) = (5.0 * i as f64, |missing: bool| (!missing).then_some(7.0 * i as f64));
-            Sample { z: [there(i % 7 == 0), there(i % 5 == 1), None, None], ..sample(i, t, 0.0) }
+            Sample { z: [there(i.is_multiple_of(7)), there(i % 5 == 1), None, None], ..sample(i, t, 0.0) }
         };
         let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3; 2]), Vec::new());
         let mut bins: Vec<Bin> = (0..60).filter_map(|i| binner.push(two(i), &mut spikes)).collect();
