@@ -534,7 +534,7 @@ fn a_clock_is_blamed_where_times_say_so_too() {
         stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ")
     };
     let clock = said(&[&file.display().to_string()]);
-    assert!(clock.contains("the clock: positions begin and end as by a clock that is 1.9"), "{clock}");
+    assert!(clock.contains("the clock: positions begin and end as by a clock that is 2.0"), "{clock}");
     assert!(clock.contains("those that the earth rate tells by more"), "{clock}");
     // a correct clock with a wrong latitude or a wrong slew rate
     for wrong in [["--latitude", "49"], ["--slew-rate", "3"]] {

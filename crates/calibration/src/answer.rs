@@ -125,6 +125,24 @@ pub enum Finding {
         /// First and last line number of these cells in the record.
         lines: (u64, u64),
     },
+    /// Measurements in succession that lie off to the same side; they were left out. Outliers are independent
+    /// of each other: these are a step of an output, or the platform moved.
+    Succession {
+        /// Name of the record with this finding.
+        record: String,
+        /// Name of the position at which these measurements lie.
+        position: String,
+        /// Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for single cells, the column of the record.
+        channel: String,
+        /// Number of these measurements.
+        count: usize,
+        /// First and last line number in the record.
+        lines: (u64, u64),
+        /// Times of the first and the last one, in s of the record's timeline.
+        span_s: (f64, f64),
+        /// Least and largest distance from the expected value, in standard deviations (dimensionless).
+        sigmas: (f64, f64),
+    },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
     Clock {
         /// Name of the record with this finding.
@@ -569,6 +587,11 @@ pub struct RecordReport {
     pub span_s: (f64, f64),
     /// Source of the position of each sample.
     pub positions_by: PositionsBy,
+    /// Longest interval, in s, in which a change of position may lie by the rows beside it: its time is
+    /// uniform there, which is part of the sigmas. Null where the scheme says when positions change, or no
+    /// drift passes from one to the next.
+    #[serde(default)]
+    pub change_open_s: Option<f64>,
     /// Columns that are not used.
     pub ignored: Vec<String>,
     /// Mean length of the specific force, in g; null if the record has no forces.

@@ -144,8 +144,9 @@ pub(crate) fn calibrated(source: &Source, base: &Scheme) -> Result<KnownCovarian
         .map_err(|e| wrong(&format!("a calibration of another version ({e})")))?;
     let own = Setup::of(base);
     let same = Setup { geometry: setup.geometry, latitude_deg: setup.latitude_deg, ..own.clone() };
-    if let [_, ..] = &own.differences(&same)[..] {
-        let other = own.differences(&same).join("; ");
+    let differences = own.differences(&same);
+    if !differences.is_empty() {
+        let other = differences.join("; ");
         return Err(Problem::input(format!(
             "{}: a calibration of another platform or place: {other}; expected that of the scheme",
             source.name

@@ -429,10 +429,14 @@ mod tests {
             let mut random = Pcg64Mcg::seed_from_u64(n as u64);
             let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
             let mut bias = 0.0;
+            // means over each sample of a continuous walk W: the integral of W over the unit interval has the
+            // variance 1/3 and the covariance 1/2 with W(1)
             let samples: Vec<f64> = (0..n)
                 .map(|_| {
-                    bias += walk * normal();
-                    bias + normal()
+                    let (step, rest) = (normal(), normal());
+                    let mean = bias + walk * (step / 2.0 + rest / 12f64.sqrt());
+                    bias += walk * step;
+                    mean + normal()
                 })
                 .collect();
             let sizes = (0..).map(|k| 1 << k).take_while(|m| 4 * m <= n);

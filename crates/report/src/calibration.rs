@@ -48,7 +48,8 @@ fn cause(c: &ForceCause) -> String {
 
 /// Relative rate error of a clock in percent, with `fast` or `slow`.
 fn part(fast: f64) -> String {
-    format!("{:.2} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
+    let digits = if fast.abs() < 1e-3 { 4 } else { 2 };
+    format!("{:.digits$} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
 }
 
 /// Relative rate error from which a clock error is large.
@@ -61,8 +62,18 @@ pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth
     both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
 }
 
+/// What shows the rate of a clock, by the source of positions.
+fn shows(by: Option<PositionsBy>) -> &'static str {
+    match by {
+        Some(PositionsBy::Timeline | PositionsBy::Both) => {
+            "the changes of position and the rates of the earth and of turns"
+        }
+        _ => "the rates of the earth and of turns",
+    }
+}
+
 /// Sentence on the offset and the rate of a record's clock.
-fn clock(c: &Clock) -> String {
+fn clock(c: &Clock, by: PositionsBy) -> String {
     let begins = match (c.offset_s, c.offset_sigma_s) {
         (Some(at), Some(sigma)) => format!(
             "; the scheme begins at {at:.3} s of its clock (estimated, sigma {} s; labels leave it open)",
@@ -71,17 +82,18 @@ fn clock(c: &Clock) -> String {
         (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
         _ => String::new(),
     };
-    format!("{begins}{}", rates(c))
+    format!("{begins}{}", rates(c, by))
 }
 
 /// Sentence on the rate of a record's clock.
-fn rates(c: &Clock) -> String {
+fn rates(c: &Clock, by: PositionsBy) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
     });
     match &c.by_earth {
         Some(e) if 3.0 * e.sigma < CLOCK => format!(
-            "; by the rates of the earth and of turns its clock is {} (sigma {} %){held}",
+            "; by {} its clock is {} (sigma {} %){held}",
+            shows(Some(by)),
             part(e.fast),
             number(100.0 * e.sigma)
         ),
@@ -154,6 +166,18 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                 ),
             }
         }
+        Finding::Succession { record, position, channel, count, lines, span_s, sigmas } => format!(
+            "{count} measurements of {channel}{} in succession (position {position}, {} to {} s, lines {} to \
+             {}) lie {:+.1} to {:+.1} sigma off, and were left out: no outliers, but a step of an output at \
+             either end of them, or a platform that moved; a step also changes what comes before or after",
+            of(record, records),
+            number(span_s.0),
+            number(span_s.1),
+            lines.0,
+            lines.1,
+            sigmas.0,
+            sigmas.1
+        ),
         Finding::Clock { record, by_durations, by_earth } => {
             let of = of(record, records);
             let held = by_durations
@@ -165,12 +189,16 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                     "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
                      off by that part, those that the earth rate tells by more"
                 ),
-                (held, Some(rates)) => format!(
+                (Some(held), Some(rates)) => format!(
                     "the rates of the earth and of turns{of} are not those of the scheme: they fit best as \
-                     by a clock that is {rates}{}; another latitude or rate of turns, or an error that no \
-                     unknown explains, look the same, and are likelier where positions last as in the \
-                     scheme",
-                    held.map_or_else(String::new, |held| format!(", while {held}"))
+                     by a clock that is {rates}, while {held}; another latitude or rate of turns, or an error \
+                     that no unknown explains, look the same"
+                ),
+                (None, Some(rates)) => format!(
+                    "times or rates{of} are not those of the scheme: {} fit best as by a clock that is \
+                     {rates}; positions held longer or shorter, another latitude or rate of turns, or an \
+                     error that no unknown explains, look the same",
+                    shows(records.iter().find(|r| r.name == *record).map(|r| r.positions_by))
                 ),
                 (held, None) => format!(
                     "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from \
@@ -357,7 +385,7 @@ pub(crate) fn gaps(of: &[Gap]) -> Option<String> {
 pub(crate) fn by_what(by: PositionsBy) -> &'static str {
     match by {
         PositionsBy::Labels => {
-            "the column `position`: one ends with its last sample, the next begins when the slew is over"
+            "the column `position`: one ends behind its last sample, the next begins when the slew is over"
         }
         PositionsBy::Timeline => "the timeline of the scheme",
         PositionsBy::Both => {
@@ -382,6 +410,12 @@ fn records(c: &Calibration) -> Vec<String> {
             r.bins,
             by_what(r.positions_by)
         );
+        if let Some(open) = r.change_open_s {
+            out += &format!(
+                "; the rows leave the time of a change open within {} s, which is part of the sigmas",
+                number(open)
+            );
+        }
         out += &gaps(&r.gaps).map_or_else(String::new, |gaps| format!("; {gaps}"));
         let empty: Vec<String> =
             r.empty_cells.iter().map(|e| format!("{} of `{}`", e.count, e.column)).collect();
@@ -397,7 +431,7 @@ fn records(c: &Calibration) -> Vec<String> {
         if let Some(off) = r.gimbals_deg {
             out += &format!("; the gimbals are within {} deg of the scheme", number(off));
         }
-        out += &clock(&r.clock);
+        out += &clock(&r.clock, r.positions_by);
         if !r.ignored.is_empty() {
             out += &format!("; nothing was made of the columns {}", r.ignored.join(", "));
         }
@@ -619,7 +653,11 @@ impl Answer for Calibration {
         }];
         lead.extend(self.requirements.as_ref().map(|r| {
             let psi = "; those on psi are not judged, since psi here is that of the start of a record";
-            format!("{}{psi}.", stated::capital(&stated::requirements(r)))
+            let said = stated::requirements(r);
+            match said.strip_prefix("by this record ").filter(|_| !self.consistent) {
+                Some(rest) => format!("By these sigmas, which a finding contradicts, {rest}{psi}."),
+                None => format!("{}{psi}.", stated::capital(&said)),
+            }
         }));
         lead.extend(omitted::of_requirements(self));
         lead.extend(left_open(self));

@@ -468,7 +468,8 @@ pub(crate) fn of_requirements(c: &Calibration) -> Vec<String> {
             names.join(" and ")
         )
     }));
-    let all = c.omitted.limits.iter();
+    // sigmas that a finding contradicts leave no margin
+    let all = c.omitted.limits.iter().filter(|_| c.consistent);
     let listed = limits(all.map(|l| (l.family.as_str(), l.size, l.unit.as_str(), String::new())));
     out.extend(listed.map(|listed| {
         let of = if r.with_bench { ", of what the bench does not state" } else { "" };

@@ -35,7 +35,9 @@ const REPEATED: f64 = 0.4;
 pub(super) const BENT: f64 = 1.0;
 /// Largest curvature, in sigma, at which records and priors determine the estimates.
 const MOST: f64 = 20.0;
-/// Reciprocal of the fraction of repeated estimates that may fail to converge.
+/// Reciprocal of the fraction of repeated estimates that may fail to converge. Failures are the extremes,
+/// which the covariance then lacks: two of 2,400 right records, with 8 and 6 failures of 80, had a NEES of
+/// 444 on 15 and of 60 on 12.
 const FAILED: usize = 40;
 /// Fewest repeated estimates, and their number per unknown.
 const REFITS: (usize, usize) = (80, 4);

@@ -14,7 +14,6 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 
 use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
-use super::gross::Why;
 use super::observe::{By, channel_name};
 use super::offset::{Later, Offset};
 use super::run::Key;
@@ -22,7 +21,7 @@ use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved,
-    Outlier, PositionFit, RecordReport, SCHEMA, SecondPath,
+    PositionFit, RecordReport, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -357,7 +356,7 @@ impl Parts<'_> {
         let channels = self.channels();
         let records = self.records();
         let repeatability = self.repeatability(&fit);
-        let outliers = self.outliers();
+        let left_out = self.left_out()?;
         let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
         let asked = (&self.conditions.bench[..], self.options.seed);
         let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, self.later, asked)?;
@@ -375,8 +374,8 @@ impl Parts<'_> {
             fit,
             positions,
             channels,
-            outlier_count: outliers.len(),
-            outliers,
+            outlier_count: left_out.len(),
+            outliers: left_out.iter().map(|l| l.outlier.clone()).collect(),
             second_path: self.found.second.clone(),
             repeatability,
             records,
@@ -392,7 +391,7 @@ impl Parts<'_> {
             series: self.series(),
             residuals: self.residuals(),
         };
-        out.findings = self.findings(&out);
+        out.findings = self.findings(&out, &left_out);
         out.consistent = out.findings.is_empty();
         for e in out.quantities.iter_mut().filter(|e| outside.adds_to(&e.name)) {
             e.total = total(e, &outside);
@@ -524,63 +523,12 @@ impl Parts<'_> {
             bins: run.len(),
             span_s: run.reading.span,
             positions_by: run.reading.by.into(),
+            change_open_s: run.changes.iter().map(|c| c.open).reduce(f64::max),
             gimbals_deg: run.reading.gimbals,
             ignored: run.reading.ignored.clone(),
             force_g: run.reading.force,
         };
         self.problem.runs.iter().enumerate().map(of).collect()
-    }
-
-    fn outliers(&self) -> Vec<Outlier> {
-        let mut out = Vec::new();
-        let channel = |c: usize| channel_name(self.planned.components[c]);
-        for run in self.problem.runs {
-            for (cell, column) in run.reading.cells.iter().filter(|(c, _)| c.why == Why::Far) {
-                out.push(Outlier {
-                    record: run.reading.name.clone(),
-                    lines: cell.lines,
-                    t_s: run.reading.origin + cell.t,
-                    channel: column.clone(),
-                    sigmas: cell.sigmas,
-                });
-            }
-            for s in &run.reading.spikes {
-                out.push(Outlier {
-                    record: run.reading.name.clone(),
-                    lines: (s.line, s.line),
-                    t_s: run.reading.origin + s.t,
-                    channel: channel(s.channel),
-                    sigmas: s.sigmas,
-                });
-            }
-            for (key, mean, bin) in run.measured().filter(|(k, ..)| !run.counts[k.bin][k.channel]) {
-                let sigma = self.problem.sigmas[key.channel];
-                let own = (mean.variance * if mean.given { 1.0 } else { sigma * sigma }).sqrt();
-                out.push(Outlier {
-                    record: run.reading.name.clone(),
-                    lines: bin.lines,
-                    t_s: run.reading.origin + bin.t,
-                    channel: channel(key.channel),
-                    sigmas: self.off(run, &key, mean.value) / own,
-                });
-            }
-        }
-        out
-    }
-
-    /// Distance of a measurement that was left out from the mean of its nearest neighbours of the same
-    /// position and channel that count.
-    fn off(&self, run: &super::run::Run, key: &Key, value: f64) -> f64 {
-        let near = run.measured().filter(|(k, ..)| {
-            k.position == key.position && k.channel == key.channel && run.counts[k.bin][k.channel]
-        });
-        let mut near: Vec<(usize, f64)> = near.map(|(k, m, _)| (k.bin.abs_diff(key.bin), m.value)).collect();
-        near.sort_by_key(|(d, _)| *d);
-        near.truncate(2);
-        match near.len() {
-            0 => f64::NAN,
-            n => value - near.iter().map(|(_, v)| v).sum::<f64>() / n as f64,
-        }
     }
 
     /// Keys of the conditions that are not stated.

@@ -1,23 +1,34 @@
-//! Clock of a record, checked by the rates of the earth and of turns.
+//! Clock of a record, checked by the rates of the earth and of turns and, where the timeline of the scheme
+//! stands, by its changes of position.
 //!
 //! A clock that is fast by a fraction `e` makes every rate of a record smaller by that fraction. Rates of
 //! drift are unknown, so they show nothing of it. The rate of the earth is known. It shows where psi is large
 //! enough for `w x psi` to matter, or where unknown torquer errors act with it. Rates of turns show by the
-//! drift during a turn.
+//! drift during a turn. Where positions change at the times of the scheme, these are later by the fraction in
+//! the record, and the drift changes then.
 
+use nalgebra::{Matrix2, Vector2};
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use super::CalibrationError;
 use super::clock::bounds;
 use super::diagnose::Parts;
 use super::estimate::{Problem, WEAK};
-use super::observe::{By, Reading};
+use super::observe::{By, Reading, TOLERANCE};
 use super::run::Run;
+use super::timeline::{narrow, slews};
 use crate::answer::ClockByEarth;
 use crate::least_squares::Information;
 
 /// Relative change of the rates for the finite differences.
 const MOVED: f64 = 0.005;
+/// Change of the last time for the finite differences where the timeline stands, in intervals between rows.
+const MOVED_ROWS: f64 = 0.02;
+/// Largest distance of the last change of position from the timeline, in intervals between rows, by a clock
+/// that this finds: rows beyond would belong to other positions.
+const MOST_ROWS: f64 = 2.0;
+/// Standard deviation of an open beginning, in intervals between rows.
+const FREE: f64 = 10.0;
 /// Largest sigma of the result: above, three sigma exceed the clock rate that the parabola of nearby rates
 /// can represent.
 const LARGEST: f64 = 1.0 / 3.0;
@@ -27,13 +38,67 @@ const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
 
 impl Parts<'_> {
-    /// Fraction by which the clock of run `r` is fast, by the best fit of the rates of the earth and of turns
-    /// with all unknowns free. The result is the minimum of a parabola through the sums of squares at three
-    /// rates; `None` where they are nearly equal.
+    /// Fraction by which the clock of run `r` is fast, by the best fit with all unknowns free: the minimum of
+    /// a parabola through the sums of squares of nearby rates. `None` where these are nearly equal.
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn clock(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
+        if matches!(self.problem.runs[r].reading.by, By::Timeline | By::Both)
+            && let Some(found) = self.clock_by_changes(r)?
+        {
+            return Ok(Some(found));
+        }
+        self.clock_by_rates(r)
+    }
+
+    /// Sum of squares of all runs, with `instead` in place of run `r`, and all unknowns free.
+    fn left_with(&self, r: usize, instead: &Run, conditions: &Conditions) -> Result<f64, CalibrationError> {
+        let at = &self.estimate.at;
+        let (along, _) = instead.along(conditions, &self.problem.sigmas, &at.x[r])?;
+        let information = Information::of(&along)?;
+        Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
+    }
+
+    /// Clock of a run on the timeline of the scheme: all times of the record are divided by `1 + e`, and its
+    /// beginning is free as far as the rows leave it open. `None` where the changes of position say too
+    /// little, or are so far off that rows would be at other positions.
+    fn clock_by_changes(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
+        let own = &self.problem.runs[r];
+        let interval = own.reading.interval;
+        let last = bounds(self.planned).last().map_or(0.0, |b| b.1);
+        let step = MOVED_ROWS * interval;
+        let left = |late: f64, stretched: f64| {
+            let reading = own.reading.later(late * step).stretched(stretched * step / last);
+            let mut run = Run::new(reading, self.scheme, self.planned, self.problem.conditions)?;
+            run.counts.clone_from(&own.counts);
+            self.left_with(r, &run, self.problem.conditions)
+        };
+        // rows at the end of a position stay at it if all times are earlier
+        let same = left(0.0, 0.0)?;
+        let [late, later] = [left(1.0, 0.0)?, left(2.0, 0.0)?];
+        let [fast, faster] = [left(0.0, 1.0)?, left(0.0, 2.0)?];
+        let both = left(1.0, 1.0)?;
+        let tolerance = self.scheme.recording.tolerance.unwrap_or(TOLERANCE);
+        // what rows say of a beginning that is open depends on the clock
+        let known = own.reading.open.map_or(tolerance * interval, |_| FREE * interval) / step;
+        let cross = both - late - fast + same;
+        let hessian = Matrix2::new(
+            same - 2.0 * late + later + 2.0 / (known * known),
+            cross,
+            cross,
+            same - 2.0 * fast + faster,
+        );
+        let slope = Vector2::new(-3.0 * same + 4.0 * late - later, -3.0 * same + 4.0 * fast - faster) / 2.0;
+        let Some(inverse) = hessian.cholesky().map(|c| c.inverse()) else { return Ok(None) };
+        let scale = step / last;
+        let (fast, sigma) = (-(inverse * slope)[1] * scale, (2.0 * inverse[(1, 1)]).sqrt() * scale);
+        let near = (fast.abs() + sigma) * last <= MOST_ROWS * interval;
+        Ok(near.then_some(ClockByEarth { fast, sigma }))
+    }
+
+    /// Clock of a run by the rates of the earth and of turns alone.
+    fn clock_by_rates(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
         let own = &self.problem.runs[r];
         let mut reading = own.reading.clone();
         if matches!(reading.by, By::Timeline | By::Both) {
@@ -44,10 +109,7 @@ impl Parts<'_> {
         }
         let left = |by: f64| -> Result<f64, CalibrationError> {
             let (conditions, run) = self.at_rate(own, &reading, by)?;
-            let (sigmas, at) = (&self.problem.sigmas, &self.estimate.at);
-            let (along, _) = run.along(&conditions, sigmas, &at.x[r])?;
-            let information = Information::of(&along)?;
-            Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
+            self.left_with(r, &run, &conditions)
         };
         // slower turns may not fit between two samples: use faster ones only
         let [same, fast, faster] = [left(0.0)?, left(MOVED)?, left(2.0 * MOVED)?];
@@ -74,7 +136,12 @@ impl Parts<'_> {
         rate(&mut conditions.slew_rate_deg_s);
         scheme.positions.iter_mut().filter_map(|p| p.slew.as_mut()).for_each(|s| rate(&mut s.rate_deg_s));
         let planned = Plan::derived(&scheme, &conditions)?;
-        let mut run = Run::new(reading.clone(), &scheme, &planned, &conditions)?;
+        let mut reading = reading.clone();
+        // the same clock for all positions says more of each change than the rows beside it
+        if reading.ends_open && reading.by_durations(self.planned).is_some() {
+            narrow(&mut reading.stays, self.planned, &slews(&planned));
+        }
+        let mut run = Run::new(reading, &scheme, &planned, &conditions)?;
         run.counts.clone_from(&own.counts);
         run.plan.point.w_n *= 1.0 + by;
         run.plan.point.w_u *= 1.0 + by;

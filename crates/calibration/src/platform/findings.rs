@@ -9,6 +9,7 @@ use super::diagnose::{MapBoth, Parts};
 use super::gross::Why;
 use super::length::wrong;
 use super::run::Run;
+use super::successions::LeftOut;
 use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
 use crate::levels;
 
@@ -18,8 +19,8 @@ const AGREE: f64 = 1e-6;
 const APART: f64 = 2.0;
 
 impl Parts<'_> {
-    /// Findings against a calibration.
-    pub(super) fn findings(&self, c: &Calibration) -> Vec<Finding> {
+    /// Findings against a calibration, with the measurements that it left out.
+    pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOut]) -> Vec<Finding> {
         let mut out = Vec::new();
         if self.interrupted {
             out.push(Finding::Interrupted);
@@ -30,6 +31,7 @@ impl Parts<'_> {
             out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));
         }
         out.extend(self.problem.runs.iter().flat_map(cells));
+        out.extend(self.successions(left_out));
         out.extend(c.records.iter().filter_map(|record| clock(record, c)));
         out.extend(self.fits(c));
         for (r, record) in c.records.iter().enumerate() {
@@ -178,16 +180,20 @@ fn cells(run: &Run) -> Vec<Finding> {
     out
 }
 
-/// Finding on the clock of a record: significant by the rate of the earth, with sigmas as the fit has them.
-/// If the rate of the earth shows a right clock, positions were only held longer or shorter than in the
-/// scheme, and there is no finding.
+/// Finding on the clock of a record: significant by the rate of the earth, with sigmas as the fit has them;
+/// or by the durations of positions, where a clock would change a drift by more than its sigma. If the rate
+/// of the earth shows a right clock, positions were only held longer or shorter than in the scheme, and there
+/// is no finding.
 fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
     let most = chi_square_quantile(1.0, 1.0 - levels::CLOCK / c.records.len() as f64).sqrt();
     let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());
     let beyond =
         |from: f64| by_earth.is_some_and(|e| (e.fast - from).abs() > most * e.sigma * c.fit.factor.max(1.0));
     let (wrong, held) = (beyond(0.0), by_durations.is_some_and(&beyond));
-    (wrong || by_durations.is_some() && !held).then(|| Finding::Clock {
+    let rates = c.quantities.iter().filter(|q| q.unit.starts_with("deg/h"));
+    let sigmas = rates.filter_map(|q| Some((q.estimate? / q.sigma?).abs())).fold(0.0, f64::max);
+    let matters = by_durations.is_some_and(|fast| fast.abs() * sigmas > 1.0);
+    (wrong || matters && !held).then(|| Finding::Clock {
         record: record.name.clone(),
         by_durations,
         by_earth: by_earth.filter(|_| wrong).cloned(),

@@ -31,8 +31,10 @@ const STUCK: usize = 4;
 pub(crate) struct Row {
     /// First and last line.
     pub lines: (u64, u64),
-    /// Time of the row, in s of the record's clock.
+    /// Time of the row, for a median the median of its times, in s of the record's clock.
     pub t: f64,
+    /// Number of samples.
+    pub samples: usize,
     /// Values of the three columns, in their unit; NaN for an empty cell.
     pub values: [f64; 3],
     /// Index of the bin within its position.
@@ -55,6 +57,8 @@ pub(crate) enum Why {
 pub(crate) struct Cell {
     /// First and last line.
     pub lines: (u64, u64),
+    /// Index of its row within its position; `None` for a sample of a dense bin.
+    pub row: Option<usize>,
     pub t: f64,
     /// Index of the column, 0 to 2.
     pub axis: usize,
@@ -86,10 +90,11 @@ fn beside(values: &[f64], i: usize) -> f64 {
     off.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
-/// The cells of a window whose values are gross: index, sigmas and why. `noise` is about the standard
-/// deviation of a row; values are stuck where the expected number of such successions by chance, from how
+/// The cells of a window whose values are gross: index, sigmas and why. Rows have `t`, the value, and
+/// weights, 1 for the usual number of samples, less for fewer. `noise` is about the standard deviation of a
+/// row; values are stuck where the expected number of such successions by chance, from how
 /// often two neighbours are equal, is below `stuck`.
-fn window(t: &[f64], values: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64, Why)> {
+fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64, Why)> {
     let n = values.len();
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -102,8 +107,8 @@ fn window(t: &[f64], values: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64,
     let far = (CODE * s).max(STEPS * median(values.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
     for (i, &x) in values.iter().enumerate() {
         let off = beside(values, i);
-        if (x == 0.0 || count(x) > 1) && off.abs() > far {
-            out.push((i, off / s, Why::Code));
+        if (x == 0.0 || count(x) > 1) && off.abs() * weights[i] > far {
+            out.push((i, off * weights[i] / s, Why::Code));
         }
     }
     let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
@@ -139,7 +144,7 @@ fn window(t: &[f64], values: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64,
         // residual of a row from the cubic of all others
         let alone = |i: usize| {
             let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
-            (i, left[i] / free.sqrt() / s)
+            (i, left[i] * weights[kept[i]] / free.sqrt() / s)
         };
         let furthest = (0..kept.len()).map(alone).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
@@ -176,18 +181,25 @@ pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
     for &(from, to) in &windows {
         let own = &rows[from..to];
         for axis in 0..3 {
-            let there: Vec<&Row> = own.iter().filter(|r| r.values[axis].is_finite()).collect();
+            let finite = |(_, r): &(usize, &Row)| r.values[axis].is_finite();
+            let there: Vec<(usize, &Row)> = (from..).zip(own).filter(finite).collect();
             if there.len() < FEWEST / 2 {
                 continue;
             }
-            let (t, values): (Vec<f64>, Vec<f64>) = there.iter().map(|r| (r.t, r.values[axis])).unzip();
-            out.extend(window(&t, &values, noise, stuck).into_iter().map(|(i, sigmas, why)| Cell {
-                lines: there[i].lines,
-                t: there[i].t,
-                axis,
-                value: values[i],
-                sigmas,
-                why,
+            let (t, values): (Vec<f64>, Vec<f64>) = there.iter().map(|(_, r)| (r.t, r.values[axis])).unzip();
+            let samples: Vec<f64> = there.iter().map(|(_, r)| r.samples as f64).collect();
+            let usual = median(samples.clone());
+            let weights: Vec<f64> = samples.iter().map(|n| (n / usual).min(1.0).sqrt()).collect();
+            out.extend(window(&t, &values, &weights, noise, stuck).into_iter().map(|(i, sigmas, why)| {
+                Cell {
+                    lines: there[i].1.lines,
+                    row: Some(there[i].0),
+                    t: there[i].1.t,
+                    axis,
+                    value: values[i],
+                    sigmas,
+                    why,
+                }
             }));
         }
     }
@@ -237,7 +249,7 @@ mod tests {
             let t = 10.0 * i as f64;
             let angle = 0.3 + 6.3e-5 * t;
             let values = [angle.cos(), 0.2, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-            Row { lines: (i as u64 + 2, i as u64 + 2), t, values, bin: i }
+            Row { lines: (i as u64 + 2, i as u64 + 2), t, samples: 1, values, bin: i }
         };
         (0..250).map(of).collect()
     }
@@ -274,7 +286,7 @@ mod tests {
         for _ in 0..10_000 {
             let of = |i: usize| {
                 let values = [0; 3].map(|_| (10.0 * noise.normal()).round() * 1e-6);
-                Row { lines: (i as u64, i as u64), t: 10.0 * i as f64, values, bin: i }
+                Row { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
             };
             let own: Vec<Row> = (0..100).map(of).collect();
             let equal = |w: &&[Row]| (0..3).any(|k| w.iter().all(|r| r.values[k] == w[0].values[k]));

@@ -19,6 +19,7 @@ mod reading;
 mod residuals;
 mod run;
 mod shooting;
+mod successions;
 mod suspects;
 mod timeline;
 

@@ -12,7 +12,7 @@ use super::force::{ForceColumn, Forces};
 use super::gross;
 use super::length::Length;
 use super::mistaken::Mistaken;
-use super::timeline::{self, Gap, Intervals};
+use super::timeline::{self, Gap, Intervals, by_rows};
 use crate::Going;
 use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
@@ -30,7 +30,7 @@ const INCREMENTS: [(&str, f64); 4] = [("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-
 const GAP: f64 = 1.5;
 /// Largest deviation of the time stamps from the timeline of the scheme, as a fraction of an interval, unless
 /// the file states one.
-const TOLERANCE: f64 = 0.05;
+pub(super) const TOLERANCE: f64 = 0.05;
 /// Largest delay of a row by rounding, as a fraction of an interval, where positions follow each other
 /// directly.
 const ROUNDED: f64 = 1e-3;
@@ -92,6 +92,8 @@ pub(crate) struct Reading {
     /// Earliest and latest origin, in s; `None` unless labels leave it open and it differs from the scheme's
     /// clock.
     pub open: Option<(f64, f64)>,
+    /// True if rows alone say when positions begin and end.
+    pub ends_open: bool,
     /// Usual interval between rows, in s.
     pub interval: f64,
     /// Intervals with missing rows.
@@ -150,6 +152,13 @@ impl Reading {
         out
     }
 
+    /// Reading by a clock that is fast by the fraction `by`, corrected: all times are divided by `1 + by`.
+    pub(super) fn stretched(mut self, by: f64) -> Self {
+        self.bins.iter_mut().flatten().for_each(|b| b.t /= 1.0 + by);
+        self.stays.iter_mut().for_each(|s| *s = (s.0 / (1.0 + by), s.1 / (1.0 + by)));
+        self
+    }
+
     /// Intervals with missing rows, by the names of positions.
     pub(crate) fn gaps(&self, scheme: &Scheme) -> Vec<answer::Gap> {
         let name = |p: usize| scheme.positions[p].name.clone();
@@ -175,8 +184,12 @@ impl Reading {
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
         let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
-        let own = matches!(self.by, By::Label | By::Static);
-        if own { by_durations(&self.stays, between, plan) } else { None }
+        match self.by {
+            // the timeline of the scheme does not hold, so the rate is not zero
+            By::Label => by_rows(&self.stays, plan).or_else(|| by_durations(&self.stays, between, plan)),
+            By::Static => by_durations(&self.stays, between, plan),
+            By::Timeline | By::Both => None,
+        }
     }
 }
 
@@ -395,6 +408,18 @@ fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
 /// Row in the detector: its line, its numbers, and the interval before it.
 type Kept = (u64, Vec<Option<f64>>, Option<f64>);
 
+/// Sample of a bin.
+struct SampleRow {
+    /// Line of the record.
+    line: u64,
+    /// Time, in s.
+    t: f64,
+    /// Values of the columns of the force or of Z.
+    values: [f64; 3],
+    /// True if the force is below the horizon of n.
+    over: bool,
+}
+
 /// State of the assignment of samples to positions and bins.
 struct SampleAssignment<'a> {
     layout: &'a Layout,
@@ -419,10 +444,8 @@ struct SampleAssignment<'a> {
     decided: Vec<DecidedSample<Kept>>,
     /// First and last time of every interval at rest.
     rests: Vec<(f64, f64)>,
-    /// Line, time and values of the samples of the bin; `rows` has the input of the robust pass, by position.
-    samples: Vec<(u64, f64, [f64; 3])>,
-    /// Number of samples of the bin with a force below the horizon of n.
-    over: usize,
+    /// Samples of the bin; `rows` has the input of the robust pass, by position.
+    samples: Vec<SampleRow>,
     rows: Vec<Vec<gross::Row>>,
     /// Number of empty cells at positions, by requested number.
     empty: Vec<usize>,
@@ -622,15 +645,15 @@ impl SampleAssignment<'_> {
         // a mean belongs to the middle of its interval
         let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
         let spikes = self.out.spikes.len();
-        let bin = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
-        if let Some(bin) = bin {
+        let bins = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
+        for bin in bins {
             self.put_bin(p, bin, spikes);
         }
         // f = Z - g points down
-        self.over += usize::from(in_n[1].is_some_and(|z| z < -1.0));
+        let over = in_n[1].is_some_and(|z| z < -1.0);
         let values =
             std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
-        self.samples.push((line, t, values));
+        self.samples.push(SampleRow { line, t, values, over });
         for (count, number) in self.empty.iter_mut().zip(numbers) {
             *count += usize::from(number.is_none());
         }
@@ -639,24 +662,29 @@ impl SampleAssignment<'_> {
 
     fn end(&mut self) {
         let spikes = self.out.spikes.len();
-        if let (Some(bin), Some(p)) = (self.binner.end(&mut self.out.spikes), self.now) {
+        let bins = self.binner.end(&mut self.out.spikes);
+        let Some(p) = self.now else { return };
+        for bin in bins {
             self.put_bin(p, bin, spikes);
         }
     }
 
-    /// Adds a bin of a position. Its spikes are those from index `spikes` on; each is replaced by a cell in
-    /// the column that is farthest off.
+    /// Adds a bin of a position. Its spikes are among those from index `spikes` on; each is replaced by a
+    /// cell in the column that is farthest off.
     fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
-        let samples = std::mem::take(&mut self.samples);
+        let own = self.samples.partition_point(|s| s.line <= bin.lines.1);
+        let samples: Vec<SampleRow> = self.samples.drain(..own).collect();
+        let over = samples.iter().filter(|s| s.over).count();
         let index = self.out.bins[p].len();
         self.out.bins[p].push(bin);
-        self.out.over[p].push(2 * std::mem::take(&mut self.over) > samples.len());
+        self.out.over[p].push(2 * over > samples.len());
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
         if samples.len() < FEWEST {
-            let row = |&(line, t, values): &(u64, f64, [f64; 3])| gross::Row {
-                lines: (line, line),
-                t,
-                values,
+            let row = |s: &SampleRow| gross::Row {
+                lines: (s.line, s.line),
+                t: s.t,
+                samples: 1,
+                values: s.values,
                 bin: index,
             };
             self.rows[p].extend(samples.iter().map(row));
@@ -665,28 +693,33 @@ impl SampleAssignment<'_> {
         // the median of a part of the samples is the usual value
         let some = samples.iter().step_by(samples.len().div_ceil(SOME));
         let usual: [f64; 3] = std::array::from_fn(|i| {
-            gross::median(some.clone().map(|s| s.2[i]).filter(|x| x.is_finite()).collect())
+            gross::median(some.clone().map(|s| s.values[i]).filter(|x| x.is_finite()).collect())
         });
-        self.rows[p].push(gross::Row { lines: (first.0, last.0), t: first.1, values: usual, bin: index });
-        let mut found: Vec<Spike> = self.out.spikes.drain(spikes..).collect();
+        let lines = (first.line, last.line);
+        let t = gross::median(some.map(|s| s.t).collect());
+        self.rows[p].push(gross::Row { lines, t, samples: samples.len(), values: usual, bin: index });
+        let inside = |s: &Spike| (lines.0..=lines.1).contains(&s.line);
+        let (mut found, others): (Vec<Spike>, Vec<Spike>) = self.out.spikes.drain(spikes..).partition(inside);
+        self.out.spikes.extend(others);
         found.sort_by(|a, b| {
             (a.line, b.sigmas.abs()).partial_cmp(&(b.line, a.sigmas.abs())).unwrap_or(Ordering::Equal)
         });
         found.dedup_by_key(|s| s.line);
         for spike in found {
-            let Some(s) = samples.iter().find(|s| s.0 == spike.line) else { continue };
-            let off = |i: usize| (s.2[i] - usual[i]).abs();
-            let axis = (0..3).filter(|&i| s.2[i].is_finite()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
+            let Some(s) = samples.iter().find(|s| s.line == spike.line) else { continue };
+            let off = |i: usize| (s.values[i] - usual[i]).abs();
+            let axis = (0..3).filter(|&i| s.values[i].is_finite()).max_by(|a, b| off(*a).total_cmp(&off(*b)));
             // a measured azimuth is no such column
             let Some(axis) = axis.filter(|_| self.plan.components[spike.channel] != AZIMUTH) else {
                 self.out.spikes.push(spike);
                 continue;
             };
             self.cell(gross::Cell {
+                row: None,
                 lines: (spike.line, spike.line),
                 t: spike.t,
                 axis,
-                value: s.2[axis],
+                value: s.values[axis],
                 sigmas: spike.sigmas,
                 why: gross::Why::Far,
             });
@@ -760,6 +793,7 @@ fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
         Some(begin) => {
             *reading = reading.later(begin.at - reading.origin);
             (reading.by, reading.origin, reading.open) = (By::Both, begin.at, begin.open);
+            reading.ends_open = false;
         }
         None => timeline::ends(&mut reading.stays, &reading.after, plan, reading.interval, tolerance),
     }
@@ -814,6 +848,7 @@ pub(crate) fn observe(
         lengths: vec![None; positions],
         gimbals: None,
         digest: String::new(),
+        ends_open: matches!(by, By::Label | By::Static),
         columns: layout.used(&record),
         written: record.written().map(Into::into),
     };
@@ -836,7 +871,6 @@ pub(crate) fn observe(
         decided: Vec::new(),
         rests: Vec::new(),
         samples: Vec::new(),
-        over: 0,
         rows: vec![Vec::new(); positions],
         empty: vec![0; layout.wanted.len()],
         numbers: Vec::new(),

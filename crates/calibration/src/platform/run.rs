@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
-use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ScalarOutput, Stage, Update};
+use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ProcessNoise, ScalarOutput, Stage, Update};
 use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind, Tilt};
 
 use super::CalibrationError;
@@ -26,6 +26,50 @@ pub(crate) struct Run {
     pub bins: Vec<Option<(usize, usize)>>,
     /// Flags by bin (in order) and channel: true if the measurement counts.
     pub counts: Vec<Vec<bool>>,
+    /// Changes of position whose time the rows leave open, in order.
+    pub changes: Vec<Change>,
+}
+
+/// Change of position at a time that is known to within an interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Change {
+    /// Index of the position that begins.
+    pub to: usize,
+    /// Its first segment.
+    pub begin: usize,
+    /// Length of the interval, in s.
+    pub open: f64,
+}
+
+/// Time over which a rate of drift is taken, in s.
+const RATE_S: f64 = 1.0;
+/// Noise of a change of position in all directions, as a fraction of that along the difference of the
+/// drifts: it makes the covariance definite.
+const AROUND: f64 = 1e-3;
+
+/// Rate at which the platform drifts from `x`, in local coordinates (shape n, 1/s).
+fn rate(motion: &impl Motion<PlatformState>, x: &PlatformState) -> Result<Vec<f64>, EkfError> {
+    let mut moved = x.clone();
+    motion.advance(0.0, RATE_S, &mut moved)?;
+    let mut out = moved.local(x);
+    out[3 * x.attitudes()..].fill(0.0);
+    out.iter_mut().for_each(|d| *d /= RATE_S);
+    Ok(out)
+}
+
+/// Root of the noise of a step with that of a change of position at its end: its time is uniform within
+/// `open` s, and the state changes by `drift` per second.
+fn with_change(root: DMatrix<f64>, drift: &[f64], open: f64) -> DMatrix<f64> {
+    let sigma = open / 12f64.sqrt();
+    let drift = DVector::from_column_slice(drift) * sigma;
+    let moved: Vec<usize> = (0..drift.len()).filter(|&i| drift[i] != 0.0).collect();
+    let first = root.ncols();
+    let mut out = root.resize_horizontally(first + 1 + moved.len(), 0.0);
+    out.set_column(first, &drift);
+    for (k, &i) in moved.iter().enumerate() {
+        out[(i, first + 1 + k)] = AROUND * drift.norm();
+    }
+    out
 }
 
 /// Measurement of a row of a linearised run.
@@ -77,16 +121,17 @@ impl Run {
         let mut stays = reading.stays.clone();
         let slews = slews(planned);
         let slew_s = |p: usize| slews[p];
-        if reading.by == By::Static {
-            // a window is not at rest for equal times before and behind a turn: the turn is in the middle of
-            // the gap
+        let mut open = vec![0.0; own.positions.len()];
+        if reading.ends_open {
+            // the platform leaves a position at any time between its last row and the latest time from which
+            // the slew takes it to the next position before the first row there: on average in the middle
             for p in 1..stays.len() {
-                stays[p - 1].1 += ((stays[p].0 - stays[p - 1].1 - slew_s(p)) / 2.0).max(0.0);
+                open[p] = (stays[p].0 - stays[p - 1].1 - slew_s(p)).max(0.0);
+                stays[p - 1].1 += open[p] / 2.0;
             }
         }
         if matches!(reading.by, By::Label | By::Static) {
-            // the platform leaves a position after its last sample, and spends the rest of a gap without slew
-            // at the next position
+            // the platform spends the rest of a gap without slew at the next position
             let mut left = 0.0;
             for (p, position) in own.positions.iter_mut().enumerate() {
                 let turned = slew_s(p);
@@ -118,15 +163,25 @@ impl Run {
         let plan = plan.in_steps(conditions, of)?;
         let mut seen = vec![0; own.positions.len()];
         let mut bins = Vec::with_capacity(plan.segments.len());
-        for s in &plan.segments {
+        let mut changes: Vec<Change> = Vec::new();
+        for (k, s) in plan.segments.iter().enumerate() {
             let next = seen[s.position];
-            let there = !matches!(s.kind, SegmentKind::Slew(_)) && next < reading.bins[s.position].len();
+            let at_rest = !matches!(s.kind, SegmentKind::Slew(_));
+            let there = at_rest && next < reading.bins[s.position].len();
+            let from = changes.last().map_or(0, |c| c.begin);
+            if at_rest && s.position > plan.segments[from].position {
+                // an attitude of its own begins where the position does
+                let carried = plan.psi_columns(from) == plan.psi_columns(k);
+                let open = if carried { open[s.position] } else { 0.0 };
+                changes.push(Change { to: s.position, begin: k, open });
+            }
             bins.push(there.then_some((s.position, next)));
             seen[s.position] += usize::from(there);
         }
         let all = bins.iter().flatten().count();
         let counts = vec![vec![true; plan.components.len()]; all];
-        Ok(Self { reading, plan, bins, counts })
+        changes.retain(|c| c.open > CLOSEST);
+        Ok(Self { reading, plan, bins, counts, changes })
     }
 
     /// Number of bins.
@@ -190,6 +245,7 @@ impl Run {
         let (mut out, mut keys) = (Linearised::default(), Vec::new());
         let (mut x, mut bin) = (x0.clone(), 0);
         let mut nodes = nodes.iter().peekable();
+        let (mut changes, mut drift, mut scratch) = (self.changes.iter().peekable(), Vec::new(), Vec::new());
         for (segment, s) in plan.segments.iter().enumerate() {
             let motion = filter.motion(segment);
             if let Some((_, node)) = nodes.next_if(|(at, _)| *at == segment) {
@@ -212,8 +268,26 @@ impl Run {
                 }
                 bin += 1;
             }
-            out.roots.push(noise_root(plan, segment, n));
-            out.stages.push(Stage { transition, noise: noise.into_owned(), outputs, steps: 1 });
+            let (mut root, mut noise) = (noise_root(plan, segment, n), noise.into_owned());
+            // a change that is later by some time adds the drift before it, carried through the slew, and
+            // takes away that behind it
+            if let Some(change) = changes.peek() {
+                let next = segment + 1;
+                if s.position < change.to && plan.segments[next].position == change.to {
+                    drift = rate(&motion, &x)?;
+                } else if s.position == change.to {
+                    transition.apply(&mut drift, &mut scratch);
+                }
+                if next == change.begin {
+                    let behind = rate(&filter.motion(next), &x)?;
+                    drift.iter_mut().zip(behind).for_each(|(d, b)| *d -= b);
+                    root = with_change(root, &drift, change.open);
+                    noise = ProcessNoise::new(&(&root * root.transpose()))?;
+                    changes.next();
+                }
+            }
+            out.roots.push(root);
+            out.stages.push(Stage { transition, noise, outputs, steps: 1 });
         }
         if let Some(k) = out.residuals.iter().position(|x| !x.is_finite()) {
             let value = out.residuals[k];

@@ -16,6 +16,8 @@ const MOST: usize = 1000;
 const ROUNDING_S: f64 = 1e-9;
 /// Largest rate of a clock that is tried, as a fraction.
 const FASTEST: f64 = 0.1;
+/// Number of intervals of the rates of a clock at which the ends of positions are taken.
+const CLOCKS: usize = 20;
 
 /// Beginning of a scheme by the clock of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +53,9 @@ pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option
     Some(Begin { at: open.map_or(at, |(from, to)| (from + to) / 2.0), open })
 }
 
-/// Excess duration of the positions over the scheme, as a fraction, with which all rows lie inside them: the
-/// middle of the possible values.
-fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
+/// Least and largest excess duration of the positions over the scheme, as a fraction, with which all rows lie
+/// inside them.
+fn rates(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<(f64, f64)> {
     let beyond = |rate: f64| {
         let (from, to) = window(stays, bounds, rate);
         from - to - 2.0 * tolerance
@@ -73,7 +75,12 @@ fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f
         }
         inside
     };
-    (beyond(best) <= 0.0).then(|| (end(-FASTEST) + end(FASTEST)) / 2.0)
+    (beyond(best) <= 0.0).then(|| (end(-FASTEST), end(FASTEST)))
+}
+
+/// Middle of these excess durations.
+fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
+    rates(stays, bounds, tolerance).map(|(low, high)| (low + high) / 2.0)
 }
 
 /// Duration of the slew to each position, in s.
@@ -98,6 +105,34 @@ pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interva
         // the next row is no longer at the position
         let most = ((room / interval - 0.5).floor()).max(0.0);
         stays[p].1 += (by / interval).floor().clamp(0.0, most) * interval;
+    }
+}
+
+/// Excess duration of all positions over the scheme, as a fraction, with which the rows of all of them lie
+/// inside; `None` where no such rate exists.
+pub(crate) fn by_rows(stays: &[(f64, f64)], plan: &Plan) -> Option<f64> {
+    rate(stays, &bounds(plan), ROUNDING_S)
+}
+
+/// Narrows what the rows beside a change of position leave open, if all positions last equally many times as
+/// long as in the scheme: such a clock has one beginning, which the rows of all positions bound. `slews` has
+/// the duration of the slew to each position by the clock of the record.
+pub(crate) fn narrow(stays: &mut [(f64, f64)], plan: &Plan, slews: &[f64]) {
+    let own = bounds(plan);
+    let Some((low, high)) = rates(stays, &own, ROUNDING_S) else { return };
+    // earliest and latest end of each position over all clocks
+    let clocks: Vec<(f64, (f64, f64))> = (0..=CLOCKS)
+        .map(|k| low + (high - low) * k as f64 / CLOCKS as f64)
+        .map(|rate| (rate, window(stays, &own, rate)))
+        .collect();
+    for p in 0..stays.len().saturating_sub(1) {
+        let ends = clocks.iter().map(|(rate, (from, to))| ((1.0 + rate) * own[p].1 + from, to - from));
+        let (earliest, latest) = ends
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), (end, open)| {
+                (least.min(end), most.max(end + open))
+            });
+        stays[p].1 = stays[p].1.max(earliest);
+        stays[p + 1].0 = stays[p + 1].0.min(latest + slews[p + 1]).max(stays[p].1 + slews[p + 1]);
     }
 }
 

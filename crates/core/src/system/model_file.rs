@@ -91,7 +91,7 @@ pub struct ModelFile {
     combinations: Vec<Spanned<String>>,
     /// Quantities that could be measured, for `obsdeg design`: an expression, or a table with expression (or
     /// `experiment = true`: the same outputs from another start), cost (1 when left out), unit, description.
-    /// They are no outputs.
+    /// Candidates are no outputs of the model.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     candidates: BTreeMap<String, Spanned<Value>>,

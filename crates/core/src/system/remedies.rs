@@ -142,7 +142,7 @@ impl<'a> ModelRemedySearch<'a> {
         self.two(directions, &states.chain(self.started()).collect::<Vec<_>>());
     }
 
-    /// States whose start is known. They are no unknowns, but as outputs their course tells more.
+    /// States whose start is known: no unknowns, but their values at later times depend on unknowns.
     fn started(&self) -> impl Iterator<Item = Role> + use<'a> {
         let states = self.model.states.iter().enumerate();
         states.filter(|(_, s)| s.start != StateStart::Unknown).map(|(i, _)| Role::State(i))

@@ -277,6 +277,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             "Look at column `{column}` of the record: state codes of missing values as `missing` under \
              [record]. A stuck output is no measurement."
         ),
+        Finding::Succession { position, .. } => format!(
+            "Look at the record around these lines: after a step of an output, run {position} again; where \
+             the platform was disturbed, empty the cells of those rows."
+        ),
         Finding::Force { .. } => {
             "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the \
              gravity of the place (--gravity, for forces in m/s^2)."
