@@ -3232,8 +3232,8 @@ to the rows before it to the last digit.
 """
 
 
-class ClockByEarth(Record):
-    """Rate error of a clock by the rate of the earth."""
+class ClockRate(Record):
+    """Rate error of the clock of a record, with its sigma."""
 
     __slots__ = ()
 
@@ -3299,6 +3299,44 @@ class FindingCells(Record):
     """First and last line number of these cells in the record."""
 
 
+class FindingSuccession(Record):
+    """Measurements in succession that lie off to the same side; they were left out. Outliers are independent of each other: these are a
+    step of an output, or the platform moved.
+    """
+
+    __slots__ = ()
+
+    kind: Literal["succession"]
+    record: str
+    """Name of the record with this finding."""
+    position: str
+    """Name of the position at which these measurements lie."""
+    channel: str
+    """Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for single cells, the column of the record."""
+    count: int
+    """Number of these measurements."""
+    lines: tuple[int, int]
+    """First and last line number in the record."""
+    span_s: tuple[float, float]
+    """Times of the first and the last one, in s of the record's timeline."""
+    sigmas: tuple[float, float]
+    """Least and largest distance from the expected value, in standard deviations (dimensionless)."""
+
+
+class FindingTurns(Record):
+    """Turns that last longer or shorter than in the scheme, while positions do not."""
+
+    __slots__ = ()
+
+    kind: Literal["turns"]
+    record: str
+    """Name of the record with this finding."""
+    factor: float
+    """Duration of a turn in the record over that in the scheme, dimensionless."""
+    slew_rate_deg_s: float | None
+    """Slew rate of the record, in deg/s; null where the scheme states none for all slews."""
+
+
 class FindingClock(Record):
     """Clock of a record that does not run as fast as that of the scheme, or as the earth turns."""
 
@@ -3309,7 +3347,9 @@ class FindingClock(Record):
     """Name of the record with this finding."""
     by_durations: float | None
     """Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless; null if they show none."""
-    by_earth: ClockByEarth | None
+    by_changes: ClockRate | None
+    """Rate error of the clock by the times at which the drift changes with the position; null if that is within chance."""
+    by_earth: ClockRate | None
     """Fraction by which the clock is fast by the rate of the earth; null if that is within chance."""
 
 
@@ -3443,6 +3483,8 @@ Finding = Union[
     FindingNotSettled,
     FindingForce,
     FindingCells,
+    FindingSuccession,
+    FindingTurns,
     FindingClock,
     FindingPosition,
     FindingNoise,
@@ -3764,7 +3806,11 @@ class Clock(Record):
     """Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all times stretched by it: a
     clock, or a scheme run so; null if not.
     """
-    by_earth: ClockByEarth | None
+    by_changes: ClockRate | None
+    """Rate error of the clock by the times at which the drift changes with the position, on the timeline of the scheme: a clock, or
+    positions held longer or shorter. Null where positions are held otherwise than in the scheme, or where drifts change too little.
+    """
+    by_earth: ClockRate | None
     """Fraction by which the clock is fast by the rate of the earth when all unknowns follow; drifts are too small by the same fraction.
     Null if its sigma would be above a third.
     """
@@ -3797,6 +3843,10 @@ class RecordReport(Record):
     """First and last time of the record, in s."""
     positions_by: PositionsBy
     """Source of the position of each sample."""
+    change_open_s: float | None
+    """Longest interval, in s, in which a change of position may lie by the rows beside it: its time is uniform there, which is part of
+    the sigmas. Null where the scheme says when positions change, or no drift passes from one to the next.
+    """
     ignored: list[str]
     """Columns that are not used."""
     force_g: float | None

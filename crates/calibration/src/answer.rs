@@ -143,6 +143,15 @@ pub enum Finding {
         /// Least and largest distance from the expected value, in standard deviations (dimensionless).
         sigmas: (f64, f64),
     },
+    /// Turns that last longer or shorter than in the scheme, while positions do not.
+    Turns {
+        /// Name of the record with this finding.
+        record: String,
+        /// Duration of a turn in the record over that in the scheme, dimensionless.
+        factor: f64,
+        /// Slew rate of the record, in deg/s; null where the scheme states none for all slews.
+        slew_rate_deg_s: Option<f64>,
+    },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
     Clock {
         /// Name of the record with this finding.
@@ -150,8 +159,12 @@ pub enum Finding {
         /// Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless;
         /// null if they show none.
         by_durations: Option<f64>,
+        /// Rate error of the clock by the times at which the drift changes with the position; null if that is
+        /// within chance.
+        #[serde(default)]
+        by_changes: Option<ClockRate>,
         /// Fraction by which the clock is fast by the rate of the earth; null if that is within chance.
-        by_earth: Option<ClockByEarth>,
+        by_earth: Option<ClockRate>,
     },
     /// Position that fits worse than its measurements allow.
     Position {
@@ -639,14 +652,19 @@ pub struct Clock {
     /// Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all
     /// times stretched by it: a clock, or a scheme run so; null if not.
     pub by_durations: Option<f64>,
+    /// Rate error of the clock by the times at which the drift changes with the position, on the timeline of
+    /// the scheme: a clock, or positions held longer or shorter. Null where positions are held otherwise than
+    /// in the scheme, or where drifts change too little.
+    #[serde(default)]
+    pub by_changes: Option<ClockRate>,
     /// Fraction by which the clock is fast by the rate of the earth when all unknowns follow; drifts are too
     /// small by the same fraction. Null if its sigma would be above a third.
-    pub by_earth: Option<ClockByEarth>,
+    pub by_earth: Option<ClockRate>,
 }
 
-/// Rate error of a clock by the rate of the earth.
+/// Rate error of the clock of a record, with its sigma.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ClockByEarth {
+pub struct ClockRate {
     /// Fraction by which the clock is fast, dimensionless.
     pub fast: f64,
     /// Standard deviation of `fast`, dimensionless: a fraction not much larger is not significant.

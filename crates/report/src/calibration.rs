@@ -2,7 +2,7 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, CellKind, Clock, ClockByEarth, CovarianceTable, Curvature, Estimated, Finding, ForceCause,
+    Assumed, CellKind, Clock, ClockRate, CovarianceTable, Curvature, Estimated, Finding, ForceCause,
     ForceError, Gap, NextRun, PositionFit, PositionsBy, RecordReport,
 };
 
@@ -57,23 +57,13 @@ const CLOCK: f64 = 0.1;
 
 /// True if durations and rates show the same clock. Drifts that follow the clock take up a quarter of its
 /// error, so the two may differ by that.
-pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockByEarth>) -> bool {
+pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockRate>) -> bool {
     let both = by_durations.zip(by_earth);
     both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
 }
 
-/// What shows the rate of a clock, by the source of positions.
-fn shows(by: Option<PositionsBy>) -> &'static str {
-    match by {
-        Some(PositionsBy::Timeline | PositionsBy::Both) => {
-            "the changes of position and the rates of the earth and of turns"
-        }
-        _ => "the rates of the earth and of turns",
-    }
-}
-
 /// Sentence on the offset and the rate of a record's clock.
-fn clock(c: &Clock, by: PositionsBy) -> String {
+fn clock(c: &Clock) -> String {
     let begins = match (c.offset_s, c.offset_sigma_s) {
         (Some(at), Some(sigma)) => format!(
             "; the scheme begins at {at:.3} s of its clock (estimated, sigma {} s; labels leave it open)",
@@ -82,18 +72,25 @@ fn clock(c: &Clock, by: PositionsBy) -> String {
         (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
         _ => String::new(),
     };
-    format!("{begins}{}", rates(c, by))
+    format!("{begins}{}", rates(c))
 }
 
 /// Sentence on the rate of a record's clock.
-fn rates(c: &Clock, by: PositionsBy) -> String {
+fn rates(c: &Clock) -> String {
     let held = c.by_durations.map_or_else(String::new, |fast| {
         format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
     });
+    let sharper = |e: &&ClockRate| c.by_earth.as_ref().is_none_or(|by| e.sigma < by.sigma);
+    if let Some(e) = c.by_changes.as_ref().filter(sharper).filter(|e| 3.0 * e.sigma < CLOCK) {
+        return format!(
+            "; by its changes of position its clock is {} (sigma {} %)",
+            part(e.fast),
+            number(100.0 * e.sigma)
+        );
+    }
     match &c.by_earth {
         Some(e) if 3.0 * e.sigma < CLOCK => format!(
-            "; by {} its clock is {} (sigma {} %){held}",
-            shows(Some(by)),
+            "; by the rates of the earth and of turns its clock is {} (sigma {} %){held}",
             part(e.fast),
             number(100.0 * e.sigma)
         ),
@@ -178,27 +175,30 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             sigmas.0,
             sigmas.1
         ),
-        Finding::Clock { record, by_durations, by_earth } => {
+        Finding::Clock { record, by_durations, by_changes, by_earth } => {
             let of = of(record, records);
             let held = by_durations
                 .map(|fast| format!("positions begin and end as by a clock that is {}", part(fast)));
-            let rates =
-                by_earth.as_ref().map(|e| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma)));
-            match (held, rates) {
+            let rate = |e: &ClockRate| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma));
+            let rates = by_earth.as_ref().map(rate);
+            let by_changes = by_changes.as_ref().map(|e| {
+                format!(
+                    "the clock{of} is {} by its changes of position, and drifts are off by that part; \
+                     positions held so much longer or shorter than in the scheme look the same",
+                    rate(e)
+                )
+            });
+            let by_rates = || match (held, rates) {
                 (Some(held), Some(rates)) if is_clock(*by_durations, by_earth.as_ref()) => format!(
                     "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
                      off by that part, those that the earth rate tells by more"
                 ),
-                (Some(held), Some(rates)) => format!(
+                (held, Some(rates)) => format!(
                     "the rates of the earth and of turns{of} are not those of the scheme: they fit best as \
-                     by a clock that is {rates}, while {held}; another latitude or rate of turns, or an error \
-                     that no unknown explains, look the same"
-                ),
-                (None, Some(rates)) => format!(
-                    "times or rates{of} are not those of the scheme: {} fit best as by a clock that is \
-                     {rates}; positions held longer or shorter, another latitude or rate of turns, or an \
-                     error that no unknown explains, look the same",
-                    shows(records.iter().find(|r| r.name == *record).map(|r| r.positions_by))
+                     by a clock that is {rates}{}; another latitude or rate of turns, or an error that no \
+                     unknown explains, look the same, and are likelier where positions last as in the \
+                     scheme",
+                    held.map_or_else(String::new, |held| format!(", while {held}"))
                 ),
                 (held, None) => format!(
                     "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from \
@@ -206,8 +206,16 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                      part or more, else the scheme has other times than its run",
                     held.unwrap_or_default()
                 ),
-            }
+            };
+            by_changes.unwrap_or_else(by_rates)
         }
+        Finding::Turns { record, factor, slew_rate_deg_s } => format!(
+            "the turns{} last {factor:.3} times as long as in the scheme, while positions do not{}",
+            of(record, records),
+            slew_rate_deg_s.map_or_else(String::new, |rate| {
+                format!(": they were made at about {rate:.2} deg/s (`slew_rate_deg_s`)")
+            })
+        ),
         Finding::Position { record, position, chi_square, factor } => format!(
             "the model does not explain position {position}{} (chi-square {} per degree of freedom): {} there",
             of(record, records),
@@ -431,7 +439,7 @@ fn records(c: &Calibration) -> Vec<String> {
         if let Some(off) = r.gimbals_deg {
             out += &format!("; the gimbals are within {} deg of the scheme", number(off));
         }
-        out += &clock(&r.clock, r.positions_by);
+        out += &clock(&r.clock);
         if !r.ignored.is_empty() {
             out += &format!("; nothing was made of the columns {}", r.ignored.join(", "));
         }

@@ -51,15 +51,36 @@ pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
 
 /// Excess rate of a record's clock by its positions `stays` (begin and end), as a fraction; `between` is the
 /// time between two samples, in s. `None` unless such a clock explains the positions and a right one does
-/// not. A common delay of begins or ends has no effect.
-pub(crate) fn by_durations(stays: &[(f64, f64)], between: f64, plan: &Plan) -> Option<f64> {
+/// not: by far or, for `inside`, with a clock by which all rows lie inside their positions. A common delay of
+/// begins or ends has no effect.
+pub(crate) fn by_durations(
+    stays: &[(f64, f64)],
+    between: f64,
+    plan: &Plan,
+    inside: Option<f64>,
+) -> Option<f64> {
     let bounds = bounds(plan);
     let each = bounds.iter().zip(stays);
     let points: Vec<(f64, f64)> =
         each.flat_map(|(scheme, stay)| [(scheme.0, stay.0), (scheme.1, stay.1)]).collect();
     let line = line(&points)?;
     let whole = points.last()?.0 - points.first()?.0;
-    (line.within <= TOLD / 2.0 * between && line.fast.abs() * whole > TOLD * between).then_some(line.fast)
+    let explains = line.within <= TOLD / 2.0 * between;
+    let far = (line.fast.abs() * whole > TOLD * between).then_some(line.fast);
+    inside.or(far).filter(|_| explains)
+}
+
+/// Factor by which the turns of a record last longer than in the scheme: the slope of the times between the
+/// positions `stays` (begin and end) over the durations of the slews. `between` is the time between two
+/// samples, in s. `None` unless such a factor explains these times and one does not; a common time to settle
+/// has no effect.
+pub(crate) fn of_turns(stays: &[(f64, f64)], between: f64, slews: &[f64]) -> Option<f64> {
+    let each = (1..stays.len()).map(|p| (slews[p], stays[p].0 - stays[p - 1].1));
+    let points: Vec<(f64, f64)> = each.collect();
+    let line = line(&points)?;
+    let ends = points.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), p| (a.min(p.0), b.max(p.0)));
+    let explains = line.within <= TOLD / 2.0 * between;
+    (explains && line.fast.abs() * (ends.1 - ends.0) > TOLD * between).then_some(1.0 + line.fast)
 }
 
 #[cfg(test)]

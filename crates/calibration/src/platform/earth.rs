@@ -17,7 +17,7 @@ use super::estimate::{Problem, WEAK};
 use super::observe::{By, Reading, TOLERANCE};
 use super::run::Run;
 use super::timeline::{narrow, slews};
-use crate::answer::ClockByEarth;
+use crate::answer::ClockRate;
 use crate::least_squares::Information;
 
 /// Relative change of the rates for the finite differences.
@@ -38,20 +38,6 @@ const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
 
 impl Parts<'_> {
-    /// Fraction by which the clock of run `r` is fast, by the best fit with all unknowns free: the minimum of
-    /// a parabola through the sums of squares of nearby rates. `None` where these are nearly equal.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn clock(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
-        if matches!(self.problem.runs[r].reading.by, By::Timeline | By::Both)
-            && let Some(found) = self.clock_by_changes(r)?
-        {
-            return Ok(Some(found));
-        }
-        self.clock_by_rates(r)
-    }
-
     /// Sum of squares of all runs, with `instead` in place of run `r`, and all unknowns free.
     fn left_with(&self, r: usize, instead: &Run, conditions: &Conditions) -> Result<f64, CalibrationError> {
         let at = &self.estimate.at;
@@ -60,11 +46,18 @@ impl Parts<'_> {
         Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
     }
 
-    /// Clock of a run on the timeline of the scheme: all times of the record are divided by `1 + e`, and its
-    /// beginning is free as far as the rows leave it open. `None` where the changes of position say too
-    /// little, or are so far off that rows would be at other positions.
-    fn clock_by_changes(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
+    /// Fraction by which the clock of run `r` is fast, on the timeline of the scheme, by its changes of
+    /// position: all times of the record are divided by `1 + e`, its beginning is free as far as the rows
+    /// leave it open, and so are all unknowns. The minimum of a parabola through the sums of squares nearby.
+    /// `None` where the changes say too little, or are so far off that rows would be at other positions.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] for a number that is not finite.
+    pub(super) fn clock_by_changes(&self, r: usize) -> Result<Option<ClockRate>, CalibrationError> {
         let own = &self.problem.runs[r];
+        if !matches!(own.reading.by, By::Timeline | By::Both) {
+            return Ok(None);
+        }
         let interval = own.reading.interval;
         let last = bounds(self.planned).last().map_or(0.0, |b| b.1);
         let step = MOVED_ROWS * interval;
@@ -94,11 +87,16 @@ impl Parts<'_> {
         let scale = step / last;
         let (fast, sigma) = (-(inverse * slope)[1] * scale, (2.0 * inverse[(1, 1)]).sqrt() * scale);
         let near = (fast.abs() + sigma) * last <= MOST_ROWS * interval;
-        Ok(near.then_some(ClockByEarth { fast, sigma }))
+        Ok(near.then_some(ClockRate { fast, sigma }))
     }
 
-    /// Clock of a run by the rates of the earth and of turns alone.
-    fn clock_by_rates(&self, r: usize) -> Result<Option<ClockByEarth>, CalibrationError> {
+    /// Fraction by which the clock of run `r` is fast, by the best fit of the rates of the earth and of turns
+    /// with all unknowns free. The result is the minimum of a parabola through the sums of squares at three
+    /// rates; `None` where they are nearly equal.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] for a number that is not finite.
+    pub(super) fn clock_by_rates(&self, r: usize) -> Result<Option<ClockRate>, CalibrationError> {
         let own = &self.problem.runs[r];
         let mut reading = own.reading.clone();
         if matches!(reading.by, By::Timeline | By::Both) {
@@ -117,7 +115,7 @@ impl Parts<'_> {
         let sigma = MOVED * (2.0 / curvature).sqrt();
         // a fast clock makes all rates small
         let found =
-            ClockByEarth { fast: -MOVED * (3.0 * same - 4.0 * fast + faster) / (2.0 * curvature), sigma };
+            ClockRate { fast: -MOVED * (3.0 * same - 4.0 * fast + faster) / (2.0 * curvature), sigma };
         let fall = (found.fast / sigma).powi(2);
         let far = fall > SEEN && found.fast.abs() > FAR;
         if sigma.is_nan()
@@ -151,7 +149,7 @@ impl Parts<'_> {
     /// True if the estimate with the found clock of run `r` converges to a sum of squares below `most`. The
     /// parabola of nearby rates does not hold for a clock that is far off where the model is nonlinear. A
     /// clock with which turns do not fit between two samples cannot be tried, and is accepted.
-    fn fits_at(&self, r: usize, reading: &Reading, found: &ClockByEarth, most: f64) -> bool {
+    fn fits_at(&self, r: usize, reading: &Reading, found: &ClockRate, most: f64) -> bool {
         let own = self.problem;
         let Ok((conditions, run)) = self.at_rate(&own.runs[r], reading, -found.fast) else { return true };
         let mut runs = own.runs.to_vec();

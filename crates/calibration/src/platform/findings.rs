@@ -10,7 +10,7 @@ use super::gross::Why;
 use super::length::wrong;
 use super::run::Run;
 use super::successions::LeftOut;
-use crate::answer::{Calibration, CellKind, Finding, ForceLength, PositionFit, RecordReport};
+use crate::answer::{Calibration, CellKind, ClockRate, Finding, ForceLength, PositionFit, RecordReport};
 use crate::levels;
 
 /// Largest difference of the two paths, in sigma, that counts as agreement.
@@ -32,6 +32,7 @@ impl Parts<'_> {
         }
         out.extend(self.problem.runs.iter().flat_map(cells));
         out.extend(self.successions(left_out));
+        out.extend(self.problem.runs.iter().filter_map(|run| self.turns(run)));
         out.extend(c.records.iter().filter_map(|record| clock(record, c)));
         out.extend(self.fits(c));
         for (r, record) in c.records.iter().enumerate() {
@@ -69,6 +70,16 @@ impl Parts<'_> {
             out.push(Finding::SecondPath { difference });
         }
         out
+    }
+
+    /// Finding on the turns of a run. Where positions last longer by the same factor, the clock is wrong.
+    fn turns(&self, run: &Run) -> Option<Finding> {
+        let factor = run.reading.of_turns(self.planned)?;
+        if run.reading.by_durations(self.planned).is_some() {
+            return None;
+        }
+        let rate = self.problem.conditions.slew_rate_deg_s.map(|rate| rate / factor);
+        Some(Finding::Turns { record: run.reading.name.clone(), factor, slew_rate_deg_s: rate })
     }
 
     /// Finding on the length of the specific force of a run.
@@ -180,22 +191,28 @@ fn cells(run: &Run) -> Vec<Finding> {
     out
 }
 
-/// Finding on the clock of a record: significant by the rate of the earth, with sigmas as the fit has them;
-/// or by the durations of positions, where a clock would change a drift by more than its sigma. If the rate
-/// of the earth shows a right clock, positions were only held longer or shorter than in the scheme, and there
-/// is no finding.
+/// Finding on the clock of a record: significant by its changes of position or by the rate of the earth, with
+/// sigmas as the fit has them; or by the durations of positions, where a clock would change a drift by more
+/// than its sigma. If the rate of the earth shows a right clock, positions were only held longer or shorter
+/// than in the scheme, and there is no finding.
 fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
-    let most = chi_square_quantile(1.0, 1.0 - levels::CLOCK / c.records.len() as f64).sqrt();
-    let (by_durations, by_earth) = (record.clock.by_durations, record.clock.by_earth.as_ref());
-    let beyond =
-        |from: f64| by_earth.is_some_and(|e| (e.fast - from).abs() > most * e.sigma * c.fit.factor.max(1.0));
-    let (wrong, held) = (beyond(0.0), by_durations.is_some_and(&beyond));
+    // two tests
+    let level = levels::CLOCK / (2 * c.records.len()) as f64;
+    let most = chi_square_quantile(1.0, 1.0 - level).sqrt() * c.fit.factor.max(1.0);
+    let beyond = |by: &Option<ClockRate>, from: f64| {
+        by.as_ref().is_some_and(|e| (e.fast - from).abs() > most * e.sigma)
+    };
+    let clock = &record.clock;
+    let held = clock.by_durations.is_some_and(|fast| beyond(&clock.by_earth, fast));
+    let [changes, earth] =
+        [&clock.by_changes, &clock.by_earth].map(|by| by.clone().filter(|_| beyond(by, 0.0)));
     let rates = c.quantities.iter().filter(|q| q.unit.starts_with("deg/h"));
     let sigmas = rates.filter_map(|q| Some((q.estimate? / q.sigma?).abs())).fold(0.0, f64::max);
-    let matters = by_durations.is_some_and(|fast| fast.abs() * sigmas > 1.0);
-    (wrong || matters && !held).then(|| Finding::Clock {
+    let matters = clock.by_durations.is_some_and(|fast| fast.abs() * sigmas > 1.0);
+    (changes.is_some() || earth.is_some() || matters && !held).then(|| Finding::Clock {
         record: record.name.clone(),
-        by_durations,
-        by_earth: by_earth.filter(|_| wrong).cloned(),
+        by_durations: clock.by_durations,
+        by_changes: changes,
+        by_earth: earth,
     })
 }

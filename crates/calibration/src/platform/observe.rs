@@ -7,7 +7,7 @@ use obsdeg_core::model::{AZIMUTH, Carry, Float, Matrix3, Scheme, elementary, pro
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
-use super::clock::{bounds, by_durations};
+use super::clock::{bounds, by_durations, of_turns};
 use super::force::{ForceColumn, Forces};
 use super::gross;
 use super::length::Length;
@@ -179,6 +179,12 @@ impl Reading {
         self.missing.iter().map(of).collect()
     }
 
+    /// Factor by which turns last longer than in the scheme; `None` if the record does not show it.
+    pub(crate) fn of_turns(&self, plan: &Plan) -> Option<f64> {
+        let own = matches!(self.by, By::Label | By::Static);
+        if own { of_turns(&self.stays, self.interval, &timeline::slews(plan)) } else { None }
+    }
+
     /// Fraction by which the clock is fast, by the durations of positions; `None` if the record does not show
     /// it.
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
@@ -186,8 +192,8 @@ impl Reading {
         let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
         match self.by {
             // the timeline of the scheme does not hold, so the rate is not zero
-            By::Label => by_rows(&self.stays, plan).or_else(|| by_durations(&self.stays, between, plan)),
-            By::Static => by_durations(&self.stays, between, plan),
+            By::Label => by_durations(&self.stays, between, plan, by_rows(&self.stays, plan)),
+            By::Static => by_durations(&self.stays, between, plan, None),
             By::Timeline | By::Both => None,
         }
     }

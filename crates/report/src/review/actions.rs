@@ -258,6 +258,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
              ([simulation.estimates])."
                 .into()
         }
+        Finding::Clock { by_changes: Some(_), .. } => "Compare the times of the record and of its positions \
+                                                        with those of its run: either the clock is wrong, and \
+                                                        drifts by the same part, or the scheme has other times."
+            .into(),
         Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
             (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
                 "Correct the times of the record: its clock fits neither the scheme nor the earth rate. \
@@ -281,6 +285,9 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             "Look at the record around these lines: after a step of an output, run {position} again; where \
              the platform was disturbed, empty the cells of those rows."
         ),
+        Finding::Turns { .. } => {
+            "State the rate of the turns of this run (`slew_rate_deg_s`), and calibrate again.".into()
+        }
         Finding::Force { .. } => {
             "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the \
              gravity of the place (--gravity, for forces in m/s^2)."
