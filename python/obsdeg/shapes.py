@@ -3323,6 +3323,20 @@ class FindingSuccession(Record):
     """Least and largest distance from the expected value, in standard deviations (dimensionless)."""
 
 
+class FindingCopy(Record):
+    """Record with the noise of another one: a copy, whose numbers count twice."""
+
+    __slots__ = ()
+
+    kind: Literal["copy"]
+    record: str
+    """Name of the record with this finding."""
+    other: str
+    """Name of the record with the same noise."""
+    correlation: float
+    """Coefficient of correlation of the residuals of both, dimensionless, -1 to 1."""
+
+
 class FindingTurns(Record):
     """Turns that last longer or shorter than in the scheme, while positions do not."""
 
@@ -3484,6 +3498,7 @@ Finding = Union[
     FindingForce,
     FindingCells,
     FindingSuccession,
+    FindingCopy,
     FindingTurns,
     FindingClock,
     FindingPosition,

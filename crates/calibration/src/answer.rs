@@ -143,6 +143,15 @@ pub enum Finding {
         /// Least and largest distance from the expected value, in standard deviations (dimensionless).
         sigmas: (f64, f64),
     },
+    /// Record with the noise of another one: a copy, whose numbers count twice.
+    Copy {
+        /// Name of the record with this finding.
+        record: String,
+        /// Name of the record with the same noise.
+        other: String,
+        /// Coefficient of correlation of the residuals of both, dimensionless, -1 to 1.
+        correlation: f64,
+    },
     /// Turns that last longer or shorter than in the scheme, while positions do not.
     Turns {
         /// Name of the record with this finding.

@@ -209,6 +209,10 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             };
             by_changes.unwrap_or_else(by_rates)
         }
+        Finding::Copy { record, other, correlation } => format!(
+            "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a copy, \
+             and counts twice"
+        ),
         Finding::Turns { record, factor, slew_rate_deg_s } => format!(
             "the turns{} last {factor:.3} times as long as in the scheme, while positions do not{}",
             of(record, records),

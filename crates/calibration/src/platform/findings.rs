@@ -31,6 +31,7 @@ impl Parts<'_> {
             out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));
         }
         out.extend(self.problem.runs.iter().flat_map(cells));
+        out.extend(self.copies());
         out.extend(self.successions(left_out));
         out.extend(self.problem.runs.iter().filter_map(|run| self.turns(run)));
         out.extend(c.records.iter().filter_map(|record| clock(record, c)));

@@ -1,6 +1,7 @@
 //! Calibration of a torquing scheme from the records of its runs.
 
 mod clock;
+mod copies;
 mod curvature;
 mod diagnose;
 mod earth;

@@ -549,6 +549,38 @@ fn a_record_counts_once() {
     assert!(e.contains("of a platform with another mounting of the sensors"), "{e}");
 }
 
+/// Copies of a record with other times, fewer digits and every second row are found by their noise; records
+/// of other runs are not.
+#[test]
+fn copies_are_found_by_their_noise() {
+    let bench = bench();
+    let samples = bench.record();
+    let of = |c: &Calibration| {
+        c.findings.iter().find_map(|f| match f {
+            Finding::Copy { record, other, correlation } => {
+                Some((record.clone(), other.clone(), *correlation))
+            }
+            _ => None,
+        })
+    };
+    let first = csv(&samples);
+    let later = samples.iter().map(|s| Sample { t: s.t + 5000.0, ..s.clone() });
+    let rounded = samples.iter().map(|s| Sample { f: s.f.map(|f| (f * 1e6).round() / 1e6), ..s.clone() });
+    let half = samples.iter().step_by(2).cloned();
+    let copies = [later.collect::<Vec<_>>(), rounded.collect(), half.collect()];
+    for (copy, least) in copies.iter().zip([0.95, 0.95, 0.6]) {
+        let c = with(&bench, &[("a.csv", &first), ("b.csv", &csv(copy))], None).expect("calibrated");
+        let (record, other, correlation) = of(&c).unwrap_or_else(|| panic!("{:?}", c.findings));
+        assert_eq!((record.as_str(), other.as_str()), ("b.csv", "a.csv"));
+        assert!(correlation > least && correlation <= 1.0 + 1e-12, "{correlation}");
+    }
+    for seed in 40..44 {
+        let other = csv(&Bench { seed, ..bench.clone() }.record());
+        let c = with(&bench, &[("a.csv", &first), ("b.csv", &other)], None).expect("calibrated");
+        assert!(of(&c).is_none(), "{:?}", c.findings);
+    }
+}
+
 /// Bench with the unknown of index `k`, in the order of the scheme, changed by `by`, in deg or deg/h.
 fn moved(bench: &Bench, k: usize, by: f64) -> Bench {
     let mut out = bench.clone();

@@ -285,6 +285,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             "Look at the record around these lines: after a step of an output, run {position} again; where \
              the platform was disturbed, empty the cells of those rows."
         ),
+        Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
         Finding::Turns { .. } => {
             "State the rate of the turns of this run (`slew_rate_deg_s`), and calibrate again.".into()
         }
