@@ -162,9 +162,9 @@ impl Forces {
         });
     }
 
-    /// Removes the piece of a position with these lines.
+    /// Removes the pieces of a position with any of these lines.
     pub(crate) fn leave_out(&mut self, position: usize, lines: (u64, u64)) {
-        self.pieces[position].retain(|piece| piece.lines != lines);
+        self.pieces[position].retain(|piece| piece.lines.1 < lines.0 || lines.1 < piece.lines.0);
     }
 
     /// Robust lengths of the force, by position. Their standard deviation is that of a median, from the known

@@ -23,6 +23,8 @@ const LEAST: f64 = 0.1;
 const BESIDE: usize = 2;
 /// Least distance of a code from its neighbours, in usual differences between rows.
 const STEPS: f64 = 10.0;
+/// Factor by which the scatter falls without the most frequent value, where that is a code.
+const CLEARED: f64 = 5.0;
 /// Number of equal rows in succession that are stuck, where values seldom repeat.
 const STUCK: usize = 4;
 
@@ -102,9 +104,13 @@ fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) ->
     let steps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
     // a converter with steps above the noise
     let step = if 2 * steps.len() < n { steps.iter().copied().fold(f64::INFINITY, f64::min) } else { 0.0 };
-    let s = scatter(values).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
+    // a code in many rows is in most differences of neighbours
+    let often = sorted.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len()).map(|equal| equal[0]);
+    let others: Vec<f64> = values.iter().copied().filter(|x| Some(*x) != often).collect();
+    let usual = if CLEARED * scatter(&others) < scatter(values) { &others } else { values };
+    let s = scatter(usual).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
     let mut out: Vec<(usize, f64, Why)> = Vec::new();
-    let far = (CODE * s).max(STEPS * median(values.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
+    let far = (CODE * s).max(STEPS * median(usual.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
     for (i, &x) in values.iter().enumerate() {
         let off = beside(values, i);
         if (x == 0.0 || count(x) > 1) && off.abs() * weights[i] > far {

@@ -128,3 +128,22 @@ fn a_code_here_and_there_is_asked_about() {
     assert!(c.findings.iter().any(code) && c.outliers.is_empty(), "{:?} {:?}", c.findings, c.outliers);
     is_near(&bench, &c, "codes");
 }
+
+/// Codes in every seventh or fourth row of a column, with two rows in a bin: all are named, and nothing else.
+#[test]
+fn frequent_codes_are_asked_about() {
+    let bench = Bench { step_s: 5.0, dropped: 0, ..bench() };
+    for (every, code) in [(7, -9999.0), (7, 0.0), (4, -9999.0)] {
+        let mut own = bench.record();
+        let rows: Vec<usize> = (0..own.len()).filter(|k| k % every == every - 1).collect();
+        rows.iter().for_each(|&k| own[k].f[0] = code);
+        let at_rest = rows.iter().filter(|&&k| !own[k].label.is_empty()).count();
+        let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+        let [Finding::Cells { column, kind_of_cells: CellKind::Code, value, count, .. }] = &c.findings[..]
+        else {
+            panic!("{every} {code}: {:?}", c.findings)
+        };
+        assert_eq!((column.as_str(), *value, *count), ("fx [g]", code, at_rest));
+        is_near(&bench, &c, "frequent codes");
+    }
+}
