@@ -56,6 +56,26 @@ pub enum Mistaken {
         /// Length of the force there, in g.
         length_g: String,
     },
+    /// Output that holds one value through a position.
+    #[error(
+        "{record}: column `{column}` is {value} in all {rows} rows of {position} from line {line} on, and \
+         varies at all other positions: its output was stuck or missing; leave its cells empty or record \
+         {position} again"
+    )]
+    Held {
+        /// Name of the record.
+        record: String,
+        /// First line of the position.
+        line: u64,
+        /// Column with that output.
+        column: String,
+        /// Value of all its cells.
+        value: String,
+        /// Number of rows of the position.
+        rows: usize,
+        /// Name of the position.
+        position: String,
+    },
     /// Times of another unit.
     #[error(
         "{record}: column `{column}`: the first position lasts {found} s by what the header says, in the \

@@ -147,3 +147,22 @@ fn frequent_codes_are_asked_about() {
         is_near(&bench, &c, "frequent codes");
     }
 }
+
+/// An output that is missing or stuck through a whole position is named, whatever that does to the length of
+/// the force; coarse steps of a converter are right.
+#[test]
+fn an_output_that_is_held_through_a_position_is_named() {
+    let bench = bench();
+    for (axis, column) in ["fx", "fy", "fz"].iter().enumerate() {
+        for value in [0.0, 0.123] {
+            let mut own = bench.record();
+            own.iter_mut().filter(|s| s.label == "p3").for_each(|s| s.f[axis] = value);
+            let e = of_csv(&bench, "F,I,O,S", csv(&own)).expect_err("refused").to_string();
+            let begins = format!("run.csv: column `{column} [g]` is {value} in all ");
+            assert!(e.starts_with(&begins) && e.contains(" rows of p3 from line "), "{e}");
+        }
+    }
+    let steps = bench.record().into_iter().map(|s| Sample { f: s.f.map(|f| (f * 1e3).round() / 1e3), ..s });
+    let read = of_csv(&bench, "F,I,O,S", csv(&steps.collect::<Vec<_>>()));
+    assert!(!matches!(&read, Err(CalibrationError::Mistaken(e)) if e.to_string().contains("was stuck")));
+}
