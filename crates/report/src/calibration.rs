@@ -520,12 +520,13 @@ fn next_run(n: &NextRun) -> String {
     let then = format!("{} {}", number(then), n.unit);
     if n.met {
         format!(
-            "{required}: a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes it {then}."
+            "{required}: a run of {dwell} s at {attitude} with rows as often as here, calibrated with this answer \
+             (--prior), makes it {then}."
         )
     } else {
         format!(
-            "{required}: even a run of {dwell} s at {attitude}, calibrated with this answer (--prior), makes \
-             it {then} only."
+            "{required}: even a run of {dwell} s at {attitude} with rows as often as here, calibrated with this \
+             answer (--prior), makes it {then} only."
         )
     }
 }
