@@ -3799,10 +3799,10 @@ class EmptyCells(Record):
     """Number of cells that are empty or NaN, in rows at positions."""
 
 PositionsBy = Literal["labels", "timeline", "both", "static"]
-"""Source of the position of each sample. labels: Column of labels: a position ends with its last sample, and the next begins when the
-slew is over. timeline: Timeline of the scheme, by the times of the samples. both: Column of labels that agrees with the timeline of
-the scheme, which sets the start and end of a position. static: Intervals at rest that were found, as many as the scheme has
-positions; slews lie in the middle between them.
+"""Source of the position of each sample. labels: Column of labels: a position ends behind its last sample, and the next begins when the
+slew is over; a change lies in the middle of what the rows beside it leave open. timeline: Timeline of the scheme, by the times of the
+samples. both: Column of labels that agrees with the timeline of the scheme, which sets the start and end of a position. static:
+Intervals at rest that were found, as many as the scheme has positions; slews lie in the middle between them.
 """
 
 

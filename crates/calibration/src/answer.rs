@@ -684,7 +684,8 @@ pub struct ClockRate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PositionsBy {
-    /// Column of labels: a position ends with its last sample, and the next begins when the slew is over.
+    /// Column of labels: a position ends behind its last sample, and the next begins when the slew is over; a
+    /// change lies in the middle of what the rows beside it leave open.
     Labels,
     /// Timeline of the scheme, by the times of the samples.
     Timeline,

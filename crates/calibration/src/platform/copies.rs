@@ -1,52 +1,57 @@
 //! Records that are copies of each other, with other times, digits or fewer rows: the noise of one is that of
 //! the other, which counts twice then.
+//!
+//! What a model does not explain is alike in all records of a platform, but smooth: differences of
+//! neighbouring residuals are compared.
 
-use super::diagnose::Parts;
+use super::diagnose::{MeasurementResidual, Parts};
 use crate::answer::Finding;
 
 /// Fewest measurements of two records at the same times of the scheme.
 const FEWEST: usize = 20;
 /// Largest difference of these times, in intervals between rows.
 const TOGETHER: f64 = 0.25;
-/// Least correlation of the residuals of copies, and its least size in standard deviations of that of
-/// independent records.
+/// Least correlation of the differences of copies, and its least size in standard deviations of that of
+/// independent records (of independent numbers: that of differences is a fifth larger).
 const COPIED: f64 = 0.5;
 const SIGMAS: f64 = 6.0;
 
+/// Measurement: channel and position, time in s, normalised residual.
+type Normalised = ((usize, usize), f64, f64);
+
 impl Parts<'_> {
-    /// Channel, time and normalised residual of every measurement of run `r`, by channel and time.
-    fn normalised(&self, r: usize) -> Vec<(usize, f64, f64)> {
+    /// Measurements of run `r`, by channel, position and time.
+    fn normalised(&self, r: usize) -> Vec<Normalised> {
         let run = &self.problem.runs[r];
         let times: Vec<f64> =
             run.bins.iter().flatten().map(|&(position, i)| run.reading.bins[position][i].t).collect();
         let own = self.found.all.iter().filter(|m| m.run == r);
-        let mut out: Vec<(usize, f64, f64)> =
-            own.map(|m| (m.key.channel, times[m.key.bin], m.residual / m.r.sqrt())).collect();
-        out.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
+        let of = |m: &MeasurementResidual| {
+            ((m.key.channel, m.key.position), times[m.key.bin], m.residual / m.r.sqrt())
+        };
+        let mut out: Vec<Normalised> = own.map(of).collect();
+        out.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         out
     }
 
     /// Findings on pairs of records with the same noise.
     pub(super) fn copies(&self) -> Vec<Finding> {
         let runs = self.problem.runs;
-        let each: Vec<Vec<(usize, f64, f64)>> = match runs.len() {
-            0 | 1 => return Vec::new(),
-            n => (0..n).map(|r| self.normalised(r)).collect(),
-        };
+        if runs.len() < 2 {
+            return Vec::new();
+        }
+        let each: Vec<Vec<Normalised>> = (0..runs.len()).map(|r| self.normalised(r)).collect();
         let mut out = Vec::new();
         for (a, own) in each.iter().enumerate() {
             for (b, others) in each.iter().enumerate().take(a) {
                 let within = TOGETHER * runs[a].reading.interval.min(runs[b].reading.interval);
-                let mut pairs: Vec<(f64, f64)> = Vec::new();
-                let mut rest = others.iter().peekable();
-                for &(channel, t, x) in own {
-                    while rest.next_if(|o| (o.0, o.1) < (channel, t - within)).is_some() {}
-                    pairs.extend(rest.next_if(|o| o.0 == channel && o.1 <= t + within).map(|o| (x, o.2)));
-                }
-                let sum = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
+                let pairs = together(own, others, within);
+                let neighbours = pairs.windows(2).filter(|w| w[0].0 == w[1].0);
+                let steps: Vec<(f64, f64)> = neighbours.map(|w| (w[1].1 - w[0].1, w[1].2 - w[0].2)).collect();
+                let sum = |of: fn(&(f64, f64)) -> f64| steps.iter().map(of).sum::<f64>();
                 let correlation = sum(|p| p.0 * p.1) / (sum(|p| p.0 * p.0) * sum(|p| p.1 * p.1)).sqrt();
-                let least = COPIED.max(SIGMAS / (pairs.len() as f64).sqrt());
-                if pairs.len() >= FEWEST && correlation > least {
+                let least = COPIED.max(SIGMAS / (steps.len() as f64).sqrt());
+                if steps.len() >= FEWEST && correlation > least {
                     let name = |r: usize| runs[r].reading.name.clone();
                     out.push(Finding::Copy { record: name(a), other: name(b), correlation });
                 }
@@ -54,4 +59,14 @@ impl Parts<'_> {
         }
         out
     }
+}
+
+/// Residuals of two records at the same times, to `within` s: channel and position, and both residuals.
+fn together(own: &[Normalised], others: &[Normalised], within: f64) -> Vec<((usize, usize), f64, f64)> {
+    let mut rest = others.iter().peekable();
+    let of = |&(place, t, x): &Normalised| {
+        while rest.next_if(|o| o.0 < place || o.0 == place && o.1 < t - within).is_some() {}
+        rest.next_if(|o| o.0 == place && o.1 <= t + within).map(|o| (place, x, o.2))
+    };
+    own.iter().filter_map(of).collect()
 }

@@ -219,6 +219,25 @@ pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
     out
 }
 
+/// Position, column and value of an output that holds one value through a position of at least [`FEWEST`]
+/// rows, while most of its values differ at every other position (not so for coarse steps of a converter).
+pub(crate) fn held(positions: &[Vec<Row>]) -> Option<(usize, usize, f64)> {
+    (0..3).find_map(|axis| {
+        // number of values, and those that differ
+        let values = |rows: &Vec<Row>| {
+            let mut out: Vec<f64> = rows.iter().map(|r| r.values[axis]).filter(|x| x.is_finite()).collect();
+            out.sort_by(f64::total_cmp);
+            let all = out.len();
+            out.dedup();
+            (all, out)
+        };
+        let each: Vec<(usize, Vec<f64>)> = positions.iter().map(values).collect();
+        let p = each.iter().position(|(all, differ)| *all >= FEWEST && differ.len() == 1)?;
+        let varies = |(q, (all, differ)): (usize, &(usize, Vec<f64>))| q == p || 2 * differ.len() > *all;
+        (each.len() > 1 && each.iter().enumerate().all(varies)).then(|| (p, axis, each[p].1[0]))
+    })
+}
+
 /// Largest change of the length of the force during a turn, in g; the least angle of a turn, in deg, follows.
 const LONG: f64 = 1e-3;
 const TURNS_DEG: f64 = 1.0;

@@ -45,8 +45,6 @@ const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
 pub(crate) const TIMES: [(&str, f64); 6] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
-/// Fewest rows of a position through which an output is held.
-const HELD: usize = 16;
 /// Number of samples of a dense bin from which its median is taken.
 const SOME: usize = 64;
 /// Largest angle of the gimbal readings from the attitude of the scheme, in deg.
@@ -740,36 +738,17 @@ impl SampleAssignment<'_> {
         self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
     }
 
-    /// Checks for outputs that hold one value through a position of at least [`HELD`] rows, while most of
-    /// their values differ at every other position (not so for coarse steps of a converter).
+    /// Checks for outputs that hold one value through a position.
     fn check_held(&self) -> Result<(), Box<Mistaken>> {
-        let names: Vec<&str> =
-            self.plan.platform.scheme().positions.iter().map(|p| p.name.as_str()).collect();
-        for axis in 0..3 {
-            let values = |rows: &[gross::Row]| {
-                let mut out: Vec<f64> =
-                    rows.iter().map(|r| r.values[axis]).filter(|x| x.is_finite()).collect();
-                out.sort_by(f64::total_cmp);
-                let all = out.len();
-                out.dedup();
-                (all, out)
-            };
-            let each: Vec<(usize, Vec<f64>)> = self.rows.iter().map(|rows| values(rows)).collect();
-            let held = |(all, differ): &(usize, Vec<f64>)| *all >= HELD && differ.len() == 1;
-            let Some(p) = each.iter().position(held) else { continue };
-            let varies = |(q, (all, differ)): (usize, &(usize, Vec<f64>))| q == p || 2 * differ.len() > *all;
-            if each.len() > 1 && each.iter().enumerate().all(varies) {
-                return Err(Box::new(Mistaken::Held {
-                    record: self.out.name.clone(),
-                    line: self.rows[p][0].lines.0,
-                    column: self.layout.columns[axis].clone(),
-                    value: (each[p].1[0] / self.layout.wanted[axis + 1].scale).to_string(),
-                    rows: self.rows[p].iter().map(|r| r.samples).sum(),
-                    position: names[p].into(),
-                }));
-            }
-        }
-        Ok(())
+        let Some((p, axis, value)) = gross::held(&self.rows) else { return Ok(()) };
+        Err(Box::new(Mistaken::Held {
+            record: self.out.name.clone(),
+            line: self.rows[p][0].lines.0,
+            column: self.layout.columns[axis].clone(),
+            value: (value / self.layout.wanted[axis + 1].scale).to_string(),
+            rows: self.rows[p].iter().map(|r| r.samples).sum(),
+            position: self.plan.platform.scheme().positions[p].name.clone(),
+        }))
     }
 
     /// Leaves out the cells that a robust pass over every position finds gross. A turn (length of 1 g, at

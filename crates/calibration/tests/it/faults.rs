@@ -579,6 +579,12 @@ fn copies_are_found_by_their_noise() {
         let c = with(&bench, &[("a.csv", &first), ("b.csv", &other)], None).expect("calibrated");
         assert!(of(&c).is_none(), "{:?}", c.findings);
     }
+    // an error that the model lacks is in both records, and is no copy
+    let scaled = [[0.0; 3], [3e-4, 0.0, 0.0], [0.0; 3]];
+    let [one, two] =
+        [50, 51].map(|seed| csv(&Bench { seed, accelerometers: scaled, ..bench.clone() }.record()));
+    let c = with(&bench, &[("a.csv", &one), ("b.csv", &two)], None).expect("calibrated");
+    assert!(!c.consistent && of(&c).is_none(), "{:?}", c.findings);
 }
 
 /// Bench with the unknown of index `k`, in the order of the scheme, changed by `by`, in deg or deg/h.
