@@ -52,14 +52,18 @@ fn heading(b: &mut Browser, explained: &str, text: &str) {
     wait(b, text, &condition);
 }
 
+/// Clicks an unknown in the table of verdicts once everything has come: what comes later moves the rows.
+fn click_row(b: &mut Browser, name: &str) {
+    wait(b, "all", "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)')");
+    click(b, &format!("#verdicts tr[data-name={name}] button.why"));
+}
+
 #[test]
 fn a_verdict_is_explained() {
     let Some((mut browser, _)) = opened(1400) else { return };
     let b = &mut browser;
     let positions = ["analyze", "--angles", "0,0,0", "--angles", "180,0,0", "--why", "D_FZ"];
-    // what comes later moves the rows
-    wait(b, "all", "document.querySelector('#verdicts table:not(.old-sigmas):not(.old-solutions)')");
-    click(b, "#verdicts tr[data-name=D_FZ] button.why");
+    click_row(b, "D_FZ");
     heading(b, "#why", "Why D_FZ is not observable");
     is_as_printed(b, "#why", &positions);
     // the explanation follows the scheme: what a change is said to give is what it gives
@@ -70,9 +74,9 @@ fn a_verdict_is_explained() {
     heading(b, "#why", &format!("Why D_FZ has degree {}", degrees[inertial]));
     is_as_printed(b, "#why", &[&positions[..], &["--carry", "inertial"]].concat());
     // another unknown, then one that the scheme has not
-    click(b, "#verdicts tr[data-name=psi_y] button.why");
+    click_row(b, "psi_y");
     wait(b, "psi_y", "document.querySelector('#why h3').textContent.startsWith('Why psi_y ')");
-    click(b, "#verdicts tr[data-name=D_FZ] button.why");
+    click_row(b, "D_FZ");
     wait(b, "D_FZ", "document.querySelector('#why h3').textContent.startsWith('Why D_FZ ')");
     write(b, "#terms", "S");
     wait(b, "no D_FZ", "document.getElementById('why').textContent.includes('no unknown `D_FZ`')");
