@@ -3646,12 +3646,12 @@ class Curvature(Record):
     """Largest difference of the run and its linear model along the longest axes of the estimates' errors, in sigma (dimensionless):
     below 0.4 the linear covariance holds. Null if the run cannot be followed there, or if another minimum fits nearly as well.
     """
-    refits: int
-    """Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 0.4)."""
+    samples: int
+    """Number of weighted samples of the posterior (0 below a curvature of 0.4)."""
     failed: int
-    """Number of repeated estimates that did not converge."""
-    from_refits: bool
-    """True if estimates and sigmas are mean and covariance of the repeated estimates."""
+    """Number of samples that were not found: the equation of each is solved by iteration."""
+    from_samples: bool
+    """True if estimates and sigmas are mean and covariance of the samples of the posterior."""
 
 
 class Moved(Record):

@@ -468,12 +468,12 @@ pub struct Curvature {
     /// sigma (dimensionless): below 0.4 the linear covariance holds. Null if the run cannot be followed
     /// there, or if another minimum fits nearly as well.
     pub kappa: Option<f64>,
-    /// Number of repeated estimates from data and priors with errors drawn anew (0 below a curvature of 0.4).
-    pub refits: usize,
-    /// Number of repeated estimates that did not converge.
+    /// Number of weighted samples of the posterior (0 below a curvature of 0.4).
+    pub samples: usize,
+    /// Number of samples that were not found: the equation of each is solved by iteration.
     pub failed: usize,
-    /// True if estimates and sigmas are mean and covariance of the repeated estimates.
-    pub from_refits: bool,
+    /// True if estimates and sigmas are mean and covariance of the samples of the posterior.
+    pub from_samples: bool,
 }
 
 /// Quality of the fit at one position of a record.

@@ -19,6 +19,8 @@ pub struct Mean {
     pub scatter: f64,
     /// Degrees of freedom of the sum.
     pub free: usize,
+    /// Change of the value per second derivative of the channel, in s^2: a curve lies beside its line.
+    pub bend: f64,
 }
 
 /// Bin: a few seconds of a record.
@@ -149,7 +151,15 @@ impl Binner {
             now.iter().filter_map(|s| Some((s.t - t, s.z[c]?, s.line))).collect();
         if let ([(_, value, _)], Some(sigma)) = (&points[..], now.first().and_then(|s| s.sigma)) {
             let variance = sigma[c] * sigma[c];
-            return Some(Mean { value: *value, variance, given: true, samples: 1, scatter: 0.0, free: 0 });
+            return Some(Mean {
+                value: *value,
+                variance,
+                given: true,
+                samples: 1,
+                scatter: 0.0,
+                free: 0,
+                bend: 0.0,
+            });
         }
         if points.len() >= FEWEST {
             let (slope, level, spread) = resistant(&points);
@@ -172,14 +182,17 @@ impl Binner {
         let mean = |of: &dyn Fn(&(f64, f64, u64)) -> f64| points.iter().map(of).sum::<f64>() / n;
         let (dt, x) = (mean(&|p| p.0), mean(&|p| p.1));
         let along: f64 = points.iter().map(|p| (p.0 - dt).powi(2)).sum();
-        let slope = match samples {
+        let slope_of = |of: &dyn Fn(&(f64, f64, u64)) -> f64| match samples {
             1 => 0.0,
-            _ => points.iter().map(|p| (p.0 - dt) * (p.1 - x)).sum::<f64>() / along,
+            _ => points.iter().map(|p| (p.0 - dt) * of(p)).sum::<f64>() / along,
         };
+        let slope = slope_of(&|p| p.1 - x);
+        let curve = |p: &(f64, f64, u64)| p.0 * p.0 / 2.0;
+        let bend = mean(&curve) - slope_of(&curve) * dt;
         let scatter = points.iter().map(|p| (p.1 - x - slope * (p.0 - dt)).powi(2)).sum();
         let variance = 1.0 / n + if samples > 1 { dt * dt / along } else { 0.0 };
         let value = x - slope * dt;
-        Some(Mean { value, variance, given: false, samples, scatter, free: samples.saturating_sub(2) })
+        Some(Mean { value, variance, given: false, samples, scatter, free: samples.saturating_sub(2), bend })
     }
 }
 
@@ -220,6 +233,22 @@ mod tests {
         let mut bins: Vec<Bin> = samples.flat_map(|s| binner.push(s, &mut spikes)).collect();
         bins.extend(binner.end(&mut spikes));
         (bins, spikes)
+    }
+
+    /// A curve is moved off the middle of its line by half the mean square of the times.
+    #[test]
+    fn a_curve_lies_beside_its_line() {
+        for lost in [3, 7, 100] {
+            let times = (0..11).filter(|i| *i != lost).map(|i| 0.9 * f64::from(i));
+            let (all, _) = binned(times.enumerate().map(|(i, t)| {
+                let curve = 0.5 * 0.02 * (t - 4.5) * (t - 4.5);
+                sample(i as u64, t, 3.0 + 0.1 * (t - 4.5) + curve)
+            }));
+            let mean = all[0].channels[0].expect("measured");
+            let middle = all[0].t - 4.5;
+            let there = 3.0 + 0.1 * middle + 0.5 * 0.02 * middle * middle;
+            assert!((mean.value - 0.02 * mean.bend - there).abs() < 1e-12, "{mean:?}");
+        }
     }
 
     /// Samples every 10 s are bins of their own; a line of several samples gives its value at the middle,

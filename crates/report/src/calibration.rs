@@ -288,9 +288,9 @@ fn left_open(c: &Calibration) -> Option<String> {
         (false, false) => "this record and the stated priors leave",
         (false, true) => "these records and the stated priors leave",
     };
-    let Curvature { kappa, refits, failed, .. } = c.curvature;
+    let Curvature { kappa, samples, failed, .. } = c.curvature;
     let why = match kappa {
-        Some(_) if failed > 0 => format!("{failed} of {refits} repeated estimates do not settle"),
+        Some(_) if failed > 0 => format!("{failed} of {samples} samples of the posterior are not found"),
         Some(k) => format!("the run differs from its linear model by {} sigma", number(k)),
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };
@@ -573,11 +573,11 @@ fn mode(c: &Calibration) -> Vec<String> {
         });
     }
     out.push(match c.curvature.kappa {
-        Some(k) if c.curvature.from_refits => format!(
-            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} repeated estimates, from \
-             data and priors with errors drawn anew.",
+        Some(k) if c.curvature.from_samples => format!(
+            "Curvature {} sigma: estimates and sigmas are mean and covariance of {} samples of the posterior. \
+             Each holds by itself; errors of several together are not normally distributed.",
             number(k),
-            c.curvature.refits - c.curvature.failed
+            c.curvature.samples - c.curvature.failed
         ),
         Some(k) => format!("Curvature {} sigma (the linear covariance holds below 0.4).", number(k)),
         None => "Curvature: the run cannot be followed over what is left open.".into(),

@@ -4,10 +4,9 @@
 //! Unknowns that a prior alone determines may be far from their estimates, and bend into the others: drifts
 //! times angles enter at second order. The gate is `kappa = max |r(x +- a) - r(x) +- J a|` in sigma over the
 //! longest axes a of the posterior. Below 0.4 the covariance of the linear model holds. Above, mean and
-//! covariance are those of many estimates, each from data and priors with errors drawn anew (randomise, then
-//! optimise; Bardsley, Solonen, Haario, Laine 2014, doi:10.1137/140964023).
+//! covariance are those of weighted samples of the posterior ([`super::posterior`]).
 //!
-//! Beyond `MOST`, where another minimum is nearly as low, or where repeated estimates do not converge, no
+//! Beyond `MOST`, where another minimum is nearly as low, or where few samples have most of the weight, no
 //! covariance describes the errors, and all estimates are left open. Nothing is wrong with such a record:
 //! with the priors it is not informative enough at these drifts. Attempts to keep some of the estimates
 //! failed. They used the change of each estimate from the linear model, and the scatter of repeated
@@ -19,7 +18,8 @@ use obsdeg_ekf::Manifold;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
 
 use super::CalibrationError;
-use super::estimate::{Draw, Estimate, Problem};
+use super::estimate::{Estimate, Problem};
+use super::posterior::Sample;
 use crate::least_squares::{Information, Linearised};
 
 /// Number of the longest axes of the posterior that are tried.
@@ -27,33 +27,36 @@ const AXES: usize = 8;
 /// Threshold of an axis in sigmas of all measurements: the square of the angle by which the axis turns the
 /// platform must exceed it to count.
 const SEEN: f64 = 0.1;
-/// Curvature from which on estimates are repeated: it grows with the square of the distance, so that of 0.4
+/// Curvature from which on the posterior is sampled: it grows with the square of the distance, so that of 0.4
 /// at one sigma is 3.6 sigma at three (a record of p1 p2 with 0.82 had a NEES of 81 on 15 by the linear
 /// model).
-const REPEATED: f64 = 0.4;
-/// Curvature from which on no estimate stands without repeated ones, and other minima are sought.
+const SAMPLED: f64 = 0.4;
+/// Curvature from which on no estimate stands without samples, and other minima are sought.
 pub(super) const BENT: f64 = 1.0;
 /// Largest curvature, in sigma, at which records and priors determine the estimates.
 const MOST: f64 = 20.0;
-/// Reciprocal of the fraction of repeated estimates that may fail to converge. Failures are the extremes,
-/// which the covariance then lacks: two of 2,400 right records, with 8 and 6 failures of 80, had a NEES of
-/// 444 on 15 and of 60 on 12.
+/// Reciprocal of the fraction of samples that may not be found: they are the extremes.
 const FAILED: usize = 40;
-/// Fewest repeated estimates, and their number per unknown.
-const REFITS: (usize, usize) = (80, 4);
-/// Largest product of bins, squared unknowns and repeated estimates.
+/// Fewest samples, and their number per unknown.
+const SAMPLES: (usize, usize) = (80, 4);
+/// Fraction of that number which the effective one must reach, by up to `MORE` times as many samples.
+const MOSTLY: f64 = 0.9;
+const MORE: usize = 4;
+/// Least effective number of samples beside the number of unknowns.
+const LEAST: f64 = 30.0;
+/// Largest product of bins, squared unknowns and samples.
 const WORK: f64 = 2e9;
 
-/// Curvature of an estimate, with mean and covariance of repeated estimates where it matters.
+/// Curvature of an estimate, with mean and covariance of the posterior where it matters.
 #[derive(Debug, Clone)]
 pub(crate) struct Bent {
     /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is
     /// nearly as low.
     pub kappa: f64,
-    /// Number of repeated estimates; `failed` of them did not converge.
-    pub refits: usize,
+    /// Number of samples; `failed` of them were not found.
+    pub samples: usize,
     pub failed: usize,
-    /// Mean of the repeated estimates about the estimate, and a root (n x any) of their covariance.
+    /// Mean of the samples about the estimate, and a root (n x any) of their covariance.
     pub found: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
@@ -64,6 +67,15 @@ impl Bent {
     }
 }
 
+/// Weights of samples, with sum one, and their effective number (Kish).
+fn weighed(all: &[Sample]) -> (Vec<f64>, f64) {
+    let most = all.iter().map(|s| s.weight).fold(f64::NEG_INFINITY, f64::max);
+    let own: Vec<f64> = all.iter().map(|s| (s.weight - most).exp()).collect();
+    let sum: f64 = own.iter().sum();
+    let squares: f64 = own.iter().map(|w| w * w).sum();
+    (own.iter().map(|w| w / sum).collect(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
+}
+
 impl Problem<'_> {
     /// Curvature of an estimate.
     ///
@@ -71,50 +83,38 @@ impl Problem<'_> {
     /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn bent(&self, estimate: &Estimate, seed: u64) -> Result<Bent, CalibrationError> {
         let kappa = if estimate.rivals > 0 { f64::INFINITY } else { self.kappa(estimate)? };
-        let mut out = Bent { kappa, refits: 0, failed: 0, found: None };
+        let mut out = Bent { kappa, samples: 0, failed: 0, found: None };
         let n = self.unknowns.n;
-        let refits = REFITS.0.max(REFITS.1 * n);
+        let wanted = SAMPLES.0.max(SAMPLES.1 * n);
         let bins: usize = self.runs.iter().map(|run| run.len()).sum();
-        let work = (bins * n * n * refits) as f64;
-        if !(REPEATED..=MOST).contains(&kappa) || work > WORK || !estimate.converged || self.stopped.get() {
+        let work = (bins * n * n * wanted) as f64;
+        if !(SAMPLED..=MOST).contains(&kappa) || work > WORK || !estimate.converged || self.stopped.get() {
             return Ok(out);
         }
+        let Some(equation) = self.equation(estimate)? else { return Ok(out) };
         let mut noise = Noise::new(seed, 0);
-        let mut all: Vec<DVector<f64>> = Vec::with_capacity(refits);
-        for _ in 0..refits {
+        let mut all: Vec<Sample> = Vec::with_capacity(wanted);
+        let (mut weights, mut effective) = (Vec::new(), 0.0);
+        while out.samples < wanted || (effective < MOSTLY * wanted as f64 && out.samples < MORE * wanted) {
             if self.stopped.get() {
                 return Ok(out);
             }
-            out.refits += 1;
-            let draw = Some(self.drawn(estimate, &mut noise));
-            let other = Problem {
-                conditions: self.conditions,
-                runs: self.runs,
-                unknowns: self.unknowns,
-                sigmas: self.sigmas.clone(),
-                known: self.known.clone(),
-                draw,
-                going: self.going,
-                passes: self.passes.clone(),
-                stopped: self.stopped.clone(),
-            };
-            let settled = other.settle(estimate.at.x.clone());
-            self.passes.set(other.passes.get());
-            self.stopped.set(other.stopped.get());
-            match settled {
-                Ok(e) if e.converged => all.push(self.between(&estimate.at.x, &e.at.x)),
-                _ => out.failed += 1,
+            out.samples += 1;
+            match self.sample(&equation, estimate, &mut noise) {
+                Some(sample) => all.push(sample),
+                None => out.failed += 1,
             }
+            (weights, effective) = weighed(&all);
         }
-        let m = all.len();
-        if m < n + 10 || FAILED * out.failed > out.refits {
+        if effective < n as f64 + LEAST || FAILED * out.failed > out.samples {
             return Ok(out);
         }
-        let mean = all.iter().fold(DVector::zeros(n), |s, x| s + x) / m as f64;
+        let mean = all.iter().zip(&weights).fold(DVector::zeros(n), |s, (x, w)| s + &x.x * *w);
         // the inverse of a covariance from so few samples is too large by this factor (Hartlap, Simon,
         // Schneider 2007, doi:10.1051/0004-6361:20066170)
-        let scale = 1.0 / ((m - n - 2) as f64).sqrt();
-        let root = DMatrix::from_fn(n, m, |i, j| (all[j][i] - mean[i]) * scale);
+        let scale = effective / (effective - n as f64 - 2.0);
+        let root =
+            DMatrix::from_fn(n, all.len(), |i, j| (all[j].x[i] - mean[i]) * (scale * weights[j]).sqrt());
         out.found = Some((mean, root));
         Ok(out)
     }
@@ -126,32 +126,6 @@ impl Problem<'_> {
             index.iter().zip(to.local(from)).for_each(|(&i, d)| out[i] = d);
         }
         out
-    }
-
-    /// Errors with the distribution of the estimate: of every measurement, with the random drift until then,
-    /// and of the priors.
-    fn drawn(&self, estimate: &Estimate, noise: &mut Noise) -> Draw {
-        let of_run = |run: &Linearised, noise: &mut Noise| {
-            let (mut d, mut scratch) = (vec![0.0; run.states()], Vec::new());
-            let mut out = Vec::with_capacity(run.residuals.len());
-            for (stage, root) in run.stages.iter().zip(&run.roots) {
-                stage.transition.apply(&mut d, &mut scratch);
-                for column in root.column_iter() {
-                    let xi = noise.normal();
-                    d.iter_mut().zip(column.iter()).for_each(|(d, g)| *d += g * xi);
-                }
-                for output in &stage.outputs {
-                    let seen: f64 = output.h.iter().map(|&(j, c)| c * d[j]).sum();
-                    out.push(seen + output.r.sqrt() * noise.normal());
-                }
-            }
-            out
-        };
-        let all = estimate.at.runs.iter().map(|(run, _)| of_run(run, noise)).collect();
-        let (held, known) = self.beside_data();
-        let held = DVector::from_fn(held, |_, _| noise.normal());
-        let known = DVector::from_fn(known, |_, _| noise.normal());
-        Draw { noise: all, held, known }
     }
 
     /// Longest axes of the posterior that can cause curvature, one standard deviation long.

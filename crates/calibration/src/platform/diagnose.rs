@@ -382,9 +382,9 @@ impl Parts<'_> {
             assumed: self.assumed(&unknowns),
             curvature: Curvature {
                 kappa: self.bent.kappa.is_finite().then_some(self.bent.kappa),
-                refits: self.bent.refits,
+                samples: self.bent.samples,
                 failed: self.bent.failed,
-                from_refits: self.bent.found.is_some(),
+                from_samples: self.bent.found.is_some(),
             },
             setup: Setup::of(self.scheme),
             rests_on: self.rests_on.clone(),

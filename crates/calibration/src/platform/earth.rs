@@ -160,7 +160,6 @@ impl Parts<'_> {
             unknowns: own.unknowns,
             sigmas: own.sigmas.clone(),
             known: own.known.clone(),
-            draw: None,
             going: own.going,
             passes: own.passes.clone(),
             stopped: own.stopped.clone(),

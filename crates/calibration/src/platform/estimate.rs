@@ -168,7 +168,7 @@ impl Unknowns {
 
     /// Rows that constrain the loose directions within `width` times the prior, with the least information
     /// that does so, and rows of the biases and the stated priors.
-    fn holding(&self, width: f64) -> DMatrix<f64> {
+    pub(super) fn holding(&self, width: f64) -> DMatrix<f64> {
         let weighted =
             DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / self.prior[i]);
         let q = if weighted.ncols() == 0 { weighted } else { weighted.qr().q() };
@@ -206,26 +206,12 @@ pub(crate) struct Problem<'a> {
     pub sigmas: Vec<f64>,
     /// Prior information on some combinations: rows and values in SI units, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
-    /// Errors that are added to measurements and priors, for one of the repeated estimates; `None`: no
-    /// errors.
-    pub draw: Option<Draw>,
     /// Progress callback, called for every linearisation; the iteration ends when it returns false.
     pub going: &'a dyn Fn(Going<'_>) -> bool,
     /// Number of linearisations.
     pub passes: Cell<usize>,
     /// True if the callback returned false.
     pub stopped: Cell<bool>,
-}
-
-/// Drawn errors of the data, in units of the data.
-#[derive(Debug, Clone)]
-pub(crate) struct Draw {
-    /// Errors of every measurement, by run, in the order of the rows.
-    pub noise: Vec<Vec<f64>>,
-    /// Errors of the rows that constrain unknowns; `known` has those of the prior information (unit
-    /// variance).
-    pub held: DVector<f64>,
-    pub known: DVector<f64>,
 }
 
 /// All runs, linearised at the estimate.
@@ -266,12 +252,7 @@ impl Problem<'_> {
         }
         let each = self.runs.iter().zip(&x).enumerate();
         let runs = each.map(|(r, (run, x))| run.along_parts(self.conditions, &self.sigmas, x, nodes(r)));
-        let mut runs = runs.collect::<Result<Vec<_>, _>>()?;
-        if let Some(draw) = &self.draw {
-            for ((run, _), noise) in runs.iter_mut().zip(&draw.noise) {
-                run.residuals.iter_mut().zip(noise).for_each(|(r, e)| *r += e);
-            }
-        }
+        let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let information =
             runs.iter().map(|(run, _)| Information::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
         let mut cost: f64 = information.iter().map(Information::at_zero).sum();
@@ -300,27 +281,13 @@ impl Problem<'_> {
     }
 
     /// Residuals at `x` of the rows that constrain unknowns about their first estimates.
-    fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
-        let left = rows * self.unknowns.to_first(x);
-        match &self.draw {
-            Some(draw) => left + &draw.held,
-            None => left,
-        }
+    pub(super) fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
+        rows * self.unknowns.to_first(x)
     }
 
     /// Residuals at `x` of the rows of the prior information.
-    fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
-        let Some((_, values)) = &self.known else { return DVector::zeros(0) };
-        let left = values - rows * self.values(x);
-        match &self.draw {
-            Some(draw) => left + &draw.known,
-            None => left,
-        }
-    }
-
-    /// Numbers of constraining rows, and of rows of the prior information.
-    pub(super) fn beside_data(&self) -> (usize, usize) {
-        (self.unknowns.holding(BOX).nrows(), self.known.as_ref().map_or(0, |(_, v)| v.len()))
+    pub(super) fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
+        self.known.as_ref().map_or_else(|| DVector::zeros(0), |(_, values)| values - rows * self.values(x))
     }
 
     /// Next step from `at`, with a pull to it `weak` times as weak as the prior.

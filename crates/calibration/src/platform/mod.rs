@@ -16,6 +16,7 @@ mod mistaken;
 mod next;
 mod observe;
 mod offset;
+mod posterior;
 mod reading;
 mod residuals;
 mod run;
@@ -354,7 +355,6 @@ pub fn calibrate(
             unknowns: &unknowns,
             sigmas: sigmas.clone(),
             known: known.clone(),
-            draw: None,
             going,
             passes: Cell::new(passes),
             stopped: Cell::new(false),

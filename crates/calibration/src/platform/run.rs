@@ -47,6 +47,13 @@ const RATE_S: f64 = 1.0;
 /// drifts: it makes the covariance definite.
 const AROUND: f64 = 1e-3;
 
+/// Distance in time of the values whose differences give second derivatives, in s.
+const BEND_S: f64 = 10.0;
+/// Largest usual second derivative of Z in g/s^2: drifts of 30 deg/h that turn with the earth.
+const BENDS: f64 = 2e-8;
+/// Change of a mean by curvature, in sigma, below which the mean is that of a line.
+const FLAT: f64 = 0.003;
+
 /// Rate at which the platform drifts from `x`, in local coordinates (shape n, 1/s).
 fn rate(motion: &impl Motion<PlatformState>, x: &PlatformState) -> Result<Vec<f64>, EkfError> {
     let mut moved = x.clone();
@@ -55,6 +62,21 @@ fn rate(motion: &impl Motion<PlatformState>, x: &PlatformState) -> Result<Vec<f6
     out[3 * x.attitudes()..].fill(0.0);
     out.iter_mut().for_each(|d| *d /= RATE_S);
     Ok(out)
+}
+
+/// Second derivatives of the outputs from `x` on, in units of the outputs per s^2.
+fn bend(
+    motion: &(impl Motion<PlatformState> + Measurement<PlatformState>),
+    x: &PlatformState,
+) -> Result<Vec<f64>, EkfError> {
+    let mut later = x.clone();
+    let mut values = || -> Result<Vec<f64>, EkfError> {
+        let here = motion.h(0.0, &later).iter().copied().collect();
+        motion.advance(0.0, BEND_S, &mut later)?;
+        Ok(here)
+    };
+    let [a, b, c] = [values()?, values()?, values()?];
+    Ok(a.iter().zip(b).zip(c).map(|((a, b), c)| (a - 2.0 * b + c) / (BEND_S * BEND_S)).collect())
 }
 
 /// Root of the noise of a step with that of a change of position at its end: its time is uniform within
@@ -256,14 +278,19 @@ impl Run {
             let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
             let mut outputs = Vec::new();
             if let Some((position, i)) = self.bins[segment] {
+                let channels = &self.reading.bins[position][i].channels;
+                let bent = channels.iter().flatten().any(|mean| {
+                    mean.bend * BENDS > FLAT * mean.variance.sqrt() * if mean.given { 1.0 } else { sigmas[0] }
+                });
+                let bend = if bent { bend(&motion, &x)? } else { vec![0.0; channels.len()] };
                 let (h, rows) = (motion.h(0.0, &x), Measurement::jacobian(&motion, 0.0, &x));
-                for (channel, mean) in self.reading.bins[position][i].channels.iter().enumerate() {
+                for (channel, mean) in channels.iter().enumerate() {
                     let Some(mean) = mean.filter(|_| self.counts[bin][channel]) else { continue };
                     let row = rows.row(channel);
                     let h_of = row.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
                     let r = mean.variance * if mean.given { 1.0 } else { sigmas[channel] * sigmas[channel] };
                     outputs.push(ScalarOutput { h: h_of, r });
-                    out.residuals.push(mean.value - h[channel]);
+                    out.residuals.push(mean.value - h[channel] - bend[channel] * mean.bend);
                     keys.push(Key { position, bin, channel });
                 }
                 bin += 1;

@@ -164,7 +164,8 @@ mod tests {
     use crate::platform::observe::observe;
     use crate::record::Record;
 
-    /// Three positions with turns of 1 deg/s between them, and a minimal record.
+    /// Three positions with turns of 1 deg/s between them, and a minimal record: a sample is a bin, without the
+    /// curvature within bins, which the rows omit.
     fn run(terms: &str) -> (Run, Conditions, Vec<f64>) {
         let attitudes = ["NUE", "ENU", "DSW"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
@@ -179,11 +180,11 @@ mod tests {
         };
         let plan = Plan::new(&scheme, &conditions).expect("a plan");
         let line = |k: u32| {
-            let t = 10.0 * f64::from(k + 1);
+            let t = 50.0 * f64::from(k + 1);
             let z = [1.0, 2.0, 3.0].map(|c: f64| 1e-6 * (c * t).sin());
             format!("{t},{},{},{}\n", z[0], z[1], z[2])
         };
-        let rows: String = (0..(plan.duration_s() / 10.0) as u32).map(line).collect();
+        let rows: String = (0..(plan.duration_s() / 50.0) as u32).map(line).collect();
         let text = format!("t [s],Z1 [g],Z2 [g],Z3 [g]\n{rows}");
         let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
         let sigmas = vec![1e-5; plan.components.len()];

@@ -115,7 +115,7 @@ fn a_prior_counts_once() {
         .expect("calibrated");
     // by the linear covariance, not by repeated estimates
     for c in [&a, &one_by_one, &at_once] {
-        assert!(!c.curvature.from_refits, "{:?}", c.curvature);
+        assert!(!c.curvature.from_samples, "{:?}", c.curvature);
     }
     for (name, _) in prior {
         let (s, t) = (sigma(&one_by_one, name), sigma(&at_once, name));
