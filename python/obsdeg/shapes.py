@@ -4340,7 +4340,7 @@ class SystemCalibration(Shape):
     """Number of intervals at rest; null if the file does not ask for them."""
     begins: float | None
     """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than 100 times its own
-    length after 0 starts with its first row.
+    length after 0 (10 times where no start is known and nothing depends on the time) starts with its first row.
     """
     rows: int
     """Number of rows that the model is fitted to: those of the record, or the intervals and the runs between them."""

@@ -161,19 +161,23 @@ pub struct Column {
 }
 
 /// Seconds since 1970-01-01T00:00Z of a date with a time (ISO 8601, UTC where no offset is given), such as
-/// `2026-11-23T10:00:00.25+01:00`; a blank may replace T.
+/// `2026-11-23T10:00:00.25+01:00`; a blank may replace T. A date with points is day, month, year.
 fn unix_seconds(text: &str) -> Option<f64> {
     let (date, time) = text.split_once(['T', ' '])?;
     let whole = |text: &str, digits: usize| {
         let is = text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
         text.parse::<i64>().ok().filter(|_| is)
     };
-    let mut parts = date.split('-');
-    let (year, month, day) = (whole(parts.next()?, 4)?, whole(parts.next()?, 2)?, whole(parts.next()?, 2)?);
+    let mut parts: Vec<&str> = date.split('-').collect();
+    if date.contains('.') {
+        parts = date.rsplit('.').collect();
+    }
+    let &[year, month, day] = &parts[..] else { return None };
+    let (year, month, day) = (whole(year, 4)?, whole(month, 2)?, whole(day, 2)?);
     let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
     let days = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let valid = (1..=12).contains(&month) && (1..=*days.get(month as usize - 1)?).contains(&day);
-    if parts.next().is_some() || !valid {
+    if !valid {
         return None;
     }
     let (time, offset) = match time.find(['Z', '+', '-']) {
@@ -528,7 +532,11 @@ impl Record {
         let found = own.unit.as_ref().and_then(|u| units.iter().find(|(name, _)| name == u));
         found.map(|&(_, scale)| Wanted { column, scale: scale * own.count }).ok_or_else(|| {
             let each: Vec<String> = units.iter().map(|(u, _)| format!("`{} [{u}]`", own.name)).collect();
-            self.unit(column, format!("a unit, {}", each.join(" or ")))
+            let dates = match (&own.unit, own.name.as_str()) {
+                (None, "t") => ", or dates such as 2026-11-23 09:00:00.5",
+                _ => "",
+            };
+            self.unit(column, format!("a unit, {}{dates}", each.join(" or ")))
         })
     }
 
@@ -686,6 +694,7 @@ impl Cell {
         match field {
             Field::Double(x) => Self::Number(*x),
             Field::Float(x) => Self::Number(f64::from(*x)),
+            Field::Float16(x) => Self::Number(f64::from(*x)),
             Field::Int(x) => Self::Number(f64::from(*x)),
             Field::Short(x) => Self::Number(f64::from(*x)),
             Field::UInt(x) => Self::Number(f64::from(*x)),
@@ -804,6 +813,7 @@ mod tests {
             ("2000-02-29T12:00:00Z", 951_825_600.0),
             ("2026-11-23T10:00:00.25+01:00", 1_795_424_400.25),
             ("2026-11-23 09:00", 1_795_424_400.0),
+            ("23.11.2026 09:00", 1_795_424_400.0),
             ("1969-12-31T23:59:59.5Z", -0.5),
             ("2100-03-01T00:00:00Z", 4_107_542_400.0),
         ] {
@@ -811,6 +821,9 @@ mod tests {
         }
         for text in [
             "2026-11-23",
+            "11.23.2026 09:00",
+            "23.11.2026.1 09:00",
+            "11/23/2026 09:00",
             "2026-02-29T00:00",
             "2026-13-01T00:00",
             "2026-11-23T24:00",

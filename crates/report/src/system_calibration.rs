@@ -201,17 +201,17 @@ impl Answer for SystemCalibration {
                 self.samples
             )
         }));
+        let starts = match self.begins {
+            Some(t) => {
+                format!("with the first row, at t = {t}: the record begins many times its length after 0")
+            }
+            None => "at t = 0".into(),
+        };
         read.push(format!(
-            "{} rows; inputs that are columns are held from a row to the next; states start at t = 0; {} \
+            "{} rows; inputs that are columns are held from a row to the next; states start {starts}; {} \
              times the usual steps of integration; seed {}",
             self.rows, self.substeps, self.seed
         ));
-        if let Some(t) = self.begins {
-            read.push(format!(
-                "the record begins at t = {t}, more than 100 times its length after 0: the model starts with \
-                 its first row"
-            ));
-        }
         if !self.ignored.is_empty() {
             read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
         }

@@ -164,8 +164,8 @@ mod tests {
     use crate::platform::observe::observe;
     use crate::record::Record;
 
-    /// Three positions with turns of 1 deg/s between them, and a minimal record: a sample is a bin, without the
-    /// curvature within bins, which the rows omit.
+    /// Three positions with turns of 1 deg/s between them, and a minimal record. Each sample is a bin:
+    /// the rows omit the curvature within bins.
     fn run(terms: &str) -> (Run, Conditions, Vec<f64>) {
         let attitudes = ["NUE", "ENU", "DSW"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };

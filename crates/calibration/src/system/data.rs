@@ -150,6 +150,7 @@ impl Columns {
 pub(super) fn read(
     record: Record,
     model: &SystemModel,
+    clock: f64,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
@@ -258,22 +259,19 @@ pub(super) fn read(
     } else {
         // rows of each experiment together
         rows.sort_by_key(|r| r.experiment);
-        begins = from_first_rows(&mut rows);
+        begins = from_first_rows(&mut rows, clock);
     }
     let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
     Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
 }
 
-/// Ratio of first time to duration from which a record uses another clock than the model.
-const CLOCK: f64 = 100.0;
-
-/// Changes times to those from the first row of every experiment, if all experiments use another clock than
-/// the model. Returns the time of the first row.
-fn from_first_rows(rows: &mut [Data]) -> Option<f64> {
+/// Changes times to those from the first row of every experiment, if all experiments begin more than `clock`
+/// times their duration after 0. Returns the time of the first row.
+fn from_first_rows(rows: &mut [Data], clock: f64) -> Option<f64> {
     let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
     let other = |of: &[Data]| {
         let (first, last) = (of[0].t, of[of.len() - 1].t);
-        last > first && first > CLOCK * (last - first)
+        last > first && first > clock * (last - first)
     };
     if rows.is_empty() || !all().all(other) {
         return None;

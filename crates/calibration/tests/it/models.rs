@@ -300,6 +300,7 @@ fn times_of_another_clock() {
     let date = |t: f64| format!("2026-11-23T09:00:{t:07.4}Z");
     for (text, begins) in [
         (rows("t", &|t| (t + 1e5).to_string()), 1e5),
+        (rows("t", &|t| (t + 150.0).to_string()), 150.0),
         (rows("t", &|t| format!("{:.4}", t + 1_795_424_400.0)), 1_795_424_400.0),
         (rows("t", &date), 1_795_424_400.0),
     ] {
@@ -310,7 +311,7 @@ fn times_of_another_clock() {
         assert_eq!(c.begins, Some(begins));
     }
     // milliseconds where the model has seconds, and a start long before the record
-    for text in [rows("t", &|t| (1e3 * t).to_string()), rows("t", &|t| (t + 900.0).to_string())] {
+    for text in [rows("t", &|t| (1e3 * t).to_string()), rows("t", &|t| (t + 90.0).to_string())] {
         let e = calibrated(&DECAY.replace("step = 0.1", "step = 0.001"), &text, &options());
         let e = e.err().map(|e| e.to_string()).expect("refused");
         assert!(e.contains("steps of integration of at most 0.001; expected at most 55000"), "{e}");
