@@ -4339,8 +4339,9 @@ class SystemCalibration(Shape):
     intervals: int | None
     """Number of intervals at rest; null if the file does not ask for them."""
     begins: float | None
-    """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than 100 times its own
-    length after 0 (10 times where no start is known and nothing depends on the time) starts with its first row.
+    """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than its own length
+    after 0 (100 times its length where a start is known; never where functions of the time count) starts with its first row, as then
+    each experiment does.
     """
     rows: int
     """Number of rows that the model is fitted to: those of the record, or the intervals and the runs between them."""

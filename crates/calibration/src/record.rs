@@ -192,7 +192,9 @@ fn unix_seconds(text: &str) -> Option<f64> {
     let mut parts = time.split(':');
     let (hour, minute) = (whole(parts.next()?, 2)?, whole(parts.next()?, 2)?);
     let second = match parts.next() {
-        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => text.parse::<f64>().ok()?,
+        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => {
+            text.replacen(',', ".", 1).parse::<f64>().ok()?
+        }
         Some(_) => return None,
         None => 0.0,
     };
@@ -814,6 +816,7 @@ mod tests {
             ("2026-11-23T10:00:00.25+01:00", 1_795_424_400.25),
             ("2026-11-23 09:00", 1_795_424_400.0),
             ("23.11.2026 09:00", 1_795_424_400.0),
+            ("23.11.2026 09:00:00,5", 1_795_424_400.5),
             ("1969-12-31T23:59:59.5Z", -0.5),
             ("2100-03-01T00:00:00Z", 4_107_542_400.0),
         ] {

@@ -540,11 +540,12 @@ fn mode(c: &Calibration) -> Vec<String> {
             .collect::<Vec<_>>()
             .join(", ")
     };
+    let what = if c.curvature.from_samples { "means" } else { "the most probable values" };
     let mut out = vec![if c.assumed.priors.is_empty() {
         "Data alone: no prior is stated, so none is in an estimate that the record determines.".to_string()
     } else {
         format!(
-            "Priors as stated: estimates are the most probable values by the record and these priors (1 sigma): {}.",
+            "Priors as stated: estimates are {what} by the record and these priors (1 sigma): {}.",
             listed(&c.assumed.priors)
         )
     }];

@@ -203,7 +203,7 @@ impl Answer for SystemCalibration {
         }));
         let starts = match self.begins {
             Some(t) => {
-                format!("with the first row, at t = {t}: the record begins many times its length after 0")
+                format!("with the first row of a run (at t = {t}), since the record begins long after 0")
             }
             None => "at t = 0".into(),
         };

@@ -9,11 +9,12 @@ use crate::answer::Finding;
 
 /// Fewest measurements of two records at the same times of the scheme.
 const FEWEST: usize = 20;
-/// Largest difference of these times, in intervals between rows.
-const TOGETHER: f64 = 0.25;
+/// Largest difference of these times, in intervals between rows or lengths of bins: fewer rows of a bin have
+/// another middle.
+const TOGETHER: f64 = 0.5;
 /// Least correlation of the differences of copies, and its least size in standard deviations of that of
 /// independent records (of independent numbers: that of differences is a fifth larger).
-const COPIED: f64 = 0.5;
+const COPIED: f64 = 0.4;
 const SIGMAS: f64 = 6.0;
 
 /// Measurement: channel and position, time in s, normalised residual.
@@ -44,7 +45,8 @@ impl Parts<'_> {
         let mut out = Vec::new();
         for (a, own) in each.iter().enumerate() {
             for (b, others) in each.iter().enumerate().take(a) {
-                let within = TOGETHER * runs[a].reading.interval.min(runs[b].reading.interval);
+                let interval = runs[a].reading.interval.min(runs[b].reading.interval);
+                let within = TOGETHER * interval.max(self.problem.conditions.step_s);
                 let pairs = together(own, others, within);
                 let neighbours = pairs.windows(2).filter(|w| w[0].0 == w[1].0);
                 let steps: Vec<(f64, f64)> = neighbours.map(|w| (w[1].1 - w[0].1, w[1].2 - w[0].2)).collect();

@@ -181,7 +181,10 @@ pub enum CalibrationError {
     #[error("interrupted before anything was estimated")]
     Interrupted,
     /// No unknown is determined.
-    #[error("nothing is determined by these records: no unknown and no combination")]
+    #[error(
+        "nothing is determined by these records: no unknown and no combination; expected several measurements of \
+         each position (samples within --step are one)"
+    )]
     Nothing,
     /// No record was given.
     #[error("found no record; expected one of each run of the scheme, at least one")]

@@ -72,6 +72,14 @@ fn weighted(run: &Linearised, residuals: &[f64]) -> Result<DVector<f64>, Calibra
     Ok(DVector::from_vec(out))
 }
 
+/// Normal vectors in pairs of opposite sign (n x `pairs` of one sign), scaled so that their covariance is
+/// exactly the identity: a linear problem has exactly its own covariance then. Needs as many pairs as n.
+pub(super) fn normal_pairs(n: usize, pairs: usize, noise: &mut Noise) -> Option<DMatrix<f64>> {
+    let all = DMatrix::from_fn(n, pairs, |_, _| noise.normal());
+    let root = (&all * all.transpose() / pairs as f64).cholesky()?;
+    root.l_dirty().solve_lower_triangular(&all)
+}
+
 impl Problem<'_> {
     /// Equation of the samples about an estimate; `None` if its information is singular.
     ///
@@ -117,11 +125,9 @@ impl Problem<'_> {
         out
     }
 
-    /// One sample; `None` if its equation is not solved.
-    pub(super) fn sample(&self, of: &Equation, estimate: &Estimate, noise: &mut Noise) -> Option<Sample> {
-        let n = self.unknowns.n;
-        let eps = DVector::from_fn(n, |_, _| noise.normal());
-        let towards = of.root.l_dirty().lower_triangle() * &eps;
+    /// Sample for `eps`; `None` if its equation is not solved.
+    pub(super) fn sample(&self, of: &Equation, estimate: &Estimate, eps: &DVector<f64>) -> Option<Sample> {
+        let towards = of.root.l_dirty().lower_triangle() * eps;
         // what is left of the equation, in sigma
         let left = |at: &At| of.root.l_dirty().solve_lower_triangular(&(self.pull(of, at) + &towards));
         let mut at = self.at(estimate.at.x.clone()).ok()?;
@@ -151,5 +157,19 @@ impl Problem<'_> {
             (length, at) = next?;
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean and covariance of the drawn vectors are exactly those of the normal distribution.
+    #[test]
+    fn pairs_have_covariance_one() {
+        let half = normal_pairs(15, 60, &mut Noise::new(1, 0)).expect("enough pairs");
+        let covariance = &half * half.transpose() / 60.0;
+        assert!((covariance - DMatrix::identity(15, 15)).amax() < 1e-12);
+        assert!(normal_pairs(15, 14, &mut Noise::new(1, 0)).is_none());
     }
 }

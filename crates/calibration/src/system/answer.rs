@@ -56,8 +56,8 @@ pub struct SystemCalibration {
     /// Number of intervals at rest; null if the file does not ask for them.
     pub intervals: Option<usize>,
     /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins
-    /// more than 100 times its own length after 0 (10 times where no start is known and nothing depends on
-    /// the time) starts with its first row.
+    /// more than its own length after 0 (100 times its length where a start is known; never where functions
+    /// of the time count) starts with its first row, as then each experiment does.
     pub begins: Option<f64>,
     /// Number of rows that the model is fitted to: those of the record, or the intervals and the runs between
     /// them.

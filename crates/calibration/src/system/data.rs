@@ -265,15 +265,15 @@ pub(super) fn read(
     Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
 }
 
-/// Changes times to those from the first row of every experiment, if all experiments begin more than `clock`
-/// times their duration after 0. Returns the time of the first row.
+/// Changes times to those from the first row of every experiment, if an experiment begins more than `clock`
+/// times its duration after 0. Returns the time of the first row.
 fn from_first_rows(rows: &mut [Data], clock: f64) -> Option<f64> {
     let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
     let other = |of: &[Data]| {
         let (first, last) = (of[0].t, of[of.len() - 1].t);
         last > first && first > clock * (last - first)
     };
-    if rows.is_empty() || !all().all(other) {
+    if rows.is_empty() || !all().any(other) {
         return None;
     }
     let begins = rows[0].t;

@@ -63,7 +63,7 @@ pub struct SystemOptions {
 
 /// Ratio of first time to duration from which a record uses another clock than the model; the first where the
 /// states of the model may be those at any time.
-const LONG_AFTER: f64 = 10.0;
+const LONG_AFTER: f64 = 1.0;
 const OTHER_CLOCK: f64 = 100.0;
 
 /// Calibrates `model` from a record.
@@ -77,9 +77,14 @@ pub fn calibrate_system(
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let compiled = model.compile()?;
-    // without known starts or functions of time, the states may be those at any time
-    let anytime = model.states.iter().all(|s| s.start == StateStart::Unknown) && !compiled.uses_time();
-    let data = read(record, model, if anytime { LONG_AFTER } else { OTHER_CLOCK }, going)?;
+    // without known starts or functions of time, the states may be those at any time; functions have the time
+    // of the record
+    let clock = match model.states.iter().all(|s| s.start == StateStart::Unknown) {
+        _ if compiled.uses_time() => f64::INFINITY,
+        true => LONG_AFTER,
+        false => OTHER_CLOCK,
+    };
+    let data = read(record, model, clock, going)?;
     let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
     let own = digest(model);
     let again = options.prior.as_ref().and_then(|b| Some((b, basis.among(&b.rests_on)?)));

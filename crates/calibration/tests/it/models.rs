@@ -301,6 +301,7 @@ fn times_of_another_clock() {
     for (text, begins) in [
         (rows("t", &|t| (t + 1e5).to_string()), 1e5),
         (rows("t", &|t| (t + 150.0).to_string()), 150.0),
+        (rows("t", &|t| (t + 15.0).to_string()), 15.0),
         (rows("t", &|t| format!("{:.4}", t + 1_795_424_400.0)), 1_795_424_400.0),
         (rows("t", &date), 1_795_424_400.0),
     ] {
@@ -310,9 +311,27 @@ fn times_of_another_clock() {
         }
         assert_eq!(c.begins, Some(begins));
     }
-    // milliseconds where the model has seconds, and a start long before the record
-    for text in [rows("t", &|t| (1e3 * t).to_string()), rows("t", &|t| (t + 90.0).to_string())] {
-        let e = calibrated(&DECAY.replace("step = 0.1", "step = 0.001"), &text, &options());
+    // a function of time has the time of the record, and no start is shifted then
+    let driven = "states = { x = '-k*x + a*u' }\nparameters = ['k', 'a']\noutputs = { z = 'x' }\n\
+        known_inputs = { u = { function = 'exp(-0.02*t)' } }\n[simulation]\nvalues = { x = 1, k = 1, a = 1 }\n\
+        step = 0.1\nnoise = { z = 0.001 }";
+    let mut normal = normals(5);
+    let text = (0..100).fold("t,z\n".to_string(), |all, i| {
+        let s = 0.1 * f64::from(i);
+        // x = 3 at 30 s, k = 0.5, a = 2
+        let driven = |t: f64| 2.0 / 0.48 * (-0.02 * t).exp();
+        let x = driven(30.0 + s) + (3.0 - driven(30.0)) * (-0.5 * s).exp();
+        format!("{all}{},{}\n", 30.0 + s, x + 1e-3 * normal())
+    });
+    let c = calibrated(driven, &text, &options()).expect("calibrated");
+    let [k, a] = ["k", "a"].map(|n| found(&c.quantities, n).estimate.expect("determined"));
+    assert!((k - 0.5).abs() < 5e-3 && (a - 2.0).abs() < 5e-3 && c.begins.is_none(), "{k} {a}");
+    // milliseconds where the model has seconds, and a known start long before the record
+    let known = DECAY.replace("x = '-k*x'", "x = { equation = '-k*x', initial = 2 }");
+    assert_ne!(known, DECAY);
+    let long_before = rows("t", &|t| (t + 90.0).to_string());
+    for (model, text) in [(DECAY, rows("t", &|t| (1e3 * t).to_string())), (&known, long_before)] {
+        let e = calibrated(&model.replace("step = 0.1", "step = 0.001"), &text, &options());
         let e = e.err().map(|e| e.to_string()).expect("refused");
         assert!(e.contains("steps of integration of at most 0.001; expected at most 55000"), "{e}");
     }
