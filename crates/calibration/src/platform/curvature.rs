@@ -7,12 +7,12 @@
 //! covariance are those of weighted samples of the posterior ([`super::posterior`]).
 //!
 //! Beyond `MOST`, where another minimum is nearly as low, or where few samples have most of the weight, no
-//! covariance describes the errors, and all estimates are left open. So are they where a sample is not found,
-//! since the posterior goes on there (one such record of 3,000 had a NEES of 520 on 12). Nothing is wrong
-//! with such a record: with the priors it is not informative enough at these drifts. Attempts to keep some of the
-//! estimates failed. They used the change of each estimate from the linear model, and the scatter of repeated
-//! estimates. In a test with 20 records of p1 p2 at three times the paper's drifts, one record had 14
-//! estimates that moved by less than a quarter of a sigma. Together they were off by 160.
+//! covariance describes the errors, and all estimates are left open. So are they where a sample is not
+//! found, since the posterior goes on there (one such record of 3,000 had a NEES of 520 on 12). Nothing is
+//! wrong with such a record: with the priors it is not informative enough at these drifts. Attempts to keep
+//! some of the estimates failed. They used the change of each estimate from the linear model, and the
+//! scatter of repeated estimates. In a test with 20 records of p1 p2 at three times the paper's drifts, one
+//! record had 14 estimates that moved by less than a quarter of a sigma. Together they were off by 160.
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::Manifold;
