@@ -1,8 +1,8 @@
 //! Records that are copies of each other, with other times, digits or fewer rows: the noise of one is that of
 //! the other, which counts twice then.
 //!
-//! What a model does not explain is alike in all records of a platform, but smooth: differences of
-//! neighbouring residuals are compared.
+//! What a model does not explain is alike in all records of a platform, but smooth: second
+//! differences of neighbouring residuals are compared.
 
 use super::diagnose::{MeasurementResidual, Parts};
 use crate::answer::Finding;
@@ -11,14 +11,16 @@ use crate::answer::Finding;
 const FEWEST: usize = 20;
 /// Largest difference of these times, in intervals between rows or lengths of bins: fewer rows of a bin have
 /// another middle.
-const TOGETHER: f64 = 0.5;
-/// Least correlation of the differences of copies, and its least size in standard deviations of that of
-/// independent records (of independent numbers: that of differences is a fifth larger).
+const TOGETHER: f64 = 0.3;
+/// Least correlation of these differences of copies, and its least size in standard deviations of that of
+/// independent records (of independent numbers: that of these differences is two fifths larger).
 const COPIED: f64 = 0.4;
 const SIGMAS: f64 = 6.0;
 
 /// Measurement: channel and position, time in s, normalised residual.
 type Normalised = ((usize, usize), f64, f64);
+/// Channel and position, and the residuals of two records there.
+type Pair = ((usize, usize), f64, f64);
 
 impl Parts<'_> {
     /// Measurements of run `r`, by channel, position and time.
@@ -48,8 +50,9 @@ impl Parts<'_> {
                 let interval = runs[a].reading.interval.min(runs[b].reading.interval);
                 let within = TOGETHER * interval.max(self.problem.conditions.step_s);
                 let pairs = together(own, others, within);
-                let neighbours = pairs.windows(2).filter(|w| w[0].0 == w[1].0);
-                let steps: Vec<(f64, f64)> = neighbours.map(|w| (w[1].1 - w[0].1, w[1].2 - w[0].2)).collect();
+                let neighbours = pairs.windows(3).filter(|w| w[0].0 == w[2].0);
+                let steps: Vec<(f64, f64)> =
+                    neighbours.map(|w| (bend(w, |p| p.1), bend(w, |p| p.2))).collect();
                 let sum = |of: fn(&(f64, f64)) -> f64| steps.iter().map(of).sum::<f64>();
                 let correlation = sum(|p| p.0 * p.1) / (sum(|p| p.0 * p.0) * sum(|p| p.1 * p.1)).sqrt();
                 let least = COPIED.max(SIGMAS / (steps.len() as f64).sqrt());
@@ -63,8 +66,13 @@ impl Parts<'_> {
     }
 }
 
+/// Second difference of a residual over three neighbours.
+fn bend(w: &[Pair], of: fn(&Pair) -> f64) -> f64 {
+    of(&w[0]) - 2.0 * of(&w[1]) + of(&w[2])
+}
+
 /// Residuals of two records at the same times, to `within` s: channel and position, and both residuals.
-fn together(own: &[Normalised], others: &[Normalised], within: f64) -> Vec<((usize, usize), f64, f64)> {
+fn together(own: &[Normalised], others: &[Normalised], within: f64) -> Vec<Pair> {
     let mut rest = others.iter().peekable();
     let of = |&(place, t, x): &Normalised| {
         while rest.next_if(|o| o.0 < place || o.0 == place && o.1 < t - within).is_some() {}
