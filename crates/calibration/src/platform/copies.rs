@@ -1,8 +1,8 @@
 //! Records that are copies of each other, with other times, digits or fewer rows: the noise of one is that of
 //! the other, which counts twice then.
 //!
-//! What a model does not explain is alike in all records of a platform, but smooth: second
-//! differences of neighbouring residuals are compared.
+//! Errors that the model lacks are in all records of a platform, but their effects are smooth. So differences
+//! of differences of neighbouring residuals are compared.
 
 use super::diagnose::{MeasurementResidual, Parts};
 use crate::answer::Finding;

@@ -179,7 +179,7 @@ pub(crate) struct Parts<'a> {
     pub prediction: &'a Prediction,
     pub problem: &'a Problem<'a>,
     pub estimate: &'a Estimate,
-    /// Last step by the linear model: the covariance of the estimate may be that of repeated estimates.
+    /// Last step by the linear model: the covariance of the estimate may be that of samples.
     pub linear: &'a Solution,
     pub bent: &'a Bent,
     pub found: &'a Diagnosed,

@@ -164,7 +164,7 @@ impl Problem<'_> {
 mod tests {
     use super::*;
 
-    /// Mean and covariance of the drawn vectors are exactly those of the normal distribution.
+    /// The covariance of the drawn vectors is the identity.
     #[test]
     fn pairs_have_covariance_one() {
         let half = normal_pairs(15, 60, &mut Noise::new(1, 0)).expect("enough pairs");

@@ -279,8 +279,11 @@ impl Run {
             let mut outputs = Vec::new();
             if let Some((position, i)) = self.bins[segment] {
                 let channels = &self.reading.bins[position][i].channels;
-                let bent = channels.iter().flatten().any(|mean| {
-                    mean.bend * BENDS > FLAT * mean.variance.sqrt() * if mean.given { 1.0 } else { sigmas[0] }
+                let bent = channels.iter().zip(sigmas).any(|(mean, sigma)| {
+                    let bends = |m: &Mean| {
+                        m.bend * BENDS > FLAT * m.variance.sqrt() * if m.given { 1.0 } else { *sigma }
+                    };
+                    mean.as_ref().is_some_and(bends)
                 });
                 let bend = if bent { bend(&motion, &x)? } else { vec![0.0; channels.len()] };
                 let (h, rows) = (motion.h(0.0, &x), Measurement::jacobian(&motion, 0.0, &x));

@@ -150,7 +150,7 @@ impl Columns {
 pub(super) fn read(
     record: Record,
     model: &SystemModel,
-    clock: f64,
+    clock: Clock,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
@@ -265,15 +265,33 @@ pub(super) fn read(
     Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
 }
 
-/// Changes times to those from the first row of every experiment, if an experiment begins more than `clock`
-/// times its duration after 0. Returns the time of the first row.
-fn from_first_rows(rows: &mut [Data], clock: f64) -> Option<f64> {
+/// Clock of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Clock {
+    /// Any: states may start with the first row of every experiment, and do where an experiment begins more
+    /// than its duration after 0.
+    Any,
+    /// Another than that of the model, if all experiments begin more than 100 times their duration after 0.
+    Other,
+    /// That of the model: functions of the time count.
+    Model,
+}
+
+/// Changes times to those from the first row of every experiment, if the clock is not that of the model.
+/// Returns the time of the first row.
+fn from_first_rows(rows: &mut [Data], clock: Clock) -> Option<f64> {
     let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
     let other = |of: &[Data]| {
         let (first, last) = (of[0].t, of[of.len() - 1].t);
-        last > first && first > clock * (last - first)
+        let least = if clock == Clock::Any { 1.0 } else { 100.0 };
+        last > first && first > least * (last - first)
     };
-    if rows.is_empty() || !all().any(other) {
+    let shifted = match clock {
+        Clock::Any => all().any(other),
+        Clock::Other => !rows.is_empty() && all().all(other),
+        Clock::Model => false,
+    };
+    if !shifted {
         return None;
     }
     let begins = rows[0].t;

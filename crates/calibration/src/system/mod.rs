@@ -33,7 +33,7 @@ use crate::levels;
 use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
-use data::{Read, read};
+use data::{Clock, Read, read};
 use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
@@ -61,11 +61,6 @@ pub struct SystemOptions {
     pub seed: u64,
 }
 
-/// Ratio of first time to duration from which a record uses another clock than the model; the first where the
-/// states of the model may be those at any time.
-const LONG_AFTER: f64 = 1.0;
-const OTHER_CLOCK: f64 = 100.0;
-
 /// Calibrates `model` from a record.
 ///
 /// # Errors
@@ -79,10 +74,11 @@ pub fn calibrate_system(
     let compiled = model.compile()?;
     // without known starts or functions of time, the states may be those at any time; functions have the time
     // of the record
-    let clock = match model.states.iter().all(|s| s.start == StateStart::Unknown) {
-        _ if compiled.uses_time() => f64::INFINITY,
-        true => LONG_AFTER,
-        false => OTHER_CLOCK,
+    let free = model.states.iter().all(|s| s.start == StateStart::Unknown) && model.constraints.is_empty();
+    let clock = match free {
+        _ if compiled.uses_time() => Clock::Model,
+        true => Clock::Any,
+        false => Clock::Other,
     };
     let data = read(record, model, clock, going)?;
     let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
