@@ -161,6 +161,22 @@ pub enum Finding {
         /// Slew rate of the record, in deg/s; null where the scheme states none for all slews.
         slew_rate_deg_s: Option<f64>,
     },
+    /// Clock of a record that was set forward during the run: with the times behind a gap corrected, the model
+    /// explains the records.
+    ClockJump {
+        /// Name of the record with this finding.
+        record: String,
+        /// Line number of the first row behind the jump.
+        line: u64,
+        /// Position of the rows before and behind the jump, or both positions if they differ.
+        place: String,
+        /// Time of the last row before the jump, in s as in the record.
+        from_s: f64,
+        /// Time by which the clock was set forward, in s.
+        by_s: f64,
+        /// Chi-square per degree of freedom with the times corrected, dimensionless.
+        chi_square: f64,
+    },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
     Clock {
         /// Name of the record with this finding.

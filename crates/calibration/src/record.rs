@@ -158,6 +158,8 @@ pub struct Column {
     pub text: String,
     /// True if the cells are dates (ISO 8601), which are read as Unix seconds.
     pub dates: bool,
+    /// First cell, or type of the cells, where these are no plain numbers and no dates.
+    pub other: Option<String>,
 }
 
 /// Seconds since 1970-01-01T00:00Z of a date with a time (ISO 8601, UTC where no offset is given), such as
@@ -216,7 +218,14 @@ impl Column {
             None => (whole, None),
         };
         let sound = !name.is_empty() && !name.contains(']');
-        sound.then(|| Self { name: name.into(), unit, count: 1.0, text: whole.into(), dates: false })
+        sound.then(|| Self {
+            name: name.into(),
+            unit,
+            count: 1.0,
+            text: whole.into(),
+            dates: false,
+            other: None,
+        })
     }
 }
 
@@ -435,6 +444,12 @@ impl Record {
                 (column.unit, column.dates) = (Some("s".into()), true);
                 column.count = if nanos(field) { 1e-9 } else { 1.0 };
             }
+            column.other = match field.get_basic_info().logical_type_ref() {
+                Some(LogicalType::Time { .. }) => Some("times of a day".into()),
+                Some(LogicalType::Date) => Some("dates without a time".into()),
+                Some(LogicalType::String) => Some("texts".into()),
+                _ => None,
+            };
         }
         Ok(Self { name: name.into(), columns, rows: Rows::Parquet(reader), written: None })
     }
@@ -468,6 +483,8 @@ impl Record {
         for (column, cell) in columns.iter_mut().zip(&lines.cells) {
             if column.unit.is_none() && unix_seconds(cell).is_some() {
                 (column.unit, column.dates) = (Some("s".into()), true);
+            } else if !cell.is_empty() && number(cell, lines.separator).is_none() {
+                column.other = Some(format!("`{cell}`"));
             }
         }
         Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines), written })
@@ -538,7 +555,8 @@ impl Record {
                 (None, "t") => ", or dates such as 2026-11-23 09:00:00.5",
                 _ => "",
             };
-            self.unit(column, format!("a unit, {}{dates}", each.join(" or ")))
+            let found = own.other.as_ref().map_or_else(String::new, |other| format!("; found {other}"));
+            self.unit(column, format!("a unit, {}{dates}{found}", each.join(" or ")))
         })
     }
 
@@ -835,6 +853,11 @@ mod tests {
             "2026-11-23T10",
         ] {
             assert_eq!(unix_seconds(text), None, "{text}");
+        }
+        for cell in ["23.11.26 09:00:00", "11/23/2026 9:00 AM"] {
+            let record = Record::csv("r.csv", Box::new(std::io::Cursor::new(format!("t,f [g]\n{cell},1\n"))));
+            let e = record.expect("a header").wanted(0, &[("s", 1.0)]).expect_err("refused").to_string();
+            assert!(e.ends_with(&format!("or dates such as 2026-11-23 09:00:00.5; found `{cell}`")), "{e}");
         }
         let rows = all("t,f [g]\n2026-11-23T09:00:00Z,1\n2026-11-23T09:00:00.5Z,2\n").expect("rows");
         assert_eq!(rows[1].1, [Some(1_795_424_400.5), Some(2.0)]);

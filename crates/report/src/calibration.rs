@@ -209,6 +209,13 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             };
             by_changes.unwrap_or_else(by_rates)
         }
+        Finding::ClockJump { record, line, place, from_s, by_s, chi_square } => format!(
+            "the clock{} was set forward by {by_s:.3} s behind {from_s:.3} s ({place}, before line {line}): with \
+             the times from there on less by that, the model explains the records (chi-square {} per degree of \
+             freedom)",
+            of(record, records),
+            number(*chi_square)
+        ),
         Finding::Copy { record, other, correlation } => format!(
             "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a copy, \
              and counts twice"

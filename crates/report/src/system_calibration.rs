@@ -1,6 +1,8 @@
 //! A calibration of any system.
 
-use obsdeg_calibration::system::{OtherStarts, SystemCalibration, SystemEstimated, SystemFinding};
+use obsdeg_calibration::system::{
+    OtherStarts, StatesStart, SystemCalibration, SystemEstimated, SystemFinding,
+};
 
 use crate::calibration::{COEFFICIENTS, with_coefficients};
 use crate::document::{Block, Document, estimate, left, number, optional, right};
@@ -201,11 +203,16 @@ impl Answer for SystemCalibration {
                 self.samples
             )
         }));
-        let starts = match self.begins {
-            Some(t) => {
+        let t = self.begins.unwrap_or(0.0);
+        let starts = match (self.states_start, self.before_first_row) {
+            (StatesStart::FarRows, _) => {
                 format!("with the first row of a run (at t = {t}), since the record begins long after 0")
             }
-            None => "at t = 0".into(),
+            (StatesStart::Rows, _) => format!("with the first row of a run (at t = {t}), as `time` asks for"),
+            (StatesStart::Model, None) => format!("at t = {t}"),
+            (StatesStart::Model, Some(before)) => format!(
+                "at t = {t}, {before} before the first row (`time` in the file sets where a run begins)"
+            ),
         };
         read.push(format!(
             "{} rows; inputs that are columns are held from a row to the next; states start {starts}; {} \

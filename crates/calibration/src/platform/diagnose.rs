@@ -14,6 +14,7 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 
 use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
+use super::jump::Jump;
 use super::observe::{By, channel_name};
 use super::offset::{Later, Offset};
 use super::run::Key;
@@ -187,6 +188,8 @@ pub(crate) struct Parts<'a> {
     pub offsets: &'a [Option<Offset>],
     /// Change of the measurements with the beginning, by run; `None` unless labels leave the beginning open.
     pub later: &'a [Option<Later>],
+    /// Jump of a clock that explains an inconsistent fit.
+    pub jump: Option<Jump>,
     pub too_many: Option<usize>,
     pub known: Vec<String>,
     pub rests_on: Vec<setup::Basis>,
@@ -506,13 +509,15 @@ impl Parts<'_> {
     }
 
     fn records(&self) -> Vec<RecordReport> {
+        let changes: Vec<_> =
+            (0..self.problem.runs.len()).map(|r| self.clock_by_changes(r).ok().flatten()).collect();
         let of = |(r, run): (usize, &super::run::Run)| RecordReport {
             clock: Clock {
                 offset_s: matches!(run.reading.by, By::Timeline | By::Both).then_some(run.reading.origin),
                 offset_sigma_s: self.offsets[r].as_ref().map(|o| o.sigma),
                 by_durations: run.reading.by_durations(self.planned),
-                by_changes: self.clock_by_changes(r).ok().flatten(),
-                by_earth: self.clock_by_rates(r).ok().flatten(),
+                by_changes: changes[r].as_ref().map(|c| c.rate.clone()),
+                by_earth: self.clock_by_rates(r, changes[r].as_ref()).ok().flatten(),
             },
             name: run.reading.name.clone(),
             samples: run.reading.samples,

@@ -37,6 +37,14 @@ const LARGEST: f64 = 1.0 / 3.0;
 const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
 
+/// Clock of a run by its changes of position.
+#[derive(Debug, Clone)]
+pub(super) struct ByChanges {
+    pub rate: ClockRate,
+    /// Delay of the beginning of the scheme with this clock, in s.
+    pub late_s: f64,
+}
+
 impl Parts<'_> {
     /// Sum of squares of all runs, with `instead` in place of run `r`, and all unknowns free.
     fn left_with(&self, r: usize, instead: &Run, conditions: &Conditions) -> Result<f64, CalibrationError> {
@@ -53,7 +61,7 @@ impl Parts<'_> {
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn clock_by_changes(&self, r: usize) -> Result<Option<ClockRate>, CalibrationError> {
+    pub(super) fn clock_by_changes(&self, r: usize) -> Result<Option<ByChanges>, CalibrationError> {
         let own = &self.problem.runs[r];
         if !matches!(own.reading.by, By::Timeline | By::Both) {
             return Ok(None);
@@ -74,7 +82,8 @@ impl Parts<'_> {
         let both = left(1.0, 1.0)?;
         let tolerance = self.scheme.recording.tolerance.unwrap_or(TOLERANCE);
         // what rows say of a beginning that is open depends on the clock
-        let known = own.reading.open.map_or(tolerance * interval, |_| FREE * interval) / step;
+        let open = own.reading.open.is_some() || own.reading.origin.abs() > tolerance * interval;
+        let known = if open { FREE } else { tolerance } * interval / step;
         let cross = both - late - fast + same;
         let hessian = Matrix2::new(
             same - 2.0 * late + later + 2.0 / (known * known),
@@ -85,20 +94,30 @@ impl Parts<'_> {
         let slope = Vector2::new(-3.0 * same + 4.0 * late - later, -3.0 * same + 4.0 * fast - faster) / 2.0;
         let Some(inverse) = hessian.cholesky().map(|c| c.inverse()) else { return Ok(None) };
         let scale = step / last;
-        let (fast, sigma) = (-(inverse * slope)[1] * scale, (2.0 * inverse[(1, 1)]).sqrt() * scale);
-        let near = (fast.abs() + sigma) * last <= MOST_ROWS * interval;
-        Ok(near.then_some(ClockRate { fast, sigma }))
+        let [late, fast] = (-(inverse * slope)).into();
+        let rate = ClockRate { fast: fast * scale, sigma: (2.0 * inverse[(1, 1)]).sqrt() * scale };
+        let near = (rate.fast.abs() + rate.sigma) * last <= MOST_ROWS * interval;
+        Ok(near.then_some(ByChanges { rate, late_s: late * step }))
     }
 
     /// Fraction by which the clock of run `r` is fast, by the best fit of the rates of the earth and of turns
     /// with all unknowns free. The result is the minimum of a parabola through the sums of squares at three
-    /// rates; `None` where they are nearly equal.
+    /// rates; `None` where they are nearly equal. If the changes of position show a wrong clock, the rates
+    /// are those by this clock.
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn clock_by_rates(&self, r: usize) -> Result<Option<ClockRate>, CalibrationError> {
+    pub(super) fn clock_by_rates(
+        &self,
+        r: usize,
+        changes: Option<&ByChanges>,
+    ) -> Result<Option<ClockRate>, CalibrationError> {
         let own = &self.problem.runs[r];
         let mut reading = own.reading.clone();
+        let changes = changes.filter(|c| (c.rate.fast / c.rate.sigma).powi(2) > SEEN);
+        if let Some(c) = changes {
+            reading = reading.later(c.late_s).stretched(c.rate.fast);
+        }
         if matches!(reading.by, By::Timeline | By::Both) {
             // as with labels, so that turns may take less time
             let ends = bounds(self.planned).into_iter().map(|(_, end)| end);
@@ -124,7 +143,8 @@ impl Parts<'_> {
         {
             return Ok(None);
         }
-        Ok(Some(found))
+        let before = changes.map_or(0.0, |c| c.rate.fast);
+        Ok(Some(ClockRate { fast: found.fast + before, ..found }))
     }
 
     /// Run and conditions in which the earth and the platform turn `1 + by` times as fast as in the scheme.

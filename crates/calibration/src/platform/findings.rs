@@ -21,6 +21,11 @@ const APART: f64 = 2.0;
 impl Parts<'_> {
     /// Findings against a calibration, with the measurements that it left out.
     pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOut]) -> Vec<Finding> {
+        if let Some(jump) = self.clock_jump() {
+            // everything else is by times that are wrong
+            let interrupted = self.interrupted.then_some(Finding::Interrupted);
+            return interrupted.into_iter().chain([jump]).collect();
+        }
         let mut out = Vec::new();
         if self.interrupted {
             out.push(Finding::Interrupted);
@@ -71,6 +76,21 @@ impl Parts<'_> {
             out.push(Finding::SecondPath { difference });
         }
         out
+    }
+
+    /// Finding on a clock that was set forward during the run.
+    fn clock_jump(&self) -> Option<Finding> {
+        let jump = self.jump?;
+        let reading = &self.problem.runs[jump.run].reading;
+        let gap = reading.gaps(self.scheme).swap_remove(jump.gap);
+        Some(Finding::ClockJump {
+            record: reading.name.clone(),
+            line: gap.line,
+            place: gap.place,
+            from_s: gap.from_s,
+            by_s: jump.by,
+            chi_square: jump.chi_square,
+        })
     }
 
     /// Finding on the turns of a run. Where positions last longer by the same factor, the clock is wrong.

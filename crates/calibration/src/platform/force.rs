@@ -220,7 +220,7 @@ impl Forces {
             let (position, length_g) = (names[p].to_string(), format!("{:.4}", length(&force)));
             return Err(Box::new(Mistaken::ForceUnit { record, line, columns, position, length_g, units }));
         }
-        let mut rows = self.suspects.iter().filter_map(|suspect| {
+        let mut rows = self.suspects.iter().filter(|suspect| !self.has_code(suspect)).filter_map(|suspect| {
             let like = |f: &[f64; 3]| self.is_beside(suspect, f, attitudes);
             let (columns, units) = other_units(&[suspect.2], columns?, units, &like)?;
             Some((suspect.1, columns, units, format!("{:.4}", length(&suspect.2))))
@@ -241,6 +241,13 @@ impl Forces {
             })),
             None => Ok(()),
         }
+    }
+
+    /// True if a suspect has a component that is equal to the last digit at another position: a code of missing
+    /// values, since forces differ from position to position.
+    fn has_code(&self, &(p, _, force): &(usize, u64, [f64; 3])) -> bool {
+        let mut others = self.suspects.iter().filter(|other| other.0 != p);
+        others.any(|(_, _, other)| force.iter().zip(other).any(|(a, b)| a == b))
     }
 
     /// True if `force` agrees with the nearest samples of 1 g about a suspect in the record.

@@ -111,9 +111,17 @@ fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) ->
     let s = scatter(usual).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
     let mut out: Vec<(usize, f64, Why)> = Vec::new();
     let far = (CODE * s).max(STEPS * median(usual.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
+    // an output that gets stuck holds a value that fits the row before; a code does not
+    let mut gets_stuck = vec![false; n];
+    let mut start = 0;
+    for run in values.chunk_by(|a, b| a == b) {
+        let near = start > 0 && (values[start] - values[start - 1]).abs() <= far;
+        gets_stuck[start..start + run.len()].fill(near && run.len() >= STUCK);
+        start += run.len();
+    }
     for (i, &x) in values.iter().enumerate() {
         let off = beside(values, i);
-        if (x == 0.0 || count(x) > 1) && off.abs() * weights[i] > far {
+        if (x == 0.0 || count(x) > 1) && off.abs() * weights[i] > far && !gets_stuck[i] {
             out.push((i, off * weights[i] / s, Why::Code));
         }
     }
@@ -212,7 +220,7 @@ pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
     // a run of equal values that a window ends in
     let held: Vec<(usize, f64)> =
         out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
-    for cell in out.iter_mut().filter(|c| c.why == Why::Far && held.contains(&(c.axis, c.value))) {
+    for cell in out.iter_mut().filter(|c| held.contains(&(c.axis, c.value))) {
         (cell.why, cell.sigmas) = (Why::Stuck, 0.0);
     }
     out.sort_by_key(|c| (c.lines, c.axis));

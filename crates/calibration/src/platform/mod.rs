@@ -10,6 +10,7 @@ mod findings;
 mod force;
 mod goodness;
 mod gross;
+mod jump;
 mod length;
 mod minimum;
 mod mistaken;
@@ -346,6 +347,7 @@ pub fn calibrate(
     unknowns.determined_by(&prior);
     let mut x: Vec<PlatformState> =
         runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
+    let first = x.clone();
     let (mut round, mut passes, mut too_many) = (0, 0, None);
     let lay = |reading: Reading| Run::new(reading, scheme, &planned, &own);
     let mut rivals = 0;
@@ -422,6 +424,7 @@ pub fn calibrate(
                 root.set_column(columns, &(&o.direction * o.sigma));
             }
             let later = problem.later(&estimate, &lay)?;
+            let jump = problem.jump(&estimate, &first, &lay)?;
             let parts = diagnose::Parts {
                 scheme,
                 conditions,
@@ -435,6 +438,7 @@ pub fn calibrate(
                 found: &found,
                 offsets: &offsets,
                 later: &later,
+                jump,
                 too_many: too_many.filter(|_| many),
                 known: known_names,
                 rests_on,

@@ -55,10 +55,14 @@ pub struct SystemCalibration {
     pub samples: usize,
     /// Number of intervals at rest; null if the file does not ask for them.
     pub intervals: Option<usize>,
-    /// Time of the record at which the model starts, in its unit; null where that is 0. A record that begins
-    /// more than its own length after 0 (100 times its length where a start is known; never where functions
-    /// of the time count) starts with its first row, as then each experiment does.
+    /// Time of the record at which the states start (those of the first experiment), in the unit of the model;
+    /// null where that is 0.
     pub begins: Option<f64>,
+    /// Rule of the start of the states.
+    pub states_start: StatesStart,
+    /// Time from the start of the states to the first row, in the unit of the model, where it is longer than the
+    /// record; null elsewhere.
+    pub before_first_row: Option<f64>,
     /// Number of rows that the model is fitted to: those of the record, or the intervals and the runs between
     /// them.
     pub rows: usize,
@@ -162,6 +166,20 @@ pub struct OutputFit {
     pub whiteness_probability: Option<f64>,
 }
 
+/// Rule of the start of the states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StatesStart {
+    /// Time at which the model lets a run begin (`time` in its file; 0 without it).
+    Model,
+    /// First row of every experiment, as the model asks for (`time = "generic"`).
+    Rows,
+    /// First row of every experiment, since the record begins long after 0 and the model states no time: more
+    /// than the length of an experiment where no start is known, more than 100 times the length of every
+    /// experiment where a start or a constraint is known and no function depends on the time.
+    FarRows,
+}
+
 /// Ends of the starts that did not lead to the solution. The numbers and that of the starts that led there
 /// add up to the number of starts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
@@ -245,13 +263,14 @@ pub enum SystemCalibrationError {
     },
     /// The times need too many integration steps.
     #[error(
-        "{record}: its times, up to {last}, take {found} steps of integration of at most {longest}; expected \
-         at most {most}: times in the unit of the model that begin at its start, or a longer `step` under [simulation]"
+        "{record}: its times, up to {last} after the start of the states, take {found} steps of integration of at \
+         most {longest}; expected at most {most}: times in the unit of the model that begin at its start (`time` in \
+         the file sets it), or a longer `step` under [simulation]"
     )]
     TooLong {
         /// Name of the record.
         record: String,
-        /// Last time.
+        /// Last time, from the start of the states.
         last: f64,
         /// Number of steps that the times need.
         found: f64,

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use obsdeg_core::model::Still;
-use obsdeg_core::system::{KnownInput, ModelError, SystemModel};
+use obsdeg_core::system::{KnownInput, ModelError, StartTime, StateStart, SystemModel};
 
-use super::answer::SystemCalibrationError;
+use super::answer::{StatesStart, SystemCalibrationError};
 use super::units;
 use crate::Going;
 use crate::record::{MOST, Record, RecordError, Row, Wanted};
@@ -42,8 +42,10 @@ pub(super) struct Read {
     pub(super) digest: String,
     pub(super) ignored: Vec<String>,
     pub(super) samples: usize,
-    /// Time of the record at the start of the model; `None` if it is 0.
-    pub(super) begins: Option<f64>,
+    /// Time of the record at which the states of each experiment start; `t` of a row is the time from it.
+    pub(super) origins: Vec<f64>,
+    /// Rule of `origins`.
+    pub(super) states_start: StatesStart,
     /// Number of intervals at rest; `None` unless they are sought.
     pub(super) intervals: Option<usize>,
 }
@@ -150,7 +152,7 @@ impl Columns {
 pub(super) fn read(
     record: Record,
     model: &SystemModel,
-    clock: Clock,
+    uses_time: bool,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
@@ -160,6 +162,11 @@ pub(super) fn read(
     let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
     let mut rows: Vec<Data> = Vec::new();
     let segments = model.segments.len().max(1);
+    let least = match model.time {
+        StartTime::Zero => 0.0,
+        StartTime::Generic => f64::NEG_INFINITY,
+        at @ StartTime::At { .. } => at.number(),
+    };
     // segment and time of the last row of every experiment
     let mut reached = vec![(0, f64::NEG_INFINITY); experiments];
     let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
@@ -203,8 +210,9 @@ pub(super) fn read(
             return Err(refuse(&texts[0], t.to_string(), &expected));
         }
         reached[experiment] = (segment, t);
-        if t < 0.0 && still.is_none() {
-            return Err(refuse(&texts[0], t.to_string(), "a time from 0, the start of the model, on"));
+        if t < least && still.is_none() {
+            let expected = format!("a time from {least}, where the run of the model begins, on");
+            return Err(refuse(&texts[0], t.to_string(), &expected));
         }
         let value = |i: usize| row.numbers[i];
         let sigma = |i: Option<usize>| -> Result<Option<f64>, SystemCalibrationError> {
@@ -241,7 +249,9 @@ pub(super) fn read(
         Ok(())
     };
     let digest = record.read(&columns.wanted, columns.label, true, take)?;
-    let (samples, mut intervals, mut begins) = (rows.len(), None, None);
+    let (samples, mut intervals) = (rows.len(), None);
+    let begins = if least.is_finite() { least } else { 0.0 };
+    let (mut rule, mut origins) = (StatesStart::Model, vec![begins; experiments]);
     if let Some(still) = still {
         let place =
             |name: &String| columns.inputs.iter().position(|(k, _)| model.known_inputs[*k].0.name == *name);
@@ -259,47 +269,68 @@ pub(super) fn read(
     } else {
         // rows of each experiment together
         rows.sort_by_key(|r| r.experiment);
-        begins = from_first_rows(&mut rows, clock);
+        let given = |k: usize| columns.inputs.iter().any(|(of, _)| *of == k);
+        let of_time = |k: usize| model.simulation.inputs.contains_key(&model.known_inputs[k].0.name);
+        let uses_time = uses_time || (0..model.known_inputs.len()).any(|k| !given(k) && of_time(k));
+        rule = states_start(&rows, model, uses_time);
+        origins = from_origins(&mut rows, rule, begins, experiments);
     }
     let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
-    Ok(Read { rows, inputs, name, digest, ignored: columns.ignored, samples, begins, intervals })
+    Ok(Read {
+        rows,
+        inputs,
+        name,
+        digest,
+        ignored: columns.ignored,
+        samples,
+        origins,
+        states_start: rule,
+        intervals,
+    })
 }
 
-/// Clock of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Clock {
-    /// Any: states may start with the first row of every experiment, and do where an experiment begins more
-    /// than its duration after 0.
-    Any,
-    /// Another than that of the model, if all experiments begin more than 100 times their duration after 0.
-    Other,
-    /// That of the model: functions of the time count.
-    Model,
-}
-
-/// Changes times to those from the first row of every experiment, if the clock is not that of the model.
-/// Returns the time of the first row.
-fn from_first_rows(rows: &mut [Data], clock: Clock) -> Option<f64> {
-    let all = || rows.chunk_by(|a, b| a.experiment == b.experiment);
-    let other = |of: &[Data]| {
+/// Rule of the start of the states for `rows`, sorted by experiment. A stated `time` holds. Without it, states
+/// whose values at the start are all unknown may start with the first rows: their values are free at any time.
+fn states_start(rows: &[Data], model: &SystemModel, uses_time: bool) -> StatesStart {
+    match model.time {
+        StartTime::Generic => return StatesStart::Rows,
+        StartTime::At { .. } => return StatesStart::Model,
+        StartTime::Zero => {}
+    }
+    let mut all = rows.chunk_by(|a, b| a.experiment == b.experiment);
+    let beyond = |of: &[Data], least: f64| {
         let (first, last) = (of[0].t, of[of.len() - 1].t);
-        let least = if clock == Clock::Any { 1.0 } else { 100.0 };
         last > first && first > least * (last - first)
     };
-    let shifted = match clock {
-        Clock::Any => all().any(other),
-        Clock::Other => !rows.is_empty() && all().all(other),
-        Clock::Model => false,
+    let free = model.states.iter().all(|s| s.start == StateStart::Unknown) && model.constraints.is_empty();
+    let far = match (free, uses_time) {
+        (true, _) => all.any(|of| beyond(of, 1.0)),
+        (false, true) => false,
+        (false, false) => !rows.is_empty() && all.all(|of| beyond(of, 100.0)),
     };
-    if !shifted {
-        return None;
-    }
-    let begins = rows[0].t;
+    if far { StatesStart::FarRows } else { StatesStart::Model }
+}
+
+/// Longest time from the start of the states to the first row of an experiment, where it is longer than the
+/// experiment.
+pub(super) fn before_first_row(rows: &[Data]) -> Option<f64> {
+    let all = rows.chunk_by(|a, b| a.run == b.run);
+    let waits = all.filter(|of| of.len() > 1 && 2.0 * of[0].t > of[of.len() - 1].t).map(|of| of[0].t);
+    waits.max_by(f64::total_cmp)
+}
+
+/// Changes times of rows to those from the start of the states of their experiment: the time `begins` of the
+/// model, or the first row. Returns the starts by experiment.
+fn from_origins(rows: &mut [Data], rule: StatesStart, begins: f64, experiments: usize) -> Vec<f64> {
+    let mut origins = vec![begins; experiments];
     for of in rows.chunk_by_mut(|a, b| a.experiment == b.experiment) {
-        let first = of[0].t;
-        of.iter_mut().for_each(|row| row.t -= first);
+        let origin = &mut origins[of[0].experiment];
+        if rule != StatesStart::Model {
+            *origin = of[0].t;
+        }
+        of.iter_mut().for_each(|row| row.t -= *origin);
     }
-    Some(begins)
+    origins
 }
 
 /// Intervals at rest by the inputs `by`, as ranges of rows.

@@ -15,14 +15,15 @@ use std::cell::Cell;
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
-    Compiled, Judgement, ModelError, StateStart, SystemModel, invariant_reports, judge_compiled, symmetries,
+    Compiled, Judgement, ModelError, StartTime, StateStart, SystemModel, invariant_reports, judge_compiled,
+    symmetries,
 };
 use obsdeg_ekf::EkfError;
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::system::{FilterState, Numeric};
 
 pub use answer::{
-    OtherSolution, OtherStarts, OutputFit, Profile, SystemCalibration, SystemCalibrationError,
+    OtherSolution, OtherStarts, OutputFit, Profile, StatesStart, SystemCalibration, SystemCalibrationError,
     SystemEstimated, SystemFinding, SystemResidual,
 };
 
@@ -33,7 +34,7 @@ use crate::levels;
 use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
-use data::{Clock, Read, read};
+use data::{Read, before_first_row, read};
 use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
@@ -72,15 +73,7 @@ pub fn calibrate_system(
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let compiled = model.compile()?;
-    // without known starts or functions of time, the states may be those at any time; functions have the time
-    // of the record
-    let free = model.states.iter().all(|s| s.start == StateStart::Unknown) && model.constraints.is_empty();
-    let clock = match free {
-        _ if compiled.uses_time() => Clock::Model,
-        true => Clock::Any,
-        false => Clock::Other,
-    };
-    let data = read(record, model, clock, going)?;
+    let data = read(record, model, compiled.uses_time(), going)?;
     let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
     let own = digest(model);
     let again = options.prior.as_ref().and_then(|b| Some((b, basis.among(&b.rests_on)?)));
@@ -88,7 +81,8 @@ pub fn calibrate_system(
         let other = format!("{}, which the calibration before rests on, of the same model", other.record);
         return Err(SystemCalibrationError::SameRecord { record: basis.record, other });
     }
-    let numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
+    let mut numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
+    data.origins.iter().enumerate().for_each(|(experiment, t)| numeric.begin(experiment, *t));
     let stopped = Cell::new(false);
     let going = |now: Going<'_>| {
         stopped.set(!going(now) || stopped.get());
@@ -189,8 +183,15 @@ impl<'a> Calibrating<'a> {
         Ok(Self { model, compiled, data, options, problem, base, estimated })
     }
 
+    /// Verdicts: with functions of the time, those of almost every time where the states start with a row.
+    fn judged(&self) -> Result<Judgement, ModelError> {
+        let any_time = self.data.states_start != StatesStart::Model && self.compiled.uses_time();
+        let generic = any_time.then(|| SystemModel { time: StartTime::Generic, ..self.model.clone() });
+        judge_compiled(generic.as_ref().unwrap_or(self.model), self.compiled, self.options.seed, None)
+    }
+
     fn run(mut self) -> Result<SystemCalibration, SystemCalibrationError> {
-        let judged = judge_compiled(self.model, self.compiled, self.options.seed, None)?;
+        let judged = self.judged()?;
         let measured = self.data.rows.iter().flat_map(|r| &r.outputs).flatten().count();
         let starts = self.starts();
         let names: Vec<String> =
@@ -362,7 +363,9 @@ impl<'a> Calibrating<'a> {
             profiles,
             samples: self.data.samples,
             intervals: self.data.intervals,
-            begins: self.data.begins,
+            begins: self.data.origins.first().copied().filter(|t| *t != 0.0),
+            states_start: self.data.states_start,
+            before_first_row: before_first_row(&self.data.rows),
             rows: self.data.rows.len(),
             ignored: self.data.ignored.clone(),
             model: digest(self.model),

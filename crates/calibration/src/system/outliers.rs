@@ -18,7 +18,7 @@ impl Calibrating<'_> {
                 output,
                 experiment: row.experiment,
                 line: row.line,
-                t: row.t,
+                t: row.t + self.data.origins[row.experiment],
                 measured: row.outputs[output].unwrap_or(f64::NAN),
                 residual: at.left[i],
                 sigma: at.sigmas[i],

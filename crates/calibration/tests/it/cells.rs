@@ -129,6 +129,42 @@ fn a_code_here_and_there_is_asked_about() {
     is_near(&bench, &c, "codes");
 }
 
+/// Codes that another unit would explain, here and there in the record, are codes; rows in another unit are
+/// refused as such.
+#[test]
+fn codes_are_no_other_unit() {
+    let bench = Bench { step_s: 4.0, dropped: 0, ..bench() };
+    for code in [-1.0, 1.0] {
+        let mut own = bench.record();
+        own.iter_mut().skip(3).step_by(50).for_each(|s| s.f = [code; 3]);
+        let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+        let is_code = |f: &&Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Code, .. });
+        assert_eq!(c.findings.iter().filter(is_code).count(), 3, "{code}: {:?}", c.findings);
+        is_near(&bench, &c, "codes");
+    }
+    let mut own = bench.record();
+    own.iter_mut().skip(3).step_by(50).for_each(|s| s.f = s.f.map(|f| f * 9.80665));
+    let e = of_csv(&bench, "F,I,O,S", csv(&own)).expect_err("refused").to_string();
+    assert!(e.contains("with these numbers as [m/s^2] it is as in the rows beside it"), "{e}");
+}
+
+/// An output that gets stuck while the platform drifts far is stuck, and no code: it holds the value of a row.
+#[test]
+fn a_stuck_output_is_no_code() {
+    let drift = [[12.0, -9.0, 14.0], [5.0, 3.0, -4.0], [-2.0, 6.0, 1.0], [4.0, -5.0, 3.0]];
+    let bench = Bench { drift, dropped: 0, ..bench() };
+    let mut own = bench.record();
+    let from = own.iter().position(|s| s.label == "p3").expect("there") + 20;
+    for axis in 0..3 {
+        let value = own[from].f[axis];
+        own[from..from + 15].iter_mut().for_each(|s| s.f[axis] = value);
+    }
+    let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+    let stuck = |f: &Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Stuck, count: 14, .. });
+    assert!(c.findings.len() == 3 && c.findings.iter().all(stuck), "{:?}", c.findings);
+    is_near(&bench, &c, "stuck");
+}
+
 /// Codes in every seventh or fourth row of a column, with two rows in a bin: all are named, and nothing else.
 #[test]
 fn frequent_codes_are_asked_about() {

@@ -147,7 +147,49 @@ fn a_clock_shows_by_the_changes_of_position() {
         assert!((found.fast - fast).abs() < 4.0 * found.sigma && found.sigma < 5e-5, "{fast}: {found:?}");
         let by_changes = |f: &Finding| matches!(f, Finding::Clock { by_changes: Some(_), .. });
         assert_eq!(c.findings.iter().any(by_changes), fast != 0.0, "{fast}: {:?}", c.findings);
+        // the rates of the earth and of turns are by the same clock
+        let earth = c.records[0].clock.by_earth.as_ref().expect("seen");
+        assert!((earth.fast - fast).abs() < 4.0 * earth.sigma, "{fast}: {earth:?}");
     }
+    // a beginning at another time, which rows 4 s apart and the clock narrow down together
+    for fast in [5e-4, -3e-4] {
+        let late = by_clock(&bench, fast).into_iter().map(|s| Sample { t: s.t + 7.0, ..s });
+        let c = of_csv(&bench, "F,I,O,S", csv(&late.collect::<Vec<_>>())).expect("calibrated");
+        let clock = &c.records[0].clock;
+        for found in [&clock.by_changes, &clock.by_earth] {
+            let found = found.as_ref().unwrap_or_else(|| panic!("{fast}: {clock:?} {:?}", c.findings));
+            assert!((found.fast - fast).abs() < 4.0 * found.sigma, "{fast}: {clock:?}");
+        }
+    }
+}
+
+/// A clock that is set forward by an hour or a minute in a position or in a turn is the one finding; rows that
+/// are lost for as long are none.
+#[test]
+fn a_clock_that_is_set_forward_is_named() {
+    let drift = [[12.0, -9.0, 14.0], [5.0, 3.0, -4.0], [-2.0, 6.0, 1.0], [4.0, -5.0, 3.0]];
+    let bench = Bench { drift, dropped: 0, ..bench() };
+    let samples = bench.record();
+    let inside = samples.iter().rposition(|s| s.label == "p3").expect("there") - 60;
+    let turn = samples.iter().position(|s| s.label == "p4").expect("there");
+    for (at, by, place) in [(inside, 3600.0, "p3"), (inside, 60.0, "p3"), (turn, 3600.0, "before p4")] {
+        let set = |(k, s): (usize, &Sample)| Sample { t: s.t + if k < at { 0.0 } else { by }, ..s.clone() };
+        let own: Vec<Sample> = samples.iter().enumerate().map(set).collect();
+        let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
+        let [Finding::ClockJump { line, place: found, by_s, chi_square, .. }] = &c.findings[..] else {
+            panic!("{by} at {at}: {:?}", c.findings)
+        };
+        assert_eq!((*line, found.as_str()), (at as u64 + 2, place));
+        assert!((by_s - by).abs() < 0.5 && *chi_square < 1.2, "{by_s} {chi_square}");
+    }
+    let lost: Vec<Sample> = samples
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| !(inside..inside + 40).contains(k))
+        .map(|(_, s)| s.clone())
+        .collect();
+    let c = of_csv(&bench, "F,I,O,S", csv(&lost)).expect("calibrated");
+    assert!(c.consistent && c.records[0].gaps.len() == 1, "{:?}", c.findings);
 }
 
 /// Positions held longer or shorter than in the scheme, by a right clock: rows say when they begin and end to

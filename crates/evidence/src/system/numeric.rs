@@ -34,8 +34,8 @@ pub struct Numeric<'a> {
     constants: Vec<Vec<f64>>,
     /// Known inputs with held values, whatever the time.
     held: Vec<Option<f64>>,
-    /// Time of the model at which a run begins.
-    origin: f64,
+    /// Time of the model at which a run begins, by experiment.
+    origins: Vec<f64>,
     /// Index of the filter state of each slot, by experiment.
     columns: Vec<Vec<Option<usize>>>,
 }
@@ -102,8 +102,13 @@ impl<'a> Numeric<'a> {
             columns.push(compiled.roles.iter().map(column).collect());
         }
         let held = vec![None; model.known_inputs.len()];
-        let origin = model.time.number();
-        Ok(Self { compiled, states, names, inputs, constants, held, origin, columns })
+        let origins = vec![model.time.number(); experiments];
+        Ok(Self { compiled, states, names, inputs, constants, held, origins, columns })
+    }
+
+    /// Lets the runs of `experiment` begin at the time `t` of the model.
+    pub fn begin(&mut self, experiment: usize, t: f64) {
+        self.origins[experiment] = t;
     }
 
     /// Holds the known input `input` at a value from now on.
@@ -128,9 +133,9 @@ impl<'a> Numeric<'a> {
 
     /// Values of all nodes at a time of a part.
     fn values(&self, part: usize, t: f64, x: &[f64]) -> Vec<f64> {
-        let t = t + self.origin;
         let dag = &self.compiled.dag;
         let experiment = part / self.segments();
+        let t = t + self.origins[experiment];
         let mut values: Vec<f64> = Vec::with_capacity(dag.ops.len());
         for op in &dag.ops {
             let value = match *op {

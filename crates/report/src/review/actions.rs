@@ -1,7 +1,7 @@
 //! Recommended actions by the findings on a scheme, a model or a calibration.
 
 use obsdeg_calibration::Calibration;
-use obsdeg_calibration::answer::{Estimated, Finding, PositionFit};
+use obsdeg_calibration::answer::{CellKind, Estimated, Finding, PositionFit};
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
@@ -277,13 +277,20 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             }
         }
         .into(),
-        Finding::Cells { column, .. } => format!(
-            "Look at column `{column}` of the record: state codes of missing values as `missing` under \
-             [record]. A stuck output is no measurement."
+        Finding::Cells { column, kind_of_cells: CellKind::Code, .. } => format!(
+            "Look at column `{column}` of the record: state codes of missing values as `missing` under [record]."
+        ),
+        Finding::Cells { column, kind_of_cells: CellKind::Stuck, lines, .. } => format!(
+            "Look at column `{column}` of the record between lines {} and {}: empty the cells of a stuck output.",
+            lines.0, lines.1
         ),
         Finding::Succession { position, .. } => format!(
             "Look at the record around these lines: after a step of an output, run {position} again; where \
              the platform was disturbed, empty the cells of those rows."
+        ),
+        Finding::ClockJump { line, by_s, .. } => format!(
+            "Subtract {by_s:.3} s from the times from line {line} on, and calibrate again. Let loggers run by UTC or \
+             by a clock that nobody sets."
         ),
         Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
         Finding::Turns { .. } => {
