@@ -3351,6 +3351,26 @@ class FindingTurns(Record):
     """Slew rate of the record, in deg/s; null where the scheme states none for all slews."""
 
 
+class FindingClockJump(Record):
+    """Clock of a record that was set forward during the run: with the times behind a gap corrected, the model explains the records."""
+
+    __slots__ = ()
+
+    kind: Literal["clock_jump"]
+    record: str
+    """Name of the record with this finding."""
+    line: int
+    """Line number of the first row behind the jump."""
+    place: str
+    """Position of the rows before and behind the jump, or both positions if they differ."""
+    from_s: float
+    """Time of the last row before the jump, in s as in the record."""
+    by_s: float
+    """Time by which the clock was set forward, in s."""
+    chi_square: float
+    """Chi-square per degree of freedom with the times corrected, dimensionless."""
+
+
 class FindingClock(Record):
     """Clock of a record that does not run as fast as that of the scheme, or as the earth turns."""
 
@@ -3500,6 +3520,7 @@ Finding = Union[
     FindingSuccession,
     FindingCopy,
     FindingTurns,
+    FindingClockJump,
     FindingClock,
     FindingPosition,
     FindingNoise,
@@ -3649,7 +3670,7 @@ class Curvature(Record):
     samples: int
     """Number of weighted samples of the posterior (0 below a curvature of 0.4)."""
     failed: int
-    """Number of samples that were not found: the equation of each is solved by iteration."""
+    """Number of samples that were not found (the equation of each is solved by iteration): the first ends the search, with no estimate."""
     from_samples: bool
     """True if estimates and sigmas are mean and covariance of the samples of the posterior."""
 
@@ -4281,6 +4302,13 @@ class Profile(Record):
     flat: bool
     """True if the profile is flat: no value changes the sum of squares by more than 0.01."""
 
+StatesStart = Literal["model", "rows", "far_rows"]
+"""Rule of the start of the states. model: Time at which the model lets a run begin (`time` in its file; 0 without it). rows: First row
+of every experiment, as the model asks for (`time = 'generic'`). far_rows: First row of every experiment, since the record begins long
+after 0 and the model states no time: more than the length of an experiment where no start is known, more than 100 times the length of
+every experiment where a start or a constraint is known and no function depends on the time.
+"""
+
 
 class SystemCalibrationBasis(Record):
     """Record that estimates rest on."""
@@ -4339,10 +4367,11 @@ class SystemCalibration(Shape):
     intervals: int | None
     """Number of intervals at rest; null if the file does not ask for them."""
     begins: float | None
-    """Time of the record at which the model starts, in its unit; null where that is 0. A record that begins more than its own length
-    after 0 (100 times its length where a start is known; never where functions of the time count) starts with its first row, as then
-    each experiment does.
-    """
+    """Time of the record at which the states start (those of the first experiment), in the unit of the model; null where that is 0."""
+    states_start: StatesStart
+    """Rule of the start of the states."""
+    before_first_row: float | None
+    """Time from the start of the states to the first row, in the unit of the model, where it is longer than the record; null elsewhere."""
     rows: int
     """Number of rows that the model is fitted to: those of the record, or the intervals and the runs between them."""
     ignored: list[str]

@@ -161,8 +161,8 @@ pub enum Finding {
         /// Slew rate of the record, in deg/s; null where the scheme states none for all slews.
         slew_rate_deg_s: Option<f64>,
     },
-    /// Clock of a record that was set forward during the run: with the times behind a gap corrected, the model
-    /// explains the records.
+    /// Clock of a record that was set forward during the run: with the times behind a gap corrected, the
+    /// model explains the records.
     ClockJump {
         /// Name of the record with this finding.
         record: String,
@@ -486,7 +486,8 @@ pub struct Curvature {
     pub kappa: Option<f64>,
     /// Number of weighted samples of the posterior (0 below a curvature of 0.4).
     pub samples: usize,
-    /// Number of samples that were not found: the equation of each is solved by iteration.
+    /// Number of samples that were not found (the equation of each is solved by iteration): the first ends
+    /// the search, with no estimate.
     pub failed: usize,
     /// True if estimates and sigmas are mean and covariance of the samples of the posterior.
     pub from_samples: bool,

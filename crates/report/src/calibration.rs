@@ -210,7 +210,7 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             by_changes.unwrap_or_else(by_rates)
         }
         Finding::ClockJump { record, line, place, from_s, by_s, chi_square } => format!(
-            "the clock{} was set forward by {by_s:.3} s behind {from_s:.3} s ({place}, before line {line}): with \
+            "the clock{} was set forward by {by_s:.1} s behind {from_s:.3} s ({place}, before line {line}): with \
              the times from there on less by that, the model explains the records (chi-square {} per degree of \
              freedom)",
             of(record, records),
@@ -297,7 +297,7 @@ fn left_open(c: &Calibration) -> Option<String> {
     };
     let Curvature { kappa, samples, failed, .. } = c.curvature;
     let why = match kappa {
-        Some(_) if failed > 0 => format!("{failed} of {samples} samples of the posterior are not found"),
+        Some(_) if failed > 0 => format!("of {samples} samples of the posterior {failed} is not found"),
         Some(k) => format!("the run differs from its linear model by {} sigma", number(k)),
         None => "other values fit nearly as well, or the run cannot be followed".into(),
     };

@@ -101,14 +101,15 @@ impl Problem<'_> {
                     return Ok(out);
                 }
                 out.samples += 1;
-                match self.sample(&equation, estimate, &eps) {
-                    Some(sample) => all.push(sample),
-                    None => out.failed += 1,
-                }
+                let Some(sample) = self.sample(&equation, estimate, &eps) else {
+                    out.failed += 1;
+                    return Ok(out);
+                };
+                all.push(sample);
             }
             (weights, effective) = weighed(&all);
         }
-        if effective < n as f64 + LEAST || out.failed > 0 {
+        if effective < n as f64 + LEAST {
             return Ok(out);
         }
         let mean = all.iter().zip(&weights).fold(DVector::zeros(n), |s, (x, w)| s + &x.x * *w);

@@ -289,7 +289,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
              the platform was disturbed, empty the cells of those rows."
         ),
         Finding::ClockJump { line, by_s, .. } => format!(
-            "Subtract {by_s:.3} s from the times from line {line} on, and calibrate again. Let loggers run by UTC or \
+            "Subtract {by_s:.1} s from the times from line {line} on, and calibrate again. Let loggers run by UTC or \
              by a clock that nobody sets."
         ),
         Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
