@@ -243,8 +243,8 @@ impl Forces {
         }
     }
 
-    /// True if a suspect has a component that is equal to the last digit at another position: a code of missing
-    /// values, since forces differ from position to position.
+    /// True if a suspect has a component that is equal to the last digit at another position: a code of
+    /// missing values, since forces differ from position to position.
     fn has_code(&self, &(p, _, force): &(usize, u64, [f64; 3])) -> bool {
         let mut others = self.suspects.iter().filter(|other| other.0 != p);
         others.any(|(_, _, other)| force.iter().zip(other).any(|(a, b)| a == b))

@@ -77,9 +77,9 @@ impl Problem<'_> {
         Ok(best.map(|(_, jump)| jump))
     }
 
-    /// Fit of all runs with all measurements where the clock of run `r` was set forward in a gap, with the time
-    /// by which it was: the gap leaves that open by about an interval between rows, which is resolved if the
-    /// sum of squares is below `most`.
+    /// Fit of all runs with all measurements where the clock of run `r` was set forward in a gap, with the
+    /// time by which it was: the gap leaves that open by about an interval between rows, which is resolved if
+    /// the sum of squares is below `most`.
     fn closed(
         &self,
         r: usize,

@@ -59,7 +59,7 @@ pub enum Mistaken {
     /// Output that holds one value through a position.
     #[error(
         "{record}: column `{column}` is {value} in all {rows} rows of {position} from line {line} on, and \
-         varies at all other positions: its output was stuck or missing; leave its cells empty or record \
+         varies at all other positions: its output was stuck, saturated or missing; leave its cells empty or record \
          {position} again"
     )]
     Held {

@@ -55,13 +55,13 @@ pub struct SystemCalibration {
     pub samples: usize,
     /// Number of intervals at rest; null if the file does not ask for them.
     pub intervals: Option<usize>,
-    /// Time of the record at which the states start (those of the first experiment), in the unit of the model;
-    /// null where that is 0.
+    /// Time of the record at which the states start (those of the first experiment), in the unit of the
+    /// model; null where that is 0.
     pub begins: Option<f64>,
     /// Rule of the start of the states.
     pub states_start: StatesStart,
-    /// Time from the start of the states to the first row, in the unit of the model, where it is longer than the
-    /// record; null elsewhere.
+    /// Time from the start of the states to the first row, in the unit of the model, where it is longer than
+    /// the record; null elsewhere.
     pub before_first_row: Option<f64>,
     /// Number of rows that the model is fitted to: those of the record, or the intervals and the runs between
     /// them.

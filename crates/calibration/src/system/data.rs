@@ -289,8 +289,9 @@ pub(super) fn read(
     })
 }
 
-/// Rule of the start of the states for `rows`, sorted by experiment. A stated `time` holds. Without it, states
-/// whose values at the start are all unknown may start with the first rows: their values are free at any time.
+/// Rule of the start of the states for `rows`, sorted by experiment. A stated `time` holds. Without it,
+/// states whose values at the start are all unknown may start with the first rows: their values are free at
+/// any time.
 fn states_start(rows: &[Data], model: &SystemModel, uses_time: bool) -> StatesStart {
     match model.time {
         StartTime::Generic => return StatesStart::Rows,

@@ -148,7 +148,8 @@ fn codes_are_no_other_unit() {
     assert!(e.contains("with these numbers as [m/s^2] it is as in the rows beside it"), "{e}");
 }
 
-/// An output that gets stuck while the platform drifts far is stuck, and no code: it holds the value of a row.
+/// An output that gets stuck while the platform drifts far is stuck, and no code: it holds the value of a
+/// row.
 #[test]
 fn a_stuck_output_is_no_code() {
     let drift = [[12.0, -9.0, 14.0], [5.0, 3.0, -4.0], [-2.0, 6.0, 1.0], [4.0, -5.0, 3.0]];

@@ -163,8 +163,8 @@ fn a_clock_shows_by_the_changes_of_position() {
     }
 }
 
-/// A clock that is set forward by an hour or a minute in a position or in a turn is the one finding; rows that
-/// are lost for as long are none.
+/// A clock that is set forward by an hour or a minute in a position or in a turn is the one finding; rows
+/// that are lost for as long are none.
 #[test]
 fn a_clock_that_is_set_forward_is_named() {
     let drift = [[12.0, -9.0, 14.0], [5.0, 3.0, -4.0], [-2.0, 6.0, 1.0], [4.0, -5.0, 3.0]];

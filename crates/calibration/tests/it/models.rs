@@ -322,8 +322,8 @@ fn times_of_another_clock() {
     }
 }
 
-/// A function of the time has the time of the record, wherever the states start: x = 3 at the first row, k = 0.5,
-/// a = 2, by the closed formula of x' = -k x + a exp(-0.02 t).
+/// A function of the time has the time of the record, wherever the states start: x = 3 at the first row, k =
+/// 0.5, a = 2, by the closed formula of x' = -k x + a exp(-0.02 t).
 #[test]
 fn functions_have_the_time_of_the_record() {
     const DRIVEN: &str = "time = 0\nstates = { x = '-k*x + a*u' }\nparameters = ['k', 'a']\n\

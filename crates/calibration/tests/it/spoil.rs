@@ -349,7 +349,7 @@ fn sensors(c: &mut Cases) {
                 f[axis] = f[axis].clamp(-0.7, 0.7);
                 force(s, f)
             },
-            Says(&["Force {", "Stuck", "long", "Code"]),
+            Says(&["Force {", "Stuck", "long", "Code", "saturated"]),
         );
         for by in [1e-3, 1e-4] {
             c.each(
