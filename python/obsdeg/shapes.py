@@ -2229,6 +2229,23 @@ class CandidateGain(Record):
     """Observable degrees in the order of `required`; null for a coefficient that is not observable."""
 
 
+class AttitudeBound(Record):
+    """What one more position with the stated dwell cannot exceed, whatever its attitude. It holds by sigma alone (the bench only adds)
+    and without random drift.
+    """
+
+    __slots__ = ()
+
+    sigmas: list[Worst]
+    """Smallest sigma of each required drift coefficient by any attitude, each by itself."""
+    ratio: float | None
+    """Smallest value by any attitude of the largest ratio of sigma to requirement over these coefficients, dimensionless; null without
+    requirements on them.
+    """
+    worst_dph: float | None
+    """Smallest value by any attitude of the largest of these sigmas, in deg/h or deg/h/g; null with requirements on them."""
+
+
 class Meeting(Record):
     """Shortest dwell that meets the requirements."""
 
@@ -2289,6 +2306,10 @@ class NextPositions(Shape):
     """
     as_good: int
     """Number of extensions as good as the first, including the first."""
+    bound: AttitudeBound | None
+    """Bound over all attitudes, not the candidates alone; null unless one position is added after a calibration that determines the
+    first-order drift coefficients one by one.
+    """
     meets: Meeting | None
     """Shortest dwell, equal at all positions of the first extension, with which every requirement is met; null without requirements, or
     if no dwell up to 16 times the stated one meets them.

@@ -128,6 +128,21 @@ fn validity(n: &NextPositions) -> Vec<String> {
         ),
         false => format!("interrupted after {} extensions: another one may be better", n.examined),
     }];
+    if let Some(bound) = &n.bound {
+        let dwell = number(n.conditions.dwell_s);
+        out.extend(bound.ratio.map(|ratio| {
+            format!(
+                "no attitude, candidate or not, gives a smallest margin above {} with a dwell of {dwell} s",
+                number(1.0 / ratio)
+            )
+        }));
+        out.extend(bound.worst_dph.map(|worst| {
+            format!(
+                "no attitude, candidate or not, gives a worst sigma below {} deg/h (per g) with a dwell of {dwell} s",
+                number(worst)
+            )
+        }));
+    }
     if n.as_good > 1 {
         out.push(format!("{} extensions are as good as the first", n.as_good));
     }

@@ -613,3 +613,57 @@ fn calibrate_names_the_same_position() {
         assert!((sigma / own - 1.0).abs() < 0.02, "{sigma} {own}");
     }
 }
+
+/// No attitude is better than the bound over all attitudes: by the test's own least squares at 150 random
+/// ones, for random covariances. The bound is near the best of them where a dwell tells less than the
+/// calibration.
+#[test]
+fn no_attitude_is_better_than_the_bound() {
+    let mut near = 0;
+    for seed in 0..4 {
+        let mut a = aged(seed);
+        let mut rng = SplitMix64::new(900 + seed);
+        let mut candidates = Candidates::default();
+        let mut angle = || obsdeg_core::model::Angle::from_degrees(rng.below(360) as i32 - 180);
+        (0..150).for_each(|_| candidates.add(std::array::from_fn(|_| angle())));
+        a.task.options = NextOptions { candidates, added: 1, days: Vec::new(), keep: 1, ..a.task.options };
+        for dwell_s in [100.0, 400.0] {
+            a.task.conditions.dwell_s = dwell_s;
+            let found =
+                next(&a.task.scheme, &a.task.conditions, &a.task.options, &|_, _| true).expect("an answer");
+            let bound = found.bound.expect("a bound");
+            let all = 0..a.task.options.candidates.attitudes.len();
+            let best = all.clone().map(|c| a.value(&[c], dwell_s, 0.0)).fold(f64::INFINITY, f64::min);
+            let ratio = bound.ratio.expect("a requirement");
+            println!("{seed} {} {dwell_s} s: {ratio:.4} {best:.4}", a.task.terms);
+            assert!(ratio <= best * (1.0 + 1e-6) && bound.worst_dph.is_none(), "{seed}: {ratio} {best}");
+            assert_eq!(bound.sigmas.len(), a.names.len());
+            near += usize::from(ratio > 0.9 * best);
+        }
+    }
+    // what a cell may see at most grows with the information of a dwell
+    assert!(near >= 4, "{near} of 8");
+}
+
+/// After the calibration of the bench: 744 candidates by the program itself.
+#[test]
+fn the_bound_of_the_bench_is_near() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("calibration");
+    let (scheme, record) = ("examples/bench-day/scheme.toml", "examples/bench-day/record.csv");
+    let out = path.to_str().expect("UTF-8");
+    crate::program::run(&["calibrate", scheme, record, "--quiet", "-o", out]);
+    let file = path.join("calibration.json");
+    let after = file.to_str().expect("UTF-8");
+    let number = |v: &serde_json::Value| v.as_f64().expect("a number");
+    for (dwell, near) in [("60", 0.95), ("600", 0.75)] {
+        let own = ["design", scheme, "--next", "1", "--after", after, "--candidates", "grid:30"];
+        let asked = ["--dwell", dwell, "--drift-noise", "0 deg/sqrt(h)", "--format", "json"];
+        let a = crate::program::json(&[&own[..], &asked, &["--requirement", "D_IX=0.01"]].concat());
+        let all = a["by_candidate"].as_array().expect("candidates");
+        assert!(all.len() > 100, "{}", all.len());
+        let best = all.iter().map(|c| number(&c["ratio"])).fold(f64::INFINITY, f64::min);
+        let bound = number(&a["bound"]["ratio"]);
+        assert!(bound <= best * (1.0 + 1e-9) && bound > near * best, "{dwell} s: {bound} {best}");
+    }
+}

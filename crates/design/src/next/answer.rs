@@ -64,6 +64,9 @@ pub struct NextPositions {
     pub by_candidate: Vec<CandidateGain>,
     /// Number of extensions as good as the first, including the first.
     pub as_good: u64,
+    /// Bound over all attitudes, not the candidates alone; null unless one position is added after a
+    /// calibration that determines the first-order drift coefficients one by one.
+    pub bound: Option<AttitudeBound>,
     /// Shortest dwell, equal at all positions of the first extension, with which every requirement is met;
     /// null without requirements, or if no dwell up to 16 times the stated one meets them.
     pub meets: Option<Meeting>,
@@ -79,6 +82,20 @@ pub struct NextPositions {
     pub error_bound: f64,
     /// Seed of all random choices.
     pub seed: u64,
+}
+
+/// What one more position with the stated dwell cannot exceed, whatever its attitude. It holds by sigma alone
+/// (the bench only adds) and without random drift.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct AttitudeBound {
+    /// Smallest sigma of each required drift coefficient by any attitude, each by itself.
+    pub sigmas: Vec<Worst>,
+    /// Smallest value by any attitude of the largest ratio of sigma to requirement over these coefficients,
+    /// dimensionless; null without requirements on them.
+    pub ratio: Option<f64>,
+    /// Smallest value by any attitude of the largest of these sigmas, in deg/h or deg/h/g; null with
+    /// requirements on them.
+    pub worst_dph: Option<f64>,
 }
 
 /// State of the required coefficients.

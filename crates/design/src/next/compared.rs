@@ -7,7 +7,8 @@ use obsdeg_core::model::{Dwell, Platform, Position, Scheme, SlewTo, angles_text,
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements, Worst};
 use obsdeg_evidence::simulation::{Attained, Conditions, KnownCovariance, SimulationError, is_rate, resolve};
 
-use super::answer::{AddedPosition, Meeting, Quickest, Standing};
+use super::answer::{AddedPosition, AttitudeBound, Meeting, Quickest, Standing};
+use super::bound;
 use super::options::{LONGEST, NextOptions, SAME, any_position, is_ordered};
 use crate::design::{Candidates, DesignError, MOST_EXTENSIONS, half_turn};
 
@@ -228,6 +229,19 @@ impl Compared<'_> {
         let attained = Attained::new(self.start, self.conditions, self.options.seed)?;
         let (standing, degrees, _) = self.standing(&attained)?;
         Ok(Some(Before { standing, degrees }))
+    }
+
+    /// Bound over all attitudes on one more position after a calibration.
+    pub(super) fn bound(&self, first: &Extended) -> Result<Option<AttitudeBound>, DesignError> {
+        let Some(known) = self.options.beforehand.as_ref().filter(|_| self.options.added == 1) else {
+            return Ok(None);
+        };
+        let (scheme, _) = self.scheme(&first.sequence, self.conditions.dwell_s);
+        let attained = Attained::beside(&scheme, self.conditions, Some(known), self.options.seed)?;
+        let platform = &attained.plan.platform;
+        let limits = resolve("required sigma", platform, &self.conditions.requirements, f64::NAN)?;
+        let limit = |c: usize| Some(limits[c]).filter(|limit| !limit.is_nan());
+        Ok(bound::bound(&attained, known, self.conditions, self.required, limit))
     }
 
     /// State of the coefficients given by a covariance alone.

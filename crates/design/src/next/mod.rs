@@ -3,6 +3,7 @@
 //! that aged since a calibration: runs that meet the requirements again.
 
 mod answer;
+mod bound;
 mod compared;
 mod options;
 
@@ -64,6 +65,7 @@ pub fn next(
     let meets = compared.meets(first)?;
     let error_bound = first.error_bound;
     let before = compared.before()?;
+    let bound = compared.bound(first)?;
     let by_candidate = if options.added == 1 { by_candidate(&found) } else { Vec::new() };
     found.truncate(options.keep.max(1));
     let found = found.into_iter().map(|e| extension(e, before.as_ref(), &required)).collect();
@@ -93,6 +95,7 @@ pub fn next(
         },
         before: before.map(|b| b.standing),
         as_good,
+        bound,
         meets,
         examined,
         proven: !interrupted,

@@ -158,6 +158,11 @@ impl Attained {
         Ok(())
     }
 
+    /// Standard deviations of the unknowns before the scheme (SI): stated ones, else wide ones.
+    pub fn priors(&self) -> &[f64] {
+        &self.prior
+    }
+
     /// Influence of omitted errors on the estimates, by the weights of the sigmas.
     ///
     /// # Errors
