@@ -2230,8 +2230,8 @@ class CandidateGain(Record):
 
 
 class AttitudeBound(Record):
-    """What one more position with the stated dwell cannot exceed, whatever its attitude. It holds by sigma alone (the bench only adds)
-    and without random drift.
+    """Bound on sigmas with one more position of the stated dwell, whatever its attitude: without a bench and without random drift, which
+    only add to sigmas.
     """
 
     __slots__ = ()

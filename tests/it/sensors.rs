@@ -618,6 +618,8 @@ fn options_of_the_other_kind_are_refused() {
     refused(&["design", SIR, "--certificate", "c.json"], &["--certificate is about schemes"]);
     refused(&["design", SIR, "--require-met"], &["no requirement is stated"]);
     refused(&["design", "--measure", "states"], &["expected a model file"]);
+    refused(&["design", SIR, "--measure", "state"], &["`state` is not known here; did you mean `states`?"]);
+    refused(&["design", SIR, "--measure", "experiment"], &["none is chosen", "--own-outputs"]);
     let scheme = "examples/pole/scheme.toml";
     refused(&["design", scheme, "--measure", "states"], &["--measure is about models", "is a scheme"]);
     refused(&["design", SIR, "--measure", "nowhere"], &["nowhere", "candidate"]);

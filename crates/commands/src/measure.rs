@@ -88,8 +88,15 @@ pub(crate) fn measured(
         Some(limit) => SystemModel { work_limit: WorkLimit(limit), ..file.model.clone() },
         None => file.model.clone(),
     };
+    let candidates = candidates(a, &model).map_err(|e| wrong(&file, e))?;
+    if !a.own_outputs && candidates.iter().all(|c| c.experiment) {
+        return Err(Problem::input(
+            "--measure experiment repeats outputs from another start, and none is chosen; expected candidates \
+             beside it, or --own-outputs",
+        ));
+    }
     let options = SensorOptions {
-        candidates: candidates(a, &model).map_err(|e| wrong(&file, e))?,
+        candidates,
         own_outputs: a.own_outputs,
         required: wanted.required.to_vec(),
         max_degree: wanted.max_degree.clone(),

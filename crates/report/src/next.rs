@@ -28,15 +28,36 @@ fn gains(n: &NextPositions, e: &Extension) -> Vec<String> {
         names(all.iter().map(String::as_str))
     };
     let mut out = Vec::new();
-    if !e.resolves.is_empty() && n.before.is_some() {
-        out.push(format!("makes {} observable", list(&e.resolves)));
+    // degrees are those of repositioning at once, sigmas those with the slews
+    let is_open = |name: &String| e.then.not_observable.contains(name);
+    let is_resolved = |name: &String| e.resolves.iter().any(|r| r.name == *name);
+    let (open, resolved): (Vec<_>, Vec<_>) = e.resolves.iter().cloned().partition(|r| is_open(&r.name));
+    if !resolved.is_empty() && n.before.is_some() {
+        out.push(format!("makes {} observable", list(&resolved)));
+    }
+    if !open.is_empty() && n.before.is_some() {
+        out.push(format!(
+            "makes {} observable by repositioning at once, but not with the slews",
+            list(&open)
+        ));
+    }
+    if let Some(before) = &n.before {
+        let by_slews = |name: &&String| !is_open(name) && !is_resolved(name);
+        let shown: Vec<&str> = before.not_observable.iter().filter(by_slews).map(String::as_str).collect();
+        if !shown.is_empty() && !n.after_calibration {
+            out.push(format!(
+                "determines {} by what the slews show (degrees are of repositioning at once)",
+                names(shown)
+            ));
+        }
     }
     if !e.lowers.is_empty() {
         out.push(format!("lowers the degree of {}", list(&e.lowers)));
     }
-    if !e.then.not_observable.is_empty() {
-        let open = e.then.not_observable.iter().map(String::as_str);
-        out.push(format!("leaves {} undetermined", names(open)));
+    let left: Vec<&str> =
+        e.then.not_observable.iter().filter(|name| !is_resolved(name)).map(String::as_str).collect();
+    if !left.is_empty() {
+        out.push(format!("leaves {} undetermined", names(left)));
     }
     out
 }

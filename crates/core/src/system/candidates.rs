@@ -8,7 +8,7 @@ use toml::Value;
 use super::error::ModelError;
 use super::model::{Candidate, MAX_EXPERIMENTS, Named, Place, PlacedExpression, SystemModel};
 use super::reader::{Entry, ModelReader, base};
-use crate::language::{Expression, Node, Shape, Shapes, parse_components};
+use crate::language::{Expression, Node, Shape, Shapes, nearest, parse_components};
 
 /// Words for groups of candidates, with their meanings.
 pub const CANDIDATE_WORDS: [(&str, &str); 6] = [
@@ -102,6 +102,18 @@ impl SystemModel {
             .chain(self.unknown_inputs.iter().map(|u| &u.0));
         if let Some(own) = own.into_iter().find(|n| n.name == text) {
             return Ok(named(own));
+        }
+        let is_name = text.chars().all(|c| c.is_alphanumeric() || c == '_');
+        let known = self
+            .slot_names()
+            .iter()
+            .chain(self.definitions.iter().map(|d| &d.0))
+            .any(|n| n.split('[').next() == Some(text));
+        if is_name && !known {
+            let words = CANDIDATE_WORDS.map(|(word, _)| word.to_string());
+            if let Some(word) = nearest(text, &words) {
+                return Err(wrong(text, &format!("`{text}` is not known here; did you mean `{word}`?")));
+            }
         }
         let place = Place { what: format!("the candidate {text}"), offset: None };
         let read = parse_components(text, &self.shapes()).map_err(|e| ModelError {

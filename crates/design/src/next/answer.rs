@@ -84,8 +84,8 @@ pub struct NextPositions {
     pub seed: u64,
 }
 
-/// What one more position with the stated dwell cannot exceed, whatever its attitude. It holds by sigma alone
-/// (the bench only adds) and without random drift.
+/// Bound on sigmas with one more position of the stated dwell, whatever its attitude: without a bench and
+/// without random drift, which only add to sigmas.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AttitudeBound {
     /// Smallest sigma of each required drift coefficient by any attitude, each by itself.

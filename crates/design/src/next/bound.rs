@@ -9,9 +9,9 @@
 //! `e_i^T (L + E^T C^T M C E)^-1 e_i >= x_i^2 / (x^T L x + |M^(1/2) d_x|^2)`, `d_x = C E(g) x`.
 //!
 //! Attitudes run over cells of the rotations. In a cell up to the angle r from its middle, the change of
-//! `d_x = C (u + G g)` is that of first order and at most `r^2/2 (|u| + 4 |G|)` more. The x of a cell is that of
-//! equality at its middle with an information enlarged for the size of the cell. Cells that cannot be better
-//! than the best attitude found so far are done; the others are divided, the most promising first.
+//! `d_x = C (u + G g)` is that of first order and at most `r^2/2 (|u| + 4 |G|)` more. The x of a cell is that
+//! of equality at its middle with an information enlarged for the size of the cell. Cells that cannot be
+//! better than the best attitude found so far are done; the others are divided, the most promising first.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
