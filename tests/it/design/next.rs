@@ -635,7 +635,6 @@ fn no_attitude_is_better_than_the_bound() {
             let all = 0..a.task.options.candidates.attitudes.len();
             let best = all.clone().map(|c| a.value(&[c], dwell_s, 0.0)).fold(f64::INFINITY, f64::min);
             let ratio = bound.ratio.expect("a requirement");
-            println!("{seed} {} {dwell_s} s: {ratio:.4} {best:.4}", a.task.terms);
             assert!(ratio <= best * (1.0 + 1e-6) && bound.worst_dph.is_none(), "{seed}: {ratio} {best}");
             assert_eq!(bound.sigmas.len(), a.names.len());
             near += usize::from(ratio > 0.9 * best);
