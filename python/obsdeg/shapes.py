@@ -3373,7 +3373,9 @@ class FindingTurns(Record):
 
 
 class FindingClockJump(Record):
-    """Clock of a record that was set forward during the run: with the times behind a gap corrected, the model explains the records."""
+    """Clock of a record that was set forward during the run: with the times behind a gap corrected, chi-square falls to a twentieth or
+    less.
+    """
 
     __slots__ = ()
 
@@ -3390,6 +3392,8 @@ class FindingClockJump(Record):
     """Time by which the clock was set forward, in s."""
     chi_square: float
     """Chi-square per degree of freedom with the times corrected, dimensionless."""
+    explains: bool
+    """True if the model explains the records with the times corrected; there are no other findings then."""
 
 
 class FindingClock(Record):

@@ -161,8 +161,8 @@ pub enum Finding {
         /// Slew rate of the record, in deg/s; null where the scheme states none for all slews.
         slew_rate_deg_s: Option<f64>,
     },
-    /// Clock of a record that was set forward during the run: with the times behind a gap corrected, the
-    /// model explains the records.
+    /// Clock of a record that was set forward during the run: with the times behind a gap corrected,
+    /// chi-square falls to a twentieth or less.
     ClockJump {
         /// Name of the record with this finding.
         record: String,
@@ -176,6 +176,8 @@ pub enum Finding {
         by_s: f64,
         /// Chi-square per degree of freedom with the times corrected, dimensionless.
         chi_square: f64,
+        /// True if the model explains the records with the times corrected; there are no other findings then.
+        explains: bool,
     },
     /// Clock of a record that does not run as fast as that of the scheme, or as the earth turns.
     Clock {

@@ -209,11 +209,14 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             };
             by_changes.unwrap_or_else(by_rates)
         }
-        Finding::ClockJump { record, line, place, from_s, by_s, chi_square } => format!(
+        Finding::ClockJump { record, line, place, from_s, by_s, chi_square, explains } => format!(
             "the clock{} was set forward by {by_s:.1} s behind {from_s:.3} s ({place}, before line {line}): with \
-             the times from there on less by that, the model explains the records (chi-square {} per degree of \
-             freedom)",
+             the times from there on less by that, {} (chi-square {} per degree of freedom)",
             of(record, records),
+            match explains {
+                true => "the model explains the records",
+                false => "the records fit far better, but something else is wrong besides",
+            },
             number(*chi_square)
         ),
         Finding::Copy { record, other, correlation } => format!(

@@ -8,15 +8,16 @@
 //! the record, and the drift changes then.
 
 use nalgebra::{Matrix2, Vector2};
+use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
-use super::CalibrationError;
 use super::clock::bounds;
 use super::diagnose::Parts;
 use super::estimate::{Problem, WEAK};
 use super::observe::{By, Reading, TOLERANCE};
 use super::run::Run;
 use super::timeline::{narrow, slews};
+use super::{CalibrationError, STRICT};
 use crate::answer::ClockRate;
 use crate::least_squares::Information;
 
@@ -36,6 +37,8 @@ const LARGEST: f64 = 1.0 / 3.0;
 /// the parabola is checked by an estimate with that clock.
 const SEEN: f64 = 10.8;
 const FAR: f64 = 0.05;
+/// Least fraction of a misfit that a wrong clock explains.
+const EXPLAINED: f64 = 0.85;
 
 /// Clock of a run by its changes of position.
 #[derive(Debug, Clone)]
@@ -52,6 +55,14 @@ impl Parts<'_> {
         let (along, _) = instead.along(conditions, &self.problem.sigmas, &at.x[r])?;
         let information = Information::of(&along)?;
         Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
+    }
+
+    /// True if a clock that lowers the sum of squares by `fall` explains the misfit, or if there is none:
+    /// another error in the model, such as a scale of an axis, looks partly like any clock.
+    fn explains(&self, fall: f64) -> bool {
+        let (_, free) = self.found.sums(|_| true);
+        let beyond = self.estimate.at.cost - chi_square_band(free.max(1.0), 1.0, STRICT).1;
+        beyond <= 0.0 || fall >= EXPLAINED * (self.estimate.at.cost - free)
     }
 
     /// Fraction by which the clock of run `r` is fast, on the timeline of the scheme, by its changes of
@@ -97,6 +108,7 @@ impl Parts<'_> {
         let [late, fast] = (-(inverse * slope)).into();
         let rate = ClockRate { fast: fast * scale, sigma: (2.0 * inverse[(1, 1)]).sqrt() * scale };
         let near = (rate.fast.abs() + rate.sigma) * last <= MOST_ROWS * interval;
+        let near = near && self.explains((slope.transpose() * inverse * slope)[0] / 2.0);
         Ok(near.then_some(ByChanges { rate, late_s: late * step }))
     }
 

@@ -21,7 +21,8 @@ const APART: f64 = 2.0;
 impl Parts<'_> {
     /// Findings against a calibration, with the measurements that it left out.
     pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOut]) -> Vec<Finding> {
-        if let Some(jump) = self.clock_jump() {
+        let jump = self.clock_jump();
+        if let Some(jump) = jump.clone().filter(|_| self.jump.is_some_and(|j| j.explains)) {
             // everything else is by times that are wrong
             let interrupted = self.interrupted.then_some(Finding::Interrupted);
             return interrupted.into_iter().chain([jump]).collect();
@@ -32,6 +33,7 @@ impl Parts<'_> {
         } else if !self.estimate.converged {
             out.push(Finding::NotSettled);
         }
+        out.extend(jump);
         if !self.planned.platform.observed().accelerometers {
             out.extend(self.problem.runs.iter().filter_map(|run| self.force(run)));
         }
@@ -90,6 +92,7 @@ impl Parts<'_> {
             from_s: gap.from_s,
             by_s: jump.by,
             chi_square: jump.chi_square,
+            explains: jump.explains,
         })
     }
 

@@ -16,6 +16,8 @@ const MOST: usize = 3;
 /// Largest fraction of the sum of squares that a record may leave without its gap.
 const EXPLAINED: f64 = 0.05;
 
+/// Factor on the band of chi-square that single outliers may take.
+const REMAINS: f64 = 1.2;
 /// Step for finite differences of a jump, in intervals between rows.
 const NEARBY: f64 = 0.25;
 
@@ -40,6 +42,8 @@ pub(crate) struct Jump {
     pub by: f64,
     /// Chi-square per degree of freedom without the jump.
     pub chi_square: f64,
+    /// True if the model explains the records without the jump.
+    pub explains: bool,
 }
 
 impl Problem<'_> {
@@ -68,9 +72,12 @@ impl Problem<'_> {
                 let Some((by, found)) = self.closed(run, gap, estimate.at.cost / 2.0, start, lay) else {
                     continue;
                 };
-                let explains = found.cost <= most.max(EXPLAINED * estimate.at.cost);
-                if explains && best.as_ref().is_none_or(|(cost, _)| found.cost < *cost) {
-                    best = Some((found.cost, Jump { run, gap, by, chi_square: found.cost / found.free }));
+                let falls = found.cost <= most.max(EXPLAINED * estimate.at.cost);
+                if falls && best.as_ref().is_none_or(|(cost, _)| found.cost < *cost) {
+                    // single outliers are found later
+                    let explains = found.cost <= REMAINS * chi_square_band(found.free, 1.0, STRICT).1;
+                    let chi_square = found.cost / found.free;
+                    best = Some((found.cost, Jump { run, gap, by, chi_square, explains }));
                 }
             }
         }

@@ -163,6 +163,21 @@ fn a_clock_shows_by_the_changes_of_position() {
     }
 }
 
+/// The scale of an axis looks partly like a clock: only the scale is named.
+#[test]
+fn a_scale_is_no_clock() {
+    let drift = [[12.0, -9.0, 14.0], [5.0, 3.0, -4.0], [-2.0, 6.0, 1.0], [4.0, -5.0, 3.0]];
+    for (axis, scale) in [(0, 1e-4), (1, 1e-4), (2, 3e-4)] {
+        let mut accelerometers = [[0.0; 3]; 3];
+        accelerometers[1][axis] = scale;
+        let bench = Bench { drift, dropped: 0, accelerometers, ..bench() };
+        let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
+        let clock = |f: &Finding| matches!(f, Finding::Clock { by_changes: Some(_), .. });
+        assert!(!c.consistent && !c.findings.iter().any(clock), "{axis}: {:?}", c.findings);
+        assert!(c.findings.iter().any(|f| matches!(f, Finding::Force { .. })), "{axis}: {:?}", c.findings);
+    }
+}
+
 /// A clock that is set forward by an hour or a minute in a position or in a turn is the one finding; rows
 /// that are lost for as long are none.
 #[test]
@@ -176,12 +191,25 @@ fn a_clock_that_is_set_forward_is_named() {
         let set = |(k, s): (usize, &Sample)| Sample { t: s.t + if k < at { 0.0 } else { by }, ..s.clone() };
         let own: Vec<Sample> = samples.iter().enumerate().map(set).collect();
         let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-        let [Finding::ClockJump { line, place: found, by_s, chi_square, .. }] = &c.findings[..] else {
+        let [Finding::ClockJump { line, place: found, by_s, chi_square, explains: true, .. }] =
+            &c.findings[..]
+        else {
             panic!("{by} at {at}: {:?}", c.findings)
         };
         assert_eq!((*line, found.as_str()), (at as u64 + 2, place));
         assert!((by_s - by).abs() < 0.5 && *chi_square < 1.2, "{by_s} {chi_square}");
     }
+    // beside another error a jump is one of several findings
+    let set = |(k, s): (usize, &Sample)| Sample {
+        t: s.t + if k < inside { 0.0 } else { 3600.0 },
+        f: [s.f[0], 1.001 * s.f[1], s.f[2]],
+        ..s.clone()
+    };
+    let both: Vec<Sample> = samples.iter().enumerate().map(set).collect();
+    let c = of_csv(&bench, "F,I,O,S", csv(&both)).expect("calibrated");
+    let jump = |f: &Finding| matches!(f, Finding::ClockJump { explains: false, .. });
+    let force = |f: &Finding| matches!(f, Finding::Force { .. });
+    assert!(c.findings.iter().any(jump) && c.findings.iter().any(force), "{:?}", c.findings);
     let lost: Vec<Sample> = samples
         .iter()
         .enumerate()
