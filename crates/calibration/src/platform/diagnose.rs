@@ -1,6 +1,9 @@
 //! Diagnosis of an estimate: residuals of every measurement, by position, component and time; the filter as a
 //! second path; contributions of single positions and of the prior.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
@@ -66,6 +69,8 @@ pub(crate) struct Diagnosed {
     pub second: SecondPath,
     /// Sum of squares of each run alone, by least squares with the wide prior.
     pub alone: Vec<f64>,
+    /// Probabilities of whiteness that were computed, by run and channel.
+    pub white: RefCell<BTreeMap<(usize, usize), Option<f64>>>,
 }
 
 impl Diagnosed {
@@ -82,6 +87,7 @@ impl Diagnosed {
             all: Vec::new(),
             second: SecondPath { difference: 0.0, sigma_difference: 0.0 },
             alone: Vec::new(),
+            white: RefCell::default(),
         };
         for (r, (run, keys)) in estimate.at.runs.iter().enumerate() {
             let index = &problem.unknowns.index[r];

@@ -19,8 +19,11 @@ impl Parts<'_> {
     /// Probability that independent residuals are correlated as these are, by those of the filter: between
     /// those of a smoother an estimate leaves correlations of about minus its unknowns over their number.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {
-        let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
-        crate::white::whiteness(&own.map(|l| l.innovation).collect::<Vec<f64>>())
+        let of = || {
+            let own = self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel);
+            crate::white::whiteness(&own.map(|l| l.innovation).collect::<Vec<f64>>())
+        };
+        *self.found.white.borrow_mut().entry((run, channel)).or_insert_with(of)
     }
 
     /// Correlation of the residuals of a channel with the temperature, position by position: an effect fixed

@@ -49,6 +49,9 @@ const AROUND: f64 = 1e-3;
 
 /// Distance in time of the values whose differences give second derivatives, in s.
 const BEND_S: f64 = 10.0;
+/// Time in a position for which second derivatives are taken to be constant, in s: they change with the drift
+/// and the rate of the earth, by about a hundredth.
+const STEADY_S: f64 = 100.0;
 /// Largest usual second derivative of Z in g/s^2: drifts of 30 deg/h that turn with the earth.
 const BENDS: f64 = 2e-8;
 /// Change of a mean by curvature, in sigma, below which the mean is that of a line.
@@ -62,6 +65,14 @@ fn rate(motion: &impl Motion<PlatformState>, x: &PlatformState) -> Result<Vec<f6
     out[3 * x.attitudes()..].fill(0.0);
     out.iter_mut().for_each(|d| *d /= RATE_S);
     Ok(out)
+}
+
+/// Second derivatives of the outputs at a position, in units of the outputs per s^2, and the time of the run
+/// until which they are used, in s.
+struct Bent {
+    position: usize,
+    until: f64,
+    values: Vec<f64>,
 }
 
 /// Second derivatives of the outputs from `x` on, in units of the outputs per s^2.
@@ -267,6 +278,7 @@ impl Run {
         let (mut out, mut keys) = (Linearised::default(), Vec::new());
         let (mut x, mut bin) = (x0.clone(), 0);
         let mut nodes = nodes.iter().peekable();
+        let (mut now, mut second) = (0.0, None::<Bent>);
         let (mut changes, mut drift, mut scratch) = (self.changes.iter().peekable(), Vec::new(), Vec::new());
         for (segment, s) in plan.segments.iter().enumerate() {
             let motion = filter.motion(segment);
@@ -276,6 +288,7 @@ impl Run {
                 x = begins;
             }
             let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
+            now += s.dt;
             let mut outputs = Vec::new();
             if let Some((position, i)) = self.bins[segment] {
                 let channels = &self.reading.bins[position][i].channels;
@@ -285,7 +298,14 @@ impl Run {
                     };
                     mean.as_ref().is_some_and(bends)
                 });
-                let bend = if bent { bend(&motion, &x)? } else { vec![0.0; channels.len()] };
+                let steady = |b: &Bent| b.position == position && b.until >= now;
+                if bent && !second.as_ref().is_some_and(steady) {
+                    second = Some(Bent { position, until: now + STEADY_S, values: bend(&motion, &x)? });
+                }
+                let bend = |channel: usize| match &second {
+                    Some(b) if bent => b.values[channel],
+                    _ => 0.0,
+                };
                 let (h, rows) = (motion.h(0.0, &x), Measurement::jacobian(&motion, 0.0, &x));
                 for (channel, mean) in channels.iter().enumerate() {
                     let Some(mean) = mean.filter(|_| self.counts[bin][channel]) else { continue };
@@ -293,7 +313,7 @@ impl Run {
                     let h_of = row.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
                     let r = mean.variance * if mean.given { 1.0 } else { sigmas[channel] * sigmas[channel] };
                     outputs.push(ScalarOutput { h: h_of, r });
-                    out.residuals.push(mean.value - h[channel] - bend[channel] * mean.bend);
+                    out.residuals.push(mean.value - h[channel] - bend(channel) * mean.bend);
                     keys.push(Key { position, bin, channel });
                 }
                 bin += 1;
