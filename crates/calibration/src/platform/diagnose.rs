@@ -194,7 +194,7 @@ pub(crate) struct Parts<'a> {
     pub offsets: &'a [Option<Offset>],
     /// Change of the measurements with the beginning, by run; `None` unless labels leave the beginning open.
     pub later: &'a [Option<Later>],
-    /// Jump of a clock that explains an inconsistent fit.
+    /// Jump of a clock that explains most of an inconsistent fit.
     pub jump: Option<Jump>,
     pub too_many: Option<usize>,
     pub known: Vec<String>,

@@ -15,12 +15,10 @@ use super::{CalibrationError, STRICT};
 const MOST: usize = 3;
 /// Largest fraction of the sum of squares that a record may leave without its gap.
 const EXPLAINED: f64 = 0.05;
-
 /// Factor on the band of chi-square that single outliers may take.
 const REMAINS: f64 = 1.2;
 /// Step for finite differences of a jump, in intervals between rows.
 const NEARBY: f64 = 0.25;
-
 /// Number of improvements of a jump.
 const ROUNDS: usize = 4;
 
@@ -47,8 +45,8 @@ pub(crate) struct Jump {
 }
 
 impl Problem<'_> {
-    /// Jump of a clock that explains an inconsistent fit: without it, all runs with all their measurements
-    /// fit. `start` is the first iterate of every run; `lay` places a reading on the timeline.
+    /// Jump of a clock that explains most of an inconsistent fit, by a fit of all measurements without it.
+    /// `start` is the first iterate of every run; `lay` places a reading on the timeline.
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite in the fit as it is.
