@@ -3406,6 +3406,10 @@ class FindingClock(Record):
     """Name of the record with this finding."""
     by_durations: float | None
     """Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless; null if they show none."""
+    by_durations_sigma: float | None
+    """Standard deviation of `by_durations`, dimensionless: rows leave the begin and the end of a position open by the time between two
+    of them; null without `by_durations`.
+    """
     by_changes: ClockRate | None
     """Rate error of the clock by the times at which the drift changes with the position; null if that is within chance."""
     by_earth: ClockRate | None
@@ -3866,6 +3870,10 @@ class Clock(Record):
     by_durations: float | None
     """Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all times stretched by it: a
     clock, or a scheme run so; null if not.
+    """
+    by_durations_sigma: float | None
+    """Standard deviation of `by_durations`, dimensionless: rows leave the begin and the end of a position open by the time between two
+    of them; null without `by_durations`.
     """
     by_changes: ClockRate | None
     """Rate error of the clock by the times at which the drift changes with the position, on the timeline of the scheme: a clock, or

@@ -186,6 +186,10 @@ pub enum Finding {
         /// Fraction by which the clock is fast, by the times at which positions begin and end, dimensionless;
         /// null if they show none.
         by_durations: Option<f64>,
+        /// Standard deviation of `by_durations`, dimensionless: rows leave the begin and the end of a
+        /// position open by the time between two of them; null without `by_durations`.
+        #[serde(default)]
+        by_durations_sigma: Option<f64>,
         /// Rate error of the clock by the times at which the drift changes with the position; null if that is
         /// within chance.
         #[serde(default)]
@@ -680,6 +684,10 @@ pub struct Clock {
     /// Fraction by which the clock is fast, dimensionless, if positions begin and end as in a scheme with all
     /// times stretched by it: a clock, or a scheme run so; null if not.
     pub by_durations: Option<f64>,
+    /// Standard deviation of `by_durations`, dimensionless: rows leave the begin and the end of a
+    /// position open by the time between two of them; null without `by_durations`.
+    #[serde(default)]
+    pub by_durations_sigma: Option<f64>,
     /// Rate error of the clock by the times at which the drift changes with the position, on the timeline of
     /// the scheme: a clock, or positions held longer or shorter. Null where positions are held otherwise than
     /// in the scheme, or where drifts change too little.

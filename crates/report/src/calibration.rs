@@ -57,9 +57,19 @@ const CLOCK: f64 = 0.1;
 
 /// True if durations and rates show the same clock. Drifts that follow the clock take up a quarter of its
 /// error, so the two may differ by that.
-pub(crate) fn is_clock(by_durations: Option<f64>, by_earth: Option<&ClockRate>) -> bool {
+pub(crate) fn is_clock(by_durations: Option<&ClockRate>, by_earth: Option<&ClockRate>) -> bool {
     let both = by_durations.zip(by_earth);
-    both.is_some_and(|(d, e)| (e.fast - d).abs() <= 3.0 * e.sigma + d.abs() / 4.0)
+    both.is_some_and(|(d, e)| (e.fast - d.fast).abs() <= 3.0 * e.sigma.hypot(d.sigma) + d.fast.abs() / 4.0)
+}
+
+/// Rate of a clock by the durations of positions. Answers of before have no sigma: it is 0 then.
+pub(crate) fn durations(fast: Option<f64>, sigma: Option<f64>) -> Option<ClockRate> {
+    fast.map(|fast| ClockRate { fast, sigma: sigma.unwrap_or(0.0) })
+}
+
+/// Sigma in parentheses, with a unit or without; empty for 0.
+fn sigma(value: f64, unit: &str) -> String {
+    if value > 0.0 { format!(" (sigma {}{unit})", number(value)) } else { String::new() }
 }
 
 /// Sentence on the offset and the rate of a record's clock.
@@ -77,8 +87,9 @@ fn clock(c: &Clock) -> String {
 
 /// Sentence on the rate of a record's clock.
 fn rates(c: &Clock) -> String {
-    let held = c.by_durations.map_or_else(String::new, |fast| {
-        format!("; positions last {:.4} times as long as in the scheme", 1.0 + fast)
+    let held = durations(c.by_durations, c.by_durations_sigma).map_or_else(String::new, |held| {
+        let times = 1.0 + held.fast;
+        format!("; positions last {times:.4} times as long as in the scheme{}", sigma(held.sigma, ""))
     });
     let sharper = |e: &&ClockRate| c.by_earth.as_ref().is_none_or(|by| e.sigma < by.sigma);
     if let Some(e) = c.by_changes.as_ref().filter(sharper).filter(|e| 3.0 * e.sigma < CLOCK) {
@@ -89,6 +100,11 @@ fn rates(c: &Clock) -> String {
         );
     }
     match &c.by_earth {
+        Some(e) if 3.0 * e.sigma < CLOCK && e.fast.abs() > CLOCK => {
+            format!(
+                "; no rate of its clock makes the rates of the earth and of turns those of the scheme{held}"
+            )
+        }
         Some(e) if 3.0 * e.sigma < CLOCK => format!(
             "; by the rates of the earth and of turns its clock is {} (sigma {} %){held}",
             part(e.fast),
@@ -175,11 +191,13 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             sigmas.0,
             sigmas.1
         ),
-        Finding::Clock { record, by_durations, by_changes, by_earth } => {
+        Finding::Clock { record, by_durations, by_durations_sigma, by_changes, by_earth } => {
             let of = of(record, records);
+            let by_durations = durations(*by_durations, *by_durations_sigma);
+            let rate = |e: &ClockRate| format!("{}{}", part(e.fast), sigma(100.0 * e.sigma, " %"));
             let held = by_durations
-                .map(|fast| format!("positions begin and end as by a clock that is {}", part(fast)));
-            let rate = |e: &ClockRate| format!("{} (sigma {} %)", part(e.fast), number(100.0 * e.sigma));
+                .as_ref()
+                .map(|d| format!("positions begin and end as by a clock that is {}", rate(d)));
             let rates = by_earth.as_ref().map(rate);
             let by_changes = by_changes.as_ref().map(|e| {
                 format!(
@@ -189,7 +207,7 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
                 )
             });
             let by_rates = || match (held, rates) {
-                (Some(held), Some(rates)) if is_clock(*by_durations, by_earth.as_ref()) => format!(
+                (Some(held), Some(rates)) if is_clock(by_durations.as_ref(), by_earth.as_ref()) => format!(
                     "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
                      off by that part, those that the earth rate tells by more"
                 ),

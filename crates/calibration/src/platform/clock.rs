@@ -2,6 +2,8 @@
 
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
+use crate::answer::ClockRate;
+
 /// Smallest difference of durations that is significant, in intervals between samples.
 const TOLD: f64 = 4.0;
 
@@ -14,6 +16,8 @@ pub(crate) struct Line {
     pub fast: f64,
     /// Largest distance of a point from the line, in s.
     pub within: f64,
+    /// Standard deviation of `fast` for times of the record with one of 1 s.
+    pub sigma: f64,
 }
 
 /// Least-squares line through points (scheme, record) in s; `None` for fewer than three points.
@@ -28,7 +32,12 @@ pub(crate) fn line(points: &[(f64, f64)]) -> Option<Line> {
     let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / along;
     let at_zero = y - slope * x;
     let off = |p: &(f64, f64)| (p.1 - at_zero - slope * p.0).abs();
-    Some(Line { at_zero, fast: slope - 1.0, within: points.iter().map(off).fold(0.0, f64::max) })
+    Some(Line {
+        at_zero,
+        fast: slope - 1.0,
+        within: points.iter().map(off).fold(0.0, f64::max),
+        sigma: along.powf(-0.5),
+    })
 }
 
 /// Description of a clock in words.
@@ -50,15 +59,15 @@ pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
 }
 
 /// Excess rate of a record's clock by its positions `stays` (begin and end), as a fraction; `between` is the
-/// time between two samples, in s. `None` unless such a clock explains the positions and a right one does
-/// not: by far or, for `inside`, with a clock by which all rows lie inside their positions. A common delay of
-/// begins or ends has no effect.
+/// time between two samples, in s: a begin or an end is equally likely anywhere in it. `None` unless such a
+/// clock explains the positions and a right one does not: by far or, for `inside`, with the least and the
+/// largest rate by which all rows lie inside their positions. A common delay of begins or ends has no effect.
 pub(crate) fn by_durations(
     stays: &[(f64, f64)],
     between: f64,
     plan: &Plan,
-    inside: Option<f64>,
-) -> Option<f64> {
+    inside: Option<(f64, f64)>,
+) -> Option<ClockRate> {
     let bounds = bounds(plan);
     let each = bounds.iter().zip(stays);
     let points: Vec<(f64, f64)> =
@@ -66,8 +75,12 @@ pub(crate) fn by_durations(
     let line = line(&points)?;
     let whole = points.last()?.0 - points.first()?.0;
     let explains = line.within <= TOLD / 2.0 * between;
-    let far = (line.fast.abs() * whole > TOLD * between).then_some(line.fast);
-    inside.or(far).filter(|_| explains)
+    let of = |width: f64| width / 12f64.sqrt();
+    let sigma = of(between) * line.sigma;
+    let far = || (line.fast.abs() * whole > TOLD * between).then_some(ClockRate { fast: line.fast, sigma });
+    let middle =
+        |(low, high): (f64, f64)| ClockRate { fast: (low + high) / 2.0, sigma: sigma.max(of(high - low)) };
+    if explains { inside.map(middle).or_else(far) } else { None }
 }
 
 /// Factor by which the turns of a record last longer than in the scheme: the slope of the times between the

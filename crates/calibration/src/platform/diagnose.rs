@@ -18,14 +18,14 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
 use super::jump::Jump;
-use super::observe::{By, channel_name};
+use super::observe::channel_name;
 use super::offset::{Later, Offset};
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, Clock, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved,
-    PositionFit, RecordReport, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved, PositionFit,
+    RecordReport, SCHEMA, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -515,16 +515,8 @@ impl Parts<'_> {
     }
 
     fn records(&self) -> Vec<RecordReport> {
-        let changes: Vec<_> =
-            (0..self.problem.runs.len()).map(|r| self.clock_by_changes(r).ok().flatten()).collect();
         let of = |(r, run): (usize, &super::run::Run)| RecordReport {
-            clock: Clock {
-                offset_s: matches!(run.reading.by, By::Timeline | By::Both).then_some(run.reading.origin),
-                offset_sigma_s: self.offsets[r].as_ref().map(|o| o.sigma),
-                by_durations: run.reading.by_durations(self.planned),
-                by_changes: changes[r].as_ref().map(|c| c.rate.clone()),
-                by_earth: self.clock_by_rates(r, changes[r].as_ref()).ok().flatten(),
-            },
+            clock: self.clock(r),
             name: run.reading.name.clone(),
             samples: run.reading.samples,
             interval_s: run.reading.interval,

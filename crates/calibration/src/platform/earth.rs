@@ -18,7 +18,7 @@ use super::observe::{By, Reading, TOLERANCE};
 use super::run::Run;
 use super::timeline::{narrow, slews};
 use super::{CalibrationError, STRICT};
-use crate::answer::ClockRate;
+use crate::answer::{Clock, ClockRate};
 use crate::least_squares::Information;
 
 /// Relative change of the rates for the finite differences.
@@ -42,13 +42,28 @@ const EXPLAINED: f64 = 0.85;
 
 /// Clock of a run by its changes of position.
 #[derive(Debug, Clone)]
-pub(super) struct ByChanges {
+struct ByChanges {
     pub rate: ClockRate,
     /// Delay of the beginning of the scheme with this clock, in s.
     pub late_s: f64,
 }
 
 impl Parts<'_> {
+    /// Clock of run `r`: its offset, and its rate in three ways.
+    pub(super) fn clock(&self, r: usize) -> Clock {
+        let reading = &self.problem.runs[r].reading;
+        let changes = self.clock_by_changes(r).ok().flatten();
+        let durations = reading.by_durations(self.planned);
+        Clock {
+            offset_s: matches!(reading.by, By::Timeline | By::Both).then_some(reading.origin),
+            offset_sigma_s: self.offsets[r].as_ref().map(|o| o.sigma),
+            by_durations: durations.as_ref().map(|d| d.fast),
+            by_durations_sigma: durations.map(|d| d.sigma),
+            by_changes: changes.as_ref().map(|c| c.rate.clone()),
+            by_earth: self.clock_by_rates(r, changes.as_ref()).ok().flatten(),
+        }
+    }
+
     /// Sum of squares of all runs, with `instead` in place of run `r`, and all unknowns free.
     fn left_with(&self, r: usize, instead: &Run, conditions: &Conditions) -> Result<f64, CalibrationError> {
         let at = &self.estimate.at;
@@ -72,7 +87,7 @@ impl Parts<'_> {
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn clock_by_changes(&self, r: usize) -> Result<Option<ByChanges>, CalibrationError> {
+    fn clock_by_changes(&self, r: usize) -> Result<Option<ByChanges>, CalibrationError> {
         let own = &self.problem.runs[r];
         if !matches!(own.reading.by, By::Timeline | By::Both) {
             return Ok(None);
@@ -119,7 +134,7 @@ impl Parts<'_> {
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn clock_by_rates(
+    fn clock_by_rates(
         &self,
         r: usize,
         changes: Option<&ByChanges>,

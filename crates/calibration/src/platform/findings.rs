@@ -236,6 +236,7 @@ fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
     (changes.is_some() || earth.is_some() || matters && !held).then(|| Finding::Clock {
         record: record.name.clone(),
         by_durations: clock.by_durations,
+        by_durations_sigma: clock.by_durations_sigma,
         by_changes: changes,
         by_earth: earth,
     })

@@ -187,7 +187,7 @@ impl Reading {
 
     /// Fraction by which the clock is fast, by the durations of positions; `None` if the record does not show
     /// it.
-    pub(crate) fn by_durations(&self, plan: &Plan) -> Option<f64> {
+    pub(crate) fn by_durations(&self, plan: &Plan) -> Option<answer::ClockRate> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
         let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
         match self.by {

@@ -176,8 +176,8 @@ impl Run {
                         position: position.name.clone(),
                         gap_s: first - left,
                         slew_s: turned,
-                        clock: reading.by_durations(planned).map_or_else(String::new, |fast| {
-                            format!("; positions lie as by {}", words(fast))
+                        clock: reading.by_durations(planned).map_or_else(String::new, |rate| {
+                            format!("; positions lie as by {}", words(rate.fast))
                         }),
                     });
                 }

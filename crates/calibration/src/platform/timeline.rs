@@ -108,10 +108,10 @@ pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interva
     }
 }
 
-/// Excess duration of all positions over the scheme, as a fraction, with which the rows of all of them lie
-/// inside; `None` where no such rate exists.
-pub(crate) fn by_rows(stays: &[(f64, f64)], plan: &Plan) -> Option<f64> {
-    rate(stays, &bounds(plan), ROUNDING_S)
+/// Least and largest excess duration of all positions over the scheme, as a fraction, with which the rows of
+/// all of them lie inside; `None` where no such rate exists.
+pub(crate) fn by_rows(stays: &[(f64, f64)], plan: &Plan) -> Option<(f64, f64)> {
+    rates(stays, &bounds(plan), ROUNDING_S)
 }
 
 /// Narrows what the rows beside a change of position leave open, if all positions last equally many times as

@@ -9,7 +9,7 @@ use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
 
 use super::fewest_of_all;
-use crate::calibration::is_clock;
+use crate::calibration::{durations, is_clock};
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
 use crate::{omitted, resolve, stated, words};
@@ -262,8 +262,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
                                                         with those of its run: either the clock is wrong, and \
                                                         drifts by the same part, or the scheme has other times."
             .into(),
-        Finding::Clock { by_durations, by_earth, .. } => match (by_durations, by_earth) {
-            (Some(_), Some(_)) if is_clock(*by_durations, by_earth.as_ref()) => {
+        Finding::Clock { by_durations, by_durations_sigma, by_earth, .. } => match (by_durations, by_earth) {
+            (Some(_), Some(_))
+                if is_clock(durations(*by_durations, *by_durations_sigma).as_ref(), by_earth.as_ref()) =>
+            {
                 "Correct the times of the record: its clock fits neither the scheme nor the earth rate. \
                  Drifts are wrong by the same part or more."
             }
