@@ -21,6 +21,7 @@ mod lock;
 mod origin;
 mod output;
 mod paper;
+mod print;
 mod progress;
 mod report;
 mod schema;

@@ -4,26 +4,29 @@ use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
 use obsdeg_commands::{CalibrationFile, Given, Host, Report, Source, Word, one_of, origin, report};
-use obsdeg_report::{ReportError, ReviewFormat, picture_folder};
+use obsdeg_report::{ReviewFormat, picture_folder};
 
 use crate::arguments::{AllFiles, RequireMet};
 use crate::engine::{EngineArguments, notice, say_busy};
 use crate::failure::Failure;
+use crate::failure::say;
 use crate::input::read;
 use crate::interrupt;
 use crate::origin::command;
 use crate::output::Target;
+use crate::print::{PdfBy, Printer, print};
 use crate::progress::Bar;
 
 const AFTER_HELP: &str = "\
 Examples:
   obsdeg report examples/paper-p1-p2/scheme.toml -o review.html
   obsdeg report a.toml b.toml --carry inertial --requirement D=0.05 -o review.html
-  obsdeg report scheme.toml -o review.pdf                (with the cargo feature `pdf`)
+  obsdeg report scheme.toml -o review.pdf
   obsdeg report examples/two-compartment/model.toml -o review.md
   obsdeg report scheme.toml --calibration calibration -o review.html
 
-The format follows the ending of the file, or --format. HTML and PDF are one file; Markdown and LaTeX have \
+The format follows the ending of the file, or --format. HTML and PDF are one file: a PDF is the page as a \
+browser of this computer prints it, or by the typesetter (--pdf-by). Markdown and LaTeX have \
 their pictures in a folder of their own beside it, review_figures for review.md. The same command writes the \
 same bytes.
 
@@ -32,7 +35,7 @@ Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input,
 /// The words of `--format`.
 const FORMATS: [Word<ReviewFormat>; 4] = [
     ("html", "one self-contained page", ReviewFormat::Html),
-    ("pdf", "one file (cargo feature `pdf`)", ReviewFormat::Pdf),
+    ("pdf", "one file, printed by a browser or the typesetter", ReviewFormat::Pdf),
     ("markdown", "with its pictures in a folder beside it", ReviewFormat::Markdown),
     ("latex", "with its pictures in a folder beside it", ReviewFormat::Latex),
 ];
@@ -52,6 +55,11 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     target: Target,
+
+    /// Maker of a PDF: browser (the first that is found), the path of one, or typesetter (cargo feature
+    /// `pdf`); default: a browser, and where none is found the typesetter
+    #[arg(long, value_name = "PROGRAM", help_heading = "Output")]
+    pdf_by: Option<PdfBy>,
 
     /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times
     #[arg(long, value_name = "FOLDER")]
@@ -81,6 +89,10 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     interrupt::ends()?;
     let path = a.target.path().unwrap_or(Path::new("-"));
     let format = format(a.format, path)?;
+    if a.pdf_by.is_some() && format != ReviewFormat::Pdf {
+        return Err(Failure::input("--pdf-by does nothing without a PDF; expected -o FILE.pdf".into()));
+    }
+    let printer = (format == ReviewFormat::Pdf).then(|| Printer::find(a.pdf_by.as_ref())).transpose()?;
     let folder = picture_folder(&path.file_stem().unwrap_or_default().to_string_lossy());
     a.target.check()?;
     if matches!(format, ReviewFormat::Markdown | ReviewFormat::Latex) {
@@ -102,8 +114,18 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     a.met.check(reviewed.requirements())?;
     bar.set_message("writing");
-    let written = reviewed.files(&origin, format, &folder)?;
+    let mut written = match &printer {
+        Some(Printer::Browser(_)) => reviewed.files(&origin, ReviewFormat::Html, &folder)?,
+        _ => reviewed.files(&origin, format, &folder)?,
+    };
+    if let (Some(Printer::Browser(browser)), Some(page)) = (&printer, written.first_mut()) {
+        bar.set_message("printing");
+        page.bytes = print(browser, &page.bytes)?;
+    }
     drop(bar);
+    if let Some(Printer::Browser(browser)) = printer.filter(|_| !a.target.quiet) {
+        say(&format!("printed by {}", browser.display()));
+    }
     written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
     worker.iter().for_each(say_busy);
     notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
@@ -128,14 +150,10 @@ fn format(asked: Option<ReviewFormat>, path: &Path) -> Result<ReviewFormat, Fail
         Some("tex") => Some(ReviewFormat::Latex),
         _ => None,
     };
-    let format = asked.or(by_ending).ok_or_else(|| {
+    asked.or(by_ending).ok_or_else(|| {
         Failure::input(format!(
             "no format for {}; expected a file that ends in .html, .pdf, .md or .tex, or --format",
             path.display()
         ))
-    })?;
-    if format == ReviewFormat::Pdf && !obsdeg_report::HAS_PDF {
-        return Err(ReportError::NoPdf.into());
-    }
-    Ok(format)
+    })
 }

@@ -2102,7 +2102,11 @@ class Sensors(Shape):
     quantities: list[SensorUnknown]
     """Per unknown the cheapest set that makes it observable."""
     judged_sets: int
-    """Number of sets whose degrees were computed, at two points each."""
+    """Number of sets whose degrees were computed, at one point each."""
+    relied_on_sets: int
+    """Number of sets, out of these, that the answer rests on: those listed, and those whose failure or whose degree its proofs use.
+    Their degrees were computed at a second point too, and are the same.
+    """
     confirmed_sets: int
     """Number of sets, out of those in this answer and those that its proofs rest on, that `analyze` judged again as a model with these
     outputs: the degrees are the same.
@@ -2116,7 +2120,7 @@ class Sensors(Shape):
     degrees.
     """
     error_bound: float | None
-    """Bound on the probability that the degrees of a judged set are wrong; null for a model judged in real numbers."""
+    """Bound on the probability that the degrees of a set that the answer rests on are wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None
     """Margin of the rank decisions on all candidates together, in real numbers; null for a model judged in prime fields."""
     seed: int
@@ -2280,6 +2284,8 @@ class NextPositions(Shape):
     """Number of days of ageing since the calibration; null without ageing."""
     ageing: dict[str, float] | None
     """Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day)."""
+    unused_ageing: list[str]
+    """Names of the table of ageing that are no coefficients of the scheme, and have no effect."""
     schedule: list[Requalification]
     """Requalification after each requested number of days; left out without days."""
     candidates: list[str]

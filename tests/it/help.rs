@@ -13,7 +13,7 @@ const COMMANDS: [(&str, usize); 14] = [
     ("allan", 24),
     ("compare", 46),
     ("design", 84),
-    ("report", 60),
+    ("report", 61),
     ("paper", 18),
     ("verify", 15),
     ("licences", 12),

@@ -57,7 +57,7 @@ fn number(text: &str) -> f64 {
 fn the_report_has_a_budget_of_every_coefficient() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = Html::parse_document(&report(folder.path(), "bench.html", &[BENCH]).1);
-    assert!(texts(&page, "h2").iter().any(|t| t == "What is not estimated"));
+    assert!(texts(&page, "h3").iter().any(|t| t == "What is not estimated"));
     // longer dwells do not lower the part of the bench: the recommended action was tried with the bench
     let front = texts(&page, "section.front").concat();
     assert!(front.contains("Estimate K0,M6 too") && !front.contains("Dwell "), "{front}");

@@ -167,19 +167,27 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
         texts(&page, "h2"),
         [
             "Verdict",
-            "Unknowns",
-            "What cannot be told apart",
             "Positions",
-            "How each is solved",
-            "Sensitivity",
-            "What is not estimated",
-            "Fewest positions, and what each is for",
-            "Evidence by a filter",
-            "Validity of the small-angle model",
-            "Assumptions and certainty",
+            "What limits it, and what to change",
+            "Appendix",
             "How to check this without obsdeg",
             "Notation",
             "About this report",
+        ]
+    );
+    assert_eq!(
+        texts(&page, "details.part > summary > h3"),
+        [
+            "Unknowns",
+            "What cannot be told apart",
+            "Positions in numbers",
+            "How each is solved",
+            "Sensitivity",
+            "What is not estimated",
+            "Evidence by a filter",
+            "One run of the filter",
+            "Validity of the small-angle model",
+            "Assumptions and certainty",
         ]
     );
     // method.md, section 9: two positions, platform carry
@@ -390,7 +398,8 @@ fn text_from_files_is_text_in_every_format() {
     let parts = texts(&page, "h2");
     assert_eq!(parts.len(), 7, "{parts:?}");
     assert_eq!(parts[0], "Comparison of the schemes");
-    assert_eq!(texts(&page, "details:not([open]) > summary > h2"), parts[1..4]);
+    assert_eq!(texts(&page, "main > details:not([open]) > summary > h2"), parts);
+    assert!(parts[1].starts_with("Scheme ") && parts[3].starts_with("Model "), "{parts:?}");
     assert!(table(&page, "Side by side").len() == 2);
     // a box for each input at the top; tables in formats without boxes
     let titles = texts(&page, ".status > .heading");
@@ -462,10 +471,38 @@ fn what_cannot_be_reported_is_refused_and_nothing_is_written() {
     refused(&["examples/wrong-gimbals/scheme.toml", PAPER, "-o", &at("a.html")], "wrong-gimbals");
     assert_eq!(std::fs::read_to_string(at("taken.html")).expect("still there"), "mine");
     if cfg!(not(feature = "pdf")) {
-        refused(
-            &[PAPER, "-o", &at("a.pdf")],
-            "build it with `--features pdf`, or write HTML (-o review.html) and print it",
-        );
+        refused(&[PAPER, "-o", &at("a.pdf"), "--pdf-by", "typesetter"], "a build with `--features pdf`");
+    }
+    let nowhere = at("no-browser");
+    refused(&[PAPER, "-o", &at("a.pdf"), "--pdf-by", &nowhere], "expected browser, typesetter, or the path");
+    refused(&[PAPER, "-o", &at("a.html"), "--pdf-by", "browser"], "--pdf-by does nothing without a PDF");
+}
+
+/// The page as a browser of this computer prints it: the same bytes twice, with its texts, and the browser
+/// named.
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn a_browser_prints_the_pdf() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("review.pdf");
+    let print = || {
+        let path = file.display().to_string();
+        run(&["report", PAPER, "--runs", "20", "--pdf-by", "browser", "--force", "-o", &path])
+    };
+    let printed = print();
+    if stderr(&printed).contains("--pdf-by browser: none was found") {
+        eprintln!("skipped: no browser on this machine");
+        return;
+    }
+    assert!(printed.status.success() && stderr(&printed).contains("printed by "), "{}", stderr(&printed));
+    let once = std::fs::read(&file).expect("written");
+    assert!(once.starts_with(b"%PDF-"));
+    assert!(print().status.success());
+    assert!(once == std::fs::read(&file).expect("written"), "the same command gives the same bytes");
+    let Ok(text) = std::process::Command::new("pdftotext").arg(&file).arg("-").output() else { return };
+    let text = String::from_utf8_lossy(&text.stdout).into_owned();
+    for part in ["Design review: paper-p1-p2", "What limits it, and what to change", "About this report"] {
+        assert!(text.contains(part), "{part}: {text}");
     }
 }
 
@@ -476,8 +513,9 @@ fn the_pdf_holds_every_table() {
     let folder = tempfile::tempdir().expect("a folder");
     let scheme = hostile(folder.path(), 12).display().to_string();
     let inputs = [scheme.as_str(), PAPER, MODEL];
-    let (file, _) = report(folder.path(), "review.pdf", &inputs);
-    let (again, _) = report(folder.path(), "again.pdf", &inputs);
+    let typeset = [&inputs[..], &["--pdf-by", "typesetter"]].concat();
+    let (file, _) = report(folder.path(), "review.pdf", &typeset);
+    let (again, _) = report(folder.path(), "again.pdf", &typeset);
     let bytes = std::fs::read(&file).expect("written");
     assert!(bytes.starts_with(b"%PDF-"));
     assert!(bytes == std::fs::read(&again).expect("written"), "the same command gives the same bytes");

@@ -8,7 +8,7 @@ use scraper::{Html, Selector};
 use serde_json::json;
 
 use crate::browser::Browser;
-use crate::program::{run, stderr};
+use crate::program::{refused, run, stderr};
 use crate::report::{MODEL, PAPER, assert_unique_ids, hostile, report, statuses, table, texts};
 
 /// First box of a review of several schemes or of one, by its title.
@@ -107,7 +107,8 @@ fn generic_angles_are_reported() {
     }
     assert!(!texts(&page, "th").iter().any(|h| h.contains("sigma")));
     let page = Html::parse_document(&report(folder.path(), "both.html", &[generic, PAPER]).1);
-    assert_eq!(texts(&page, "summary > h2").len(), 2);
+    let schemes = texts(&page, "summary > h2").into_iter().filter(|t| t.starts_with("Scheme "));
+    assert_eq!(schemes.count(), 2);
 }
 
 #[test]
@@ -150,8 +151,8 @@ fn a_browser_shows_it() {
     // folded parts are printed on paper
     let (several, _) = report(folder.path(), "several.html", &[PAPER, MODEL]);
     browser.open(&several, 1280, 900);
-    let visible = "[...document.querySelectorAll('details .wide > table')].map(e => e.checkVisibility({ \
-                   contentVisibilityAuto: true }))";
+    let visible = "[...document.querySelectorAll('details .wide > table')].filter(e => !e.closest('.unprinted')).map(e => \
+                   e.checkVisibility({ contentVisibilityAuto: true }))";
     let seen = |browser: &mut Browser, all: bool| {
         let shown = browser.value(visible);
         let shown = shown.as_array().expect("a list");
@@ -184,7 +185,12 @@ fn a_browser_shows_it() {
     for (file, degree_of_d_fy) in [(&paper, "2"), (&long, "1")] {
         browser.events.clear();
         browser.open(file, 1280, 900);
-        // every figure with curves has an interactive drawing, and the still picture is hidden
+        // every figure with curves has an interactive drawing once it is unfolded, and the still picture is
+        // hidden
+        let folded = browser.value("document.querySelectorAll('details figure.curves canvas').length");
+        assert_eq!(folded, json!(0));
+        browser.value("document.querySelectorAll('details').forEach(d => { d.open = true; })");
+        browser.settle();
         let counts = browser.value(
             "[document.querySelectorAll('figure.curves').length, document.querySelectorAll('figure.curves \
              canvas').length, \
@@ -232,7 +238,7 @@ fn a_browser_shows_it() {
         browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
         browser.settle();
         let printed = browser.value(
-            "[...document.querySelectorAll('figure .still')].every(e => e.checkVisibility()) \
+            "[...document.querySelectorAll('figure .still')].every(e => !!e.closest('.unprinted') !== e.checkVisibility()) \
              && ![...document.querySelectorAll('.plot')].some(e => e.checkVisibility())",
         );
         assert_eq!(printed, json!(true), "on paper the still pictures");
@@ -248,6 +254,87 @@ fn a_browser_shows_it() {
                 assert!(url.starts_with("data:") || url.ends_with(".html"), "{url}");
             }
         }
+    }
+}
+
+/// Number of A4 pages that a browser prints.
+fn printed_pages(browser: &mut Browser, file: &Path) -> usize {
+    use base64::Engine;
+    browser.open(file, 1280, 900);
+    let answer =
+        browser.call("Page.printToPDF", json!({ "preferCSSPageSize": true, "printBackground": false }));
+    let pdf = base64::engine::general_purpose::STANDARD.decode(answer["data"].as_str().expect("data"));
+    let pdf = String::from_utf8_lossy(&pdf.expect("base64")).into_owned();
+    pdf.matches("/Type /Page").count() - pdf.matches("/Type /Pages").count()
+}
+
+/// On paper one scheme takes at most eight pages with its appendix, three take at most twelve, and what
+/// stands before the appendix answers the questions of a board.
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn a_review_fits_its_pages() {
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let example = |name: &str| format!("examples/{name}/scheme.toml");
+    for name in ["six-positions", "bench-errors", "paper-p1-p2"] {
+        let (file, text) = report(folder.path(), &format!("{name}.html"), &[&example(name)]);
+        let pages = printed_pages(&mut browser, &file);
+        assert!((3..=8).contains(&pages), "{name}: {pages} pages");
+        let page = Html::parse_document(&text);
+        let body = texts(&page, "body").remove(0);
+        let first = body.split("Every unknown, best first").next().unwrap_or_default();
+        for answer in [
+            "carry ",
+            "noise of Z 1e-5 g",
+            "Recommended action",
+            "errors K0 of 20 ug",
+            " s, a sample after each",
+            "Without one position",
+            "Made by obsdeg",
+            "a verdict is wrong with probability below",
+            "Filter and exact verdicts",
+            "dwell [s]",
+        ] {
+            assert!(first.contains(answer), "{name}: {answer}");
+        }
+        assert!(body.len() > 2 * first.len(), "an appendix");
+    }
+    let three = ["five-positions", "six-positions", "paper-p1-p2"].map(example);
+    let (file, _) = report(folder.path(), "three.html", &three.each_ref().map(String::as_str));
+    let pages = printed_pages(&mut browser, &file);
+    assert!((4..=12).contains(&pages), "{pages} pages");
+}
+
+/// A title block is printed as it is stated, with a place for each signature, and never from the clock.
+#[test]
+fn a_title_block_is_that_of_the_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let written = |line: &str| {
+        let file = folder.path().join("s.toml");
+        let positions = "[[position]]\nattitude = 'NUE'\n[[position]]\nattitude = 'UEN'\n";
+        std::fs::write(&file, format!("[document]\n{line}\n{positions}")).expect("written");
+        file.display().to_string()
+    };
+    let all = "reference = 'GN-7'\nrevision = 'B <i>'\ndate = 2026-03-01\nauthor = 'A. N. Other'\n\
+               signatures = ['Checked', 'Approved']";
+    let (_, page) = report(folder.path(), "s.html", &[&written(all)]);
+    let page = Html::parse_document(&page);
+    let cells = texts(&page, ".front tbody tr:first-child td");
+    assert_eq!(cells[1..5], ["GN-7", "B <i>", "2026-03-01", "A. N. Other"]);
+    let heads = texts(&page, ".front thead th");
+    assert_eq!(heads[5..7], ["Checked: name, date, signature", "Approved: name, date, signature"]);
+    let (_, none) = report(folder.path(), "none.html", &[PAPER]);
+    assert!(none.contains("are not stated (table [document] of the file)"));
+    let to = folder.path().join("x.html").display().to_string();
+    for (line, said) in [
+        ("revison = 'B'", "revison"),
+        ("signatures = 'B'", "signatures"),
+        (&format!("author = '{}'", "a".repeat(300)), "300"),
+    ] {
+        refused(&["report", &written(line), "-o", &to], &[said]);
     }
 }
 

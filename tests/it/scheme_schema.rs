@@ -191,6 +191,8 @@ fn schema_and_reader_agree() {
         "[record]\nvalues = { g = 1 }",
         "[record.static]\ninitial = 9\nwindow = 3",
         "[geometry]\nX = 5",
+        "[document]\ntitle = \"t\"",
+        "[document]\nsignatures = \"Checked\"",
     ] {
         let text = format!("{position}{keys}\n");
         assert!(read(&text).is_err(), "{keys}");
@@ -210,6 +212,7 @@ azimuth_noise_deg = 1
 drift_noise = \"0.1 deg/sqrt(h)\"\nangle_random_walk_deg_sqrt_h = 0.001\nrate_random_walk_dph_sqrt_h = [0.1, 0, 0.1]
 bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\n\
 estimates = {{ D = 1 }}\npriors = {{ D = 1 }}
+[document]\nreference = \"r\"\nrevision = \"B\"\ndate = \"2026-03-01\"\nauthor = \"a\"\nsignatures = [\"Checked\"]
 [requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\n\
 static = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\n\
 alpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"

@@ -565,10 +565,11 @@ fn fronts_of_twenty_candidates() {
         assert!(found.stopped.is_none(), "{name}: {:?}", found.stopped);
         let front: Vec<(usize, usize)> = found.front.iter().map(|f| (f.outputs.len(), f.degree)).collect();
         println!(
-            "{name}: {} candidates, {} unknowns, {} sets judged, {:?} minimal, front {front:?}, {:.2} s",
+            "{name}: {} candidates, {} unknowns, {} sets judged, {} relied on, {:?} minimal, front {front:?}, {:.2} s",
             found.candidates.len(),
             found.quantities.len(),
             found.judged_sets,
+            found.relied_on_sets,
             found.minimal_sets,
             before.elapsed().as_secs_f64()
         );
@@ -589,6 +590,15 @@ fn what_cannot_be_is_said() {
     let found = sensors(&model, &strict, &|_| true).expect("sets");
     assert_eq!((found.unattainable[0].name.as_str(), found.unattainable[0].degree), ("k", Some(1)));
     assert_eq!(found.max_degree, ["k=0"]);
+    // the narrower name holds, in either order
+    let caps = [(None, 0), (Some("k".into()), 1), (Some("unused".into()), 5)];
+    for max_degree in [caps.to_vec(), caps.iter().rev().cloned().collect()] {
+        let found =
+            sensors(&model, &SensorOptions { max_degree, ..options.clone() }, &|_| true).expect("sets");
+        let unattainable: Vec<&str> = found.unattainable.iter().map(|u| u.name.as_str()).collect();
+        assert_eq!(unattainable, ["unused"]);
+        assert_eq!(found.front[0].outputs, ["b", "a"]);
+    }
     let unknown = SensorOptions { required: vec!["q".into()], ..options.clone() };
     let error = sensors(&model, &unknown, &|_| true).expect_err("no such unknown").to_string();
     assert!(error.contains("`q` is no unknown of the model; expected one of a, b, k, unused"), "{error}");

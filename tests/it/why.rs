@@ -11,7 +11,7 @@ use obsdeg_exact::SplitMix64;
 use serde_json::Value;
 
 use crate::models::models;
-use crate::program::refused;
+use crate::program::{refused, run, stderr, stdout};
 use crate::remedies::{
     Degrees, changed_model, changed_scheme, degree, degrees_of_scheme, judged_model, judged_scheme, p1_p2,
     random_scheme,
@@ -319,4 +319,25 @@ fn two_positions_by_hand() {
 fn names_are_checked() {
     let asked = ["analyze", "--angles", "NUE", "--why", "D_FW", "--solutions", "off"];
     refused(&asked, &["--why: no unknown `D_FW`; did you mean `D_FX`?"]);
+}
+
+/// A family stands for its coefficients, a state for that of every experiment; none is explained twice.
+#[test]
+fn a_family_is_explained_one_by_one() {
+    let names = |arguments: &[&str]| -> Vec<String> {
+        let run = run(&[arguments, &["--solutions", "off", "--format", "json"]].concat());
+        assert!(run.status.success(), "{}", stderr(&run));
+        let answer: Value = serde_json::from_str(&stdout(&run)).expect("JSON");
+        let why = answer["why"].as_array().expect("a list");
+        why.iter().map(|w| w["name"].as_str().expect("a name").to_string()).collect()
+    };
+    let scheme = ["analyze", "--angles", "NUE", "--why", "D_FY", "--why", "D_F"];
+    assert_eq!(names(&scheme), ["D_FY", "D_FX", "D_FZ"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("m.toml");
+    let text =
+        "name='m'\nparameters=['k']\n[states]\nx='-k*x'\n[outputs]\ny='x'\n[[experiment]]\n[[experiment]]\n";
+    std::fs::write(&file, text).expect("written");
+    let model = ["analyze", "--model", file.to_str().expect("UTF-8"), "--why", "x"];
+    assert_eq!(names(&model), ["x@1", "x@2"]);
 }

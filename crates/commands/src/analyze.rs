@@ -6,6 +6,7 @@ use clap::{ArgAction, Args};
 use obsdeg_core::analysis::AnalysisOptions;
 use obsdeg_core::certificate::{CertificateError, certify, certify_model};
 use obsdeg_core::model::Scheme;
+use obsdeg_core::model::settings::concerns;
 use obsdeg_core::solution::Frame;
 use obsdeg_core::system::{
     COUNT_LIMIT, RELATION_LIMIT, ReducedError, SystemAnalysis, SystemOptions, analyze_system, explain_system,
@@ -77,8 +78,9 @@ pub struct Analyze {
     #[arg(long, help_heading = "Solutions")]
     pub sensitivities: bool,
 
-    /// Explain the verdict on an unknown: what decides it, which assumptions it rests on, and the changes
-    /// that make it observable or lower its degree, in order of cost, each tried; repeatable
+    /// Explain the verdict on an unknown, or on each of a family (D_F): what decides it, which assumptions it
+    /// rests on, and the changes that make it observable or lower its degree, in order of cost, each tried;
+    /// repeatable
     #[arg(long, value_name = "NAME", help_heading = "Solutions")]
     pub why: Vec<String>,
 
@@ -326,8 +328,30 @@ pub(crate) fn certificate_digest(scheme: &Scheme) -> Result<String, Problem> {
 }
 
 /// Error of `--why` with a name that is not an unknown.
-fn not_an_unknown(name: &str, unknowns: Vec<String>) -> Problem {
-    Problem::input(format!("--why: {}", no_unknown(name, &unknowns)))
+fn not_an_unknown(name: &str, unknowns: &[String]) -> Problem {
+    Problem::input(format!("--why: {}", no_unknown(name, unknowns)))
+}
+
+/// Unknowns that `--why` asks for, each once: those of these names, or all that a name `stands_for`.
+///
+/// # Errors
+/// [`Problem`] of a name that stands for no unknown.
+fn to_explain(
+    why: &[String],
+    unknowns: &[String],
+    stands_for: impl Fn(&str, &str) -> bool,
+) -> Result<Vec<String>, Problem> {
+    let mut out: Vec<String> = Vec::new();
+    for name in why {
+        let of = |own: &&String| if unknowns.contains(name) { *own == name } else { stands_for(name, own) };
+        let found: Vec<&String> = unknowns.iter().filter(of).collect();
+        if found.is_empty() {
+            return Err(not_an_unknown(name, unknowns));
+        }
+        let new: Vec<String> = found.into_iter().filter(|own| !out.contains(own)).cloned().collect();
+        out.extend(new);
+    }
+    Ok(out)
 }
 
 fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged, Problem> {
@@ -344,10 +368,10 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             let options = AnalysisOptions { seed, solutions, formulas, frame, omitted };
             let worker = host.worker.as_deref_mut();
             let mut verdicts = obsdeg_core::analysis::analyze(scheme, options, worker)?;
-            for name in why {
-                let found = obsdeg_core::analysis::explain(scheme, &verdicts, name, seed)?;
-                let names = verdicts.quantities.iter().map(|q| q.name.clone());
-                verdicts.why.push(found.ok_or_else(|| not_an_unknown(name, names.collect()))?);
+            let names: Vec<String> = verdicts.quantities.iter().map(|q| q.name.clone()).collect();
+            for name in to_explain(why, &names, concerns)? {
+                let found = obsdeg_core::analysis::explain(scheme, &verdicts, &name, seed)?;
+                verdicts.why.push(found.ok_or_else(|| not_an_unknown(&name, &names))?);
             }
             Judged::Scheme(Box::new(SchemeAnalysis { verdicts, sensitivities: of_record }))
         }
@@ -357,11 +381,13 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             let order = order.map(Into::into);
             let options = SystemOptions { seed, solutions, count_limit, relation_limit, order };
             let mut found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
-            for name in why {
-                let explained = explain_system(&file.model, &found, name, options);
+            let names: Vec<String> = found.quantities.iter().map(|q| q.name.clone()).collect();
+            let of_experiment =
+                |asked: &str, name: &str| name.split_once('@').is_some_and(|(own, _)| own == asked);
+            for name in to_explain(why, &names, of_experiment)? {
+                let explained = explain_system(&file.model, &found, &name, options);
                 let explained = explained.map_err(|e| file.wrong(&e))?;
-                let names = found.quantities.iter().map(|q| q.name.clone());
-                found.why.push(explained.ok_or_else(|| not_an_unknown(name, names.collect()))?);
+                found.why.push(explained.ok_or_else(|| not_an_unknown(&name, &names))?);
             }
             Judged::Model(Box::new(found))
         }

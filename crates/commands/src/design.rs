@@ -179,7 +179,8 @@ pub struct WantedOptions {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub observable: Vec<String>,
 
-    /// Largest degree, of all required coefficients, or of one, a family or an unknown of a model: 1, D_F=1
+    /// Largest degree, of all required coefficients, or of one, a family or an unknown of a model: 1, D_F=1.
+    /// Of several, that of the narrowest name holds
     #[arg(long, value_name = "[NAME=]K")]
     #[serde(with = "text::list")]
     pub max_degree: Vec<DegreeCap>,

@@ -49,4 +49,5 @@ pub mod omitted;
 pub mod remedies;
 pub mod solution;
 pub mod system;
+pub mod title_block;
 pub mod why;

@@ -16,6 +16,7 @@
 //! of their samples. [`next`] chooses further positions of a scheme, [`sensors`] outputs of a model.
 //! [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
 
+mod degree_caps;
 pub mod design;
 pub mod next;
 pub mod review;

@@ -11,7 +11,7 @@
     "#E69F00": "--amber", "#999999": "--grey",
   };
   const made = [];
-  const shown = (x) => (x == null ? "--" : Math.abs(x) >= 1e-3 && Math.abs(x) < 1e5 || x === 0 ? String(+x.toPrecision(4)) : x.toExponential(2));
+  const shown = (x) => (x == null ? "" : Math.abs(x) >= 1e-3 && Math.abs(x) < 1e5 || x === 0 ? String(+x.toPrecision(4)) : x.toExponential(2));
 
   function plot(figure, spec) {
     const holder = figure.querySelector(".plot");
@@ -88,7 +88,7 @@
     });
   }
 
-  for (const figure of document.querySelectorAll("figure.curves")) {
+  function make(figure) {
     const spec = JSON.parse(figure.querySelector("script").textContent);
     const entry = { figure, spec, plot: plot(figure, spec) };
     made.push(entry);
@@ -97,8 +97,19 @@
       if (Math.abs(width - entry.plot.width) > 1) entry.plot.setSize({ width, height: 320 });
     }).observe(figure);
   }
+  // what is folded has no width: it is drawn when it is unfolded
+  let waiting = [...document.querySelectorAll("figure.curves")];
+  const unfolded = () => {
+    const folded = (figure) => figure.closest("details:not([open])") !== null;
+    waiting.filter((figure) => !folded(figure)).forEach(make);
+    waiting = waiting.filter(folded);
+  };
+  unfolded();
+  document.addEventListener("toggle", unfolded, true);
   // what is folded is opened for a link into it, and on paper
-  const reveal = () => document.getElementById(location.hash.slice(1))?.closest("details")?.setAttribute("open", "");
+  const reveal = () => {
+    for (let e = document.getElementById(location.hash.slice(1)); e; e = e.parentElement) if (e.matches("details")) e.open = true;
+  };
   addEventListener("hashchange", reveal);
   reveal();
   let folded = [];

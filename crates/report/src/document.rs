@@ -24,11 +24,33 @@ pub(crate) enum Block {
     Picture(Picture),
     /// Status of each scheme or model, in boxes at the beginning.
     Status(Vec<Status>),
-    /// Part (level 1) that may be folded away; folds are not nested.
-    Fold { title: String, blocks: Vec<Block> },
+    /// Part that may be folded away.
+    Fold(Fold),
+    /// What follows begins a page where pages are printed.
+    NewPage,
+}
+
+/// Part of a page that may be folded away.
+pub(crate) struct Fold {
+    /// Level of its heading, as of a section.
+    pub(crate) level: usize,
+    pub(crate) title: String,
+    /// False for details that a printed page leaves out; texts have them all.
+    pub(crate) printed: bool,
+    pub(crate) blocks: Vec<Block>,
 }
 
 impl Block {
+    pub(crate) fn fold(level: usize, title: impl Into<String>, blocks: Vec<Block>) -> Self {
+        Self::Fold(Fold { level, title: title.into(), printed: true, blocks })
+    }
+
+    /// Details that a printed page leaves out; `None` without any.
+    pub(crate) fn details(level: usize, title: impl Into<String>, blocks: Vec<Block>) -> Option<Self> {
+        let fold = Fold { level, title: title.into(), printed: false, blocks };
+        (!fold.blocks.is_empty()).then_some(Self::Fold(fold))
+    }
+
     pub(crate) fn table<C: Into<Cell>>(
         heading: impl Into<String>,
         columns: impl Into<Vec<Column>>,
@@ -294,18 +316,24 @@ pub(crate) fn parts(blocks: &[Block]) -> Vec<BlockGroup<'_>> {
     out
 }
 
+/// Blocks with status boxes as tables, and folds as sections.
+fn unfolded(blocks: Vec<Block>) -> Vec<Block> {
+    let of = |b: Block| match b {
+        Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
+        Block::Fold(fold) => {
+            let mut out = vec![Block::Section { level: fold.level.min(2), title: fold.title }];
+            out.extend(unfolded(fold.blocks));
+            out
+        }
+        other => vec![other],
+    };
+    blocks.into_iter().flat_map(of).collect()
+}
+
 impl Document {
     /// The document with status boxes as tables and without folds.
     pub(crate) fn plain(mut self) -> Self {
-        let tables = |b: Block| match b {
-            Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
-            Block::Fold { title, mut blocks } => {
-                blocks.insert(0, Block::Section { level: 1, title });
-                blocks
-            }
-            other => vec![other],
-        };
-        self.blocks = self.blocks.into_iter().flat_map(tables).collect();
+        self.blocks = unfolded(self.blocks);
         self
     }
 

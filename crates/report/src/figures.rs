@@ -106,47 +106,49 @@ fn curve(record: &Traces, i: usize) -> Figure {
     }
 }
 
-/// Error of one series (estimate minus truth) with +-3 sigma around zero, the error of the linear filter on
-/// the same measurements, and the offset that an unknown psi leaves. The axis fits the second half of the
-/// last position: earlier errors leave the picture.
+/// Smallest error of a picture, as a fraction of the smallest 3 sigma: smaller ones are drawn there.
+const LEAST_ERROR: f64 = 0.03;
+
+/// Absolute error of one series (estimate minus truth) beside 3 sigma, on a logarithmic axis; those of the
+/// linear filter on the same measurements, and the offset that an unknown psi leaves.
 pub(crate) fn error_figure(record: &Traces, i: usize, most: usize) -> Figure {
     let (scale, unit) = (record.scales[i], &record.units[i]);
     let settled = settled(record, most);
-    let marks = boundaries(record);
     let end = record.time.last().copied().unwrap_or(0.0);
-    let late = (marks.last().copied().unwrap_or(0.0) + end) / 2.0;
-    let (mut bands, mut lines, mut largest) = (Vec::new(), Vec::new(), 0.0f64);
-    let mut add = |series: &Series, label: &str, fill, color, stroke| {
-        let error = |k: usize| (series.estimate[k] - series.truth[k]) / scale;
-        let width = |k: usize| 3.0 * series.sigma[k] / scale;
-        let shown = settled.iter().filter(|&&k| record.time[k] >= late);
-        largest = shown.fold(largest, |most, &k| most.max(error(k).abs()).max(width(k)));
-        let span = |&k: &usize| (record.time[k], -width(k), width(k));
-        bands.push(Band { color: fill, points: settled.iter().map(span).collect() });
-        let points = settled.iter().map(|&k| (record.time[k], error(k))).collect();
-        lines.push(line(format!("{label}, band of +-3 sigma"), color, stroke, points));
-    };
-    match &record.linear {
-        Some(linear) => {
-            add(&record.series[i], "error of the filter", SKY, BLUE, Stroke::Solid);
-            add(&linear[i], "error of the linear filter", AMBER, ORANGE, Stroke::Dashed);
-        }
-        None => add(&record.series[i], "error", SKY, BLUE, Stroke::Solid),
+    let mut all = vec![(&record.series[i], "", BLUE, SKY)];
+    all.extend(record.linear.as_ref().map(|linear| (&linear[i], " of the linear filter", ORANGE, AMBER)));
+    let widths =
+        |series: &Series| -> Vec<f64> { settled.iter().map(|&k| 3.0 * series.sigma[k] / scale).collect() };
+    let positive = all.iter().flat_map(|(series, ..)| widths(series)).filter(|w| *w > 0.0);
+    let (least, largest) = positive.fold((f64::MAX, 0.0f64), |(l, m), w| (l.min(w), m.max(w)));
+    let (least, largest) = if largest > 0.0 { (least * LEAST_ERROR, 2.0 * largest) } else { (1e-3, 1.0) };
+    let along = |y: Vec<f64>| settled.iter().map(|&k| record.time[k]).zip(y).collect::<Vec<(f64, f64)>>();
+    let mut lines = Vec::new();
+    for (series, whose, color, soft) in all {
+        let error = |&k: &usize| ((series.estimate[k] - series.truth[k]) / scale).abs().clamp(least, largest);
+        let widths = widths(series).into_iter().map(|w| w.max(least)).collect();
+        lines.push(line(format!("3 sigma{whose}"), soft, Stroke::Dashed, along(widths)));
+        lines.push(line(
+            format!("|error|{whose}"),
+            color,
+            Stroke::Solid,
+            along(settled.iter().map(error).collect()),
+        ));
     }
     if let Some((what, offset)) = offset(record, i) {
-        let label = format!("{what} = {} {unit}", number(offset));
-        lines.push(line(label, BLACK, Stroke::Dotted, vec![(0.0, offset), (end, offset)]));
+        let label = format!("|{what}| = {} {unit}", number(offset.abs()));
+        let at = offset.abs().clamp(least, largest);
+        lines.push(line(label, BLACK, Stroke::Dotted, vec![(0.0, at), (end, at)]));
     }
-    let half = if largest > 0.0 { 1.2 * largest } else { 1.0 };
     Figure {
         title: format!("Error of {}", series_title(record, i)),
         x_label: format!("t{}", bracketed(&record.time_unit)),
-        y_label: format!("error{}", bracketed(unit)),
-        bands,
+        y_label: format!("|error|{}", bracketed(unit)),
         lines,
-        marks,
+        marks: boundaries(record),
         x_range: Some((0.0, end)),
-        y_range: Some((-half, half)),
+        y_range: Some((least, largest)),
+        log_y: true,
         ..Figure::default()
     }
 }

@@ -9,7 +9,7 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::document::{
-    Block, BlockGroup, Document, Drawing, Picture, Status, StatusRow, Typeset, parts, table_of_page,
+    Block, BlockGroup, Document, Drawing, Fold, Picture, Status, StatusRow, Typeset, parts, table_of_page,
 };
 use crate::figure::{CLIP, Figure, Line, Stroke};
 use crate::{ReportError, visible};
@@ -25,7 +25,7 @@ const FONT: &[u8] = include_bytes!("../assets/math.woff2");
 /// The document as a page.
 pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
     // blocks before the first part
-    let first = d.blocks.iter().position(|b| matches!(b, Block::Section { .. } | Block::Fold { .. }));
+    let first = d.blocks.iter().position(|b| matches!(b, Block::Section { .. } | Block::Fold(_)));
     let (front, rest) = d.blocks.split_at(first.unwrap_or(d.blocks.len()));
     let mut ids = 0;
     let [front, blocks] = [front, rest].map(|b| listed(b, &mut ids));
@@ -73,7 +73,7 @@ pub(crate) fn fragment(d: &Document) -> Result<String, ReportError> {
 fn has_curves(blocks: &[Block]) -> bool {
     blocks.iter().any(|b| match b {
         Block::Picture(p) => matches!(p.drawing, Drawing::Curves(_)),
-        Block::Fold { blocks, .. } => has_curves(blocks),
+        Block::Fold(fold) => has_curves(&fold.blocks),
         _ => false,
     })
 }
@@ -84,8 +84,10 @@ fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
     let mut out = Vec::new();
     for part in parts(blocks) {
         *ids += 1;
-        if let BlockGroup::Block(Block::Fold { title, blocks }) = &part {
-            out.push(json!({ "kind": "fold", "level": 1, "title": title, "id": format!("section-{ids}") }));
+        if let BlockGroup::Block(Block::Fold(fold)) = &part {
+            let id = format!("section-{ids}");
+            let Fold { level, title, printed, blocks } = fold;
+            out.push(json!({ "kind": "fold", "level": level, "title": title, "printed": printed, "id": id }));
             out.extend(listed(blocks, ids));
             out.push(json!({ "kind": "end" }));
         } else {
@@ -116,7 +118,8 @@ fn block(i: usize, part: &BlockGroup<'_>) -> Json {
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
         // pictures come in groups, folds are taken apart by `listed`
-        Block::Picture(_) | Block::Fold { .. } => Json::Null,
+        Block::Picture(_) | Block::Fold(_) => Json::Null,
+        Block::NewPage => json!({ "kind": "page" }),
         Block::Status(boxes) => {
             let row = |f: &StatusRow| {
                 let (grade, mark) = (f.grade.name(), f.grade.mark());

@@ -126,7 +126,7 @@ fn body(d: &Document) -> String {
                 p.name,
                 escape(&p.caption)
             )),
-            Block::Status(_) | Block::Fold { .. } => {}
+            Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
         }
     }
     out

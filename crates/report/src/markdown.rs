@@ -48,7 +48,7 @@ pub(crate) fn document(d: &Document) -> String {
         text => format!("{} {}\n\n", "#".repeat(above + 1), escape(text)),
     };
     for (i, block) in d.blocks.iter().enumerate() {
-        if matches!(block, Block::Status(_) | Block::Fold { .. }) {
+        if matches!(block, Block::Status(_) | Block::Fold(_) | Block::NewPage) {
             continue;
         }
         out.push_str(if i == 0 { "" } else { "\n" });
@@ -73,7 +73,7 @@ pub(crate) fn document(d: &Document) -> String {
                 out.extend(lines.iter().map(|line| format!("- ${}$\n", line.latex)));
             }
             Block::Picture(p) => out.push_str(&format!("![{}]({}.svg)\n", escape(&p.caption), p.name)),
-            Block::Status(_) | Block::Fold { .. } => {}
+            Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
         }
     }
     out

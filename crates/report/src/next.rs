@@ -173,6 +173,9 @@ fn validity(n: &NextPositions) -> Vec<String> {
             "{days} days after the calibration; random walk per sqrt(day), in the units of the coefficients: {walk}"
         ));
     }
+    if !n.unused_ageing.is_empty() {
+        out.push(format!("no coefficients of this scheme, no ageing: {}", n.unused_ageing.join(", ")));
+    }
     if !n.schedule.is_empty() {
         out.push(
             "fewest positions and shortest runs: every extension was compared, with one dwell at all \

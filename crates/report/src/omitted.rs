@@ -139,6 +139,29 @@ pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
     (blocks(&alone, ""), budgets.map(|b| budget(b, "", usize::MAX)).collect())
 }
 
+/// Sizes of a bench by which a review shows what errors outside the model do.
+const TYPICAL: [(&str, f64); 4] = [("K0", 20.0), ("M", 10.0), ("M3", 10.0), ("M6", 10.0)];
+
+/// Sentences on the largest change by errors of a typical bench, one for each family that is not estimated.
+pub(crate) fn typical(of: &OmittedEffects) -> Vec<String> {
+    let families = TYPICAL.iter().filter_map(|(name, size)| {
+        let f = of.families.iter().find(|f| f.family == *name)?;
+        Some((f, *size))
+    });
+    let sentence = |(f, size): (&FamilyEffect, f64)| match &f.worst {
+        Some(w) => format!(
+            "errors {} of {size} {} (1 sigma each) change {} most, by {} {}",
+            f.family,
+            f.unit,
+            w.unknown,
+            number(size * w.per_unit),
+            w.unit
+        ),
+        None => format!("errors {} of any size change no estimate", f.family),
+    };
+    families.map(sentence).collect()
+}
+
 /// Sigma, bias and total of the worst drift coefficient under every carry; `None` without a bench.
 fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
     let columns = [left("carry"), left("worst"), right("sigma"), right("bias"), right("total"), left("unit")];

@@ -134,6 +134,6 @@ fn part(part: BlockGroup<'_>) -> Json {
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
         // pictures come in groups, a status is a table here, and folds are taken apart
-        Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => Json::Null,
+        Block::Picture(_) | Block::Status(_) | Block::Fold(_) | Block::NewPage => Json::Null,
     }
 }

@@ -7,6 +7,7 @@ mod generic;
 mod model;
 mod notation;
 mod pictures;
+mod title;
 mod verdict;
 
 use obsdeg_calibration::Calibration;
@@ -14,11 +15,10 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::{DesignReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
-use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::Outcome;
 
 use crate::analysis::null_vector;
-use crate::document::{Block, Document, Typeset, left, number, optional, right};
+use crate::document::{Block, Cell, Document, Typeset, left, number, optional, right};
 use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
@@ -28,17 +28,16 @@ const CALIBRATED: &str = "The run that is simulated of its scheme, and the check
                           the scheme states (of several calibrations those of the last); what is not \
                           determined has the values of the scheme.";
 
-/// Review as one document. A single scheme or model has its status, a picture of the unknowns and its
-/// sections. Several have the comparison first and every part folded below it.
+/// Review as one document. On two pages stand the question with its answer, then the positions with what
+/// limits them and what to change; the rest is an appendix. Several schemes are compared first.
 pub(crate) fn document(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],
     origin: &Origin,
 ) -> Document {
     let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
-    let level = if alone { 1 } else { 2 };
     let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
-    let mut blocks = Vec::new();
+    let mut blocks = vec![title::block(r), Block::Text(title::made_from(r, origin))];
     if r.schemes.len() > 1 {
         first::comparison(&mut blocks, r);
     }
@@ -54,21 +53,28 @@ pub(crate) fn document(
         blocks.extend(r.models.iter().map(|m| first::model_degrees(&m.analysis, "m1")));
     }
     if r.schemes.len() > 1 {
-        blocks.push(section(1, "Comparison of the schemes"));
         let comparison = r.comparison.document();
-        blocks.extend(comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
-        blocks.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
+        let mut own: Vec<Block> = vec![first::ratios(&r.comparison.schemes)];
+        own.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
+        let rest = comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")).collect();
+        own.extend(Block::details(2, "Comparison, every figure", rest));
+        blocks.push(Block::fold(1, "Comparison of the schemes", own));
+    }
+    for (i, (name, c)) in calibrations.iter().enumerate() {
+        let mut own = vec![Block::Text(CALIBRATED.into())];
+        own.extend(calibrated::section(c, &format!("c{}", i + 1)));
+        blocks.push(Block::fold(1, format!("Calibration {name}"), own));
     }
     let mut part = |title: String, own: Vec<Block>| match alone {
         true => blocks.extend(own),
-        false => blocks.push(Block::Fold { title, blocks: own }),
+        false => blocks.extend([Block::NewPage, Block::fold(1, title, own)]),
     };
     for (i, (s, review)) in reviewed().enumerate() {
         let (mut own, id) = (Vec::new(), format!("s{}", i + 1));
         if !alone {
             own.push(first::margins(s, review, &id));
         }
-        scheme(&mut own, s, review, level, &id);
+        scheme(&mut own, s, review, alone, &id);
         part(format!("Scheme {}", s.name), own);
     }
     for (i, g) in r.generic.iter().enumerate() {
@@ -76,7 +82,7 @@ pub(crate) fn document(
         if !alone {
             own.push(first::generic_degrees(g, &id));
         }
-        generic::part(&mut own, g, level, &id);
+        generic::part(&mut own, g, if alone { 1 } else { 2 }, &id);
         part(format!("Scheme {}", g.name), own);
     }
     for (i, m) in r.models.iter().enumerate() {
@@ -84,19 +90,22 @@ pub(crate) fn document(
         if !alone {
             own.push(first::model_degrees(&m.analysis, &id));
         }
-        model::part(&mut own, m, level, &id);
+        model::part(&mut own, m, if alone { 1 } else { 2 }, &id);
         part(format!("Model {}", m.analysis.name), own);
     }
-    for (i, (name, c)) in calibrations.iter().enumerate() {
-        blocks.push(section(1, format!("Calibration {name}")));
-        blocks.push(Block::Text(CALIBRATED.into()));
-        blocks.extend(calibrated::section(c, &format!("c{}", i + 1)));
-    }
-    certificates(&mut blocks, origin);
-    blocks.push(section(1, "Notation"));
-    blocks.push(notation::notation(r));
-    blocks.push(section(1, "About this report"));
-    blocks.push(Block::list(
+    blocks.extend(certificates(origin));
+    blocks.push(Block::fold(1, "Notation", vec![notation::notation(r)]));
+    blocks.push(about(r, origin));
+    let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
+        .chain(r.generic.iter().map(|g| g.name.as_str()))
+        .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
+        .collect();
+    Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
+}
+
+/// Program, command and files of the review.
+fn about(r: &DesignReview, origin: &Origin) -> Block {
+    let mut blocks = vec![Block::list(
         "",
         vec![
             format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
@@ -105,25 +114,17 @@ pub(crate) fn document(
                 stated::predicted_of(r.comparison.schemes.iter().map(|s| &s.conditions))
             ),
         ],
-    ));
+    )];
     blocks.extend(Block::list_if_any(
         "Command",
         Vec::from_iter((!origin.command.is_empty()).then(|| origin.command.clone())),
     ));
     blocks.extend(Block::list_if_any("Files that were read", origin.inputs.clone()));
-    let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
-        .chain(r.generic.iter().map(|g| g.name.as_str()))
-        .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
-        .collect();
-    Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
+    Block::fold(1, "About this report", blocks)
 }
 
-/// Section on checking the exact verdicts of schemes without this program.
-fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
-    if origin.certificates.is_empty() {
-        return;
-    }
-    blocks.push(section(1, "How to check this without obsdeg"));
+/// Part on checking the exact verdicts of schemes without this program.
+fn certificates(origin: &Origin) -> Option<Block> {
     let steps = [
         "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a \
          certificate: a JSON file that proves them.",
@@ -136,8 +137,9 @@ fn certificates(blocks: &mut Vec<Block>, origin: &Origin) {
          checker of your own.",
         "Predicted sigmas, the run and the evidence by a filter are not part of a certificate.",
     ];
-    blocks.push(Block::list("", steps.map(String::from).to_vec()));
-    blocks.push(Block::list("Certificates", origin.certificates.clone()));
+    let steps = Block::list("", steps.map(String::from).to_vec());
+    let own = vec![steps, Block::list("Certificates", origin.certificates.clone())];
+    (!origin.certificates.is_empty()).then(|| Block::fold(1, "How to check this without obsdeg", own))
 }
 
 fn section(level: usize, title: impl Into<String>) -> Block {
@@ -152,13 +154,50 @@ fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, level: usize, id: &str) {
-    let a = &s.analysis;
+/// Two pages and the appendix of a scheme. Of several schemes a printed page has the two pages alone.
+fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, alone: bool, id: &str) {
+    let level = if alone { 1 } else { 2 };
     let coefficients: Vec<&Quantity> =
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
     blocks.push(section(level, "Verdict"));
+    verdict(blocks, s, review, &coefficients);
+    if alone {
+        blocks.push(Block::NewPage);
+    }
+    blocks.push(section(level, "Positions"));
+    positions(blocks, s, id);
+    blocks.push(section(level, "What limits it, and what to change"));
+    fewest(blocks, s, review);
+    blocks.extend(Block::list_if_any(
+        "What errors outside the model would do",
+        omitted::typical(&review.omitted),
+    ));
+    blocks.extend(correlated(s));
+    let caption =
+        "Uncertainty budgets: shares of samples and of the errors of the bench in the squared total";
+    let picture = budget::bars(&review.omitted);
+    blocks.extend(picture.map(|svg| pictures::still(&format!("{id}_budget"), caption, svg)));
+    blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
+    if !s.alternatives.front.is_empty() {
+        blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
+    }
+    if alone {
+        blocks.push(Block::NewPage);
+        blocks.push(section(1, "Appendix"));
+    }
+    let parts = appendix(s, review, &coefficients, id).into_iter();
+    let parts = parts.map(|(title, own)| Block::fold(if alone { 2 } else { 3 }, title, own));
+    match alone {
+        true => blocks.extend(parts),
+        false => blocks.extend(Block::details(2, format!("Appendix of {}", s.name), parts.collect())),
+    }
+}
+
+/// Verdict in sentences, with its conditions in one list.
+fn verdict(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) {
+    let a = &s.analysis;
+    blocks.push(Block::Text(verdict::sentences(s, review, coefficients)));
     blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
-    blocks.push(Block::Text(verdict::sentences(s, review, &coefficients)));
     if s.simulation.timeline.iter().any(|t| t.slew) {
         let exact = if a.positions.iter().any(|p| !p.turns.is_empty()) {
             "are exact and of turns fast against the earth rate, in which torquer errors act"
@@ -173,27 +212,37 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
         blocks.push(Block::Text(text));
     }
     blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
-    blocks.push(section(level, "Unknowns"));
-    blocks.push(unknowns(a, review));
-    blocks.push(pictures::staircase(a, &format!("{id}_staircase")));
-    blocks.push(section(level, "What cannot be told apart"));
-    null_space(blocks, a);
-    blocks.push(section(level, "Positions"));
-    positions(blocks, s, &coefficients, review, id);
-    blocks.push(section(level, "How each is solved"));
-    solved(blocks, a);
-    blocks.push(section(level, "Sensitivity"));
-    sensitivity(blocks, s, review, id);
-    blocks.push(section(level, "What is not estimated"));
-    not_estimated(blocks, review, id);
-    blocks.push(section(level, "Fewest positions, and what each is for"));
-    fewest(blocks, s, review, id);
-    blocks.push(section(level, "Evidence by a filter"));
-    evidence(blocks, s, id);
-    blocks.push(section(level, "Validity of the small-angle model"));
-    blocks.push(Block::list("", simulation::validity(&s.simulation.validity, &s.simulation.conditions)));
-    blocks.extend(compare::at_own_drifts(std::slice::from_ref(review)));
-    blocks.push(section(level, "Assumptions and certainty"));
+    let carry = words::assumptions(a).into_iter().filter(|l| l.starts_with("carry"));
+    let lines = carry.chain(stated::measurement(&review.conditions)).chain([words::certainty(a)]).collect();
+    blocks.push(Block::list("Conditions", lines));
+}
+
+/// Notes, with those on several unknowns that say the same in one.
+fn alike(notes: &[String]) -> Vec<String> {
+    let mut out: Vec<(String, String)> = Vec::new();
+    for note in notes {
+        let (head, tail) = note.split_once(": ").unwrap_or((note, ""));
+        let (start, name) = head.rsplit_once(' ').unwrap_or(("", head));
+        match out.iter_mut().find(|(own, rest)| !tail.is_empty() && rest == tail && own.starts_with(start)) {
+            Some((own, _)) => own.push_str(&format!(", {name}")),
+            None => out.push((head.into(), tail.into())),
+        }
+    }
+    let line =
+        |(head, tail): (String, String)| if tail.is_empty() { head } else { format!("{head}: {tail}") };
+    out.into_iter().map(line).collect()
+}
+
+/// Parts of the appendix: title and content.
+fn appendix(
+    s: &SchemeReview,
+    review: &ComparedScheme,
+    coefficients: &[&Quantity],
+    id: &str,
+) -> Vec<(&'static str, Vec<Block>)> {
+    let a = &s.analysis;
+    let mut told_apart = Vec::new();
+    null_space(&mut told_apart, a);
     let mut assumed = words::assumptions(a);
     // carry, latitude and observation are stated above
     assumed
@@ -202,9 +251,23 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, le
     assumed.push(words::certainty(a));
     let evidence = s.evidence.as_ref().err().map(words::no_evidence);
     let alternatives = s.alternatives.refused.iter().map(|e| format!("no alternatives: {e}"));
-    let notes = a.notes.iter().cloned().chain(evidence).chain(alternatives);
+    let notes = alike(&a.notes).into_iter().chain(evidence).chain(alternatives);
     assumed.extend(notes.map(|n| format!("note: {n}")));
-    blocks.push(Block::list("", assumed));
+    let mut valid =
+        vec![Block::list("", simulation::validity(&s.simulation.validity, &s.simulation.conditions))];
+    valid.extend(compare::at_own_drifts(std::slice::from_ref(review)));
+    vec![
+        ("Unknowns", vec![unknowns(a, review), pictures::staircase(a, &format!("{id}_staircase"))]),
+        ("What cannot be told apart", told_apart),
+        ("Positions in numbers", numbers(s, coefficients, review, id)),
+        ("How each is solved", solved(a)),
+        ("Sensitivity", sensitivity(s, review, id)),
+        ("What is not estimated", not_estimated(review)),
+        ("Evidence by a filter", evidence_of(s, id)),
+        ("One run of the filter", run(s, review, id)),
+        ("Validity of the small-angle model", valid),
+        ("Assumptions and certainty", vec![Block::list("", assumed)]),
+    ]
 }
 
 /// `with derivatives up to order 2 (D_FY, D_IY)`: names if only some unknowns need that order.
@@ -218,15 +281,18 @@ fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usiz
     }
 }
 
-/// Effects of errors that the scheme does not estimate; with a bench also the budgets.
-fn not_estimated(blocks: &mut Vec<Block>, review: &ComparedScheme, id: &str) {
+/// Largest number of rows of a table in the printed part of an appendix.
+const PRINTED: usize = 14;
+
+/// Effects of errors that the scheme does not estimate; with a bench also the budgets. Long tables are
+/// details.
+fn not_estimated(review: &ComparedScheme) -> Vec<Block> {
     let (effects, budgets) = omitted::in_full(&review.omitted);
-    blocks.extend(effects);
-    let caption =
-        "Uncertainty budgets: shares of samples and of the errors of the bench in the squared total";
-    let picture = budget::bars(&review.omitted);
-    blocks.extend(picture.map(|svg| pictures::still(&format!("{id}_budget"), caption, svg)));
-    blocks.extend(budgets);
+    let long = |b: &Block| matches!(b, Block::Table { rows, .. } if rows.len() > PRINTED);
+    let (long, mut out): (Vec<Block>, Vec<Block>) = effects.into_iter().partition(long);
+    out.extend(Block::details(3, "Every error that is not estimated", long));
+    out.extend(Block::details(3, "Uncertainty budgets, line by line", budgets));
+    out
 }
 
 fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
@@ -342,15 +408,7 @@ fn seconds(t: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), String::from)
 }
 
-fn positions(
-    blocks: &mut Vec<Block>,
-    s: &SchemeReview,
-    coefficients: &[&Quantity],
-    review: &ComparedScheme,
-    id: &str,
-) {
-    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.3}") };
-    let g = |g: [f64; 3]| g.map(component).join(", ");
+fn positions(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
         vec![
             p.name.clone(),
@@ -360,37 +418,55 @@ fn positions(
             seconds(numbers.dwell_s),
             numbers.slew_s.map_or_else(|| "-".into(), seconds),
             numbers.turn.map_or_else(|| "-".into(), |turn| words::turn(&turn)),
-            g(numbers.g[0]),
-            g(numbers.g[1]),
-            g(numbers.g[2]),
         ]
     });
-    blocks.push(Block::table(
-        "Positions, with the components of g along the axes I, O, S of each gyro (in g, at the start)",
-        [
-            left("position"),
-            left("alpha, beta, gamma [deg]"),
-            left("X_p Y_p Z_p"),
-            right("start [s]"),
-            right("dwell [s]"),
-            right("slew to it [s]"),
-            left("turn"),
-            right("gyro X: I O S"),
-            right("gyro Y: I O S"),
-            right("gyro Z: I O S"),
-        ],
-        rows,
-    ));
+    let columns = [
+        left("position"),
+        left("alpha, beta, gamma [deg]"),
+        left("X_p Y_p Z_p"),
+        right("start [s]"),
+        right("dwell [s]"),
+        right("slew to it [s]"),
+        left("turn"),
+    ];
+    let table = Block::table("Positions in order of time", columns, rows);
+    let empty = |all: &dyn Fn(usize) -> bool| (0..s.positions.len()).all(all);
+    let unused = [
+        ("X_p Y_p Z_p", empty(&|i| s.analysis.positions[i].attitude.is_none())),
+        ("slew to it [s]", empty(&|i| s.positions[i].slew_s.is_none())),
+        ("turn", empty(&|i| s.positions[i].turn.is_none())),
+    ];
+    let unused: Vec<&str> = unused.into_iter().filter(|c| c.1).map(|c| c.0).collect();
+    blocks.push(table.without(&unused));
     blocks.extend(gimbals::block(s.analysis.gimbals.as_ref()));
     let at = &s.simulation.conditions;
     blocks.extend(pictures::poses(&s.poses, at.latitude_deg, at.latitude_by_default, id));
-    blocks.push(pictures::attitudes(s, &format!("{id}_attitude")));
-    if coefficients.iter().any(|q| !q.excitation.is_empty()) {
-        blocks.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
-    }
 }
 
-fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
+/// Gravity along the axes of the gyros at each position, and what each position excites.
+fn numbers(s: &SchemeReview, coefficients: &[&Quantity], review: &ComparedScheme, id: &str) -> Vec<Block> {
+    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.3}") };
+    let g = |g: [f64; 3]| g.map(component).join(", ");
+    let row =
+        |p: &obsdeg_design::review::PositionReview| vec![p.name.clone(), g(p.g[0]), g(p.g[1]), g(p.g[2])];
+    let mut out = vec![
+        Block::table(
+            "Components of g along the axes I, O, S of each gyro (in g, at the start)",
+            [left("position"), right("gyro X: I O S"), right("gyro Y: I O S"), right("gyro Z: I O S")],
+            s.positions.iter().map(row),
+        ),
+        pictures::attitudes(s, &format!("{id}_attitude")),
+    ];
+    if coefficients.iter().any(|q| !q.excitation.is_empty()) {
+        out.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
+    }
+    out
+}
+
+/// Length in bytes from which a formula is one of many terms or decimals.
+const LONG_FORMULA: usize = 220;
+
+fn solved(a: &Analysis) -> Vec<Block> {
     let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Typeset {
         text: format!("{expression} = {}", solution.text),
         latex: format!("{left} = {}", latex::solution(solution, a.frame, &a.stations)),
@@ -399,17 +475,26 @@ fn solved(blocks: &mut Vec<Block>, a: &Analysis) {
         let solution = q.solution.as_ref()?;
         Some(formula(latex::symbol(&q.name), &q.name, solution))
     });
-    let none = || Block::Text("No unknown is observable by itself.".into());
-    blocks.push(Block::formulas("Unknowns", unknowns).unwrap_or_else(none));
     let combinations = a.combinations.iter().filter_map(|c| {
         let solution = c.solution.as_ref()?;
         Some(formula(latex::expression(&c.expression), &c.expression, solution))
     });
-    blocks.extend(Block::formulas("Combinations", combinations));
-    blocks.extend(Block::list_if_any(words::ACCURACY, words::accuracy(a)));
+    let is_long = |f: &Typeset| f.text.len() > LONG_FORMULA;
+    let ((long, short), (long_sums, short_sums)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) =
+        (unknowns.partition(is_long), combinations.partition(is_long));
+    let none = long.is_empty() && short.is_empty();
+    let mut out: Vec<Block> =
+        Vec::from_iter(none.then(|| Block::Text("No unknown is observable by itself.".into())));
+    out.extend(Block::formulas("Unknowns", short));
+    out.extend(Block::formulas("Combinations", short_sums));
+    out.extend(Block::list_if_any(words::ACCURACY, words::accuracy(a)));
+    let long =
+        Block::formulas("Unknowns", long).into_iter().chain(Block::formulas("Combinations", long_sums));
+    out.extend(Block::details(3, "Formulas of many terms or decimals", long.collect()));
+    out
 }
 
-fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
+fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
     let row = |c: &obsdeg_evidence::compare::Sensitivity| {
         vec![
             c.condition.clone(),
@@ -418,15 +503,42 @@ fn sensitivity(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedSchem
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
-    blocks.push(Block::table(
+    let mut out = vec![Block::table(
         "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where \
          one is not observable)",
         [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
         review.sensitivity.iter().map(row),
-    ));
-    blocks.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
-    blocks.extend(pictures::latitudes(s, &format!("{id}_latitude")));
-    blocks.extend(pictures::dwells(s, review, &format!("{id}_dwell")));
+    )];
+    out.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
+    out.extend(pictures::latitudes(s, &format!("{id}_latitude")));
+    out
+}
+
+/// Absolute value from which a correlation of two estimates is listed, and the number of lines.
+const CORRELATED: f64 = 0.9;
+const LINES: usize = 6;
+
+/// Strongest correlations of the estimates of unknowns that are determined.
+fn correlated(s: &SchemeReview) -> Option<Block> {
+    let of = &s.evidence.as_ref().ok()?.correlation;
+    let determined = |name: &str| {
+        let found = s.analysis.quantities.iter().find(|q| q.name == name);
+        found.is_some_and(|q| q.degree.is_some())
+    };
+    let mut pairs: Vec<(f64, &str, &str)> = Vec::new();
+    for (i, a) in of.names.iter().enumerate().filter(|(_, name)| determined(name)) {
+        for (j, b) in of.names.iter().enumerate().take(i).filter(|(_, name)| determined(name)) {
+            pairs.push((of.values[i][j], b, a));
+        }
+    }
+    pairs.retain(|p| p.0.abs() >= CORRELATED);
+    pairs.sort_by(|p, q| q.0.abs().total_cmp(&p.0.abs()));
+    let more = pairs.len().saturating_sub(LINES);
+    let mut lines: Vec<String> =
+        pairs.iter().take(LINES).map(|(r, a, b)| format!("{a} and {b}: {r:.3}")).collect();
+    lines.extend((more > 0).then(|| format!("{more} more pairs")));
+    let title = format!("Estimates that depend on each other (correlation of {CORRELATED} or more)");
+    Block::list_if_any(title, lines)
 }
 
 /// Sentence on the smallest number of cardinal attitudes that make every coefficient observable.
@@ -448,7 +560,7 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
     })
 }
 
-fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id: &str) {
+fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
     let mut lines = Vec::new();
     let alternatives = &s.alternatives;
     if let Some(kept) = &alternatives.kept {
@@ -497,55 +609,99 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, id
         let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
         blocks.push(table.without(&left_out(review)));
     }
-    if !alternatives.front.is_empty() {
-        blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
-    }
 }
 
-fn evidence(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
-    match &s.evidence {
-        Ok(c) => {
-            let outcome = match (c.passed, c.verdicts_agree) {
-                (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",
-                (true, _) => "agree in every check",
-                (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
-                (false, false) => "DISAGREE, as listed below",
-            };
-            // the run below has the truth of the checks
-            let run = if s.simulation.consistency.consistent {
-                ""
-            } else {
-                ", but the run below is not consistent"
-            };
-            blocks.push(Block::Text(format!(
-                "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
-            )));
-            let document = c.document();
-            blocks.extend(document.lead.into_iter().map(Block::Text));
-            let kept = |b: &Block| !is_list(b, "Assumed") && !is_list(b, "Validity of the small-angle model");
-            blocks.extend(document.blocks.into_iter().filter(kept));
-            checks(blocks, c, id);
+/// Largest number of pictures of slopes, one for each unit, in the printed part of an appendix.
+const SLOPES: usize = 4;
+
+/// Evidence: a line per kind of check that agrees, and the rows of those that do not.
+fn evidence_of(s: &SchemeReview, id: &str) -> Vec<Block> {
+    let c = match &s.evidence {
+        Ok(c) => c,
+        Err(e) => return vec![Block::Text(format!("None: {}.", words::no_evidence(e)))],
+    };
+    let outcome = match (c.passed, c.verdicts_agree) {
+        (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",
+        (true, _) => "agree in every check",
+        (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
+        (false, false) => "DISAGREE, as listed below",
+    };
+    // the run has the truth of the checks
+    let run = if s.simulation.consistency.consistent { "" } else { ", but the run below is not consistent" };
+    let mut out = vec![Block::Text(format!(
+        "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
+    ))];
+    let Document { lead, blocks, .. } = c.document();
+    out.extend(lead.into_iter().map(Block::Text));
+    let (mut agree, mut open, mut details) = (Vec::new(), Vec::new(), Vec::new());
+    for block in blocks {
+        match block {
+            Block::Table { heading, columns, rows } => {
+                let fails =
+                    |row: &&Vec<Cell>| row.iter().any(|c| c.text == "FAIL" || c.text == "not resolvable");
+                let failing: Vec<Vec<Cell>> = rows.iter().filter(fails).cloned().collect();
+                agree.push(format!("{heading}: {} of {} agree", rows.len() - failing.len(), rows.len()));
+                if !failing.is_empty() {
+                    open.push(Block::Table {
+                        heading: format!("Not agreeing: {heading}"),
+                        columns: columns.clone(),
+                        rows: failing,
+                    });
+                }
+                details.push(Block::Table { heading, columns, rows });
+            }
+            b if is_list(&b, "Assumed") || is_list(&b, "Validity of the small-angle model") => {}
+            b if is_list(&b, "What disagrees") || is_list(&b, "Not resolvable, and why") => open.push(b),
+            b => details.push(b),
         }
-        Err(e) => blocks.push(Block::Text(format!("None: {}.", words::no_evidence(e)))),
     }
-    let run = s.simulation.document();
-    blocks.push(Block::Text("One run against a simulated truth, with its errors and bands:".into()));
+    out.push(Block::list("Checks", agree));
+    out.extend(open);
+    let mut slopes = pictures::slopes(c, id);
+    let more = slopes.split_off(slopes.len().min(SLOPES));
+    out.extend(slopes);
+    out.extend(pictures::consistency(c, id));
+    details.extend(more);
+    details.push(pictures::correlation(c, &format!("{id}_correlation")));
+    out.extend(Block::details(3, "Every check", details));
+    out
+}
+
+/// Number of pictures of errors in the printed part of an appendix.
+const ERRORS: usize = 6;
+
+/// One run against a simulated truth: its lists, the errors of the worst unknowns, and in the details all.
+fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
+    let blocks = s.simulation.document().blocks.into_iter();
     let kept = |b: &Block| {
         matches!(b, Block::Table { .. } | Block::List { .. })
-            && !is_list(b, "Assumed")
-            && !is_list(b, "Validity of the small-angle model")
+            && !["Assumed", "Validity of the small-angle model"].iter().any(|name| is_list(b, name))
+            && !matches!(b, Block::List { heading, .. } if heading.starts_with("Not estimated"))
     };
     // the unknowns' table has the predicted sigmas, and a page has no room for more columns
-    blocks.extend(run.blocks.into_iter().filter(kept).map(|b| b.without(&["predicted"])));
+    let blocks = blocks.filter(kept).map(|b| b.without(&["predicted"]));
+    let (mut details, mut out): (Vec<Block>, Vec<Block>) =
+        blocks.partition(|b| matches!(b, Block::Table { .. }));
+    out.insert(0, Block::Text("One run against a simulated truth, with its errors:".into()));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
         .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)
         .map(|q| q.name.as_str())
         .collect();
-    blocks.extend(pictures::errors(&s.traces, &flat, "last position", id));
-}
-
-fn checks(blocks: &mut Vec<Block>, c: &CrossCheck, id: &str) {
-    blocks.extend(pictures::slopes(c, id));
-    blocks.extend(pictures::consistency(c, id));
-    blocks.push(pictures::correlation(c, &format!("{id}_correlation")));
+    let margin = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.margin);
+    let mut errors = pictures::errors(&s.traces, &flat, id);
+    errors.sort_by(|(a, _), (b, _)| {
+        margin(a).unwrap_or(f64::INFINITY).total_cmp(&margin(b).unwrap_or(f64::INFINITY))
+    });
+    let mut pictures: Vec<Block> = errors.into_iter().map(|(_, picture)| picture).collect();
+    let rest = pictures.split_off(pictures.len().min(ERRORS));
+    out.extend(pictures);
+    if !flat.is_empty() {
+        out.push(Block::Text(format!(
+            "Not drawn, not excited and known from the prior only: {}.",
+            flat.join(", ")
+        )));
+    }
+    details.extend(rest);
+    out.extend(Block::details(3, "Estimates at the end, and the errors of all others", details));
+    out
 }

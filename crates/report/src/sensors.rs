@@ -211,13 +211,17 @@ fn validity(s: &Sensors) -> Vec<String> {
     }
     let certainty = match (s.error_bound, s.digits) {
         (Some(bound), _) => format!(
-            "degrees under {} by ranks at two random points; one is wrong with probability below {}",
+            "degrees under {} by ranks at a random point, those of the {} that this answer rests on at a \
+             second one too; one of these is wrong with probability below {}",
             count(s.judged_sets, "set"),
+            s.relied_on_sets,
             words::at_most(bound)
         ),
         _ => format!(
-            "degrees under {} by ranks of real numbers at two random points; no probability belongs to them",
-            count(s.judged_sets, "set")
+            "degrees under {} by ranks of real numbers at a random point, those of the {} that this answer \
+             rests on at a second one too; no probability belongs to them",
+            count(s.judged_sets, "set"),
+            s.relied_on_sets
         ),
     };
     out.push(format!(

@@ -134,7 +134,7 @@ pub(crate) fn document(d: &Document, layout: Layout) -> String {
                 lines.iter().for_each(|line| paragraph(&mut out, &line.text, layout));
             }
             // a status is a table here
-            Block::Picture(_) | Block::Status(_) | Block::Fold { .. } => {}
+            Block::Picture(_) | Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
         }
     }
     if layout.ascii { in_ascii(&out) } else { out }

@@ -366,6 +366,12 @@ fn a_calibration_of_another_place_is_refused() {
     let latitude = base.lines().find(|l| l.starts_with("latitude")).unwrap_or("latitude_deg = 28.2");
     std::fs::write(path("s.toml"), text.replace("latitude_deg = 10", latitude)).expect("written");
     refused(&[&asked[..], &["--days", "30"]].concat(), &["expected a requirement"]);
+    // the ageing of a term that is no unknown
+    let text = text.replace("latitude_deg = 10", latitude).replace("[ageing]", "[ageing]\nD_II = 1");
+    std::fs::write(path("s.toml"), format!("{text}[requirements]\nD_F = 0.1\n")).expect("written");
+    let run = crate::program::run(&[&asked[..], &["--days", "30"]].concat());
+    let printed = crate::program::stdout(&run);
+    assert!(printed.contains("no coefficients of this scheme, no ageing: D_II"), "{printed}");
 }
 
 /// Calibration with aged coefficients, and their requirements.

@@ -90,9 +90,9 @@ fn the_folder_of_a_run() {
     for name in names.flat_map(|name| [name.to_string(), format!("{name}.error")]) {
         let svg = String::from_utf8_lossy(file(&format!("{name}.svg")));
         assert!(svg.starts_with("<svg") && svg.contains("[deg") && svg.contains("t [s]"), "{name}");
-        assert!(svg.contains("band of +-3 sigma"), "{name}");
+        assert!(svg.contains("3 sigma"), "{name}");
         if name.ends_with(".error") {
-            assert!(svg.contains("error [deg") && !svg.contains("linear filter"), "{name}");
+            assert!(svg.contains("|error| [deg") && !svg.contains("linear filter"), "{name}");
         }
         let png = file(&format!("{name}.png"));
         assert!(png.starts_with(b"\x89PNG\r\n\x1a\n") && png.len() > 10_000, "{name}");
@@ -110,7 +110,7 @@ fn the_folder_of_a_run() {
     // the paper's offset of D_FZ, which the estimate omits: wN at 28.2 deg times psi_y(0) of 0.1 deg, 0.023
     // deg/h
     let offset = -15.041_067 * 28.2f64.to_radians().cos() * 0.1f64.to_radians();
-    let label = format!("wN*(error of psi_y at t = 0) = {offset:.5} deg/h");
+    let label = format!("|wN*(error of psi_y at t = 0)| = {:.5} deg/h", offset.abs());
     let errors: Vec<&str> = (written.iter())
         .filter(|(n, bytes)| n.ends_with(".error.svg") && String::from_utf8_lossy(bytes).contains(&label))
         .map(|(n, _)| n.as_str())
@@ -178,9 +178,7 @@ fn errors_of_two_filters() {
     };
     for name in &record.traces.names[..15] {
         let error = svg(&format!("{name}.error.svg"));
-        for label in
-            ["error of the filter, band of +-3 sigma", "error of the linear filter, band of +-3 sigma"]
-        {
+        for label in ["3 sigma", "|error|", "3 sigma of the linear filter", "|error| of the linear filter"] {
             assert!(error.contains(label), "{name}");
         }
         assert!(!error.contains("known from the prior only"), "{name}: large angles may tell");
@@ -188,8 +186,11 @@ fn errors_of_two_filters() {
     }
     assert!(svg("D_OX.error.svg").contains("not determined at small angles"));
     assert!(!svg("D_FX.error.svg").contains("not determined"));
-    // the linear filter is off by 10 deg/h, where +-3 sigma of the other filter is 2.3
-    assert!(svg("D_FY.error.svg").contains(">-10<"));
+    // the linear filter is off by 10 deg/h at the end, where 3 sigma of the other filter is 2.3
+    let figure = svg("D_FY.error.svg");
+    let ticks: Vec<f64> =
+        figure.split('>').filter_map(|t| t.split('<').next()?.trim().parse().ok()).collect();
+    assert!(ticks.contains(&10.0), "{ticks:?}");
 }
 
 #[test]

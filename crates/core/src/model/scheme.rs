@@ -20,6 +20,7 @@ use super::terms::{Source, Term, Unknowns};
 use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
+use crate::title_block::TitleBlock;
 
 /// Geographic latitude, an exact decimal of degrees in -90..=90.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +88,8 @@ pub struct Scheme {
     pub name: String,
     /// Purpose of the scheme.
     pub description: String,
+    /// Title block of its review.
+    pub document: TitleBlock,
     /// Positions in order of time.
     pub positions: Vec<Position>,
     /// Carry between positions.
@@ -372,6 +375,9 @@ impl Scheme {
         let combinations = self.combinations.iter().enumerate();
         let combinations = combinations.map(|(i, text)| (format!("combinations.{i}"), text, MAX_COMBINATION));
         let own = [("name", &self.name, MAX_TITLE), ("description", &self.description, MAX_DESCRIPTION)];
+        if let Some((_, found, most)) = self.document.too_long() {
+            return Err(SchemeError::LongText { key: "document".into(), found, most });
+        }
         let own = own.into_iter().map(|(key, text, most)| (key.to_string(), text, most));
         for (key, text, most) in own.chain(combinations) {
             let found = text.chars().count();

@@ -95,13 +95,20 @@ impl SystemModel {
         Ok(())
     }
 
-    /// Candidate from an expression, or from the name of a state, input or parameter.
+    /// Candidate from an expression, or from the name of a state, a parameter, an unknown input, a candidate
+    /// of the file or an output.
     fn candidate(&self, text: &str) -> Result<Candidate, ModelError> {
         let own = (self.states.iter().map(|s| &s.named))
             .chain(&self.parameters)
             .chain(self.unknown_inputs.iter().map(|u| &u.0));
         if let Some(own) = own.into_iter().find(|n| n.name == text) {
             return Ok(named(own));
+        }
+        if let Some(own) = self.candidates.iter().find(|c| c.named.name == text) {
+            return Ok(own.clone());
+        }
+        if let Some((own, expression)) = self.outputs.iter().find(|o| o.0.name == text) {
+            return Ok(one(own.clone(), expression.clone()));
         }
         let is_name = text.chars().all(|c| c.is_alphanumeric() || c == '_');
         let known = self
@@ -290,6 +297,7 @@ mod tests {
         assert_eq!(names("states"), ["x 1 1", "p[1] 1 1", "p[2] 1 1"]);
         assert_eq!(names("inputs, parameters,x"), ["w 1 1", "k 1 1", "x 1 1"]);
         assert_eq!(names("outputs, candidates"), ["y 1 1", "beat 1 2.5", "place 2 1"]);
+        assert_eq!(names("y, beat, place, beat"), ["y 1 1", "beat 1 2.5", "place 2 1"]);
         assert_eq!(
             names("atan2(x, k), x + 2*w, p, atan2(x, k)"),
             ["atan2(x, k) 1 1", "x + 2*w 1 1", "p 2 1"]

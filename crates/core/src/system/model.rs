@@ -9,6 +9,7 @@ use super::error::ModelError;
 use super::work::WorkLimit;
 use crate::language::{Expression, Function, MAX_NAME, among, nearest};
 use crate::model::recording::Recording;
+use crate::title_block::TitleBlock;
 
 /// Place of a text in a model file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -167,6 +168,8 @@ pub struct SystemModel {
     pub name: String,
     /// Description and source of the system.
     pub description: String,
+    /// Title block of its review.
+    pub document: TitleBlock,
     /// States of the system.
     pub states: Vec<State>,
     /// Unknown constants.

@@ -18,6 +18,7 @@ use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mentio
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::ModelRecord;
+use crate::title_block::TitleBlock;
 
 /// Layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact),
 /// `sin cos tan asin acos atan atan2 exp log sqrt tanh abs sign`, `pi`, `deg` and the names of the model; `t`
@@ -34,6 +35,10 @@ pub struct ModelFile {
     /// Purpose and source of the system, printed in reports.
     #[serde(default)]
     description: String,
+    /// Title block of the review: reference, revision, date, author, and the roles that sign.
+    #[serde(default)]
+    #[schemars(with = "Option<TitleBlock>")]
+    document: Option<Spanned<TitleBlock>>,
     /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value),
     /// unit, description. If there are none, the outputs depend on parameters and inputs alone.
     #[serde(default)]
@@ -413,6 +418,13 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         experiments: 1,
         ..SystemModel::default()
     };
+    if let Some(document) = &file.document {
+        model.document = document.get_ref().clone();
+        if let Some((entry, found, most)) = model.document.too_long() {
+            let message = format!("{entry}: {found}; expected at most {most}");
+            return Err(r.at(document.span(), "the title block".into(), message));
+        }
+    }
     if let Some(experiments) = &file.experiments {
         model.experiments = *experiments.get_ref();
         if !(1..=MAX_EXPERIMENTS).contains(&model.experiments) {

@@ -38,6 +38,9 @@ pub struct NextPositions {
     /// Ageing of the coefficients as stated: random walk in the unit of the coefficient per sqrt(day).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ageing: BTreeMap<String, f64>,
+    /// Names of the table of ageing that are no coefficients of the scheme, and have no effect.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unused_ageing: Vec<String>,
     /// Requalification after each requested number of days; left out without days.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub schedule: Vec<Requalification>,

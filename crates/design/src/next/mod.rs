@@ -7,7 +7,7 @@ mod bound;
 mod compared;
 mod options;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use obsdeg_core::model::settings::{Assignment, concerns};
@@ -70,6 +70,10 @@ pub fn next(
     found.truncate(options.keep.max(1));
     let found = found.into_iter().map(|e| extension(e, before.as_ref(), &required)).collect();
     let of_conditions = Scheme { positions: any_position(), ..start.clone() };
+    let names = Platform::new(Scheme { combinations: Vec::new(), ..of_conditions.clone() })?.names().to_vec();
+    let walks = if options.days.is_empty() { Default::default() } else { base.ageing.clone() };
+    let (ageing, unused): (BTreeMap<String, f64>, BTreeMap<String, f64>) =
+        walks.into_iter().partition(|(of, _)| names.iter().any(|name| concerns(of, name)));
     Ok(NextPositions {
         schema: NEXT_SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -80,7 +84,8 @@ pub fn next(
         position_angles: start.positions.iter().map(|p| angles_text(&p.angles)).collect(),
         after_calibration: options.beforehand.is_some(),
         days: options.days.last().copied(),
-        ageing: if options.days.is_empty() { Default::default() } else { base.ageing.clone() },
+        unused_ageing: unused.into_keys().collect(),
+        ageing,
         schedule,
         candidates: candidates.names.clone(),
         beyond_gimbals: beyond,

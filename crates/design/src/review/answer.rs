@@ -4,6 +4,7 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::Pose;
 use obsdeg_core::model::slew::Turn;
 use obsdeg_core::system::SystemAnalysis;
+use obsdeg_core::title_block::TitleBlock;
 use obsdeg_evidence::compare::Comparison;
 use obsdeg_evidence::crosscheck::CrossCheck;
 use obsdeg_evidence::simulation::{Simulation, SimulationError, Traces};
@@ -38,6 +39,8 @@ pub struct SchemeReview {
     pub name: String,
     /// Purpose of the scheme.
     pub description: String,
+    /// Title block, as the file states it.
+    pub document: TitleBlock,
     /// Exact verdicts.
     pub analysis: Analysis,
     /// Positions of the scheme in numbers.
@@ -67,6 +70,8 @@ pub struct GenericReview {
     pub name: String,
     /// Purpose of the scheme.
     pub description: String,
+    /// Title block, as the file states it.
+    pub document: TitleBlock,
     /// Exact verdicts.
     pub analysis: Analysis,
     /// Platform at each position, as far as its angles are numbers.
@@ -167,6 +172,8 @@ pub struct Alternatives {
 /// Review of one model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelReview {
+    /// Title block, as the file states it.
+    pub document: TitleBlock,
     /// Exact verdicts.
     pub analysis: SystemAnalysis,
     /// One run of the filter, sample by sample; `None` without one.

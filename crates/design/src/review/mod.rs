@@ -150,6 +150,7 @@ fn scheme(
     Ok(SchemeReview {
         name: name.clone(),
         description: scheme.description.clone(),
+        document: scheme.document.clone(),
         positions: positions(scheme, conditions, &plan),
         poses: poses(scheme, conditions),
         attitudes: attitudes(&plan),
@@ -185,6 +186,7 @@ fn generic(
     Ok(GenericReview {
         name: entry.name.clone(),
         description: entry.scheme.description.clone(),
+        document: entry.scheme.document.clone(),
         analysis: verdicts(entry, options, worker)?,
         poses: poses(&entry.scheme, &entry.conditions),
         angles: entry.scheme.generic_names(),
@@ -375,5 +377,5 @@ fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
         Some(Err(e)) => unless_wrong(e).map(|()| None)?,
         None => None,
     };
-    Ok(ModelReview { analysis, run, evidence, refused })
+    Ok(ModelReview { document: model.document.clone(), analysis, run, evidence, refused })
 }

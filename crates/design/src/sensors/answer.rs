@@ -48,8 +48,11 @@ pub struct Sensors {
     pub complete_to: Option<usize>,
     /// Per unknown the cheapest set that makes it observable.
     pub quantities: Vec<SensorUnknown>,
-    /// Number of sets whose degrees were computed, at two points each.
+    /// Number of sets whose degrees were computed, at one point each.
     pub judged_sets: usize,
+    /// Number of sets, out of these, that the answer rests on: those listed, and those whose failure or whose
+    /// degree its proofs use. Their degrees were computed at a second point too, and are the same.
+    pub relied_on_sets: usize,
     /// Number of sets, out of those in this answer and those that its proofs rest on, that `analyze` judged
     /// again as a model with these outputs: the degrees are the same.
     pub confirmed_sets: usize,
@@ -61,8 +64,8 @@ pub struct Sensors {
     /// Reason why the search ended early; null if it did not. What is listed is true, but there may be more,
     /// and cheaper sets for lower degrees.
     pub stopped: Option<String>,
-    /// Bound on the probability that the degrees of a judged set are wrong; null for a model judged in real
-    /// numbers.
+    /// Bound on the probability that the degrees of a set that the answer rests on are wrong; null for a
+    /// model judged in real numbers.
     pub error_bound: Option<f64>,
     /// Margin of the rank decisions on all candidates together, in real numbers; null for a model judged in
     /// prime fields.

@@ -38,6 +38,8 @@ pub use ranks::{Ordered, Ranks, Set};
 use search::{CheapestSet, Goal, SetSearch, StopReason};
 use unique::{UniqueSolutions, is_one};
 
+use crate::degree_caps::widest_first;
+
 /// Largest number of candidates.
 pub const MAX_SENSORS: usize = 64;
 /// Number of pairs of points that are tried.
@@ -58,7 +60,7 @@ pub struct SensorOptions {
     pub own_outputs: bool,
     /// Unknowns that must be observable; if empty, all unknowns.
     pub required: Vec<String>,
-    /// Largest degrees: of one unknown, or of all (`None`).
+    /// Largest degrees: of one unknown, or of all others (`None`).
     pub max_degree: Vec<(Option<String>, usize)>,
     /// True if every required unknown must have one solution.
     pub unique: bool,
@@ -303,10 +305,10 @@ impl SensorTask<'_> {
     /// and listed.
     fn require(&mut self) -> Result<Vec<Unattainable>, SensorError> {
         let mut limits = vec![NONE - 1; self.asked.len()];
-        for (name, most) in &self.options.max_degree {
+        for (name, most) in widest_first(&self.options.max_degree) {
             let of = name.as_ref().map_or_else(|| Ok((0..limits.len()).collect()), |n| self.named(n))?;
             let most = u16::try_from(*most).unwrap_or(NONE - 1).min(NONE - 1);
-            of.into_iter().for_each(|u| limits[u] = limits[u].min(most));
+            of.into_iter().for_each(|u| limits[u] = most);
         }
         let mut required: Vec<usize> = match self.options.required.is_empty() {
             true => (0..self.asked.len()).collect(),
@@ -501,11 +503,12 @@ impl SensorTask<'_> {
             complete_to,
             quantities,
             judged_sets: self.search.judged.len(),
+            relied_on_sets: self.search.relied_on.len(),
             confirmed_sets: confirmed.sets,
             closed: self.gathered.ended(),
             last_order: self.gathered.judged.layout.bound,
             stopped: stopped.map(|s| s.words().into()),
-            error_bound: self.gathered.error_bound(self.search.judged.len()),
+            error_bound: self.gathered.error_bound(self.search.relied_on.len()),
             digits: self.gathered.judged.digits(),
             seed: self.options.seed,
         })
@@ -521,10 +524,11 @@ impl SensorTask<'_> {
         cuts.map(|cut| self.search.all & !cut).collect()
     }
 
-    /// Judged set under which another point gives other degrees; `None` if there is none.
+    /// Set that the answer rests on and under which another point gives other degrees; `None` if there is
+    /// none.
     fn differs(&self, other: &dyn Ranks) -> Option<Set> {
         let judged = &self.search.judged;
-        let mut sets: Vec<Set> = judged.keys().copied().collect();
+        let mut sets: Vec<Set> = self.search.relied_on.iter().copied().collect();
         sets.sort_unstable();
         parallel::find_first(sets.len(), |i| (judged[&sets[i]] != other.degrees(sets[i])).then_some(sets[i]))
     }

@@ -1,7 +1,7 @@
 //! Search for sets of candidates: the cheapest for a goal, and all minimal ones, with the failing sets
 //! that prove them.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use obsdeg_exact::parallel;
 
@@ -118,6 +118,9 @@ pub(crate) struct SetSearch<'a> {
     pub(crate) unique: Option<UniqueSolutions<'a>>,
     /// Degrees under every set that was judged.
     pub(crate) judged: HashMap<Set, Box<[u16]>>,
+    /// Sets whose degrees the answer rests on: all that were judged but for those tried while a failing set
+    /// grew, of which only the last failing ones count.
+    pub(crate) relied_on: HashSet<Set>,
     /// Maximal failing sets that were found, for any goal.
     failing: Vec<Set>,
     /// Number of sets that may still be judged.
@@ -135,12 +138,19 @@ impl<'a> SetSearch<'a> {
     ) -> Self {
         let all = if costs.len() >= 64 { Set::MAX } else { (1 << costs.len()) - 1 };
         let limits = vec![None; unknowns];
-        let (judged, failing) = (HashMap::new(), Vec::new());
-        Self { ranks, costs, all, limits, unique: None, judged, failing, left: most, going }
+        let (judged, relied_on, failing) = (HashMap::new(), HashSet::new(), Vec::new());
+        Self { ranks, costs, all, limits, unique: None, judged, relied_on, failing, left: most, going }
     }
 
     /// Judges sets that are not judged yet, on all cores, and counts solutions where they are required.
     pub(crate) fn judge(&mut self, sets: &[Set]) -> Result<(), StopReason> {
+        self.try_out(sets)?;
+        self.relied_on.extend(sets);
+        Ok(())
+    }
+
+    /// Judges sets whose degrees the answer does not rest on.
+    fn try_out(&mut self, sets: &[Set]) -> Result<(), StopReason> {
         self.judge_degrees(sets)?;
         let Some(mut unique) = self.unique.take() else { return Ok(()) };
         let mut counted = Ok(());
@@ -225,7 +235,7 @@ impl<'a> SetSearch<'a> {
         for step in 0..n {
             let with = |&(set, first): &(Set, usize)| set | 1 << ((first + step) % n);
             let longer: Vec<Set> = sets.iter().map(with).collect();
-            self.judge(&longer)?;
+            self.try_out(&longer)?;
             for ((set, _), longer) in sets.iter_mut().zip(longer) {
                 if !self.reaches(longer, goal) {
                     *set = longer;
@@ -233,6 +243,7 @@ impl<'a> SetSearch<'a> {
             }
         }
         for (set, _) in sets {
+            self.relied_on.insert(set);
             if !self.failing.contains(&set) {
                 self.failing.push(set);
             }
@@ -359,6 +370,7 @@ impl<'a> SetSearch<'a> {
         };
         let reach = |set: &Set| self.judged.contains_key(set) && self.reaches(*set, goal);
         let mut sets: Vec<Set> = found.sets.into_iter().filter(reach).collect();
+        self.relied_on.extend(&sets);
         sets.sort_by_key(|set| {
             (cost_of(*set, &self.costs), self.worst_of(*set), members(*set).collect::<Vec<_>>())
         });

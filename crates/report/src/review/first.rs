@@ -9,7 +9,7 @@ use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
 use super::{joined, seconds};
-use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
+use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number, right};
 use crate::rows::{Chart, Row};
 use crate::{compare, words};
 
@@ -38,11 +38,24 @@ fn margin(q: &Quantity) -> (String, Grade) {
 
 /// Picture of a chart; `all` is the number of rows before it was cut.
 fn chart(name: &str, caption: String, chart: Chart, all: usize) -> Block {
-    let part = if all > ROWS { format!(" (the first {ROWS} of {all})") } else { String::new() };
+    let shown = chart.rows.len();
+    let part = if all > shown { format!(" ({shown} of {all})") } else { String::new() };
     still(name, format!("{caption}{part}"), chart.svg())
 }
 
-/// Degree and margin of every unknown of a scheme, best first; degrees alone without requirements.
+/// Largest number of rows of the chart on the first page.
+const FIRST: usize = 20;
+
+/// The worst rows, in the order of all; `worse` has the larger number for the worse row.
+fn worst_rows<T>(all: Vec<T>, worse: impl Fn(&T) -> f64) -> Vec<T> {
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by(|&a, &b| worse(&all[b]).total_cmp(&worse(&all[a])));
+    order.truncate(FIRST);
+    all.into_iter().enumerate().filter(|(i, _)| order.contains(i)).map(|(_, row)| row).collect()
+}
+
+/// Degree and margin of every unknown of a scheme, best first, of many the smallest margins; degrees alone
+/// without requirements.
 pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Block {
     let all = &s.analysis.quantities;
     if review.requirements.stated == 0 {
@@ -51,14 +64,21 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
         let (text, grade) = predicted.map_or_else(|| ("-".into(), Grade::Open), margin);
-        Row {
+        let row = Row {
             name: q.name.clone(),
             remark: words::degree(q.degree),
             marks: vec![predicted.and_then(|p| p.margin)],
             limit: None,
             text,
             grade,
-        }
+        };
+        (row, predicted.is_some_and(|p| p.requirement.is_some()))
+    };
+    // what is required and not determined first, then by margin, then what is not required
+    let worse = |(row, required): &(Row, bool)| match (required, row.marks[0]) {
+        (true, None) => f64::INFINITY,
+        (true, Some(margin)) => 1.0 / margin,
+        (false, _) => -1.0,
     };
     let picture = Chart {
         remark: "degree",
@@ -69,15 +89,15 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
         orders: false,
         threshold: Some(1.0),
         series: Vec::new(),
-        rows: s.analysis.quantities.iter().take(ROWS).map(row).collect(),
+        rows: worst_rows(all.iter().map(row).collect(), worse).into_iter().map(|r| r.0).collect(),
     };
-    let caption = "Every unknown, with its degree and its margin: to the right of 1 its requirement is met \
-                   by prediction, and a ring is missed"
+    let caption = "Unknowns with their degree and their margin: to the right of 1 a requirement is met by \
+                   prediction, and a ring is missed"
         .to_string();
-    chart(&format!("{id}_margins"), caption, picture, s.analysis.quantities.len())
+    chart(&format!("{id}_margins"), caption, picture, all.len())
 }
 
-/// Chart of the degrees alone.
+/// Chart of the degrees alone, of many unknowns the largest.
 fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count: usize, id: &str) -> Block {
     let row = |(name, status, degree): (&str, Exact, Option<usize>)| Row {
         name: name.into(),
@@ -93,10 +113,10 @@ fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count
         orders: true,
         threshold: None,
         series: Vec::new(),
-        rows: all.take(ROWS).map(row).collect(),
+        rows: worst_rows(all.map(row).collect(), |row| row.marks[0].unwrap_or(f64::INFINITY)),
     };
     let caption =
-        "Every unknown with its degree, the order of derivatives that its solution needs".to_string();
+        "Unknowns with their degree, the order of derivatives that their solution needs".to_string();
     chart(&format!("{id}_degrees"), caption, picture, count)
 }
 
@@ -265,6 +285,26 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
         "Side by side"
     };
     Block::table(heading, columns, rows)
+}
+
+/// Schemes as columns: what decides a requirement, and its ratio to that of the first scheme.
+pub(super) fn ratios(schemes: &[ComparedScheme]) -> Block {
+    let mut columns = vec![left("unknown"), left("unit")];
+    columns.extend(schemes.iter().map(|s| right(s.name.clone())));
+    let row = |q: &Quantity| {
+        let values =
+            schemes.iter().map(|s| s.quantities.iter().find(|own| own.name == q.name).and_then(deciding));
+        let values: Vec<Option<f64>> = values.collect();
+        let cell = |value: &Option<f64>| match (value, values[0]) {
+            (Some(x), Some(first)) if first > 0.0 => format!("{} ({:.2})", number(*x), x / first),
+            (Some(x), _) => number(*x),
+            (None, _) => "-".into(),
+        };
+        [q.name.clone(), q.unit.clone()].into_iter().chain(values.iter().map(cell)).collect::<Vec<String>>()
+    };
+    let heading = "Predicted sigma, with a bench the total uncertainty, and in brackets its ratio to the first \
+                   scheme (- where it is not determined)";
+    Block::table(heading, columns, unknowns(schemes).into_iter().map(row))
 }
 
 /// Sigma of every unknown in every scheme, with the requirement if all schemes have the same.

@@ -6,7 +6,7 @@ use obsdeg_design::review::ModelReview;
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
-use super::{derivatives, is_list, pictures, section};
+use super::{ERRORS, derivatives, is_list, pictures, section};
 use crate::document::{Block, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
@@ -161,6 +161,15 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
             .filter(|e| e.status == Some(Exact::NotExcited) && e.outcome == Outcome::PriorOnly)
             .map(|e| e.name.as_str())
             .collect();
-        blocks.extend(pictures::errors(traces, &flat, "run", id));
+        let mut errors: Vec<Block> = pictures::errors(traces, &flat, id).into_iter().map(|e| e.1).collect();
+        let rest = errors.split_off(errors.len().min(ERRORS));
+        blocks.extend(errors);
+        if !flat.is_empty() {
+            blocks.push(Block::Text(format!(
+                "Not drawn, not excited and known from the prior only: {}.",
+                flat.join(", ")
+            )));
+        }
+        blocks.extend(Block::details(level + 1, "Errors of all others", rest));
     }
 }

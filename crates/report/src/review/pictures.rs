@@ -250,35 +250,26 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         log: true,
         ..Figure::default()
     };
-    let caption = "Total time against the largest predicted sigma of the coefficients that the scheme \
-                   determines: the scheme at other dwells, and the Pareto front (at six dwells) of schemes \
-                   of as many cardinal attitudes, five at most (twelve under reset carry), for the same \
-                   coefficients; under reset carry with the bound that no scheme of as many cardinal \
-                   attitudes in equal dwells crosses";
+    let caption = "Total time against the largest predicted sigma of what the scheme determines: the scheme \
+                   at other dwells, and the best of as many cardinal attitudes (five at most; under reset \
+                   carry twelve, with their bound)";
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
-/// Errors of the estimate with the band of three sigma, a picture each. Unknowns in `flat` are not drawn,
-/// since nothing affects them. `last` is the name of the last part of the run.
-pub(super) fn errors(traces: &Traces, flat: &[&str], last: &str, id: &str) -> Vec<Block> {
+/// Errors of the estimate beside three sigma, a picture each, with the name of the unknown. Unknowns in
+/// `flat` are not drawn, since nothing affects them.
+pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<(String, Block)> {
     let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
         let caption = format!(
-            "Error of the estimate of {}, with +-3 sigma{beside}; the axis is that of the second half of the {last}",
+            "Error of the estimate of {}, its absolute value, and 3 sigma{beside}",
             series_title(traces, i)
         );
-        curves(&name, caption, error_figure(traces, i, POINTS))
+        (traces.names[i].clone(), curves(&name, caption, error_figure(traces, i, POINTS)))
     };
     let moves = (0..traces.names.len()).filter(|&i| !flat.contains(&traces.names[i].as_str()));
-    let mut out: Vec<Block> = moves.take(ERRORS).map(of).collect();
-    if !flat.is_empty() {
-        out.push(Block::Text(format!(
-            "Not drawn, not excited and known from the prior only: {}.",
-            flat.join(", ")
-        )));
-    }
-    out
+    moves.take(ERRORS).map(of).collect()
 }
 
 pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {

@@ -14,6 +14,7 @@ use crate::model::recording::SchemeRecord;
 use crate::model::scheme::Carry;
 use crate::model::settings::{DriftNoise, FilterKind, Propagation, Truth};
 use crate::model::terms::{DefinedBy, Term};
+use crate::title_block::TitleBlock;
 
 /// Value as written: a number or text, with its byte range.
 pub(super) type Literal = Option<Spanned<toml::Value>>;
@@ -30,6 +31,9 @@ pub struct SchemeFile {
     /// Purpose and source of the scheme, printed in reports.
     #[schemars(with = "Option<String>")]
     pub(super) description: Option<Spanned<String>>,
+    /// Title block of the review: reference, revision, date, author, and the roles that sign.
+    #[schemars(with = "Option<TitleBlock>")]
+    pub(super) document: Option<Spanned<TitleBlock>>,
     /// Carry between positions: platform (default), inertial or reset.
     #[schemars(with = "Option<Carry>")]
     pub(super) carry: Option<Spanned<String>>,

@@ -228,6 +228,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
     let mut scheme = Scheme {
         name: r.keep("name", file.name.as_ref()).unwrap_or_default(),
         description: r.keep("description", file.description.as_ref()).unwrap_or_default(),
+        document: r.keep("document", file.document.as_ref()).unwrap_or_default(),
         geometry: r.keep("geometry", file.geometry.as_ref()).unwrap_or_default(),
         measured_azimuth: file.measured_azimuth,
         simulation: r.settings(&file.simulation)?,

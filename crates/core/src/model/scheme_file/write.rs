@@ -7,6 +7,7 @@ use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
 use crate::model::{Geometry, PerGyro, Recording, SlewAxis, Unknowns};
+use crate::title_block::TitleBlock;
 
 /// Text of a scheme file. Reading it gives the scheme again; a comment may precede it.
 pub fn write(scheme: &Scheme) -> String {
@@ -46,6 +47,7 @@ pub fn write(scheme: &Scheme) -> String {
     if !scheme.combinations.is_empty() {
         line(&mut out, "combinations", &list(scheme.combinations.iter().map(|c| quoted(c))));
     }
+    title_block(&mut out, &scheme.document);
     settings(&mut out, &scheme.simulation);
     numbers(&mut out, "requirements", &scheme.requirements);
     numbers(&mut out, "bench", &scheme.bench);
@@ -62,6 +64,17 @@ pub fn write(scheme: &Scheme) -> String {
         position(&mut out, p);
     }
     out
+}
+
+fn title_block(out: &mut String, block: &TitleBlock) {
+    let mut own = String::new();
+    for (key, text) in block.entries() {
+        line(&mut own, key, &quoted(text));
+    }
+    if !block.signatures.is_empty() {
+        line(&mut own, "signatures", &list(block.signatures.iter().map(|s| quoted(s))));
+    }
+    table(out, "document", &own);
 }
 
 fn line(out: &mut String, key: &str, value: &str) {
@@ -285,6 +298,11 @@ mod tests {
         }
     }
 
+    fn document(text: &str, signed: bool) -> TitleBlock {
+        let signatures = if signed { vec![text.into(), "Approved".into()] } else { vec![] };
+        TitleBlock { revision: text.into(), date: "2026-03-01".into(), signatures, ..TitleBlock::default() }
+    }
+
     prop_compose! {
         fn scheme()(
             name in "[ -~äλ\\n\\t\\u{1b}\\u{7f}]{0,12}",
@@ -326,7 +344,7 @@ mod tests {
             };
             let limits = limit.map(|(low, high)| [low * 1_234_567_891, high * 1_000_000_000]);
             Scheme {
-                name, description, positions, carry,
+                name, document: document(&description, mirrored), description, positions, carry,
                 latitude: latitude.and_then(|n| format_decimal(n).parse().ok()),
                 geometry,
                 unknowns: if alone { Unknowns::Drift } else { Unknowns::Coefficients(terms) },

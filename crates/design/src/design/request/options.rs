@@ -19,7 +19,7 @@ pub struct DesignOptions {
     pub positions: Option<usize>,
     /// Coefficients or families that must be observable; if empty, all coefficients.
     pub required: Vec<String>,
-    /// Largest degrees: of a coefficient or family, or of all required coefficients (`None`).
+    /// Largest degrees: of a coefficient or family, or of all other required coefficients (`None`).
     pub degree_caps: Vec<(Option<String>, usize)>,
     /// Errors that are not estimated and that schemes must be immune to.
     pub immune: Vec<Immune>,

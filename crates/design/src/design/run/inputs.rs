@@ -103,6 +103,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         // a design uses only the assumptions of a scheme
         name: _,
         description: _,
+        document: _,
         positions: _,
         combinations: _,
         recording: _,

@@ -12,6 +12,7 @@ use obsdeg_evidence::simulation::omitted::{Bench, OmittedEffect, term_effects};
 use obsdeg_evidence::simulation::{Attained, Conditions, PRIOR, SimulationError, latitude_of, resolve};
 use obsdeg_exact::parallel;
 
+use crate::degree_caps::widest_first;
 use crate::design::answer::{Found, HalfTurn, Minimum};
 use crate::design::measure::criterion::{Criterion, Limits};
 use crate::design::measure::evaluator::Evaluator;
@@ -133,7 +134,7 @@ impl<'a> Task<'a> {
             required.retain(|c| asked.contains(&c.1));
         }
         let mut caps = vec![usize::MAX; required.len()];
-        for (name, cap) in &options.degree_caps {
+        for (name, cap) in widest_first(&options.degree_caps) {
             let concerned = name.as_ref().map(named).transpose()?;
             for (slot, c) in caps.iter_mut().zip(&required) {
                 if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
@@ -596,8 +597,14 @@ impl<'a> Task<'a> {
             }
             None => format!("no effect of {}", i.name),
         }));
-        for (name, cap) in &self.options.degree_caps {
-            let name = name.as_deref().unwrap_or("every required coefficient");
+        let caps = widest_first(&self.options.degree_caps);
+        for (name, cap) in &caps {
+            let every = if caps.len() > 1 {
+                "every other required coefficient"
+            } else {
+                "every required coefficient"
+            };
+            let name = name.as_deref().unwrap_or(every);
             out.push(format!("degree of {name} at most {cap}"));
         }
         if !self.base.gimbals.are_free() {
