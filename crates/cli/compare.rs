@@ -34,6 +34,11 @@ pub(crate) struct Arguments {
 
     #[command(flatten)]
     output: Output,
+
+    /// The table has its details too: every unknown with its excitation, every position and condition, the
+    /// errors that are not estimated, and what is assumed; other formats always have them
+    #[arg(long, help_heading = "Output")]
+    details: bool,
 }
 
 /// Help of shared options for `compare`.
@@ -58,6 +63,6 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let comparison = comparison?;
     let requirements = || comparison.schemes.iter().map(|s| &s.requirements);
     a.met.check(requirements())?;
-    a.output.write(&comparison)?;
+    a.output.write_all(&comparison, a.details)?;
     a.met.decide(requirements())
 }

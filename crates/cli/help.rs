@@ -138,6 +138,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("filter_carry", CONTROLS, "Make the filter wrong: another carry"),
     ("filter_latitude", CONTROLS, "Make the filter wrong: another latitude in degrees"),
     ("filter_drop", CONTROLS, "Make the filter wrong: it does not know of this position"),
+    ("details", OUTPUT, "Print the details of the table too"),
     ("pdf_by", OUTPUT, "Maker of a PDF: browser, the path of one, or typesetter"),
     ("report.format", OUTPUT, "Format: html, pdf, markdown or latex (default: by the file's ending)"),
     ("format", OUTPUT, "Format: table, json, markdown, csv or latex"),

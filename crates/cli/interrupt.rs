@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::failure::{Failure, INTERRUPTED};
-use crate::files;
+use crate::{files, print};
 
 /// From now on an interrupt ends the program at once, with the code that a shell gives a program ended by
 /// Ctrl-C. Files that are being put in place are completed first; otherwise none is left.
@@ -34,6 +34,7 @@ fn listen(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
 }
 
 fn end() {
+    print::abandon();
     files::abandon();
     #[allow(clippy::exit, reason = "the user asked for it")]
     std::process::exit(INTERRUPTED.into());

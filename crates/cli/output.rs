@@ -148,8 +148,14 @@ impl Output {
 
     /// Writes a result to the file or to stdout.
     pub(crate) fn write(&self, result: &impl Answer) -> Result<(), Failure> {
+        self.write_all(result, true)
+    }
+
+    /// Writes a result to the file or to stdout, a table with its details or without.
+    pub(crate) fn write_all(&self, result: &impl Answer, details: bool) -> Result<(), Failure> {
         let stdout = self.target.path().is_none();
         let layout = if stdout { layout(self.ascii) } else { Layout { ascii: self.ascii, ..PIPE } };
+        let layout = Layout { brief: !details, ..layout };
         self.target.write(self.text(result, self.format()?, layout)?.as_bytes(), &[])
     }
 

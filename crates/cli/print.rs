@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::str::FromStr;
+use std::sync::{Mutex, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -62,7 +63,7 @@ impl Printer {
     /// [`Failure`] where that is not there, with what is expected.
     pub(crate) fn find(asked: Option<&PdfBy>) -> Result<Self, Failure> {
         let typesetter = obsdeg_report::HAS_PDF.then_some(Self::Typesetter);
-        let browser = || BROWSERS.iter().find_map(|name| on_path(name)).map(Self::Browser);
+        let browser = || BROWSERS.iter().find_map(on_path).map(Self::Browser);
         let names = || BROWSERS.join(", ");
         match asked {
             None => browser().or(typesetter).ok_or_else(|| {
@@ -106,13 +107,41 @@ fn on_path(name: impl AsRef<Path>) -> Option<PathBuf> {
     })
 }
 
-/// Folder of a print, removed at the end.
-struct Folder(PathBuf);
+/// Folder of the print that goes on, and the process group of its browser.
+static GOING: Mutex<Option<(PathBuf, Option<u32>)>> = Mutex::new(None);
 
-impl Drop for Folder {
+/// Ends the browser of a print that goes on, with all its processes, and removes the folder.
+pub(crate) fn abandon() {
+    let going = GOING.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let Some((folder, browser)) = going else { return };
+    browser.into_iter().for_each(end_group);
+    for _ in 0..10 {
+        // its processes may still write
+        if fs::remove_dir_all(&folder).is_ok() || !folder.exists() {
+            return;
+        }
+        sleep(INTERVAL);
+    }
+}
+
+#[cfg(unix)]
+fn end_group(leader: u32) {
+    use rustix::process::{Pid, Signal, kill_process_group};
+    if let Some(group) = i32::try_from(leader).ok().and_then(Pid::from_raw) {
+        // it may have ended meanwhile
+        let _ = kill_process_group(group, Signal::KILL);
+    }
+}
+
+#[cfg(not(unix))]
+fn end_group(_: u32) {}
+
+/// Print that goes on, abandoned at its end.
+struct Going;
+
+impl Drop for Going {
     fn drop(&mut self) {
-        // what cannot be removed is in the system's folder for such files
-        let _ = fs::remove_dir_all(&self.0);
+        abandon();
     }
 }
 
@@ -128,9 +157,11 @@ pub(crate) fn print(browser: &Path, page: &[u8]) -> Result<Vec<u8>, Failure> {
 
 /// Prints within a time limit; the error is the reason.
 fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, String> {
-    let folder = Folder(std::env::temp_dir().join(format!("obsdeg-print-{}", std::process::id())));
-    fs::create_dir_all(&folder.0).map_err(|e| e.to_string())?;
-    let [html, pdf, profile] = ["review.html", "review.pdf", "profile"].map(|name| folder.0.join(name));
+    let folder = std::env::temp_dir().join(format!("obsdeg-print-{}", std::process::id()));
+    *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder.clone(), None));
+    let _going = Going;
+    fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
+    let [html, pdf, profile] = ["review.html", "review.pdf", "profile"].map(|name| folder.join(name));
     fs::write(&html, page).map_err(|e| e.to_string())?;
     let mut command = Command::new(browser);
     command.args([
@@ -147,8 +178,13 @@ fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, Strin
     command.arg(format!("--user-data-dir={}", profile.display()));
     command.arg(format!("--print-to-pdf={}", pdf.display()));
     command.arg(format!("file://{}", html.display()));
+    // what it leaves when it is ended is removed with the folder
+    command.env("TMPDIR", &folder);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let child = command.spawn().map_err(|e| e.to_string())?;
+    *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder, Some(child.id())));
     let status = ended(child, limit)?;
     let mut bytes = fs::read(&pdf).map_err(|_| format!("it ended with {status}"))?;
     if !bytes.starts_with(b"%PDF-") {

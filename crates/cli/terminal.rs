@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use obsdeg_report::Layout;
 
 /// Layout of a table that does not go to a terminal: 120 columns, no colours.
-pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false };
+pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false, brief: false };
 
 /// Width, colours and character set of a table on stdout.
 pub(crate) fn layout(ascii: bool) -> Layout {
@@ -19,6 +19,7 @@ pub(crate) fn layout(ascii: bool) -> Layout {
         width: terminal_size::terminal_size().map(|(w, _)| w.0),
         color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
         ascii,
+        brief: false,
     }
 }
 

@@ -13,7 +13,7 @@ use crate::program::{json, run, stderr, stdout};
 use crate::schemes::{S6, paper, scheme};
 
 fn compared(arguments: &[&str]) -> Output {
-    run(&[&["compare"], arguments].concat())
+    run(&[&["compare", "--details"], arguments].concat())
 }
 
 fn printed(arguments: &[&str]) -> String {
@@ -384,4 +384,31 @@ fn sigmas_at_the_schemes_own_drifts() {
     assert!(
         small.validity.expect("drifts").holds && small.quantities.iter().all(|q| q.sigma_extended.is_none())
     );
+}
+
+/// The decision first: without `--details` the table has the schemes side by side and names what it leaves
+/// out, with `--details` every line of it too.
+#[test]
+fn the_decision_comes_first() {
+    let files = ["examples/five-positions/scheme.toml", "examples/six-positions/scheme.toml"];
+    let text = |more: &[&str]| {
+        let run = run(&[&["compare"], &files[..], more].concat());
+        stdout(&run)
+    };
+    let (short, long) = (text(&[]), text(&["--details"]));
+    assert!(short.lines().count() <= 52 && long.lines().count() > 120, "{short}");
+    let (own, named) = short.split_once("\n\n  --details prints: ").expect("what is left out");
+    assert!(long.starts_with(own), "{short}");
+    let named = named.replace("\n      ", " ");
+    assert!(named.contains("By unknown; Without one position; Sensitivity"), "{named}");
+    for heading in named.trim().split("; ") {
+        assert!(long.lines().any(|line| line.starts_with(heading)), "{heading}");
+        assert!(!own.lines().any(|line| line.starts_with(heading)), "{heading}");
+    }
+    // ratios of the printed sigmas
+    let row: Vec<&str> =
+        own.lines().find(|l| l.starts_with(" D_FX ")).expect("a row").split_whitespace().collect();
+    let [a, b] = [row[2], row[3]].map(|x| x.parse::<f64>().expect("a sigma"));
+    assert_eq!(row[4], format!("({:.2})", b / a));
+    assert!(text(&["--format", "markdown"]).contains("Without one position"));
 }

@@ -183,7 +183,7 @@ fn values(option: &str) -> Option<&'static [&'static str]> {
         "output" => &["o.html", "o.md", "out/x/y", "o.tex", "out", "out/x/y", ".", "s.toml", "/dev/full", ""],
         "measured-azimuth" | "formulas" | "sensitivities" | "minimum" | "refine" | "divide" | "meet"
         | "require-met" | "force" | "quiet" | "help" | "estimate-noise" | "own-outputs" | "unique"
-        | "dry-run" | "ascii" | "texts" => {
+        | "details" | "dry-run" | "ascii" | "texts" => {
             return None;
         }
         _ => number,

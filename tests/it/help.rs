@@ -11,7 +11,7 @@ const COMMANDS: [(&str, usize); 14] = [
     ("crosscheck", 70),
     ("calibrate", 51),
     ("allan", 24),
-    ("compare", 46),
+    ("compare", 47),
     ("design", 84),
     ("report", 61),
     ("paper", 18),

@@ -332,7 +332,10 @@ fn a_title_block_is_that_of_the_file() {
     for (line, said) in [
         ("revison = 'B'", "revison"),
         ("signatures = 'B'", "signatures"),
-        (&format!("author = '{}'", "a".repeat(300)), "300"),
+        ("signatures = ['A', ' ']", "signatures is blank"),
+        ("reference = '  '", "reference is blank"),
+        ("signatures = ['a', 'b', 'c', 'd', 'e', 'f', 'g']", "7 signatures; expected at most 6"),
+        (&format!("author = '{}'", "a".repeat(300)), "author has 300 characters"),
     ] {
         refused(&["report", &written(line), "-o", &to], &[said]);
     }
@@ -427,6 +430,17 @@ fn a_calibration_says_what_to_do() {
     let (none, json) = of("examples/bench-day/scheme.toml", "right");
     assert!(json.contains("\"findings\": []"));
     assert!(none.len() == 1 && none[0].starts_with("No action: every unknown is determined"), "{none:?}");
+    // requirements by the record decide, whatever the prediction says
+    let strict = folder.path().join("strict.toml").display().to_string();
+    let text = std::fs::read_to_string("examples/bench-day/scheme.toml").expect("a scheme");
+    let at = text.find("[requirements]").expect("requirements");
+    let rest = text[at..].find("\n[").map_or("", |end| &text[at + end..]);
+    std::fs::write(&strict, format!("{}[requirements]\nD = 1e-6\n{rest}", &text[..at])).expect("written");
+    let (missed, _) = of(&strict, "missed");
+    assert!(missed.iter().any(|l| l.contains("their requirements are NOT met")), "{missed:?}");
+    let path = folder.path().join("missed.html");
+    let status = statuses(&Html::parse_document(&std::fs::read_to_string(path).expect("a page")));
+    assert_eq!((status[1][0][0].as_str(), status[1][0][1].as_str()), ("Requirements", "missed"));
     let (some, json) = of("examples/six-positions/scheme.toml", "wrong");
     assert!(json.contains("\"kind\": \"position\""));
     assert!(some.iter().any(|l| l.starts_with("Look at the record at ") && l.contains("p6")), "{some:?}");

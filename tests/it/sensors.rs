@@ -641,6 +641,7 @@ fn options_of_the_other_kind_are_refused() {
     refused(&["design", SIR, "--measure", "candidates"], &["the model has none"]);
     refused(&["design", SIR, "--cost", "q=1"], &["there is no such candidate; expected one of"]);
     refused(&["design", SIR, "--cost", "S=0"], &["found 0; expected a cost above 0"]);
+    refused(&["design", SIR, "--max-degree", "S=2", "--max-degree", "S=3"], &["given twice"]);
     refused(&["design", SIR, "--cost", "S=2", "--cost", "S=3"], &["the cost of S", "given twice"]);
     let idle = ["design", SIR, "--observable", "beta", "--max-degree", "R=2"];
     refused(&idle, &["a largest degree of R does nothing", "expected one of beta"]);

@@ -251,6 +251,23 @@ impl Default for Search {
     }
 }
 
+impl WantedOptions {
+    /// Largest degrees with the names that they are for, each once.
+    ///
+    /// # Errors
+    /// [`Problem`] of a name that is given twice.
+    fn degree_caps(&self) -> Result<Vec<(Option<String>, usize)>, Problem> {
+        for (i, cap) in self.max_degree.iter().enumerate() {
+            if let Some(before) = self.max_degree[..i].iter().find(|c| c.name == cap.name) {
+                return Err(Problem::input(format!(
+                    "--max-degree {before} and {cap}: given twice; expected one largest degree for each name"
+                )));
+            }
+        }
+        Ok(self.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect())
+    }
+}
+
 /// Largest degree of one coefficient or family, or of all that are required: `D_F=1`, `1`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DegreeCap {
@@ -434,7 +451,7 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         candidates,
         positions: a.positions,
         required: a.wanted.observable.clone(),
-        degree_caps: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
+        degree_caps: a.wanted.degree_caps()?,
         immune: a.wanted.immune.clone(),
         meet: a.wanted.meet,
         total_s: a.wanted.max_time,
@@ -571,7 +588,7 @@ fn of_model(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Option<S
     a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
     let wanted = SetRequirements {
         required: &a.wanted.observable,
-        max_degree: a.wanted.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect(),
+        max_degree: a.wanted.degree_caps()?,
         keep: a.keep.unwrap_or(10).into(),
         seed: a.seed,
     };

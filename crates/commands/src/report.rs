@@ -139,9 +139,11 @@ pub fn report(
 }
 
 impl Reviewed {
-    /// Outcome of the requirements of every scheme, by prediction.
+    /// Outcome of the requirements of every scheme, by prediction, then that of every calibration, by its
+    /// sigmas.
     pub fn requirements(&self) -> impl Iterator<Item = &Requirements> {
-        self.review.comparison.schemes.iter().map(|s| &s.requirements)
+        let predicted = self.review.comparison.schemes.iter().map(|s| &s.requirements);
+        predicted.chain(self.calibrations.iter().filter_map(|(_, c)| c.requirements.as_ref()))
     }
 
     /// Files of the review: the text first, then the pictures that it refers to, in `folder` beside it.

@@ -53,15 +53,19 @@ impl TitleBlock {
             .collect()
     }
 
-    /// First entry that is too long, with its length and the largest one allowed; of too many signatures
-    /// their number.
-    pub(crate) fn too_long(&self) -> Option<(&'static str, usize, usize)> {
+    /// Error of an entry that is blank or too long, or of too many signatures.
+    pub(crate) fn wrong(&self) -> Option<String> {
         let signatures = self.signatures.iter().map(|s| ("signatures", s.as_str()));
-        let long = self
-            .entries()
-            .into_iter()
-            .chain(signatures)
-            .map(|(name, text)| (name, text.chars().count(), MOST));
-        long.chain([("signatures", self.signatures.len(), SIGNATURES)]).find(|(_, found, most)| found > most)
+        for (name, text) in self.entries().into_iter().chain(signatures) {
+            let found = text.chars().count();
+            if text.trim().is_empty() {
+                return Some(format!("{name} is blank; expected a text, or leave it out"));
+            }
+            if found > MOST {
+                return Some(format!("{name} has {found} characters; expected at most {MOST}"));
+            }
+        }
+        let found = self.signatures.len();
+        (found > SIGNATURES).then(|| format!("{found} signatures; expected at most {SIGNATURES}"))
     }
 }

@@ -71,6 +71,55 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
     )
 }
 
+/// Uncertainty that requirements are compared with: the total with a bench, else sigma.
+pub(crate) fn deciding(q: &Quantity) -> Option<f64> {
+    q.total.or(q.sigma)
+}
+
+/// The unknowns of all schemes in the order of the first that has them.
+pub(crate) fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
+    let mut out: Vec<&Quantity> = Vec::new();
+    for q in schemes.iter().flat_map(|s| &s.quantities) {
+        if !out.iter().any(|o| o.name == q.name) {
+            out.push(q);
+        }
+    }
+    out
+}
+
+/// Schemes as columns: what decides a requirement, and its ratio to that of the first scheme.
+pub(crate) fn ratios(schemes: &[ComparedScheme]) -> Block {
+    let all = unknowns(schemes);
+    let judged = all.iter().any(|q| q.requirement.is_some());
+    let mut columns = vec![left("unknown"), left("unit")];
+    columns.extend(judged.then(|| right("required")));
+    columns.extend(schemes.iter().map(|s| right(s.name.clone())));
+    let own = |s: &ComparedScheme, q: &Quantity| s.quantities.iter().find(|own| own.name == q.name).cloned();
+    let row = |q: &Quantity| -> Vec<String> {
+        let found: Vec<Option<Quantity>> = schemes.iter().map(|s| own(s, q)).collect();
+        let first = found[0].as_ref().and_then(deciding);
+        let cell = |(i, q): (usize, &Option<Quantity>)| {
+            let Some(value) = q.as_ref().and_then(deciding) else { return "-".into() };
+            let ratio = first.filter(|first| i > 0 && *first > 0.0);
+            let ratio = ratio.map_or_else(String::new, |first| format!(" ({:.2})", value / first));
+            let missed = q.as_ref().and_then(|q| q.requirement).is_some_and(|required| value > required);
+            format!("{}{ratio}{}", number(value), if missed { " MISSED" } else { "" })
+        };
+        let required: Vec<Option<f64>> = found.iter().flatten().map(|q| q.requirement).collect();
+        let same = required.windows(2).all(|pair| pair[0] == pair[1]);
+        let required = if same { optional(q.requirement) } else { "differs".into() };
+        [q.name.clone(), q.unit.clone()]
+            .into_iter()
+            .chain(judged.then_some(required))
+            .chain(found.iter().enumerate().map(cell))
+            .collect()
+    };
+    let bench = schemes.iter().any(|s| s.conditions.bench.is_some());
+    let what = if bench { "Predicted sigma, with a bench the total uncertainty" } else { "Predicted sigma" };
+    let ratio = if schemes.len() > 1 { ", and in brackets its ratio to the first scheme" } else { "" };
+    Block::table(format!("{what}{ratio} (- where it is not determined)"), columns, all.into_iter().map(row))
+}
+
 /// One row per unknown: degree, accuracy order and sigma in every scheme.
 fn by_unknown(schemes: &[ComparedScheme]) -> Block {
     let mut names: Vec<&String> = Vec::new();
@@ -222,8 +271,22 @@ impl Answer for Comparison {
         // without requirements their columns would be empty
         let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
         let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
-        let mut blocks =
-            vec![overview(&self.schemes).without(left_out), by_unknown(&self.schemes).without(left_out)];
+        let mut assumed = Vec::new();
+        for r in &self.schemes {
+            assumed.push(format!(
+                "{}: {}; positions {}{}",
+                r.name,
+                stated::measurement(&r.conditions).join("; "),
+                r.positions.join(", "),
+                half_turns(r)
+            ));
+        }
+        let first = vec![
+            overview(&self.schemes).without(left_out),
+            ratios(&self.schemes),
+            Block::list("Assumed", assumed),
+        ];
+        let mut blocks = vec![by_unknown(&self.schemes).without(left_out)];
         blocks.extend(at_own_drifts(&self.schemes));
         let drop_rows = self.schemes.iter().flat_map(|r| {
             r.drop_one.iter().map(|d| {
@@ -301,17 +364,7 @@ impl Answer for Comparison {
         if judged {
             blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
         }
-        let mut lines = Vec::new();
-        for r in &self.schemes {
-            lines.push(format!(
-                "{}: {}; positions {}{}",
-                r.name,
-                stated::measurement(&r.conditions).join("; "),
-                r.positions.join(", "),
-                half_turns(r)
-            ));
-        }
-        lines.extend([
+        let mut lines = vec![
         stated::predicted_of(self.schemes.iter().map(|r| &r.conditions)),
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
@@ -321,19 +374,19 @@ impl Answer for Comparison {
          observable"
             .into(),
         format!("seed {}", self.seed),
-    ]);
+    ];
         if self.schemes.iter().any(|r| !r.slews.is_empty()) {
             lines.push(
                 "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
                     .into(),
             );
         }
-        blocks.push(Block::list("Assumed", lines));
+        blocks.push(Block::list("Meaning of the columns", lines));
         let n = self.schemes.len();
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
             lead: lead(self),
-            blocks,
+            blocks: first.into_iter().chain(Block::details(1, "Details", blocks)).collect(),
         }
     }
 

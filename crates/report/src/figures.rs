@@ -1,6 +1,7 @@
 //! Figures of simulated runs and cross-checks.
 
 use obsdeg_evidence::simulation::{Series, Traces};
+use obsdeg_exact::parallel;
 
 use crate::document::number;
 use crate::figure::{
@@ -27,6 +28,28 @@ impl File {
 pub(crate) fn picture(name: &str, svg: String) -> Result<[File; 2], FigureError> {
     let png = png(&svg)?;
     Ok([File::new(format!("{name}.svg"), svg), File::new(format!("{name}.png"), png)])
+}
+
+/// Picture before it is drawn.
+enum Planned {
+    One(Figure),
+    /// Figures in three columns under a title.
+    Grid(Vec<Figure>, String),
+}
+
+/// Pictures with their names as files, in this order, drawn on all threads.
+fn drawn(all: &[(String, Planned)]) -> Result<Vec<File>, FigureError> {
+    let files = parallel::try_map(all.len(), |i| {
+        let (name, planned) = &all[i];
+        picture(
+            name,
+            match planned {
+                Planned::One(figure) => figure.svg(),
+                Planned::Grid(figures, title) => grid(figures, 3, title),
+            },
+        )
+    })?;
+    Ok(files.into_iter().flatten().collect())
 }
 
 /// Largest number of points of a curve: no screen shows more.
@@ -210,17 +233,17 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
         PAPER.iter().map(|name| record.names.iter().position(|n| n == name)).collect();
     let estimates: Vec<Figure> = all().map(|i| curve(record, i)).collect();
     let errors: Vec<Figure> = all().map(|i| error_figure(record, i, POINTS)).collect();
-    let mut files = Vec::new();
+    let mut planned = Vec::new();
     // names of unknowns have no dot
     for (figures, end, title) in [
         (estimates, "", "Truth, estimate and +-3 sigma"),
-        (errors, ".error", "Error (estimate minus truth) and +-3 sigma"),
+        (errors, ".error", "Error (absolute value of estimate minus truth) and 3 sigma"),
     ] {
         for (figure, name) in figures.iter().zip(&record.names) {
-            files.extend(picture(&format!("{}{end}", file_name(name)), figure.svg())?);
+            planned.push((format!("{}{end}", file_name(name)), Planned::One(figure.clone())));
         }
         let some: Vec<Figure> = unknowns.iter().take(GRID).map(|&i| figures[i].clone()).collect();
-        files.extend(picture(&format!("all{end}"), grid(&some, 3, &format!("{title}{part}")))?);
+        planned.push((format!("all{end}"), Planned::Grid(some, format!("{title}{part}"))));
         let numbered = |(k, &i): (usize, &usize)| Figure {
             title: format!("{}: {}", k + 2, figures[i].title),
             ..figures[i].clone()
@@ -228,10 +251,10 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
         if let Some(papers) = &papers {
             let some: Vec<Figure> = papers.iter().enumerate().map(numbered).collect();
             let title = format!("{title}: the unknowns of the paper's figures 2 to 10");
-            files.extend(picture(&format!("figures-2-to-10{end}"), grid(&some, 3, &title))?);
+            planned.push((format!("figures-2-to-10{end}"), Planned::Grid(some, title)));
         }
     }
-    Ok(files)
+    drawn(&planned)
 }
 
 /// Sigma against the dwell for unknowns of one unit, with a reference slope per order. Styles are numbered

@@ -142,6 +142,8 @@ pub struct Layout {
     pub color: bool,
     /// True if only ASCII is written: lines are drawn in ASCII, and other characters written as `\u{e9}`.
     pub ascii: bool,
+    /// True if the details of an answer are left out, and named in the last line.
+    pub brief: bool,
 }
 
 /// MathML of an expression in program notation; `None` if it cannot be typeset.
@@ -273,9 +275,9 @@ pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<S
     Ok(match format {
         Format::Table => table::document(&answer.document(), layout),
         Format::Json => json(answer)?,
-        Format::Markdown => markdown::document(&answer.document()),
+        Format::Markdown => markdown::document(&answer.document().plain()),
         Format::Csv => csv(answer, None)?,
-        Format::Latex => latex::document(&answer.document()),
+        Format::Latex => latex::document(&answer.document().plain()),
     })
 }
 

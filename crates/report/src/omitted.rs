@@ -144,9 +144,15 @@ const TYPICAL: [(&str, f64); 4] = [("K0", 20.0), ("M", 10.0), ("M3", 10.0), ("M6
 
 /// Sentences on the largest change by errors of a typical bench, one for each family that is not estimated.
 pub(crate) fn typical(of: &OmittedEffects) -> Vec<String> {
+    // the size that is stated, where all terms of the family have the same
+    let stated = |f: &FamilyEffect| {
+        let own: Vec<Option<f64>> =
+            of.terms.iter().filter(|t| t.family == f.family).map(|t| t.size).collect();
+        own.first().copied().flatten().filter(|size| own.iter().all(|s| *s == Some(*size)))
+    };
     let families = TYPICAL.iter().filter_map(|(name, size)| {
         let f = of.families.iter().find(|f| f.family == *name)?;
-        Some((f, *size))
+        Some((f, stated(f).unwrap_or(*size)))
     });
     let sentence = |(f, size): (&FamilyEffect, f64)| match &f.worst {
         Some(w) => format!(

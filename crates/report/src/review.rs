@@ -18,7 +18,7 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
 use crate::analysis::null_vector;
-use crate::document::{Block, Cell, Document, Typeset, left, number, optional, right};
+use crate::document::{Block, Cell, Document, Fold, Typeset, left, number, optional, right};
 use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
 
@@ -54,10 +54,12 @@ pub(crate) fn document(
     }
     if r.schemes.len() > 1 {
         let comparison = r.comparison.document();
-        let mut own: Vec<Block> = vec![first::ratios(&r.comparison.schemes)];
+        let mut own: Vec<Block> = vec![compare::ratios(&r.comparison.schemes)];
         own.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
-        let rest = comparison.blocks.into_iter().filter(|b| !is_list(b, "Assumed")).collect();
-        own.extend(Block::details(2, "Comparison, every figure", rest));
+        own.extend(comparison.blocks.into_iter().filter_map(|b| match b {
+            Block::Fold(details) => Some(Block::Fold(Fold { level: 2, ..details })),
+            _ => None,
+        }));
         blocks.push(Block::fold(1, "Comparison of the schemes", own));
     }
     for (i, (name, c)) in calibrations.iter().enumerate() {
@@ -161,9 +163,6 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, al
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
     blocks.push(section(level, "Verdict"));
     verdict(blocks, s, review, &coefficients);
-    if alone {
-        blocks.push(Block::NewPage);
-    }
     blocks.push(section(level, "Positions"));
     positions(blocks, s, id);
     blocks.push(section(level, "What limits it, and what to change"));
@@ -182,16 +181,24 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, al
         blocks.extend(pictures::time_against_sigma(std::slice::from_ref(s), &format!("{id}_front")));
     }
     if alone {
-        blocks.push(Block::NewPage);
         blocks.push(section(1, "Appendix"));
     }
     let parts = appendix(s, review, &coefficients, id).into_iter();
-    let parts = parts.map(|(title, own)| Block::fold(if alone { 2 } else { 3 }, title, own));
+    let large = s.positions.len() > MANY_POSITIONS || s.analysis.quantities.len() > MANY_UNKNOWNS;
+    let parts = parts.map(|(title, blocks)| {
+        let printed = !large || !SECONDARY.contains(&title);
+        Block::Fold(Fold { level: if alone { 2 } else { 3 }, title: title.into(), printed, blocks })
+    });
     match alone {
         true => blocks.extend(parts),
         false => blocks.extend(Block::details(2, format!("Appendix of {}", s.name), parts.collect())),
     }
 }
+
+/// Numbers of positions and of unknowns above which a printed appendix leaves out what matters least.
+const MANY_POSITIONS: usize = 7;
+const MANY_UNKNOWNS: usize = 20;
+const SECONDARY: [&str; 2] = ["Positions in numbers", "Sensitivity"];
 
 /// Verdict in sentences, with its conditions in one list.
 fn verdict(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) {
@@ -504,8 +511,11 @@ fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block
         ]
     };
     let mut out = vec![Block::table(
-        "Rank, and largest sigma in deg/h (per g): of all coefficients, of those determined here (- where \
-         one is not observable)",
+        format!(
+            "Rank, and largest {} in deg/h (per g): of all coefficients, of those determined here (- where one \
+             is not observable)",
+            if review.conditions.bench.is_some() { "total uncertainty with the bench" } else { "sigma" }
+        ),
         [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
         review.sensitivity.iter().map(row),
     )];

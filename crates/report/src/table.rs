@@ -57,7 +57,7 @@ fn wrapped(text: &str, layout: Layout, first: &str, others: &str) -> Vec<String>
 
 fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell>], layout: Layout) {
     let mut table = Table::new();
-    table.load_style(STYLE).set_header(columns.iter().map(|c| &c.name));
+    table.load_style(STYLE).set_header(columns.iter().map(|c| visible(&c.name)));
     if let Some(width) = layout.width {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }
@@ -111,31 +111,57 @@ fn marked(text: &str) -> Cow<'_, str> {
     }
 }
 
+/// Writes blocks; `left_out` receives the headings of details that are not written.
+fn blocks(out: &mut String, all: &[Block], layout: Layout, left_out: &mut Vec<String>) {
+    for block in all {
+        match block {
+            Block::Table { heading: title, columns, rows } => {
+                heading(out, title, layout);
+                table(out, columns, rows, layout);
+            }
+            Block::List { heading: title, lines } => {
+                heading(out, title, layout);
+                lines.iter().for_each(|line| paragraph(out, line, layout));
+            }
+            Block::Section { title, .. } => heading(out, title, layout),
+            Block::Text(text) => paragraph(out, text, layout),
+            Block::Formulas { heading: title, lines } => {
+                heading(out, title, layout);
+                lines.iter().for_each(|line| paragraph(out, &line.text, layout));
+            }
+            Block::Fold(fold) if fold.printed || !layout.brief => {
+                blocks(out, &fold.blocks, layout, left_out);
+            }
+            Block::Fold(fold) => left_out.extend(fold.blocks.iter().filter_map(short_heading)),
+            // a status is a table here
+            Block::Picture(_) | Block::Status(_) | Block::NewPage => {}
+        }
+    }
+}
+
+/// Heading of a block, without what explains it in brackets or behind a colon; `None` without a heading.
+fn short_heading(block: &Block) -> Option<String> {
+    let (Block::Table { heading, .. } | Block::List { heading, .. } | Block::Formulas { heading, .. }) =
+        block
+    else {
+        return None;
+    };
+    let short = heading.split([':', '(', ';']).next().unwrap_or_default().trim();
+    (!short.is_empty()).then(|| short.into())
+}
+
 pub(crate) fn document(d: &Document, layout: Layout) -> String {
     let mut out = String::new();
     heading(&mut out, &d.title, layout);
     for line in &d.lead {
         paragraph(&mut out, line, layout);
     }
-    for block in &d.blocks {
-        match block {
-            Block::Table { heading: title, columns, rows } => {
-                heading(&mut out, title, layout);
-                table(&mut out, columns, rows, layout);
-            }
-            Block::List { heading: title, lines } => {
-                heading(&mut out, title, layout);
-                lines.iter().for_each(|line| paragraph(&mut out, line, layout));
-            }
-            Block::Section { title, .. } => heading(&mut out, title, layout),
-            Block::Text(text) => paragraph(&mut out, text, layout),
-            Block::Formulas { heading: title, lines } => {
-                heading(&mut out, title, layout);
-                lines.iter().for_each(|line| paragraph(&mut out, &line.text, layout));
-            }
-            // a status is a table here
-            Block::Picture(_) | Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
-        }
+    let mut left_out = Vec::new();
+    blocks(&mut out, &d.blocks, layout, &mut left_out);
+    if !left_out.is_empty() {
+        out.push('\n');
+        left_out.dedup();
+        paragraph(&mut out, &format!("--details prints: {}", left_out.join("; ")), layout);
     }
     if layout.ascii { in_ascii(&out) } else { out }
 }

@@ -188,7 +188,7 @@ fn angles_of_a_file_beyond_its_limits_are_pointed_out() {
     for command in [
         &["analyze", &file, "--solutions", "off"][..],
         &["simulate", &file],
-        &["compare", &file],
+        &["compare", &file, "--details"],
         &[
             "design",
             "--candidates",

@@ -234,7 +234,8 @@ fn simulate_and_compare_show_the_floor() {
     let d_fx = of("D_FX");
     assert!(number(&d_fx, "least_sigma") <= number(&d_fx, "sigma") && d_fx["unit"] == "deg/h");
     for format in ["table", "markdown", "latex"] {
-        for command in [[&P1P2[..], &noise].concat(), [&["compare", &file][..], &noise].concat()] {
+        for command in [[&P1P2[..], &noise].concat(), [&["compare", &file, "--details"][..], &noise].concat()]
+        {
             let text = stdout(&run(&[&command[..], &["--format", format]].concat()));
             assert!(text.contains("Noise floor") && text.contains("no better beyond"), "{format}: {text}");
             assert!(text.contains("is the bias at the start"), "{format}: {text}");

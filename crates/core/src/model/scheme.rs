@@ -129,6 +129,12 @@ pub(crate) const MAX_UNKNOWNS: usize = 1000;
 /// Reasons why a scheme cannot be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SchemeError {
+    /// Title block with a wrong entry.
+    #[error("the title block: {message}")]
+    TitleBlock {
+        /// Entry, what was found and what is expected.
+        message: String,
+    },
     /// The scheme has no position.
     #[error("the scheme has no position; expected at least one, as in --angles 0,0,0")]
     Empty,
@@ -290,6 +296,7 @@ impl SchemeError {
             Self::LongText { key, .. } | Self::UnknownName { key, .. } | Self::BenchName { key, .. } => {
                 Some(key.clone())
             }
+            Self::TitleBlock { .. } => Some("document".into()),
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
             Self::DriftPositions { .. } | Self::Terms(_) => Some("terms".into()),
@@ -375,8 +382,8 @@ impl Scheme {
         let combinations = self.combinations.iter().enumerate();
         let combinations = combinations.map(|(i, text)| (format!("combinations.{i}"), text, MAX_COMBINATION));
         let own = [("name", &self.name, MAX_TITLE), ("description", &self.description, MAX_DESCRIPTION)];
-        if let Some((_, found, most)) = self.document.too_long() {
-            return Err(SchemeError::LongText { key: "document".into(), found, most });
+        if let Some(message) = self.document.wrong() {
+            return Err(SchemeError::TitleBlock { message });
         }
         let own = own.into_iter().map(|(key, text, most)| (key.to_string(), text, most));
         for (key, text, most) in own.chain(combinations) {

@@ -420,8 +420,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     };
     if let Some(document) = &file.document {
         model.document = document.get_ref().clone();
-        if let Some((entry, found, most)) = model.document.too_long() {
-            let message = format!("{entry}: {found}; expected at most {most}");
+        if let Some(message) = model.document.wrong() {
             return Err(r.at(document.span(), "the title block".into(), message));
         }
     }

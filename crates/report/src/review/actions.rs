@@ -12,7 +12,7 @@ use super::fewest_of_all;
 use crate::calibration::{durations, is_clock};
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
-use crate::{omitted, resolve, stated, words};
+use crate::{gimbals, omitted, resolve, stated, words};
 
 /// Advice for a run that is not consistent.
 const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsistent with the truth.";
@@ -50,12 +50,21 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
             stated::run(&s.simulation.run, &s.simulation.conditions)
         ));
     }
-    if !s.simulation.validity.holds && !stated::drifts_by_default(&s.simulation.conditions) {
-        out.push(
-            "Compensate known drifts before the run, or use a filter with full attitudes (`obsdeg simulate \
-             --truth exact` shows its sigmas): at these drifts the small-angle model does not hold."
-                .into(),
-        );
+    if !s.simulation.validity.holds {
+        let of = match stated::drifts_by_default(&s.simulation.conditions) {
+            true => {
+                "State the drifts of your gyros ([simulation.values]): at those of the paper, which stand in \
+                     their place, the small-angle model does not hold. Then compensate"
+            }
+            false => "At these drifts the small-angle model does not hold: compensate",
+        };
+        out.push(format!(
+            "{of} known drifts before the run, or use a filter with full attitudes (`obsdeg simulate --truth \
+             exact` shows its sigmas)."
+        ));
+    }
+    if gimbals::lead(s.analysis.gimbals.as_ref()).is_some() {
+        out.push("Change positions or paths that the gimbals cannot follow (Positions).".into());
     }
     if !s.simulation.consistency.consistent {
         out.push(INCONSISTENT.into());
@@ -214,6 +223,16 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
         out.push(format!(
             "Record longer or more runs for {}: these do not determine them.",
             words::names(by_record)
+        ));
+    }
+    let missed = c.requirements.iter().flat_map(|r| r.missed.iter().map(|m| m.name.as_str()));
+    let missed: Vec<&str> =
+        missed.filter(|name| c.quantities.iter().any(|q| q.name == *name && q.determined)).collect();
+    if !missed.is_empty() {
+        out.push(format!(
+            "Record longer, or one more position, for {}: by this record their requirements are NOT met (`obsdeg \
+             design --next 1 --after` names the position).",
+            words::names(missed)
         ));
     }
     if out.is_empty() {

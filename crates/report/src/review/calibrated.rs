@@ -9,6 +9,7 @@ use crate::calibration_figures::{
 };
 use crate::document::{Block, Document, Drawing, Grade, Picture, Status, StatusRow};
 use crate::figure::Figure;
+use crate::stated;
 
 /// Section of a calibration: its answer and its pictures, whose names begin with `id`.
 pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
@@ -64,34 +65,41 @@ pub(super) fn status(c: &Calibration, title: String) -> Status {
     let determined = c.quantities.iter().filter(|u| u.determined).count();
     let first = c.findings.first().map(|f| finding(f, &c.records));
     let f = &c.fit;
+    let required = c.requirements.as_ref().filter(|r| r.stated > 0).map(|r| {
+        let grade = if r.all_met() { Grade::Good } else { Grade::Missed };
+        row("Requirements", grade, stated::requirements(r))
+    });
     Status {
         title,
-        rows: vec![
-            row(
-                "Consistent",
-                if c.consistent { Grade::Good } else { Grade::Missed },
-                first.unwrap_or_else(|| "model and sigmas explain the record".into()),
-            ),
-            row(
-                "Determined",
-                if determined == all { Grade::Good } else { Grade::Limited },
-                format!("{determined} of {all} unknowns"),
-            ),
-            row(
-                "Chi-square",
-                if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
-                    Grade::Good
-                } else {
-                    Grade::Limited
-                },
-                format!(
-                    "{:.3} per degree of freedom ({:.3} to {:.3})",
-                    f.factor * f.factor,
-                    f.band.0,
-                    f.band.1
+        rows: required
+            .into_iter()
+            .chain([
+                row(
+                    "Consistent",
+                    if c.consistent { Grade::Good } else { Grade::Missed },
+                    first.unwrap_or_else(|| "model and sigmas explain the record".into()),
                 ),
-            ),
-        ],
+                row(
+                    "Determined",
+                    if determined == all { Grade::Good } else { Grade::Limited },
+                    format!("{determined} of {all} unknowns"),
+                ),
+                row(
+                    "Chi-square",
+                    if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
+                        Grade::Good
+                    } else {
+                        Grade::Limited
+                    },
+                    format!(
+                        "{:.3} per degree of freedom ({:.3} to {:.3})",
+                        f.factor * f.factor,
+                        f.band.0,
+                        f.band.1
+                    ),
+                ),
+            ])
+            .collect(),
         actions: super::actions::of_calibration(c),
     }
 }

@@ -9,17 +9,13 @@ use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
 use super::{joined, seconds};
-use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number, right};
+use crate::compare::{deciding, unknowns};
+use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
 use crate::rows::{Chart, Row};
 use crate::{compare, words};
 
 /// Largest number of rows of a chart, so that it fits a page.
 const ROWS: usize = 48;
-
-/// Uncertainty that requirements are compared with: the total with a bench, else sigma.
-fn deciding(q: &Quantity) -> Option<f64> {
-    q.total.or(q.sigma)
-}
 
 /// Outcome of one requirement, in words.
 fn margin(q: &Quantity) -> (String, Grade) {
@@ -225,17 +221,6 @@ pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview) {
     blocks.push(sigmas(&r.comparison.schemes));
 }
 
-/// The unknowns of all schemes in the order of the first that has them.
-fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
-    let mut out: Vec<&Quantity> = Vec::new();
-    for q in schemes.iter().flat_map(|s| &s.quantities) {
-        if !out.iter().any(|o| o.name == q.name) {
-            out.push(q);
-        }
-    }
-    out
-}
-
 /// `15 of 15 met`, `3 of 15 MISSED`.
 fn kept(r: &Requirements) -> String {
     match (r.stated, r.all_met()) {
@@ -285,26 +270,6 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
         "Side by side"
     };
     Block::table(heading, columns, rows)
-}
-
-/// Schemes as columns: what decides a requirement, and its ratio to that of the first scheme.
-pub(super) fn ratios(schemes: &[ComparedScheme]) -> Block {
-    let mut columns = vec![left("unknown"), left("unit")];
-    columns.extend(schemes.iter().map(|s| right(s.name.clone())));
-    let row = |q: &Quantity| {
-        let values =
-            schemes.iter().map(|s| s.quantities.iter().find(|own| own.name == q.name).and_then(deciding));
-        let values: Vec<Option<f64>> = values.collect();
-        let cell = |value: &Option<f64>| match (value, values[0]) {
-            (Some(x), Some(first)) if first > 0.0 => format!("{} ({:.2})", number(*x), x / first),
-            (Some(x), _) => number(*x),
-            (None, _) => "-".into(),
-        };
-        [q.name.clone(), q.unit.clone()].into_iter().chain(values.iter().map(cell)).collect::<Vec<String>>()
-    };
-    let heading = "Predicted sigma, with a bench the total uncertainty, and in brackets its ratio to the first \
-                   scheme (- where it is not determined)";
-    Block::table(heading, columns, unknowns(schemes).into_iter().map(row))
 }
 
 /// Sigma of every unknown in every scheme, with the requirement if all schemes have the same.

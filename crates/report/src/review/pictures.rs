@@ -202,11 +202,9 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
         log: true,
         ..Figure::default()
     };
-    Some(curves(
-        name,
-        format!("What longer dwells buy: predicted {what} against the total time, with the required sigma"),
-        figure,
-    ))
+    let required = if required.is_empty() { "" } else { ", with the required sigma" };
+    let caption = format!("What longer dwells buy: predicted {what} against the total time{required}");
+    Some(curves(name, caption, figure))
 }
 
 /// Range of the positive values of curves with a margin; `None` without positive values.
@@ -242,17 +240,21 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
             lines.push(line(&label, least, Stroke::DashDot, bound_steps(bound)));
         }
     }
+    let bench = schemes.iter().any(|s| s.simulation.requirements.with_bench);
     let figure = Figure {
         title: "Pareto front".into(),
         x_label: "total time [s]".into(),
-        y_label: "largest 1 sigma [deg/h, deg/h/g]".into(),
+        y_label: format!("largest {} [deg/h, deg/h/g]", if bench { "total" } else { "1 sigma" }),
         lines,
         log: true,
         ..Figure::default()
     };
-    let caption = "Total time against the largest predicted sigma of what the scheme determines: the scheme \
+    let largest = if bench { "largest total uncertainty with the bench" } else { "largest predicted sigma" };
+    let caption = format!(
+        "Total time against the {largest} of what the scheme determines: the scheme \
                    at other dwells, and the best of as many cardinal attitudes (five at most; under reset \
-                   carry twelve, with their bound)";
+                   carry twelve, with their bound)"
+    );
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 

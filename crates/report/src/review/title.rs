@@ -28,7 +28,7 @@ pub(super) fn block(r: &DesignReview) -> Block {
         .collect();
     let row = |(name, of): &(&str, &TitleBlock)| -> Vec<String> {
         let line =
-            |role: &&String| if of.signatures.contains(role) { "\u{2003}".repeat(6) } else { "-".into() };
+            |role: &&String| if of.signatures.contains(role) { "\u{a0}".repeat(44) } else { "-".into() };
         std::iter::once(name.to_string())
             .chain(names.map(|name| entry(of, name)))
             .chain(roles.iter().map(line))

@@ -159,12 +159,18 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     if !silent.is_empty() {
         first.push_str(&format!("; it does not excite {silent}"));
     }
-    let worst = with_dwell.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    // other units do not compare
+    let rates: Vec<&&Quantity> = match with_dwell.iter().any(|q| q.unit.starts_with("deg/h")) {
+        true => with_dwell.iter().filter(|q| q.unit.starts_with("deg/h")).copied().collect(),
+        false => with_dwell.clone(),
+    };
+    let worst = rates.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
     let accuracy = worst.map_or_else(
         || "None of them has a finite predicted sigma".to_string(),
         |(q, sigma)| {
             format!(
-                "The largest predicted sigma of those is {} {} ({}) after {} s",
+                "The largest predicted sigma of {} is {} {} ({}) after {} s",
+                if rates.len() == with_dwell.len() { "those" } else { "the drift coefficients" },
                 number(sigma),
                 q.unit,
                 q.name,
@@ -172,7 +178,7 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
             )
         },
     );
-    let total = with_dwell.iter().filter_map(|q| Some((q, q.total?))).max_by(|x, y| x.1.total_cmp(&y.1));
+    let total = rates.iter().filter_map(|q| Some((q, q.total?))).max_by(|x, y| x.1.total_cmp(&y.1));
     let total = total.map_or_else(String::new, |(q, total)| {
         format!(", with the bench the largest total uncertainty is {} {} ({})", number(total), q.unit, q.name)
     });
@@ -229,11 +235,14 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let open = open.filter(|_| review.requirements.stated > 0);
     let requirements = open.map_or(requirements.clone(), |open| format!("{requirements}. {open}"));
     let row = |what, grade, text| StatusRow { what, grade, text };
+    let beyond = gimbals::lead(s.analysis.gimbals.as_ref()).map(|text| row("Gimbals", Grade::Missed, text));
+    let first = [
+        row("Observable", grade(every), format!("{observable}{dwell}")),
+        row("Requirements", required, requirements),
+    ];
     Status {
         title: s.name.clone(),
-        rows: vec![
-            row("Observable", grade(every), format!("{observable}{dwell}")),
-            row("Requirements", required, requirements),
+        rows: first.into_iter().chain(beyond).chain([
             row(
                 "Small-angle model",
                 match stated::drifts_by_default(&s.simulation.conditions) {
@@ -262,7 +271,7 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
                 grade(prior.is_empty()),
                 if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
             ),
-        ],
+        ]).collect(),
         actions: super::actions::of_scheme(s, review),
     }
 }
