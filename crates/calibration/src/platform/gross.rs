@@ -1,21 +1,22 @@
 //! Gross errors in cells of a record, found by a robust pass over every position before anything is
 //! estimated.
 //!
-//! A platform at rest turns slowly, so a component is a polynomial of time over some minutes: of the fifth
-//! degree, since at 120 deg/h a cubic is off by four times a noise of 1e-5 g at the ends of 1000 s. The row
-//! farthest from the polynomial of all others is left out, and it is fitted again, until no row is far. The
-//! scatter comes from third differences, which neither a slow turn nor single rows change. Values that repeat
-//! to the last digit, and are far from their neighbours, are codes of missing values.
+//! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row farthest
+//! from the cubic of all others is left out, and the cubic is fitted again, until no row is far. At 120 deg/h a
+//! cubic is off by four times a noise of 1e-5 g at the ends of 1000 s, so rows that fit a polynomial of the
+//! fifth degree through the others come back. The scatter comes from third differences, which neither a slow
+//! turn nor single rows change. Values that repeat to the last digit, and are far from their neighbours, are
+//! codes of missing values.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Length of a window that is fitted by one polynomial, in s; the fewest rows of a window follow.
+/// Length of a window that is fitted by one cubic, in s; the fewest rows of a window follow.
 const WINDOW_S: f64 = 1000.0;
 const FEWEST: usize = 16;
-/// Number of coefficients of the polynomial, and those of a window with fewer than [`FEWEST`] rows.
-const TERMS: usize = 6;
-const FEW_TERMS: usize = 4;
-/// Distance from the polynomial at which a row is gross, in standard deviations.
+/// Number of coefficients of a cubic, and of the polynomial by which rows come back.
+const CUBIC: usize = 4;
+const QUINTIC: usize = 6;
+/// Distance from the cubic at which a row is gross, in standard deviations.
 const GROSS: f64 = 8.0;
 /// Least distance of a code of missing values from its neighbours, in standard deviations.
 const CODE: f64 = 20.0;
@@ -50,7 +51,7 @@ pub(crate) struct Row {
 /// Reason to leave a cell out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Why {
-    /// Far from the polynomial of the rows around it.
+    /// Far from the polynomials of the rows around it.
     Far,
     /// Code of missing values: far from its neighbours, and equal to other cells to the last digit.
     Code,
@@ -155,12 +156,11 @@ fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) ->
     let x = |t: f64| if to > from { (2.0 * t - from - to) / (to - from) } else { 0.0 };
     let mut kept: Vec<usize> = (0..n).filter(|i| out.iter().all(|o| o.0 != *i)).collect();
     while kept.len() >= FEWEST / 2 && (out.len() as f64) < MOST * n as f64 {
-        let terms = if kept.len() >= FEWEST { TERMS } else { FEW_TERMS };
-        let a = DMatrix::from_fn(kept.len(), terms, |i, j| x(t[kept[i]]).powi(j as i32));
+        let a = DMatrix::from_fn(kept.len(), CUBIC, |i, j| x(t[kept[i]]).powi(j as i32));
         let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
         let q = a.qr().q();
         let left = &y - &q * (q.transpose() * &y);
-        // residual of a row from the polynomial of all others
+        // residual of a row from the cubic of all others
         let alone = |i: usize| {
             let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
             (i, left[i] * weights[kept[i]] / free.sqrt() / s)
@@ -168,6 +168,20 @@ fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) ->
         let furthest = (0..kept.len()).map(alone).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
         out.push((kept.remove(i), sigmas, Why::Far));
+    }
+    if kept.len() >= FEWEST {
+        let powers = |i: usize| DVector::from_fn(QUINTIC, |j, _| x(t[i]).powi(j as i32));
+        let a = DMatrix::from_fn(kept.len(), QUINTIC, |i, j| x(t[kept[i]]).powi(j as i32));
+        let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
+        if let Some(normal) = (a.transpose() * &a).cholesky() {
+            let coefficients = normal.solve(&(a.transpose() * y));
+            let far = |i: usize| {
+                let row = powers(i);
+                let variance = 1.0 / weights[i].powi(2) + row.dot(&normal.solve(&row));
+                (values[i] - row.dot(&coefficients)).abs() > GROSS * s * variance.sqrt()
+            };
+            out.retain(|o| o.2 != Why::Far || far(o.0));
+        }
     }
     // so many are no errors of single cells
     if out.len() as f64 >= MOST * n as f64 {
