@@ -2,8 +2,8 @@
 //! estimated.
 //!
 //! A platform at rest turns slowly, so a component is a cubic of time over some minutes. The row farthest
-//! from the cubic of all others is left out, and the cubic is fitted again, until no row is far. At 120 deg/h a
-//! cubic is off by four times a noise of 1e-5 g at the ends of 1000 s, so rows that fit a polynomial of the
+//! from the cubic of all others is left out, and the cubic is fitted again, until no row is far. At 120 deg/h
+//! a cubic is off by four times a noise of 1e-5 g at the ends of 1000 s, so rows that fit a polynomial of the
 //! fifth degree through the others come back. The scatter comes from third differences, which neither a slow
 //! turn nor single rows change. Values that repeat to the last digit, and are far from their neighbours, are
 //! codes of missing values.
