@@ -74,8 +74,10 @@ impl Printer {
                     names()
                 ))
             }),
-            Some(PdfBy::Browser) => browser()
-                .ok_or_else(|| Failure::input(format!("--pdf-by browser: none was found; expected one of {}", names()))),
+            Some(PdfBy::Browser) => browser().ok_or_else(|| {
+                let names = names();
+                Failure::input(format!("--pdf-by browser: none was found; expected one of {names}"))
+            }),
             Some(PdfBy::Typesetter) => typesetter.ok_or_else(|| {
                 Failure::input(
                     "--pdf-by typesetter: this program was built without it; expected a build with `--features pdf`"
@@ -157,10 +159,9 @@ pub(crate) fn print(browser: &Path, page: &[u8]) -> Result<Vec<u8>, Failure> {
 
 /// Prints within a time limit; the error is the reason.
 fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, String> {
-    let folder = std::env::temp_dir().join(format!("obsdeg-print-{}", std::process::id()));
+    let folder = private_folder().map_err(|e| e.to_string())?;
     *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder.clone(), None));
     let _going = Going;
-    fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
     let [html, pdf, profile] = ["review.html", "review.pdf", "profile"].map(|name| folder.join(name));
     fs::write(&html, page).map_err(|e| e.to_string())?;
     let mut command = Command::new(browser);
@@ -177,7 +178,7 @@ fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, Strin
     }
     command.arg(format!("--user-data-dir={}", profile.display()));
     command.arg(format!("--print-to-pdf={}", pdf.display()));
-    command.arg(format!("file://{}", html.display()));
+    command.arg(address(&html));
     // what it leaves when it is ended is removed with the folder
     command.env("TMPDIR", &folder);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -192,6 +193,30 @@ fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, Strin
     }
     without_stamps(&mut bytes);
     Ok(bytes)
+}
+
+/// New folder for a print that only its user can read.
+fn private_folder() -> std::io::Result<PathBuf> {
+    let mut builder = fs::DirBuilder::new();
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    let mut number = 0;
+    loop {
+        let name = format!("obsdeg-print-{}-{number}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        match builder.create(&folder) {
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
+            done => return done.map(|()| folder),
+        }
+    }
+}
+
+/// Address of a file for a browser.
+fn address(file: &Path) -> String {
+    let path = file.display().to_string();
+    let escapes = [("%", "%25"), ("#", "%23"), ("?", "%3F"), (" ", "%20")];
+    let path = escapes.iter().fold(path, |path, (sign, escape)| path.replace(sign, escape));
+    format!("file://{path}")
 }
 
 /// Waits for the end of a process, at most `limit`.
@@ -270,7 +295,8 @@ mod tests {
         }
         let browser = script(&format!("{to} printf '%%PDF-1.4 /ModDate (D:2026)' > \"$f\""));
         assert_eq!(within(&browser, b"<p>", LIMIT).expect("a PDF"), b"%PDF-1.4 /ModDate (D:0000)");
-        let left = std::env::temp_dir().join(format!("obsdeg-print-{}", std::process::id()));
+        let left = std::env::temp_dir().join(format!("obsdeg-print-{}-0", std::process::id()));
         assert!(!left.exists());
+        assert_eq!(address(Path::new("/a b/#1%.html")), "file:///a%20b/%231%25.html");
     }
 }

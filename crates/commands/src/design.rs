@@ -180,7 +180,7 @@ pub struct WantedOptions {
     pub observable: Vec<String>,
 
     /// Largest degree, of all required coefficients, or of one, a family or an unknown of a model: 1, D_F=1.
-    /// Of several, that of the narrowest name holds
+    /// The narrowest name holds: D_FX=2 beside D_F=1
     #[arg(long, value_name = "[NAME=]K")]
     #[serde(with = "text::list")]
     pub max_degree: Vec<DegreeCap>,

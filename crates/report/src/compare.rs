@@ -99,10 +99,13 @@ pub(crate) fn ratios(schemes: &[ComparedScheme]) -> Block {
         let found: Vec<Option<Quantity>> = schemes.iter().map(|s| own(s, q)).collect();
         let first = found[0].as_ref().and_then(deciding);
         let cell = |(i, q): (usize, &Option<Quantity>)| {
-            let Some(value) = q.as_ref().and_then(deciding) else { return "-".into() };
+            let required = q.as_ref().and_then(|q| q.requirement);
+            let Some(value) = q.as_ref().and_then(deciding) else {
+                return if required.is_some() { "- MISSED".into() } else { "-".into() };
+            };
             let ratio = first.filter(|first| i > 0 && *first > 0.0);
             let ratio = ratio.map_or_else(String::new, |first| format!(" ({:.2})", value / first));
-            let missed = q.as_ref().and_then(|q| q.requirement).is_some_and(|required| value > required);
+            let missed = required.is_some_and(|required| value > required);
             format!("{}{ratio}{}", number(value), if missed { " MISSED" } else { "" })
         };
         let required: Vec<Option<f64>> = found.iter().flatten().map(|q| q.requirement).collect();

@@ -26,7 +26,7 @@ pub(crate) enum Block {
     Status(Vec<Status>),
     /// Part that may be folded away.
     Fold(Fold),
-    /// What follows begins a page where pages are printed.
+    /// Page break before the next block, in formats with pages.
     NewPage,
 }
 

@@ -28,8 +28,8 @@ const CALIBRATED: &str = "The run that is simulated of its scheme, and the check
                           the scheme states (of several calibrations those of the last); what is not \
                           determined has the values of the scheme.";
 
-/// Review as one document. On two pages stand the question with its answer, then the positions with what
-/// limits them and what to change; the rest is an appendix. Several schemes are compared first.
+/// Review as one document: status, verdict and conditions, then the positions with what limits them and what
+/// to change (some two printed pages), then the appendix. Several schemes are compared first.
 pub(crate) fn document(
     r: &DesignReview,
     calibrations: &[(String, Calibration)],
@@ -528,7 +528,7 @@ fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block
 const CORRELATED: f64 = 0.9;
 const LINES: usize = 6;
 
-/// Strongest correlations of the estimates of unknowns that are determined.
+/// Strongest correlations, under a diffuse prior, of the estimates of unknowns that are determined.
 fn correlated(s: &SchemeReview) -> Option<Block> {
     let of = &s.evidence.as_ref().ok()?.correlation;
     let determined = |name: &str| {
@@ -547,7 +547,9 @@ fn correlated(s: &SchemeReview) -> Option<Block> {
     let mut lines: Vec<String> =
         pairs.iter().take(LINES).map(|(r, a, b)| format!("{a} and {b}: {r:.3}")).collect();
     lines.extend((more > 0).then(|| format!("{more} more pairs")));
-    let title = format!("Estimates that depend on each other (correlation of {CORRELATED} or more)");
+    let title = format!(
+        "Estimates that depend on each other (correlation of {CORRELATED} or more, with a diffuse prior)"
+    );
     Block::list_if_any(title, lines)
 }
 
@@ -705,12 +707,7 @@ fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
     let mut pictures: Vec<Block> = errors.into_iter().map(|(_, picture)| picture).collect();
     let rest = pictures.split_off(pictures.len().min(ERRORS));
     out.extend(pictures);
-    if !flat.is_empty() {
-        out.push(Block::Text(format!(
-            "Not drawn, not excited and known from the prior only: {}.",
-            flat.join(", ")
-        )));
-    }
+    out.extend(pictures::not_drawn(&flat));
     details.extend(rest);
     out.extend(Block::details(3, "Estimates at the end, and the errors of all others", details));
     out

@@ -164,12 +164,7 @@ pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &
         let mut errors: Vec<Block> = pictures::errors(traces, &flat, id).into_iter().map(|e| e.1).collect();
         let rest = errors.split_off(errors.len().min(ERRORS));
         blocks.extend(errors);
-        if !flat.is_empty() {
-            blocks.push(Block::Text(format!(
-                "Not drawn, not excited and known from the prior only: {}.",
-                flat.join(", ")
-            )));
-        }
+        blocks.extend(pictures::not_drawn(&flat));
         blocks.extend(Block::details(level + 1, "Errors of all others", rest));
     }
 }

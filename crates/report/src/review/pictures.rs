@@ -274,6 +274,13 @@ pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<(String, B
     moves.take(ERRORS).map(of).collect()
 }
 
+/// Sentence on the unknowns whose errors are not drawn; `None` without any.
+pub(super) fn not_drawn(flat: &[&str]) -> Option<Block> {
+    let names = flat.join(", ");
+    let text = format!("Not drawn, not excited and known from the prior only: {names}.");
+    (!flat.is_empty()).then_some(Block::Text(text))
+}
+
 pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {
     let mut units: Vec<&str> = c.slopes.iter().map(|s| s.unit.as_str()).collect();
     units.sort_unstable();
