@@ -109,7 +109,19 @@ impl RequireMet {
     /// # Errors
     /// Failed check, after the answer is printed.
     pub(crate) fn decide<'a>(self, all: impl IntoIterator<Item = &'a Requirements>) -> Result<(), Failure> {
-        let missed = self.require_met && all.into_iter().any(Requirements::any_missed);
+        self.decide_with(all, true)
+    }
+
+    /// Reports a missed requirement, or limits within which not everything is accepted, by the exit code.
+    ///
+    /// # Errors
+    /// Failed check, after the answer is printed.
+    pub(crate) fn decide_with<'a>(
+        self,
+        all: impl IntoIterator<Item = &'a Requirements>,
+        accepted: bool,
+    ) -> Result<(), Failure> {
+        let missed = self.require_met && (!accepted || all.into_iter().any(Requirements::any_missed));
         if missed { Err(Failure::check()) } else { Ok(()) }
     }
 }

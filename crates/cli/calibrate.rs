@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::{Arg, Args};
-use obsdeg_commands::{Calibrate, Expected, Given, Host, Source, calibrate};
+use obsdeg_commands::{AcceptanceReport, Calibrate, Expected, Given, Host, Source, calibrate};
 
 use crate::arguments::RequireMet;
 use crate::failure::Failure;
@@ -36,7 +36,7 @@ are separated by commas, semicolons or tabs (then with decimal commas too); a co
 hold dates. With -o it writes calibration.json, coefficients.csv, covariance.csv, residuals.csv and figures.
 
 Exit codes: 0 done and consistent, 1 the model or its sigmas do not explain the record, or a requirement is \
-missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, \
+missed or a limit not accepted (with --require-met), 2 bad input, 3 internal error, 130 interrupted (with what there is by then, \
 once the records are read).";
 
 #[derive(Debug, Args)]
@@ -96,12 +96,16 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let host = Host { worker: None, going: &going };
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
     drop(bar);
-    a.met.check(found.requirements())?;
+    let acceptance = found.acceptance();
+    if acceptance.is_none() {
+        a.met.check(found.requirements())?;
+    }
+    let accepted = acceptance.is_none_or(AcceptanceReport::all_accepted);
     let file = if a.asked.dry_run { "records.json" } else { "calibration.json" };
     a.output.write_folder(&found, file, || found.files())?;
     match found.passed() {
         _ if found.interrupted() => Err(Failure::unfinished("interrupted".into())),
-        true => a.met.decide(found.requirements()),
+        true => a.met.decide_with(found.requirements(), accepted),
         false => Err(Failure::check()),
     }
 }

@@ -19,6 +19,7 @@ const FURTHER: Section = Some("Further positions");
 const MODELS: Section = Some("Models");
 const SOLUTIONS: Section = Some("Solutions");
 const CONTROLS: Section = Some("Controls");
+const SHEET: Section = Some("Sheet");
 const OUTPUT: Section = Some("Output");
 
 /// One-line help texts: option by its name in the program, section, line. An entry for one command, as
@@ -29,6 +30,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("column", None, "Column to use, by its name; may be given several times"),
     ("compare.files", None, "Scheme files (TOML); - is stdin"),
     ("simulate.files", None, "Scheme file (TOML) or model file (TOML, JSON); - is stdin"),
+    ("procedure.files", None, "Scheme file (TOML); - is stdin"),
     ("crosscheck.files", None, "Scheme file (TOML) or model file (TOML, JSON); - is stdin"),
     ("files", None, "Scheme files (TOML) and model files (TOML, JSON); - is stdin"),
     ("angles", None, "Angles of a position in degrees, or letters (NUE); once per position"),
@@ -138,6 +140,11 @@ const LINES: &[(&str, Section, &str)] = &[
     ("filter_carry", CONTROLS, "Make the filter wrong: another carry"),
     ("filter_latitude", CONTROLS, "Make the filter wrong: another latitude in degrees"),
     ("filter_drop", CONTROLS, "Make the filter wrong: it does not know of this position"),
+    ("settle", SHEET, "Time at rest before each recording, in s (default: 0)"),
+    ("tilt", SHEET, "Tilt that a reading may always show, in degrees (default: 1)"),
+    ("dialect", SHEET, "Table for a controller: generic or psins"),
+    ("start", SHEET, "Attitude at the start of a rotation table"),
+    ("rotations", SHEET, "Rotation table instead of a scheme: k, Ux, Uy, Uz, angle, T, T0, T1"),
     ("details", OUTPUT, "Print the details of the table too"),
     ("pdf_by", OUTPUT, "Maker of a PDF: browser, the path of one, or typesetter"),
     ("report.format", OUTPUT, "Format: html, pdf, markdown or latex (default: by the file's ending)"),
@@ -147,6 +154,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("design.output", OUTPUT, "Folder for summary, scheme and figures; with --part a file"),
     ("simulate.output", OUTPUT, "Folder for summary, series and figures; or a .json, .md, .csv, .tex file"),
     ("crosscheck.output", OUTPUT, "Folder for evidence and figures; or a .json, .md, .csv, .tex file"),
+    ("procedure.output", OUTPUT, "Folder for the sheet, its page, tables and the record's header"),
     ("allan.output", OUTPUT, "Folder for coefficients, deviations, settings and figures"),
     ("calibrate.output", OUTPUT, "Folder for calibration, coefficients, residuals and figures"),
     ("man.output", None, "Folder for all pages: obsdeg.1, obsdeg-analyze.1 and so on"),

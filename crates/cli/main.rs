@@ -22,6 +22,7 @@ mod origin;
 mod output;
 mod paper;
 mod print;
+mod procedure;
 mod progress;
 mod report;
 mod schema;
@@ -48,6 +49,7 @@ Examples:
   obsdeg analyze model.toml
   obsdeg simulate --angles 0,0,0 --angles 180,0,0 -o run
   obsdeg crosscheck --angles 0,0,0 --angles 180,0,0
+  obsdeg procedure scheme.toml -o run
   obsdeg calibrate scheme.toml record.csv
   obsdeg allan night.csv
   obsdeg compare a.toml b.toml
@@ -73,6 +75,8 @@ enum Command {
     Simulate(simulate::Arguments),
     /// Hold the exact verdicts against a filter: evidence of several kinds
     Crosscheck(crosscheck::Arguments),
+    /// Write the sheet by which a scheme is run: turns, waits, recordings, readings, what is known when
+    Procedure(procedure::Arguments),
     /// Estimate what a scheme or model determines from records of its runs
     Calibrate(calibrate::Arguments),
     /// Noise of gyros and accelerometers from a record at rest: Allan deviation and coefficients
@@ -187,6 +191,7 @@ fn run() -> Result<(), ExitCode> {
         Command::Analyze(a) => analyze::run(a, given),
         Command::Simulate(a) => simulate::run(a, given),
         Command::Crosscheck(a) => crosscheck::run(a, given),
+        Command::Procedure(a) => procedure::run(a, given),
         Command::Calibrate(a) => calibrate::run(a, given),
         Command::Allan(a) => allan::run(&a),
         Command::Compare(a) => compare::run(&a),

@@ -9,6 +9,7 @@ use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
 use obsdeg_design::design::{Design, OptimumCertificate, Part, Walks};
 use obsdeg_design::next::NextPositions;
+use obsdeg_design::procedure::Procedure;
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::audit::Audit;
 use obsdeg_evidence::compare::Comparison;
@@ -54,6 +55,8 @@ enum SchemaKind {
     Sensors,
     /// The JSON of `obsdeg design --next`
     Next,
+    /// The JSON of `obsdeg procedure`
+    Procedure,
     /// Scheme files
     Scheme,
     /// The JSON of `obsdeg analyze` of a model
@@ -93,6 +96,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         SchemaKind::Walks => written::<Walks>(),
         SchemaKind::Sensors => written::<Sensors>(),
         SchemaKind::Next => written::<NextPositions>(),
+        SchemaKind::Procedure => written::<Procedure>(),
         SchemaKind::Scheme => schema_for!(SchemeFile),
         SchemaKind::System => written::<SystemAnalysis>(),
         SchemaKind::SystemRun => written::<SystemRun>(),

@@ -25,7 +25,7 @@ from typing import Any
 from . import options as options
 from . import shapes as shapes
 from ._calibrate import allan, calibrate
-from ._commands import analyze, compare, crosscheck, design, load, measure, next_measurement, paper, report, simulate
+from ._commands import analyze, compare, crosscheck, design, load, measure, next_measurement, paper, procedure, report, simulate
 from ._files import Text
 from ._model import Model
 from ._obsdeg import ProblemError, __version__
@@ -42,6 +42,7 @@ from ._results import (
     Judgements,
     NextPositions,
     Part,
+    Procedure,
     Report,
     SensorNoise,
     Sensors,
@@ -69,6 +70,7 @@ __all__ = [
     "NextPositions",
     "Part",
     "ProblemError",
+    "Procedure",
     "Record",
     "Report",
     "Rounded",
@@ -94,6 +96,7 @@ __all__ = [
     "next_measurement",
     "options",
     "paper",
+    "procedure",
     "report",
     "shapes",
     "simulate",

@@ -24,6 +24,7 @@ from ._results import (
     Judgements,
     NextPositions,
     Part,
+    Procedure,
     Progress,
     Report,
     Sensors,
@@ -225,6 +226,60 @@ def simulate(*what: Judged, digits: int | None = DIGITS, progress: Progress | bo
     ('reached', True, 'deg/h')
     """
     return _one("simulate", kinds_of(what, Simulation, SystemRun), what, options, digits, progress)
+
+
+@named(options.Procedure)
+def procedure(
+    *what: Judged,
+    rotations: File | None = None,
+    digits: int | None = DIGITS,
+    progress: Progress | bool | None = None,
+    **options: Any,
+) -> Procedure:
+    """Sheet by which a scheme is run on the bench: steps in order of time with gimbal angles, turns, what the
+    accelerometers should read, and what is known after each position.
+
+    Parameters
+    ----------
+    *what : positions, Scheme or path
+        Scheme with numbers; none if ``angles`` or ``rotations`` are given.
+    rotations : path or text stream
+        Rotation table instead of a scheme: rows k, Ux, Uy, Uz, angle [deg], T, T0, T1 [s].
+    digits : int or None
+        Same as for :func:`analyze`.
+    progress : callable or bool
+        Called ten times a second; if it returns False, the work ends with a ``KeyboardInterrupt``.
+    **options
+        Options of ``obsdeg procedure``, see :class:`obsdeg.options.Procedure` for units: ``settle`` [s],
+        ``tilt`` [deg], ``slew_rate`` [deg/s], ``dwell`` [s], ``requirement``, ...
+
+    Returns
+    -------
+    Procedure
+        The sheet; ``passed`` is False if the gimbals cannot execute it.
+
+    Raises
+    ------
+    ProblemError
+        Invalid request; the message gives the place.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> sheet = obsdeg.procedure([(0, 0, 0), (180, 0, 0)], carry="inertial", slew_rate=2, settle=30)
+    >>> [step.kind for step in sheet.steps]
+    ['set', 'wait', 'record', 'turn', 'wait', 'record']
+    >>> sheet.total_s
+    2090.0
+    """
+    if rotations is None:
+        answer: Procedure = _one("procedure", (Procedure,), what, options, digits, progress)
+        return answer
+    log: list[Rounded] = []
+    table = source(rotations, digits, log, "rotations")
+    asked = request(options, digits, log, sources=sources(what, digits, log) if what else None, rotations=table)
+    answer = ask((Procedure,), "procedure", asked, log, progress)
+    return answer
 
 
 @overload

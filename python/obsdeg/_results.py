@@ -592,6 +592,15 @@ class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
         return 7.0, 2.5 + _plots.height_of(len(self))
 
 
+class Procedure(Answer, shapes.Procedure):
+    """Sheet of a run: turns, waits and recordings in order of time."""
+
+    def controller(self) -> str:
+        """Table for a controller, as the command line writes it to ``controller.csv`` or ``controller.txt``."""
+        files = self.files()
+        return next(text.decode() for name, text in files.items() if name.startswith("controller."))
+
+
 class SensorNoise(Answer, shapes.SensorNoiseReport):
     """Noise of sensors at rest, by the Allan deviation of a record."""
 
@@ -630,6 +639,7 @@ KINDS: dict[str, type[Answer]] = {
     "obsdeg.system-evidence/1": SystemEvidence,
     "obsdeg.calibration/1": Calibration,
     "obsdeg.system-calibration/1": SystemCalibration,
+    "obsdeg.procedure/1": Procedure,
     "obsdeg.allan/1": SensorNoise,
     "obsdeg.audit/1": Audit,
 }

@@ -158,6 +158,19 @@ class Simulate(Seeded, Positions, Filtered, total=False):
     """The options of :func:`obsdeg.simulate`."""
 
 
+class Procedure(Seeded, Positions, Filtered, total=False):
+    """The options of :func:`obsdeg.procedure`."""
+
+    settle: Real
+    """Time at rest before each recording in s, within the dwell of the position [default: 0]."""
+    tilt: Real
+    """Tilt that the tolerance of a reading always allows, in degrees [default: 1]."""
+    dialect: Literal["generic", "psins"]
+    """Table for a controller: every step, or rotations of the PSINS kind [default: generic]."""
+    start: str
+    """Attitude at the start of a rotation table: ``"alpha,beta,gamma"`` in degrees, or letters [default: 0,0,0]."""
+
+
 class Crosscheck(Seeded, Positions, Filtered, total=False):
     """The options of :func:`obsdeg.crosscheck`."""
 

@@ -3625,6 +3625,52 @@ class Estimated(Record):
     that no sigma describes its error. `determined` is false then.
     """
 
+Decision = Literal["accepted", "rejected", "undecided"]
+"""Decision on a coefficient with limits. accepted: Estimate within the limits by more than the guard band. rejected: Estimate beyond a
+limit by more than the guard band. undecided: Estimate within the guard band of a limit, a coefficient that is not determined, or a
+calibration that is not consistent.
+"""
+
+
+class AcceptanceLimit(Record):
+    """Coefficient with its limits and the decision on it."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the coefficient, such as D_FX."""
+    unit: str
+    """Unit of the limits, the estimate and the uncertainty."""
+    low: float
+    """Lowest value allowed, in the unit of `unit`."""
+    high: float
+    """Highest value allowed, in the unit of `unit`."""
+    uncertainty: float | None
+    """Standard uncertainty of the estimate, in the unit of `unit`; null if the coefficient is not determined."""
+    accepted: tuple[float, float] | None
+    """Lowest and highest estimate that is accepted, in the unit of `unit`; null if the uncertainty allows none."""
+    rejected_beyond: tuple[float, float] | None
+    """Estimates, in the unit of `unit`, below and above which the coefficient is rejected; null without an uncertainty."""
+    estimate: float | None
+    """Estimate of the coefficient, in the unit of `unit`; null before a run, and if it is not determined."""
+    decision: Decision | None
+    """Decision on the estimate; null before a run."""
+
+
+class AcceptanceReport(Record):
+    """Decisions on all coefficients with limits."""
+
+    __slots__ = ()
+
+    risk: float
+    """Largest probability, dimensionless, that an accepted coefficient lies outside its limits, and that a coefficient within them is
+    rejected.
+    """
+    valid: bool
+    """True if the decisions stand; false for a calibration that is not consistent, whose uncertainties do not count."""
+    limits: list[AcceptanceLimit]
+    """Coefficients with limits, in model order."""
+
 
 class NextRun(Record):
     """A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated with this answer as prior
@@ -4144,6 +4190,8 @@ class Calibration(Shape):
     adds and what a suspected error would change; null if none is stated. Requirements on psi are not judged: a calibration estimates
     psi of the start of a record.
     """
+    acceptance: AcceptanceReport | None
+    """Acceptance of the coefficients within the limits of the scheme, by the same uncertainties; null if no limits are stated."""
     next_runs: list[NextRun]
     """Further runs that bring coefficients to requirements they miss; empty if none is missed."""
     combinations: list[Estimated]
@@ -4425,6 +4473,212 @@ class SystemCalibration(Shape):
     """Largest number of integration steps between two rows."""
     seed: int
     """Seed of starts and verdicts."""
+
+
+class TitleBlock(Record):
+    """Title block of a review, as the file states it: nothing of it comes from the clock or from the computer."""
+
+    __slots__ = ()
+
+    reference: str
+    """Number or reference of the document; empty when left out."""
+    revision: str
+    """Revision of the document, such as `B`; empty when left out."""
+    date: str
+    """Date of the document, as a text or a date of TOML; empty when left out."""
+    author: str
+    """Author of the document; empty when left out."""
+    signatures: list[str]
+    """Roles that sign the document, such as `['Checked', 'Approved']`: a line for each in a review."""
+
+ObstacleKind = Literal["stop", "limits", "elsewhere", "misses"]
+"""Kind of an obstacle of the gimbals. stop: A gimbal stops at its limit or at the lock during the turn. limits: No gimbal angles of the
+attitude lie within the limits. elsewhere: The path gimbal by gimbal starts at other gimbal angles than those where the gimbals stand.
+misses: The stated turn does not lead to the position.
+"""
+
+
+class Obstacle(Record):
+    """Obstacle of the gimbals on the way to a position."""
+
+    __slots__ = ()
+
+    position: str
+    """Name of the position that is not reached, or whose rotation is not possible."""
+    kind: ObstacleKind
+    """Kind of the obstacle on the way."""
+    gimbal: str | None
+    """Gimbal that stops: alpha, beta or gamma; null near beta = +-90 deg and for other kinds."""
+    at_deg: float | None
+    """Limit at which the gimbal stops, in degrees; null for other kinds."""
+    after_deg: float | None
+    """Angle that the platform has turned by then, in degrees; null for other kinds."""
+
+StepKind = Literal["set", "turn", "wait", "record", "rotate"]
+"""Kind of a step of the sheet. set: Set the gimbals to the first position. turn: Turn to the next position, without recording. wait:
+Wait at rest, without recording. record: Record the outputs at rest. rotate: Record the outputs during a rotation.
+"""
+
+
+class StepTurn(Record):
+    """Turn of the platform in a step."""
+
+    __slots__ = ()
+
+    about: tuple[float, float, float]
+    """Axis in n (North, Up, East): a unit vector, dimensionless."""
+    about_platform: tuple[float, float, float]
+    """Axis in the platform (X_p, Y_p, Z_p): a unit vector, dimensionless."""
+    angle_deg: float
+    """Angle of the turn in degrees, right-handed about the axis, above 0."""
+    rate_deg_s: float | None
+    """Rate of the turn in deg/s; null if none is stated."""
+    gimbal: str | None
+    """Gimbal that makes the turn alone: alpha, beta or gamma; null about one axis."""
+
+
+class Step(Record):
+    """Step of the sheet, with its times."""
+
+    __slots__ = ()
+
+    number: int
+    """Number of the step, from 1."""
+    kind: StepKind
+    """Kind of the step: what is done."""
+    position: str
+    """Name of the position in which the step takes place, or to which it leads."""
+    start_s: float
+    """Start of the step after the start of the first position, in s."""
+    duration_s: float
+    """Duration of the step, in s; 0 for turns of unstated rate."""
+    gimbals_deg: tuple[float, float, float]
+    """Gimbal angles at the end of the step, in degrees: alpha (outer), beta (middle), gamma (inner)."""
+    turn: StepTurn | None
+    """Turn of the platform; null at rest."""
+    force_g: tuple[float, float, float] | None
+    """Readings of the accelerometers X_p, Y_p, Z_p at rest, in g, of a platform without errors; null while it turns."""
+    tolerance_g: float | None
+    """Largest deviation of a reading, in g, that the stated drifts explain; null while the platform turns."""
+
+
+class Tolerance(Record):
+    """Basis of the tolerances of the readings."""
+
+    __slots__ = ()
+
+    tilt_deg: float
+    """Tilt that is always allowed, in degrees."""
+    by_values: bool
+    """True if true values of coefficients or psi are stated, whose drift is added."""
+    by_priors: bool
+    """True if priors are stated, of which three sigma are added."""
+
+
+class AfterPosition(Record):
+    """State of the coefficients after a position."""
+
+    __slots__ = ()
+
+    position: str
+    """Name of the position that has ended."""
+    end_s: float
+    """End of the position, in s."""
+    met: int
+    """Number of requirements that are met."""
+    determines: list[str]
+    """Coefficients that the samples determine from here on, whatever the priors."""
+    meets: list[str]
+    """Coefficients that meet their requirement from here on."""
+    uncertainty: list[float | None]
+    """Uncertainty of each coefficient, in the order of `coefficients` and in its unit; null where neither samples nor stated priors
+    bound it.
+    """
+
+
+class CoefficientProgress(Record):
+    """Coefficient with the positions from which it is known."""
+
+    __slots__ = ()
+
+    name: str
+    """Name of the coefficient, such as D_FX."""
+    unit: str
+    """Unit of the uncertainty and the requirement."""
+    uncertainty: float | None
+    """Uncertainty at the end, in the unit of `unit`; null if neither samples nor stated priors bound the coefficient."""
+    required: float | None
+    """Largest uncertainty allowed, in the unit of `unit`; null without a requirement."""
+    determined_from: str | None
+    """Position from whose end on the samples determine the coefficient; null if they do not at the end."""
+    met_from: str | None
+    """Position from whose end on the requirement is met; null without a requirement, and if it is missed at the end."""
+
+
+class RotationRow(Record):
+    """Row of a rotation table: `[k, Ux, Uy, Uz, angle, T, T0, T1]`."""
+
+    __slots__ = ()
+
+    number: int
+    """Number of the row, from 1."""
+    axis: tuple[float, float, float]
+    """Axis in the body (right, front, up): a unit vector, dimensionless."""
+    angle_deg: float
+    """Angle about the axis in degrees, right-handed."""
+    rotate_s: float
+    """Duration of the rotation, in s."""
+    before_s: float
+    """Time at rest before the rotation, in s."""
+    after_s: float
+    """Time at rest after the rotation, in s."""
+
+
+class Procedure(Shape):
+    """Executable sheet of a scheme: turns, waits and recordings in order of time."""
+
+    schema: str
+    """Layout of this answer: `obsdeg.procedure/1`."""
+    version: str
+    """Version of the program that wrote it."""
+    name: str
+    """Name of the scheme; empty if it has none."""
+    document: TitleBlock
+    """Title block of the printed sheet."""
+    carry: Carry
+    """Carry of psi between positions."""
+    executable: bool
+    """True if the gimbals can execute every step."""
+    obstacles: list[Obstacle]
+    """Obstacles of the gimbals; empty if the sheet is executable."""
+    steps: list[Step]
+    """Steps of the sheet, in order of time."""
+    total_s: float
+    """Total time of the sheet, in s."""
+    timed_turns: bool
+    """True if the time of the turns is part of the times: a slew rate is stated."""
+    settle_s: float
+    """Time at rest before each recording, in s, within the dwell of the position."""
+    tolerance: Tolerance
+    """Basis of the tolerances of the readings."""
+    after: list[AfterPosition]
+    """State of the coefficients after each position; of a scheme with many positions, after the last one."""
+    coefficients: list[CoefficientProgress]
+    """Coefficients with the position from which each is known."""
+    requirements: Requirements
+    """Outcome of the requirements at the end, by prediction, without the samples of the waits."""
+    acceptance: AcceptanceReport | None
+    """Acceptance limits with their guard bands by the predicted uncertainties; null if none are stated."""
+    conditions: MeasurementReport
+    """Conditions of the predictions."""
+    start_attitude_deg: tuple[float, float, float]
+    """Attitude at the start as PSINS has it: pitch, roll and yaw in degrees of a body with the axes right, front and up along Z_p, X_p
+    and Y_p.
+    """
+    rotations: list[RotationRow]
+    """Rotation table of the PSINS kind; empty without a slew rate."""
+    seed: int
+    """Seed of the exact verdicts."""
 
 SensorKind = Literal["gyro", "accelerometer"]
 """Kind of a sensor, by the unit of its column. gyro: Gyro: the column is a rate of rotation. accelerometer: Accelerometer: the column is

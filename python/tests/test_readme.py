@@ -41,7 +41,7 @@ def test_every_command_and_object_shows_an_example() -> None:
         assert "Examples\n" in one.__doc__ and ">>> " in one.__doc__, one
 
 
-@pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report"])
+@pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "procedure", "calibrate", "allan", "compare", "design", "report"])
 def test_options_are_keyword_parameters(command: str) -> None:
     parameters = inspect.signature(getattr(obsdeg, command)).parameters
     known = set(getattr(options, command.title()).__annotations__)

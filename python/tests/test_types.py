@@ -172,7 +172,7 @@ def said(command: str) -> set[str]:
     return set(wrong.value.message.split("expected one of ")[1].split(", "))
 
 
-@pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report"])
+@pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "procedure", "calibrate", "allan", "compare", "design", "report"])
 def test_options_are_those_of_the_commands(command: str) -> None:
     mine = set(getattr(options, command.title()).__annotations__)
     files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume", "after"}

@@ -31,6 +31,7 @@ SCHEMAS = [
     "system-evidence",
     "calibration",
     "system-calibration",
+    "procedure",
     "allan",
     "audit",
 ]

@@ -207,7 +207,7 @@ const OF_MODELS: [&str; 10] = [
 /// Arguments without an option name.
 fn operands(command: &str) -> &'static [&'static str] {
     match command {
-        "analyze" | "simulate" | "crosscheck" => &["s.toml", "m.toml", "none.toml"],
+        "analyze" | "simulate" | "crosscheck" | "procedure" => &["s.toml", "m.toml", "none.toml"],
         "compare" | "report" => &["s.toml", "t.toml", "m.toml", "none.toml"],
         "calibrate" => &["s.toml"],
         "allan" => &["n.csv", "n.csv", "r.csv", "none.csv"],
@@ -259,6 +259,7 @@ fn no_command_line_of_the_grammar_meets_a_defect() {
         "licences",
         "man",
         "allan",
+        "procedure",
     ];
     let codes = std::thread::scope(|scope| {
         let draw = |(i, command)| scope.spawn(move || draws(i as u64, command));

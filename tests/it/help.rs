@@ -5,10 +5,11 @@ use obsdeg_core::system::WorkLimit;
 use crate::program::{obsdeg, refused, run, scratch, stderr, stdout};
 
 /// The commands, each with the largest number of lines of its `-h`.
-const COMMANDS: [(&str, usize); 14] = [
+const COMMANDS: [(&str, usize); 15] = [
     ("analyze", 51),
     ("simulate", 65),
     ("crosscheck", 70),
+    ("procedure", 72),
     ("calibrate", 51),
     ("allan", 24),
     ("compare", 47),

@@ -34,6 +34,7 @@ mod licences;
 mod models;
 mod not_estimated;
 mod points;
+mod procedure;
 mod program;
 mod recorded;
 mod reference_verdicts;

@@ -8,7 +8,7 @@ use crate::program::{json, run, stdout};
 use crate::validator::faults;
 
 /// Kinds of `obsdeg schema`.
-const KINDS: [&str; 21] = [
+const KINDS: [&str; 22] = [
     "allan",
     "analysis",
     "audit",
@@ -22,6 +22,7 @@ const KINDS: [&str; 21] = [
     "next",
     "optimum-certificate",
     "part",
+    "procedure",
     "scheme",
     "sensors",
     "simulation",
@@ -126,6 +127,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         &["analyze", "--angles", "NUE@X_p:360", "--angles", "alpha,0,0", "--latitude", "90"],
         &["paper"],
         &["allan", "tests/data/static/imu.csv"],
+        &["procedure", "examples/rate-table/scheme.toml"],
         &["compare", five, six],
         &["crosscheck", "--angles", "0,0,0", "--angles", "180,0,0", "--runs", "20"],
         &["crosscheck", "examples/lotka-volterra/model.toml"],

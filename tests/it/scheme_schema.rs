@@ -213,7 +213,7 @@ drift_noise = \"0.1 deg/sqrt(h)\"\nangle_random_walk_deg_sqrt_h = 0.001\nrate_ra
 bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift_scale = 2\nvalues = {{ D = 1 }}\n\
 estimates = {{ D = 1 }}\npriors = {{ D = 1 }}
 [document]\nreference = \"r\"\nrevision = \"B\"\ndate = \"2026-03-01\"\nauthor = \"a\"\nsignatures = [\"Checked\"]
-[requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\n\
+[requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[acceptance]\nrisk = 0.1\nlimits = {{ D_F = 9, D_I = [-1, 1] }}\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\n\
 static = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\n\
 alpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
     );

@@ -2,6 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
+use obsdeg_evidence::acceptance::AcceptanceReport;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::omitted::{ChangePerUnit, Suspicion};
 use schemars::JsonSchema;
@@ -30,6 +31,10 @@ pub struct Calibration {
     /// Requirements on psi are not judged: a calibration estimates psi of the start of a record.
     #[serde(default)]
     pub requirements: Option<Requirements>,
+    /// Acceptance of the coefficients within the limits of the scheme, by the same uncertainties; null if no
+    /// limits are stated.
+    #[serde(default)]
+    pub acceptance: Option<AcceptanceReport>,
     /// Further runs that bring coefficients to requirements they miss; empty if none is missed.
     #[serde(default)]
     pub next_runs: Vec<NextRun>,

@@ -306,8 +306,8 @@ pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attitude {
     text: String,
-    angles: Euler,
-    rotation: Option<Rotation>,
+    pub(crate) angles: Euler,
+    pub(crate) rotation: Option<Rotation>,
 }
 
 impl fmt::Display for Attitude {

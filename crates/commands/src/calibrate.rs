@@ -14,6 +14,7 @@ use obsdeg_calibration::{
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges;
 use obsdeg_core::model::settings::{DriftNoise, Settings};
+use obsdeg_evidence::acceptance::AcceptanceReport;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{
@@ -205,6 +206,14 @@ impl Calibrated {
     pub fn requirements(&self) -> Option<&Requirements> {
         match self {
             Self::Platform(c) => c.requirements.as_ref(),
+            Self::Model(_) | Self::Read(_) => None,
+        }
+    }
+
+    /// Acceptance within the limits of the scheme; `None` where none is stated.
+    pub fn acceptance(&self) -> Option<&AcceptanceReport> {
+        match self {
+            Self::Platform(c) => c.acceptance.as_ref(),
             Self::Model(_) | Self::Read(_) => None,
         }
     }

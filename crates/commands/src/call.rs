@@ -19,13 +19,24 @@ use crate::design::{Designed, Search, SearchFiles, design};
 use crate::host::Host;
 use crate::paper::{Paper, paper};
 use crate::problem::Problem;
+use crate::procedure::{Procedure, procedure};
 use crate::report::{CalibrationFile, Report, origin, report};
 use crate::simulate::{Simulate, files as simulation_files, simulate};
 use crate::source::{Input, Named, Source, title};
 
 /// Names of the commands.
-pub const COMMANDS: [&str; 9] =
-    ["analyze", "simulate", "crosscheck", "calibrate", "allan", "compare", "design", "report", "paper"];
+pub const COMMANDS: [&str; 10] = [
+    "analyze",
+    "simulate",
+    "crosscheck",
+    "procedure",
+    "calibrate",
+    "allan",
+    "compare",
+    "design",
+    "report",
+    "paper",
+];
 
 /// Answer of any command, written in the formats that are asked for.
 pub trait Rendered: Send + Sync {
@@ -255,6 +266,14 @@ fn answered<W: OutputForm>(
             let passed = evidence.passed();
             W::whole(evidence, passed, |e| Ok(crosscheck_files(e)?))
         }
+        "procedure" => {
+            let mut asked: Request<Procedure, Planning> = Request::read(request)?;
+            asked.options.input.given = asked.given;
+            let Planning { sources, rotations } = asked.files;
+            let planned = procedure(&asked.options, sources, rotations.as_ref())?;
+            let passed = planned.sheet.executable;
+            W::whole(planned.sheet.clone(), passed, move |_| planned.files())
+        }
         "calibrate" => {
             let mut asked: Request<Calibrate, Records> = Request::read(request)?;
             asked.options.given = asked.given;
@@ -310,6 +329,14 @@ fn answered<W: OutputForm>(
 #[serde(default)]
 struct Sources {
     sources: Vec<Source>,
+}
+
+/// Files of a sheet: a scheme, or a rotation table.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Planning {
+    sources: Vec<Source>,
+    rotations: Option<Source>,
 }
 
 /// Files of a calibration.

@@ -28,6 +28,7 @@ mod measure;
 mod next;
 mod paper;
 mod problem;
+mod procedure;
 mod report;
 mod simulate;
 mod source;
@@ -47,8 +48,10 @@ pub use design::{
 pub use host::{Host, Now};
 pub use measure::MeasureOptions;
 pub use next::FurtherOptions;
+pub use obsdeg_evidence::acceptance::AcceptanceReport;
 pub use paper::{Paper, paper};
 pub use problem::{Kind, Place, Problem};
+pub use procedure::{Dialect, Planned, Procedure, procedure};
 pub use report::{CalibrationFile, Report, Reviewed, origin, report};
 pub use simulate::{Run, Simulate, files as simulation_files, simulate};
 pub use source::{Expected, Input, ModelFile, Named, Source, title};

@@ -14,10 +14,12 @@
 //!
 //! [`design`] chooses positions from candidates: sets are judged exactly, sequences ranked by the information
 //! of their samples. [`next`] chooses further positions of a scheme, [`sensors`] outputs of a model.
+//! [`procedure`] is the sheet by which a scheme is run.
 //! [`review`] gathers verdicts, a run, evidence, sweeps and alternatives for a report.
 
 mod degree_caps;
 pub mod design;
 pub mod next;
+pub mod procedure;
 pub mod review;
 pub mod sensors;

@@ -3,6 +3,7 @@
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::function::erf::erfc;
 
 use crate::covariance::{Covariance, Form};
 use crate::decomposition::singular_values;
@@ -41,6 +42,16 @@ pub fn chi_square_quantile(dof: f64, confidence: f64) -> f64 {
 /// ```
 pub fn student_quantile(dof: f64, confidence: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |t| t.inverse_cdf(confidence))
+}
+
+/// Probability that a normal variable of mean 0 and variance 1 is at most `x`.
+///
+/// ```
+/// let p = obsdeg_ekf::consistency::normal_cdf(1.959964);
+/// assert!((p - 0.975).abs() < 1e-6);
+/// ```
+pub fn normal_cdf(x: f64) -> f64 {
+    erfc(-x / std::f64::consts::SQRT_2) / 2.0
 }
 
 /// Probability that a chi-square variable of `dof` degrees of freedom exceeds `x`.

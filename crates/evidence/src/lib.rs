@@ -15,9 +15,10 @@
 //! A scheme and the conditions of a run ([`simulation`]) become a timeline and a linear model in SI units.
 //! The exact verdicts, as numbers ([`prediction`]), are compared with the information of all samples, slopes
 //! over the dwell and Monte Carlo runs ([`crosscheck`]); those of any other system likewise ([`system`]).
-//! [`requirements`] decides on sigmas for all commands, [`compare`] sets schemes side by side, and [`audit`]
-//! checks the paper, equation by equation.
+//! [`requirements`] decides on sigmas for all commands, [`acceptance`] on estimates within limits,
+//! [`compare`] sets schemes side by side, and [`audit`] checks the paper, equation by equation.
 
+pub mod acceptance;
 pub mod audit;
 pub mod compare;
 pub mod crosscheck;

@@ -7,7 +7,7 @@ use obsdeg_calibration::answer::{
 };
 
 use crate::document::{Block, Document, estimate, left, number, optional, right};
-use crate::{Answer, ReportError, Table, omitted, stated, words};
+use crate::{Answer, ReportError, Table, acceptance, omitted, stated, words};
 
 /// Largest number of listed outliers.
 const LISTED: usize = 20;
@@ -701,6 +701,8 @@ impl Answer for Calibration {
                 None => format!("{}{psi}.", stated::capital(&said)),
             }
         }));
+        let accepted = self.acceptance.as_ref().and_then(acceptance::sentence);
+        lead.extend(accepted.map(|text| format!("{}.", stated::capital(&text))));
         lead.extend(omitted::of_requirements(self));
         lead.extend(left_open(self));
         lead.extend(by_default(&self.assumed));
@@ -731,6 +733,10 @@ impl Answer for Calibration {
                 columns,
                 rows,
             ));
+        }
+        if let Some(a) = &self.acceptance {
+            blocks.push(acceptance::table(a));
+            blocks.push(Block::list("Decision rule", acceptance::rule(a)));
         }
         blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));

@@ -12,6 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod acceptance;
 mod analysis;
 mod audit;
 mod budget;
@@ -38,6 +39,7 @@ mod panels;
 #[cfg(feature = "pdf")]
 mod pdf;
 mod poses;
+mod procedure;
 mod records_read;
 mod resolve;
 mod review;
@@ -67,6 +69,7 @@ pub use figure::{FigureError, png};
 pub use figures::{File, crosscheck_figures, simulation_figures};
 pub use next_figures::next_figures;
 pub use poses::position_figure;
+pub use procedure::{procedure_page, record_header, steps_csv};
 pub use sensor_figures::sensor_figures;
 pub use sensor_noise::sensor_noise_figures;
 pub use series::{series_csv, series_parquet};

@@ -10,6 +10,7 @@ use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
 use obsdeg_ekf::linear::{filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
+use obsdeg_evidence::acceptance::{Measured, acceptance};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
 use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
 use obsdeg_evidence::simulation::omitted::Bench;
@@ -377,6 +378,7 @@ impl Parts<'_> {
             quantities,
             omitted,
             requirements: None,
+            acceptance: None,
             next_runs: Vec::new(),
             combinations: combinations.iter().map(estimated).collect(),
             covariance,
@@ -406,6 +408,13 @@ impl Parts<'_> {
             e.total = total(e, &outside);
         }
         out.requirements = self.requirements(&out.quantities, &outside);
+        let measured = out.quantities.iter().map(|e| Measured {
+            name: &e.name,
+            unit: &e.unit,
+            estimate: e.estimate,
+            uncertainty: total(e, &outside),
+        });
+        out.acceptance = acceptance(&self.scheme.acceptance, measured, Some(out.consistent));
         if out.requirements.as_ref().is_some_and(Requirements::all_met) {
             out.omitted.limits = limits(&out.quantities, &outside);
         }

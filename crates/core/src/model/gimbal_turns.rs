@@ -126,7 +126,7 @@ impl Scheme {
 
     /// Gimbal angles of the positions. Angles within the limits are taken as written; otherwise those of the
     /// same attitude with the shortest gimbal way from the position before.
-    fn gimbal_angles(&self) -> Vec<Euler> {
+    pub(super) fn gimbal_angles(&self) -> Vec<Euler> {
         let mut out: Vec<Euler> = Vec::with_capacity(self.positions.len());
         for p in &self.positions {
             let before = out.last().unwrap_or(&p.angles);
@@ -184,12 +184,12 @@ impl Scheme {
     }
 }
 
-fn degrees(angles: &Euler) -> [f64; 3] {
+pub(super) fn degrees(angles: &Euler) -> [f64; 3] {
     angles.each_ref().map(|a| a.nanodeg() as f64 / 1e9)
 }
 
 /// Angle in degrees without the rounding errors of sines.
-fn clean(deg: f64) -> f64 {
+pub(super) fn clean(deg: f64) -> f64 {
     (deg * 1e6).round() / 1e6 + 0.0
 }
 
@@ -223,7 +223,7 @@ impl Gimbals {
 
     /// Follows a turn from gimbal angles in degrees. Returns the obstacle that stops it, if there is one,
     /// and the gimbal angles reached.
-    fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
+    pub(super) fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
         let whole = slew.turn().angle_deg;
         let (mut at, mut done) = (start, 0.0);
         // a turn of very many degrees takes larger steps

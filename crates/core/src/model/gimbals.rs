@@ -260,6 +260,11 @@ pub(super) fn is_locked(c: &Matrix3<f64>) -> bool {
     c[0][2].abs() > 1.0 - 1e-12
 }
 
+/// Euler angles of `C_c^n`, rounded to 1e-9 degrees, beta in -90..90 degrees.
+pub fn euler_of(c: &Matrix3<f64>) -> Euler {
+    euler_angles(c).map(|x| Angle::from_nanodeg((x.to_degrees() * 1e9).round() as i64))
+}
+
 /// Euler angles (rad) of `C_c^n`, beta in -90..90 degrees.
 pub(crate) fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
     // C = Mx My Mz: row 0 is (cb cg, cb sg, -sb), column 2 is (-sb, sa cb, ca cb)

@@ -1,5 +1,6 @@
 //! The platform of the paper: schemes, their notation, and the model in any ring.
 
+pub(crate) mod acceptance;
 pub(crate) mod angle;
 pub(crate) mod attitude;
 mod canonical;
@@ -7,6 +8,7 @@ pub(crate) mod combination;
 pub(crate) mod dwell;
 pub(crate) mod error_model;
 pub(crate) mod geometry;
+mod gimbal_sequence;
 mod gimbal_turns;
 pub(crate) mod gimbals;
 mod matrices;
@@ -29,6 +31,7 @@ pub mod slew;
 pub(crate) mod symbols;
 pub(crate) mod terms;
 
+pub use acceptance::{Acceptance, RISK};
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
 pub use attitude::{
     Euler, Matrix3, Turned, angles_text, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary,
@@ -37,8 +40,9 @@ pub use attitude::{
 pub use dwell::{Dwell, DwellError};
 pub use error_model::{Columns, ErrorModel};
 pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
+pub use gimbal_sequence::{GimbalObstacle, GimbalStation};
 pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
-pub use gimbals::{GimbalError, Gimbals};
+pub use gimbals::{GimbalError, Gimbals, euler_of};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
 pub use omitted::{MAX_ATTITUDES, OmittedEffect, OmittedModel, OmittedTerm};

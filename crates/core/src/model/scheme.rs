@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::fmt;
 use std::str::FromStr;
 
+use super::acceptance::Acceptance;
 use super::angle::{Angle, AngleError, MAX_NAME, excerpt, format_decimal, parse_decimal};
 use super::attitude::{Euler, Turned};
 use super::dwell::Dwell;
@@ -114,6 +115,8 @@ pub struct Scheme {
     /// Random walk of coefficients between calibrations, by coefficient or family, in the unit of the
     /// coefficient per sqrt(day).
     pub ageing: BTreeMap<String, f64>,
+    /// Limits within which calibrated coefficients are accepted.
+    pub acceptance: Acceptance,
     /// Limits of the gimbals.
     pub gimbals: Gimbals,
     /// Slew path between positions that state none; `None` if the scheme states no path.
@@ -133,6 +136,14 @@ pub enum SchemeError {
     #[error("the title block: {message}")]
     TitleBlock {
         /// Entry, what was found and what is expected.
+        message: String,
+    },
+    /// Acceptance limits with a wrong entry.
+    #[error("{message}")]
+    Acceptance {
+        /// Key in a scheme file.
+        key: String,
+        /// Entry, the value found and the values expected.
         message: String,
     },
     /// The scheme has no position.
@@ -296,6 +307,7 @@ impl SchemeError {
             Self::LongText { key, .. } | Self::UnknownName { key, .. } | Self::BenchName { key, .. } => {
                 Some(key.clone())
             }
+            Self::Acceptance { key, .. } => Some(key.clone()),
             Self::TitleBlock { .. } => Some("document".into()),
             Self::Combinations { .. } => Some("combinations".into()),
             Self::Range(e) => Some(e.what.clone()),
@@ -405,6 +417,14 @@ impl Scheme {
             if let Some(name) = list.keys().find(|name| !settings::may_be_unknown(name)) {
                 return Err(SchemeError::UnknownName { key: format!("{key}.{name}"), name: excerpt(name) });
             }
+        }
+        let limited = self.acceptance.limits.keys();
+        if let Some(name) = limited.into_iter().find(|name| !settings::may_be_unknown(name)) {
+            let key = format!("acceptance.limits.{name}");
+            return Err(SchemeError::UnknownName { key, name: excerpt(name) });
+        }
+        if let Some((key, message)) = self.acceptance.wrong() {
+            return Err(SchemeError::Acceptance { key, message });
         }
         if let Some(name) = self.bench.keys().find(|name| !omitted_names::may_be_omitted(name)) {
             return Err(SchemeError::BenchName { key: format!("bench.{name}"), name: excerpt(name) });

@@ -36,8 +36,8 @@ pub use run::optimum::{
 };
 pub use run::part::{Block, Level, PART_SCHEMA, Part, design_part, design_starts};
 pub use run::task::asked;
-pub(crate) use run::winner::half_turn;
 pub use run::winner::scheme as scheme_found;
+pub(crate) use run::winner::{half_turn, under};
 pub use search::best::Best;
 pub use search::constraints::Constraints;
 pub use search::progress::Progress;

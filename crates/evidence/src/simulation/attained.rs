@@ -98,15 +98,28 @@ impl Attained {
         seed: u64,
     ) -> Result<Self, SimulationError> {
         let conditions = conditions.as_stated();
-        let plan = Plan::new(scheme, &conditions)?;
+        Self::of_plan(Plan::new(scheme, &conditions)?, &conditions, beforehand, seed)
+    }
+
+    /// Accuracy of a plan made of `conditions` without random drift that is not stated, such as one with
+    /// steps without samples; with a covariance that is known beforehand.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    pub fn of_plan(
+        plan: Plan,
+        conditions: &Conditions,
+        beforehand: Option<&KnownCovariance>,
+        seed: u64,
+    ) -> Result<Self, SimulationError> {
         let prediction = predict(&plan, seed)?;
-        let stated = stated_prior(&plan, &conditions)?;
+        let stated = stated_prior(&plan, conditions)?;
         let rows = match beforehand {
             Some(known) => known.rows(&plan, &prediction)?,
             None => DMatrix::zeros(0, plan.unknowns()),
         };
         let noisy = conditions.drift_noise.amount() > 0.0 || plan.is_noisy() || beforehand.is_some();
-        let wide = if noisy { wide_prior(&plan, &conditions)? } else { no_prior(&plan)? };
+        let wide = if noisy { wide_prior(&plan, conditions)? } else { no_prior(&plan)? };
         let prior = |narrower: f64| -> Vec<f64> {
             stated.iter().zip(&wide).map(|(s, w)| s.unwrap_or(w / narrower)).collect()
         };
@@ -136,7 +149,7 @@ impl Attained {
         let mut out =
             Self { prior, rows, plan, prediction, sigmas, totals, by_prior, known, noisy, contributions };
         if !conditions.bench.is_empty() {
-            out.add_bench(&conditions)?;
+            out.add_bench(conditions)?;
         }
         Ok(out)
     }

@@ -378,7 +378,7 @@ impl Conditions {
 
     /// Conditions without assignments to single unknowns that `platform` does not have, for another carry or
     /// other positions.
-    pub(crate) fn within(&self, platform: &Platform) -> Self {
+    pub fn within(&self, platform: &Platform) -> Self {
         let kept = |list: &[Assignment]| -> Vec<Assignment> {
             let has = |a: &&Assignment| {
                 is_family(&a.name) || platform.names().iter().any(|name| concerns(&a.name, name))

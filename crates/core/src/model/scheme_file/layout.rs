@@ -81,6 +81,9 @@ pub struct SchemeFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>", extend("additionalProperties" = within(ranges::AGEING)))]
     pub(super) ageing: Numbers,
+    /// Acceptance of calibrated coefficients: limits and risk.
+    #[serde(default)]
+    pub(super) acceptance: AcceptanceEntry,
     /// Gimbal limits; free gimbals when left out. For positions beyond, the answer lists angles of the same
     /// attitude within the limits.
     #[serde(default)]
@@ -92,6 +95,40 @@ pub struct SchemeFile {
     #[serde(default, rename = "position")]
     #[schemars(with = "Vec<PositionEntry>")]
     pub(super) positions: Vec<Spanned<PositionEntry>>,
+}
+
+/// Limits within which calibrated coefficients are accepted.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AcceptanceEntry {
+    /// Largest probability, dimensionless, that an accepted coefficient lies outside its limits; 0.05 when
+    /// left out.
+    #[schemars(with = "Option<f64>", extend("minimum" = 1e-6, "maximum" = 0.5))]
+    pub(super) risk: Option<Spanned<f64>>,
+    /// Limits by coefficient or family, in the unit of the coefficient (deg/h, deg/h/g): a largest magnitude,
+    /// as in D_F = 20, or the lowest and the highest value, as in D_IX = [-0.5, 0.2].
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, LimitEntry>")]
+    pub(super) limits: BTreeMap<Spanned<String>, Spanned<LimitEntry>>,
+}
+
+/// Limits of a coefficient in its unit.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum LimitEntry {
+    /// Largest magnitude of the coefficient, in its unit.
+    Magnitude(f64),
+    /// Lowest and highest value of the coefficient, in its unit.
+    Interval([f64; 2]),
+}
+
+impl From<LimitEntry> for [f64; 2] {
+    fn from(entry: LimitEntry) -> Self {
+        match entry {
+            LimitEntry::Magnitude(x) => [-x, x],
+            LimitEntry::Interval(ends) => ends,
+        }
+    }
 }
 
 /// Conditions of simulated and predicted runs.

@@ -12,6 +12,7 @@ use serde_spanned::Spanned;
 pub use layout::SchemeFile;
 pub use write::write;
 
+use super::acceptance::Acceptance;
 use super::angle::parse_decimal;
 use super::path::{Path, PathError};
 use super::per_gyro::PerGyro;
@@ -21,7 +22,7 @@ use super::terms::{DefinedBy, Unknowns};
 use crate::language::file_error::explain;
 use crate::model::settings::Settings;
 use crate::model::{combination, settings};
-use layout::{GimbalEntry, Literal, Numbers, SimulationEntry};
+use layout::{AcceptanceEntry, GimbalEntry, Literal, Numbers, SimulationEntry};
 
 /// Longest scheme file, in bytes: a thousand positions with all their keys.
 pub const MAX_FILE: usize = 1_000_000;
@@ -87,6 +88,17 @@ impl SchemeReader<'_> {
             (name.get_ref().clone(), *x.get_ref())
         });
         kept.collect()
+    }
+
+    fn acceptance(&mut self, entry: &AcceptanceEntry) -> Acceptance {
+        let limits = entry.limits.iter().map(|(name, limit)| {
+            let known = settings::may_be_unknown(name.get_ref());
+            let place = if known { limit.span() } else { name.span() };
+            self.places.insert(format!("acceptance.limits.{}", name.get_ref()), place);
+            (name.get_ref().clone(), (*limit.get_ref()).into())
+        });
+        let limits = limits.collect();
+        Acceptance { limits, risk: self.keep("acceptance.risk", entry.risk.as_ref()) }
     }
 
     /// Noise of the gyros: a number, or a list of three.
@@ -235,6 +247,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         requirements: r.numbers("requirements", &file.requirements),
         bench: r.numbers("bench", &file.bench),
         ageing: r.numbers("ageing", &file.ageing),
+        acceptance: r.acceptance(&file.acceptance),
         ..Scheme::default()
     };
     if let Some(record) = &file.record {

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
-use crate::model::{Geometry, PerGyro, Recording, SlewAxis, Unknowns};
+use crate::model::{Acceptance, Geometry, PerGyro, Recording, SlewAxis, Unknowns};
 use crate::title_block::TitleBlock;
 
 /// Text of a scheme file. Reading it gives the scheme again; a comment may precede it.
@@ -52,6 +52,7 @@ pub fn write(scheme: &Scheme) -> String {
     numbers(&mut out, "requirements", &scheme.requirements);
     numbers(&mut out, "bench", &scheme.bench);
     numbers(&mut out, "ageing", &scheme.ageing);
+    acceptance(&mut out, &scheme.acceptance);
     let mut gimbals = String::new();
     for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(scheme.gimbals.limits) {
         if let Some(ends) = limit {
@@ -126,6 +127,17 @@ fn numbers(out: &mut String, name: &str, given: &BTreeMap<String, f64>) {
         line(&mut lines, &quoted(key), &number(*x));
     }
     table(out, name, &lines);
+}
+
+fn acceptance(out: &mut String, a: &Acceptance) {
+    let mut own = String::new();
+    if let Some(risk) = a.risk {
+        line(&mut own, "risk", &number(risk));
+    }
+    for (name, ends) in &a.limits {
+        line(&mut own, &format!("limits.{}", quoted(name)), &list(ends.map(number)));
+    }
+    table(out, "acceptance", &own);
 }
 
 fn recording(out: &mut String, r: &Recording) {
@@ -359,6 +371,10 @@ mod tests {
                 requirements,
                 bench: if mirrored { [("K0".into(), 20.0), ("latitude".into(), 0.5)].into() } else { [].into() },
                 ageing: if mirrored { [("D_F".into(), 0.002)].into() } else { [].into() },
+                acceptance: Acceptance {
+                    limits: if mirrored { [("D_F".into(), [-20.0, 1.5])].into() } else { [].into() },
+                    risk: (mirrored && combination).then_some(0.01),
+                },
                 gimbals: Gimbals { limits: [None, limits, None] },
                 recording: if combination { recording } else { Recording::default() },
             }

@@ -108,6 +108,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         combinations: _,
         recording: _,
         ageing: _,
+        acceptance: _,
         carry,
         latitude,
         geometry,

@@ -1,0 +1,91 @@
+//! Readings of the accelerometers at rest, with their tolerances.
+//!
+//! A platform without errors reads `f^c = -C_n^c g^n` in g. A tilt by an angle `a` changes each component by
+//! at most `2 sin(a/2)`. The tilt is the allowed one, the one that the stated true values give by the linear
+//! model, and three sigma of that by the stated priors.
+
+use obsdeg_core::model::settings::Assignment;
+use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, is_rate, resolve, si_per_shown};
+
+use super::answer::{Step, StepKind, Tolerance};
+use super::options::{ProcedureError, ProcedureOptions};
+
+/// Number of sigmas of the priors and of the noise in a tolerance.
+const SIGMAS: f64 = 3.0;
+
+/// Adds readings and tolerances to the steps at rest; returns their basis.
+///
+/// # Errors
+/// [`ProcedureError::Simulation`] for a value of a name that the scheme does not have.
+pub(super) fn add(
+    steps: &mut [Step],
+    plan: &Plan,
+    conditions: &Conditions,
+    options: &ProcedureOptions,
+) -> Result<Tolerance, ProcedureError> {
+    let sizes = |what, stated: &[Assignment]| -> Result<Vec<f64>, ProcedureError> {
+        let units = plan.platform.units();
+        let scale =
+            |unit: &str| si_per_shown(unit) * if is_rate(unit) { conditions.drift_scale } else { 1.0 };
+        let found = resolve(what, &plan.platform, stated, 0.0)?;
+        Ok(found.iter().zip(units).map(|(x, unit)| x * scale(unit)).collect())
+    };
+    let values = sizes("true value", conditions.stated_values())?;
+    let priors = sizes("prior", conditions.stated_priors())?;
+    let tilts = tilts(plan, &values, &priors);
+    let mut at_rest = 0;
+    for step in steps.iter_mut().filter(|s| matches!(s.kind, StepKind::Record | StepKind::Wait)) {
+        while plan_position(plan, at_rest) != step.position && at_rest + 1 < plan.attitudes.len() {
+            at_rest += 1;
+        }
+        // f = -C_n^c g^n with g^n = (0, -1, 0): the second row of C_c^n
+        let clean = |x: f64| (x * 1e12).round() / 1e12 + 0.0;
+        step.force_g = Some(plan.attitudes[at_rest][1].map(clean));
+        let tilt = (options.tilt_deg.to_radians() + tilts[at_rest]).min(std::f64::consts::PI);
+        let noise = SIGMAS * conditions.accelerometer_noise_g;
+        step.tolerance_g = Some(2.0 * (tilt / 2.0).sin() + noise);
+    }
+    let some = |sizes: &[f64]| sizes.iter().any(|x| *x != 0.0);
+    Ok(Tolerance { tilt_deg: options.tilt_deg, by_values: some(&values), by_priors: some(&priors) })
+}
+
+fn plan_position(plan: &Plan, i: usize) -> &str {
+    &plan.platform.scheme().positions[i].name
+}
+
+/// Largest tilt of the platform in each position, in rad, by the linear model: that of the true values
+/// `values`, and three sigma of that by the priors `priors` (both in SI units, shape n).
+fn tilts(plan: &Plan, values: &[f64], priors: &[f64]) -> Vec<f64> {
+    let n = plan.unknowns();
+    let columns: Vec<usize> = (0..n).filter(|&c| priors[c] != 0.0).collect();
+    let own = |c: usize| (0..plan.states()).map(|i| if i == c { priors[c] } else { 0.0 }).collect();
+    let mut states: Vec<Vec<f64>> = columns.iter().map(|&c| own(c)).collect();
+    let mut value = values.to_vec();
+    value.resize(plan.states(), 0.0);
+    states.push(value);
+    let mut out = vec![0.0f64; plan.attitudes.len()];
+    let mut scratch = Vec::new();
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    for (k, segment) in plan.segments.iter().enumerate() {
+        let mut note = |states: &[Vec<f64>]| {
+            let tilt = |x: &Vec<f64>| length(plan.psi_n(k, x));
+            let Some((value, spread)) = states.split_last() else { return };
+            let sigma = spread.iter().map(|x| tilt(x).powi(2)).sum::<f64>().sqrt();
+            let all = &mut out[segment.position];
+            *all = all.max(tilt(value) + SIGMAS * sigma);
+        };
+        let at_rest = segment.kind == SegmentKind::Dwell;
+        if at_rest {
+            note(&states);
+        }
+        for _ in 0..segment.steps {
+            for x in &mut states {
+                plan.stages[k].transition.apply(x, &mut scratch);
+            }
+            if at_rest {
+                note(&states);
+            }
+        }
+    }
+    out
+}
