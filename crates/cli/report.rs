@@ -3,8 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_commands::{CalibrationFile, Given, Host, Report, Source, Word, one_of, origin, report};
-use obsdeg_report::{ReviewFormat, picture_folder};
+use obsdeg_commands::{
+    AcceptanceReport, CalibrationFile, Given, Host, Report, Source, Word, calibration_report, one_of, origin,
+    report,
+};
+use obsdeg_report::{File, ReviewFormat, picture_folder};
 
 use crate::arguments::{AllFiles, RequireMet};
 use crate::engine::{EngineArguments, notice, say_busy};
@@ -24,11 +27,12 @@ Examples:
   obsdeg report scheme.toml -o review.pdf
   obsdeg report examples/two-compartment/model.toml -o review.md
   obsdeg report scheme.toml --calibration calibration -o review.html
+  obsdeg report --calibration today --calibration march -o calibration.html
 
 The format follows the ending of the file, or --format. HTML and PDF are one file: a PDF is the page as a \
 browser of this computer prints it, or by the typesetter (--pdf-by). Markdown and LaTeX have \
-their pictures in a folder of their own beside it, review_figures for review.md. The same command writes the \
-same bytes.
+their pictures in a folder of their own beside it, review_figures for review.md. Without a scheme the report is that of \
+the first calibration, and of what changed since the others. The same command writes the same bytes.
 
 Exit codes: 0 done, 1 a requirement is missed (with --require-met), 2 bad input, 3 internal error, 130 interrupted.";
 
@@ -61,7 +65,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PROGRAM", help_heading = "Output")]
     pdf_by: Option<PdfBy>,
 
-    /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times
+    /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several times.
+    /// Without a FILE the report is that of the calibration
     #[arg(long, value_name = "FOLDER")]
     calibration: Vec<PathBuf>,
 
@@ -75,6 +80,7 @@ pub(crate) struct Arguments {
 /// Help of shared options for `report`.
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
+        "files" => arg.required_unless_present("calibration"),
         "output" => arg.required(true).help("The file to be written"),
         "force" => arg.help("Replace existing files"),
         "carry" => arg.help("What is carried between positions, for all schemes"),
@@ -104,6 +110,16 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let calibrations = a.calibration.iter().map(|path| calibration(path));
     let calibrations = calibrations.collect::<Result<Vec<_>, _>>()?;
     let origin = origin(command(), sources.iter().chain(calibrations.iter().map(|c| &c.source)));
+    if read.is_empty() {
+        a.asked.assumes_nothing()?;
+        let page = printer.as_ref().filter(|p| matches!(p, Printer::Browser(_))).map(|_| ReviewFormat::Html);
+        let (files, read) = calibration_report(&calibrations, &origin, page.unwrap_or(format), &folder)?;
+        let requirements = || read.iter().take(1).filter_map(|c| c.requirements.as_ref());
+        a.met.check(requirements())?;
+        a.write(files, printer.as_ref())?;
+        let accepted = read.first().and_then(|c| c.acceptance.as_ref());
+        return a.met.decide_with(requirements(), accepted.is_none_or(AcceptanceReport::all_accepted));
+    }
     let mut worker = a.engine.worker(a.target.quiet, Box::new(Vec::new))?;
     let bar = Bar::start(a.target.quiet);
     let going = |now| {
@@ -114,22 +130,31 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     a.met.check(reviewed.requirements())?;
     bar.set_message("writing");
-    let mut written = match &printer {
+    let written = match &printer {
         Some(Printer::Browser(_)) => reviewed.files(&origin, ReviewFormat::Html, &folder)?,
         _ => reviewed.files(&origin, format, &folder)?,
     };
-    if let (Some(Printer::Browser(browser)), Some(page)) = (&printer, written.first_mut()) {
-        bar.set_message("printing");
-        page.bytes = print(browser, &page.bytes)?;
-    }
     drop(bar);
-    if let Some(Printer::Browser(browser)) = printer.filter(|_| !a.target.quiet) {
-        say(&format!("printed by {}", browser.display()));
-    }
-    written.split_first().map_or(Ok(()), |(text, pictures)| a.target.write(&text.bytes, pictures))?;
+    a.write(written, printer.as_ref())?;
     worker.iter().for_each(say_busy);
     notice(worker.as_ref().map_or(&[], |w| w.banner()), a.target.quiet);
     a.met.decide(reviewed.requirements())
+}
+
+impl Arguments {
+    /// Writes the text, printed by the browser where one is given, and the pictures beside it.
+    fn write(&self, mut files: Vec<File>, printer: Option<&Printer>) -> Result<(), Failure> {
+        if let (Some(Printer::Browser(browser)), Some(page)) = (printer, files.first_mut()) {
+            let bar = Bar::start(self.target.quiet);
+            bar.set_message("printing");
+            page.bytes = print(browser, &page.bytes)?;
+            drop(bar);
+            if !self.target.quiet {
+                say(&format!("printed by {}", browser.display()));
+            }
+        }
+        files.split_first().map_or(Ok(()), |(text, pictures)| self.target.write(&text.bytes, pictures))
+    }
 }
 
 /// Reads a calibration; its name is that of its folder.

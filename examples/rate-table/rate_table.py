@@ -213,7 +213,7 @@ def drawn(seed: int, deviations: dict[str, float]) -> dict[str, float]:
 def main(folder: Path) -> None:
     """Plays the sheet in a folder of `obsdeg procedure -o`, and fills its record."""
     sheet = json.loads((folder / "procedure.json").read_text(encoding="utf-8"))
-    drifts = drawn(7, {"D_F": 1.0, "D_I": 0.5, "D_O": 0.5, "D_S": 0.5})
+    drifts = drawn(7, {"D_F": 0.4, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
     platform = Platform(drifts, [0.02, -0.03, 0.01], sheet["conditions"]["latitude_deg"], 1e-5, 7)
     with Server(platform) as server:
         rows = play(sheet, ("127.0.0.1", server.server_address[1]), 4.0)

@@ -23,7 +23,7 @@ import obsdeg
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples" / "rate-table"
 TABLE = runpy.run_path(str(FOLDER / "rate_table.py"))
-LIMITS = {"D_F": 3.0, "D_I": 2.0, "D_O": 1.5, "D_S": 1.5}
+LIMITS = {"D_F": 1.0, "D_I": 1.0, "D_O": 0.8, "D_S": 0.8}
 SETTLE = 20
 
 
@@ -63,7 +63,7 @@ def calibrated(rows: list[list[Any]]) -> obsdeg.Calibration:
 
 def test_a_run_is_what_the_sheet_promises(sheet: Any) -> None:
     """Estimates agree with the truth, their sigmas with the sheet, and all coefficients are accepted."""
-    drifts = TABLE["drawn"](3, {"D_F": 0.5, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
+    drifts = TABLE["drawn"](3, {"D_F": 0.4, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
     found = calibrated(played(sheet, drifts, 3))
     assert found.consistent
     for coefficient in sheet.coefficients:
@@ -79,7 +79,7 @@ def test_what_is_known_early_is_known(sheet: Any) -> None:
     text = (FOLDER / "scheme.toml").read_text(encoding="utf-8")
     assert last.position == "p5"
     shorter = text[: text.index('[[position]]\nname = "p6"')]
-    drifts = TABLE["drawn"](5, {"D_F": 0.5, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
+    drifts = TABLE["drawn"](5, {"D_F": 0.4, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
     rows = [row for row in played(sheet, drifts, 5) if row[1] != "p6"]
     names = ["t [s]", "position", "fx [g]", "fy [g]", "fz [g]"]
     found = obsdeg.calibrate(obsdeg.Scheme.from_text(shorter), dict(zip(names, map(list, zip(*rows)))))

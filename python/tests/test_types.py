@@ -58,6 +58,10 @@ def answers() -> Iterator[obsdeg.Answer]:
     yield obsdeg.crosscheck("examples/lotka-volterra/model.toml")
     yield obsdeg.calibrate("examples/bench-day/scheme.toml", "examples/bench-day/record.csv")
     yield obsdeg.calibrate("examples/hudson-bay/model.toml", "examples/hudson-bay/data.csv", starts=2, profile="a")
+    yield obsdeg.procedure("examples/rate-table/scheme.toml", settle=20)
+    turn = "carry = 'inertial'\n{}[[position]]\nattitude = 'NUE'\n[[position]]\nattitude = 'NDW'\n"
+    for head in ("path = 'gimbals'\n", "gimbals.alpha_deg = [-90, 90]\n"):
+        yield obsdeg.procedure(obsdeg.Scheme.from_text(turn.format(head)), slew_rate=2)
     yield obsdeg.allan("tests/data/static/imu.csv")
     yield obsdeg.design(4, observable="D_F", carry="inertial")
     yield obsdeg.design(6, carry="reset")
@@ -175,7 +179,7 @@ def said(command: str) -> set[str]:
 @pytest.mark.parametrize("command", ["analyze", "simulate", "crosscheck", "procedure", "calibrate", "allan", "compare", "design", "report"])
 def test_options_are_those_of_the_commands(command: str) -> None:
     mine = set(getattr(options, command.title()).__annotations__)
-    files = {"sources", "records", "before", "calibrations", "command", "candidates_file", "conditions_file", "merge", "resume", "after"}
+    files = {"sources", "records", "before", "calibrations", "command", "rotations", "candidates_file", "conditions_file", "merge", "resume", "after"}
     named = {"positions", "candidates", "part"} if command == "design" else set()
     if command == "design":
         # `measure` uses the same command with a model

@@ -2,6 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::Assignment;
+use obsdeg_core::title_block::TitleBlock;
 use obsdeg_evidence::acceptance::AcceptanceReport;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::omitted::{ChangePerUnit, Suspicion};
@@ -20,6 +21,12 @@ pub struct Calibration {
     pub schema: String,
     /// Version of the program that wrote it.
     pub version: String,
+    /// Name of the scheme; empty if it has none.
+    #[serde(default)]
+    pub name: String,
+    /// Title block of the scheme's documents.
+    #[serde(default)]
+    pub document: TitleBlock,
     /// True if the model and its sigmas explain the records.
     pub consistent: bool,
     /// Evidence against the model or its sigmas, the gravest first; empty if there is none.

@@ -26,6 +26,7 @@
 
 pub mod answer;
 pub mod bins;
+mod compared;
 pub mod least_squares;
 pub mod levels;
 pub mod noise;
@@ -53,6 +54,7 @@ pub enum Going<'a> {
 }
 
 pub use answer::{Before, Calibration};
+pub use compared::{CalibrationChange, ChangeTest, CoefficientChange, compared};
 pub use platform::{CalibrationError, Options, calibrate};
 pub use setup::{Basis, Setup};
 pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};

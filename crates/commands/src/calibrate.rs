@@ -18,8 +18,8 @@ use obsdeg_evidence::acceptance::AcceptanceReport;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{
-    Answer, Document, File, Format, Layout, ReportError, Table, calibration_figures, covariance_csv,
-    residuals_csv, system_calibration_figures, system_residuals_csv,
+    Answer, Document, File, Format, Layout, Origin, ReportError, ReviewFormat, Table, calibration_figures,
+    calibration_report, covariance_csv, residuals_csv, system_calibration_figures, system_residuals_csv,
 };
 use serde::{Deserialize, Serialize};
 
@@ -252,6 +252,12 @@ impl Calibrated {
             File { name: "covariance.csv".into(), bytes: covariance_csv(covariance)?.into_bytes() },
             File { name: "residuals.csv".into(), bytes: residuals.into_bytes() },
         ];
+        if let Self::Platform(c) = self {
+            let named = [(String::new(), c.as_ref().clone())];
+            let page = calibration_report(&named, &Origin::default(), ReviewFormat::Html, "")?;
+            let page = page.into_iter().take(1).map(|f| File { name: "calibration.html".into(), ..f });
+            files.extend(page);
+        }
         files.extend(match self {
             Self::Platform(c) => calibration_figures(c)?,
             Self::Model(c) => system_calibration_figures(c)?,

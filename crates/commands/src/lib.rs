@@ -52,6 +52,6 @@ pub use obsdeg_evidence::acceptance::AcceptanceReport;
 pub use paper::{Paper, paper};
 pub use problem::{Kind, Place, Problem};
 pub use procedure::{Dialect, Planned, Procedure, procedure};
-pub use report::{CalibrationFile, Report, Reviewed, origin, report};
+pub use report::{CalibrationFile, Report, Reviewed, calibration_report, origin, report};
 pub use simulate::{Run, Simulate, files as simulation_files, simulate};
 pub use source::{Expected, Input, ModelFile, Named, Source, title};

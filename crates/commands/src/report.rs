@@ -63,6 +63,24 @@ impl Default for Report {
     }
 }
 
+impl Report {
+    /// Refuses options on schemes for a report without one.
+    ///
+    /// # Errors
+    /// The options that have no meaning.
+    pub fn assumes_nothing(&self) -> Result<(), Problem> {
+        let default = Self::default();
+        let asked = (&self.assumptions, &self.conditions, self.runs, self.seed);
+        match asked == (&default.assumptions, &default.conditions, default.runs, default.seed) {
+            true => Ok(()),
+            false => Err(Problem::input(
+                "the report of a calibration has its conditions; expected no conditions, --runs or --seed \
+                 without a scheme or model",
+            )),
+        }
+    }
+}
+
 /// Review with the calibrations that are part of it.
 #[derive(Debug)]
 pub struct Reviewed {
@@ -156,6 +174,22 @@ impl Reviewed {
     }
 }
 
+/// Files of the report of calibrations without a scheme: of the first one, the others being earlier ones.
+///
+/// # Errors
+/// Defect of a calibration, or a picture that cannot be drawn.
+pub fn calibration_report(
+    calibrations: &[CalibrationFile],
+    origin: &Origin,
+    format: ReviewFormat,
+    folder: &str,
+) -> Result<(Vec<File>, Vec<Calibration>), Problem> {
+    let read = calibrations.iter().map(|f| Ok((f.name.clone(), read_calibration(&f.source)?)));
+    let read: Vec<(String, Calibration)> = read.collect::<Result<_, Problem>>()?;
+    let files = obsdeg_report::calibration_report(&read, origin, format, folder)?;
+    Ok((files, read.into_iter().map(|(_, c)| c).collect()))
+}
+
 /// Origin of a review: a command that gives the same answer, and the digest of every file.
 pub fn origin<'a>(command: String, sources: impl Iterator<Item = &'a Source>) -> Origin {
     Origin { command, inputs: sources.map(digest).collect(), certificates: Vec::new() }
@@ -167,18 +201,25 @@ fn digest(source: &Source) -> String {
     format!("sha256 of {}: {hex}", source.name)
 }
 
+fn wrong_calibration(source: &Source, found: &str) -> Problem {
+    let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
+    Problem::input(format!("{}: {found}; {expected}", source.name))
+}
+
+/// Reads the calibration of a scheme.
+fn read_calibration(source: &Source) -> Result<Calibration, Problem> {
+    let of_model = source.text.contains("\"obsdeg.system-calibration/");
+    serde_json::from_str(&source.text).map_err(|e| match of_model {
+        true => wrong_calibration(source, "the calibration of a model"),
+        false if !source.text.trim_start().starts_with('{') => wrong_calibration(source, "no JSON"),
+        false => wrong_calibration(source, &format!("no calibration, or one of another version ({e})")),
+    })
+}
+
 /// Reads a calibration; returns it with the index of its scheme among `entries`.
 fn calibration(source: &Source, entries: &[Entry]) -> Result<(Calibration, usize), Problem> {
-    let wrong = |found: &str| {
-        let expected = "expected what `obsdeg calibrate -o` wrote of a scheme of this review";
-        Problem::input(format!("{}: {found}; {expected}", source.name))
-    };
-    let of_model = source.text.contains("\"obsdeg.system-calibration/");
-    let found: Calibration = serde_json::from_str(&source.text).map_err(|e| match of_model {
-        true => wrong("the calibration of a model"),
-        false if !source.text.trim_start().starts_with('{') => wrong("no JSON"),
-        false => wrong(&format!("no calibration, or one of another version ({e})")),
-    })?;
+    let wrong = |found: &str| wrong_calibration(source, found);
+    let found = read_calibration(source)?;
     let differences = entries.iter().map(|e| (&e.name, Setup::of(&e.scheme).differences(&found.setup)));
     let nearest = differences.enumerate().min_by_key(|(_, (_, d))| d.len());
     match nearest {

@@ -32,7 +32,7 @@
       scales: { x: scale(spec.log_x, null), y: scale(spec.log_y, spec.y_range && !spec.log_y ? spec.y_range : null) },
       axes: [axis(spec.x, spec.log_x, spec.orders, 60), axis(spec.y, spec.log_y, spec.orders, 28)],
       series: [{ label: spec.x, value: (u, v) => shown(v) }].concat(spec.series.map((s) => ({
-        label: s.label || "curve", stroke: color(s.color), width: s.width, dash: s.dash, spanGaps: true,
+        label: s.label, stroke: color(s.color), width: s.width, dash: s.dash,
         points: { show: false }, value: (u, v) => shown(v),
       }))),
       bands: spec.bands.map((b) => ({ series: b.series, fill: color(b.color) + "40" })),
@@ -68,6 +68,10 @@
       const label = row.querySelector(".u-label");
       if (i === 0) return;
       const s = spec.series[i - 1];
+      if (!s.label) {
+        row.hidden = true;
+        return;
+      }
       const marker = row.querySelector(".u-marker");
       marker.style.border = "0";
       marker.style.background = "none";

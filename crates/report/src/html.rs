@@ -233,6 +233,9 @@ fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
 
+/// Point between two pieces of a curve.
+const GAP: (f64, f64) = (f64::NAN, f64::NAN);
+
 /// Curves as data of the interactive plots: tables with strictly increasing x, one per run of equal x.
 fn curves(f: &Figure) -> Json {
     let all = || f.lines.iter().flat_map(|l| l.points.iter().map(|p| p.0));
@@ -246,6 +249,8 @@ fn curves(f: &Figure) -> Json {
         |label: &str, color: &str, dash: &[u32], width: f64, points: &mut dyn Iterator<Item = (f64, f64)>| {
             let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
             for (x, y) in points {
+                // the end of a piece is a value that is missing, right behind its last one
+                let x = if x.is_nan() { f64::MIN } else { x };
                 let x = xs.last().map_or(x, |last| if x <= *last { last + step } else { x });
                 xs.push(rounded(x, 8));
                 ys.push(rounded(y, 4));
@@ -257,10 +262,19 @@ fn curves(f: &Figure) -> Json {
             }
             series.len()
         };
-    for b in &f.bands {
-        let high = add("upper", b.color, &[], 0.5, &mut b.points.iter().map(|p| (p.0, p.2)));
-        let low = add("lower", b.color, &[], 0.5, &mut b.points.iter().map(|p| (p.0, p.1)));
-        bands.push(json!({ "series": [high, low], "color": b.color }));
+    let drawn = |pieces: &mut dyn Iterator<Item = Vec<(f64, f64)>>| -> Vec<Vec<(f64, f64)>> {
+        pieces.filter(|p| !p.is_empty()).collect()
+    };
+    // bands of one colour are pieces of one band
+    for pieces in f.bands.chunk_by(|a, b| a.color == b.color) {
+        let color = pieces[0].color;
+        let mut edge = |k: fn(&(f64, f64, f64)) -> f64| {
+            let points: Vec<Vec<(f64, f64)>> =
+                drawn(&mut pieces.iter().map(|b| b.points.iter().map(|p| (p.0, k(p))).collect()));
+            add("", color, &[], 0.5, &mut points.join(&GAP).into_iter())
+        };
+        let (high, low) = (edge(|p| p.2), edge(|p| p.1));
+        bands.push(json!({ "series": [high, low], "color": color }));
     }
     let dash = |l: &Line| -> &'static [u32] {
         match l.stroke {
@@ -270,8 +284,12 @@ fn curves(f: &Figure) -> Json {
             Stroke::Dotted => &[2, 3],
         }
     };
-    for l in &f.lines {
-        add(&l.label, l.color, dash(l), 1.6, &mut l.points.iter().copied());
+    // a line without a label is a piece of the one before, if it is drawn alike
+    let alike = |a: &Line, b: &Line| b.label.is_empty() && a.color == b.color && dash(a) == dash(b);
+    for pieces in f.lines.chunk_by(alike) {
+        let points = drawn(&mut pieces.iter().map(|l| l.points.clone()));
+        let first = &pieces[0];
+        add(&first.label, first.color, dash(first), 1.6, &mut points.join(&GAP).into_iter());
     }
     json!({
         "title": visible(&f.title), "x": visible(&f.x_label), "y": visible(&f.y_label),
@@ -284,6 +302,32 @@ fn curves(f: &Figure) -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pieces_of_a_curve_are_one_series() {
+        let line = |label: &str, points: &[(f64, f64)]| Line {
+            label: label.into(),
+            color: "#000000",
+            stroke: Stroke::Solid,
+            points: points.to_vec(),
+        };
+        let figure = Figure {
+            lines: vec![
+                line("a", &[(0.0, 1.0), (1.0, 2.0)]),
+                line("", &[(3.0, 4.0)]),
+                line("b", &[(0.0, 5.0)]),
+            ],
+            ..Figure::default()
+        };
+        let data = curves(&figure);
+        let labels: Vec<&str> =
+            data["series"].as_array().expect("series").iter().filter_map(|s| s["label"].as_str()).collect();
+        assert_eq!(labels, ["a", "b"]);
+        assert_eq!(data["tables"][0][1], json!([1.0, 2.0, null, 4.0]));
+        let x: Vec<f64> =
+            data["tables"][0][0].as_array().expect("x").iter().filter_map(Json::as_f64).collect();
+        assert!(x.len() == 4 && x.windows(2).all(|w| w[0] < w[1]), "{x:?}");
+    }
 
     #[test]
     fn long_formulas_break_before_their_signs() {

@@ -18,6 +18,7 @@ mod audit;
 mod budget;
 mod calibration;
 mod calibration_figures;
+mod calibration_page;
 mod cells;
 mod compare;
 mod crosscheck;
@@ -371,10 +372,34 @@ pub fn review(
     format: ReviewFormat,
     folder: &str,
 ) -> Result<Vec<File>, ReportError> {
-    let boxes = review::document(r, calibrations, origin);
+    rendered(review::document(r, calibrations, origin), &r.version, format, folder)
+}
+
+/// The files of the report of the first of some calibrations with names; the others are earlier ones: the text
+/// first, then the pictures that it refers to, in `folder` beside it.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn calibration_report(
+    calibrations: &[(String, Calibration)],
+    origin: &Origin,
+    format: ReviewFormat,
+    folder: &str,
+) -> Result<Vec<File>, ReportError> {
+    let version = calibrations.first().map_or("", |(_, c)| c.version.as_str());
+    rendered(calibration_page::document(calibrations, origin), version, format, folder)
+}
+
+/// The files of a document: the text first, then the pictures that it refers to.
+fn rendered(
+    boxes: Document,
+    version: &str,
+    format: ReviewFormat,
+    folder: &str,
+) -> Result<Vec<File>, ReportError> {
     let document = if format == ReviewFormat::Html { boxes } else { boxes.plain() };
     match format {
-        ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, &r.version)?)]),
+        ReviewFormat::Html => Ok(vec![File::new("review.html", html::page(&document, version)?)]),
         ReviewFormat::Markdown => {
             let document = document.with_pictures_in(folder);
             let mut files = vec![File::new("review.md", markdown::document(&document))];

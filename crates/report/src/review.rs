@@ -1,13 +1,13 @@
 //! Design review: its sections in the order of a review.
 
 mod actions;
-mod calibrated;
+pub(crate) mod calibrated;
 mod first;
 mod generic;
 mod model;
 mod notation;
 mod pictures;
-mod title;
+pub(crate) mod title;
 mod verdict;
 
 use obsdeg_calibration::Calibration;
@@ -117,11 +117,7 @@ fn about(r: &DesignReview, origin: &Origin) -> Block {
             ),
         ],
     )];
-    blocks.extend(Block::list_if_any(
-        "Command",
-        Vec::from_iter((!origin.command.is_empty()).then(|| origin.command.clone())),
-    ));
-    blocks.extend(Block::list_if_any("Files that were read", origin.inputs.clone()));
+    blocks.extend(title::origin_of(origin));
     Block::fold(1, "About this report", blocks)
 }
 

@@ -649,6 +649,11 @@ pub(crate) fn direction(v: &[f64; 3]) -> String {
     text.strip_prefix('+').unwrap_or(&text).to_string()
 }
 
+/// Probability with its digits, or `below 1e-9`.
+pub(crate) fn chance(p: f64) -> String {
+    if p < 1e-9 { "below 1e-9".into() } else { number(p) }
+}
+
 /// `180 deg about -N`.
 pub(crate) fn turn(t: &Turn) -> String {
     format!("{} deg about {}", (t.angle_deg * 100.0).round() / 100.0, direction(&t.about))

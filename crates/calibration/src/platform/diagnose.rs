@@ -373,6 +373,8 @@ impl Parts<'_> {
         let mut out = Calibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
+            name: self.scheme.name.clone(),
+            document: self.scheme.document.clone(),
             consistent: true,
             findings: Vec::new(),
             quantities,

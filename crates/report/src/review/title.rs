@@ -12,8 +12,17 @@ pub(super) fn block(r: &DesignReview) -> Block {
     let schemes = r.schemes.iter().map(|s| (s.name.as_str(), &s.document));
     let generic = r.generic.iter().map(|g| (g.name.as_str(), &g.document));
     let models = r.models.iter().map(|m| (m.analysis.name.as_str(), &m.document));
+    of(schemes.chain(generic).chain(models).collect())
+}
+
+/// Title block of one document; a sentence where the file states none.
+pub(crate) fn of_one(own: &TitleBlock, name: &str) -> Block {
+    of(vec![(name, own)])
+}
+
+fn of(all: Vec<(&str, &TitleBlock)>) -> Block {
     let all: Vec<(&str, &TitleBlock)> =
-        schemes.chain(generic).chain(models).filter(|(_, of)| **of != TitleBlock::default()).collect();
+        all.into_iter().filter(|(_, of)| **of != TitleBlock::default()).collect();
     let entry = |of: &TitleBlock, name: &str| {
         of.entries().into_iter().find(|e| e.0 == name).map_or("-", |e| e.1).to_string()
     };
@@ -48,6 +57,11 @@ const DIGITS: usize = 12;
 
 /// Sentence on the program and the files that the review was made from, with the beginning of their digests.
 pub(super) fn made_from(r: &DesignReview, origin: &Origin) -> String {
+    made(&r.version, origin)
+}
+
+/// Sentence on the version of the program and on the files, with the beginning of their digests.
+pub(crate) fn made(version: &str, origin: &Origin) -> String {
     let short = |line: &String| match line.rsplit_once(": ") {
         Some((file, digest)) => {
             let file = file.strip_prefix("sha256 of ").unwrap_or(file);
@@ -57,5 +71,19 @@ pub(super) fn made_from(r: &DesignReview, origin: &Origin) -> String {
     };
     let from = origin.inputs.iter().map(short).collect::<Vec<_>>().join(", ");
     let from = if from.is_empty() { from } else { format!(" from {from}") };
-    format!("Made by obsdeg {}{from}.", r.version)
+    format!("Made by obsdeg {version}{from}.")
+}
+
+/// Program, command and files of a document.
+pub(crate) fn about(version: &str, origin: &Origin) -> Vec<Block> {
+    let mut blocks = vec![Block::Text(format!("obsdeg {version}"))];
+    blocks.extend(origin_of(origin));
+    blocks
+}
+
+/// Command and files of a document, as far as they are known.
+pub(super) fn origin_of(origin: &Origin) -> Vec<Block> {
+    let command = Vec::from_iter((!origin.command.is_empty()).then(|| origin.command.clone()));
+    let lists = [("Command", command), ("Files that were read", origin.inputs.clone())];
+    lists.into_iter().filter_map(|(heading, lines)| Block::list_if_any(heading, lines)).collect()
 }

@@ -1,0 +1,202 @@
+//! Report of a calibration: what was found and whether it is enough, how well the record is explained, what
+//! the uncertainty consists of, and what changed since the calibration before.
+
+use obsdeg_calibration::answer::Estimated;
+use obsdeg_calibration::{Calibration, CalibrationChange, compared};
+
+use crate::document::{Block, Cell, Document, Grade, estimate, left, number, optional, right};
+use crate::review::calibrated::{Pictures, pictures, status};
+use crate::review::title;
+use crate::words::{self, names};
+use crate::{Answer, Origin, acceptance, stated};
+
+/// Probability below which a change of all coefficients together is one.
+const CHANCE: f64 = 0.001;
+/// Change of one coefficient in sigma from which it is marked.
+const MARKED: f64 = 3.0;
+
+/// Report of the first of `calibrations`, which have names; the others are earlier ones, the latest first.
+pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) -> Document {
+    let Some(((name, c), before)) = calibrations.split_first() else {
+        return Document { title: String::new(), lead: Vec::new(), blocks: Vec::new() };
+    };
+    let scheme = if c.name.is_empty() { "" } else { c.name.as_str() };
+    let mut blocks = vec![title::of_one(&c.document, scheme), Block::Text(title::made(&c.version, origin))];
+    let named = if name.is_empty() { "Calibration".into() } else { format!("Calibration {name}") };
+    blocks.push(Block::Status(vec![status(c, named)]));
+    blocks.push(coefficients(c, before.first().map(|b| &b.1)));
+    if let Some(a) = &c.acceptance {
+        blocks.push(acceptance::table(a));
+        blocks.push(Block::list("Decision rule", acceptance::rule(a)));
+    }
+    for (earlier, b) in before {
+        blocks.extend(changes(&compared(c, b), earlier));
+    }
+    blocks.push(Block::NewPage);
+    let Document { lead, blocks: own, .. } = c.document();
+    blocks.push(Block::Section { level: 1, title: "Fit and findings".into() });
+    blocks.extend(lead.into_iter().map(Block::Text));
+    let (mut front, mut rest): (Vec<Block>, Vec<Block>) = own.into_iter().partition(is_of_the_fit);
+    rest.retain(|b| !is_named(b, "Acceptance") && !is_named(b, "Decision rule"));
+    let Pictures { estimates, residuals, details } = pictures(c, "c1");
+    front.extend(residuals);
+    blocks.extend(front);
+    blocks.push(Block::Section { level: 1, title: "Uncertainty".into() });
+    blocks.push(budget(c));
+    blocks.push(Block::Text(PREDICTED.into()));
+    blocks.extend(estimates);
+    rest.extend(details);
+    blocks.push(Block::fold(1, "Details", rest));
+    blocks.push(Block::fold(1, "About this report", title::about(&c.version, origin)));
+    let of = match (scheme.is_empty(), name.is_empty()) {
+        (true, true) => c.records.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),
+        (true, false) => name.clone(),
+        (false, true) => scheme.into(),
+        (false, false) => format!("{scheme} ({name})"),
+    };
+    Document { title: format!("Calibration: {of}"), lead: Vec::new(), blocks }
+}
+
+/// Meaning of the predicted sigmas.
+const PREDICTED: &str = "Predicted sigmas are those of the linear model at the times of the record, with its \
+                         noise. The design predicts for the dwells, steps and noise that its scheme states: \
+                         where the record has more samples or other noise, the two differ by the root of \
+                         their ratio.";
+
+fn is_named(b: &Block, name: &str) -> bool {
+    match b {
+        Block::Table { heading, .. } | Block::List { heading, .. } => heading.starts_with(name),
+        _ => false,
+    }
+}
+
+fn is_of_the_fit(b: &Block) -> bool {
+    ["Fit", "Next runs", "Positions"].iter().any(|name| is_named(b, name))
+}
+
+/// Uncertainty by which requirements are judged: the total, else the larger sigma.
+fn uncertainty(e: &Estimated) -> Option<f64> {
+    e.total.or_else(|| larger(e))
+}
+
+/// Larger one of sigma and rescaled sigma.
+fn larger(e: &Estimated) -> Option<f64> {
+    e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)))
+}
+
+/// Coefficients with what decides about them; psi is that of the start of a record.
+fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
+    let mut columns = vec![
+        left("coefficient"),
+        left("unit"),
+        right("estimate"),
+        right("uncertainty"),
+        right("required"),
+        right("margin"),
+        right("predicted sigma"),
+        right("uncertainty / predicted"),
+    ];
+    columns.extend(before.is_some().then(|| right("before")));
+    let rows = c.quantities.iter().filter(|e| !e.name.starts_with("psi")).map(|e| {
+        let u = uncertainty(e);
+        let margin = u.zip(e.required_sigma).map(|(u, r)| r / u);
+        let margin = match margin {
+            Some(m) => Cell::graded(number(m), if m >= 1.0 { Grade::Good } else { Grade::Missed }),
+            None if e.required_sigma.is_some() => Cell::graded("not determined", Grade::Missed),
+            None => Cell::from("-"),
+        };
+        let ratio = larger(e).zip(e.predicted_sigma).map(|(s, p)| s / p);
+        let texts = [
+            e.name.clone(),
+            e.unit.clone(),
+            estimate(e.estimate, u),
+            optional(u),
+            optional(e.required_sigma),
+        ];
+        let mut row: Vec<Cell> = texts.into_iter().map(Cell::from).collect();
+        row.push(margin);
+        row.extend([optional(e.predicted_sigma), optional(ratio)].map(Cell::from));
+        if let Some(b) = before {
+            let own = b.quantities.iter().find(|q| q.name == e.name);
+            row.push(Cell::from(own.map_or_else(|| "-".into(), |q| estimate(q.estimate, uncertainty(q)))));
+        }
+        row
+    });
+    Block::table("Coefficients", columns, rows)
+}
+
+/// What the uncertainty of each coefficient consists of.
+fn budget(c: &Calibration) -> Block {
+    let columns = [
+        left("coefficient"),
+        left("unit"),
+        right("noise of the record"),
+        right("rescaled by the fit"),
+        right("bench and suspected errors"),
+        right("uncertainty"),
+        right("of the requirement [%]"),
+    ];
+    let rows = c.quantities.iter().filter(|e| !e.name.starts_with("psi")).map(|e| {
+        let outside = e.total.zip(larger(e)).map(|(t, s)| (t * t - s * s).max(0.0).sqrt());
+        let used = uncertainty(e).zip(e.required_sigma).map(|(u, r)| 100.0 * u / r);
+        let numbers = [e.sigma, e.sigma_rescaled, outside, uncertainty(e), used].map(optional);
+        [vec![e.name.clone(), e.unit.clone()], numbers.to_vec()].concat()
+    });
+    Block::table(
+        "Budget (root sum of squares: the larger sigma, and the errors outside the model)",
+        columns,
+        rows,
+    )
+}
+
+/// Changes since an earlier calibration.
+fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
+    let independent = change.shared.is_empty();
+    let columns = [
+        left("coefficient"),
+        left("unit"),
+        right("before"),
+        right("change"),
+        right("sigma of the change"),
+        right("in sigma"),
+    ];
+    let rows = change.coefficients.iter().map(|k| {
+        let in_sigma = k.change / k.sigma;
+        let marked = match (independent, in_sigma.abs() < MARKED) {
+            (true, true) => Cell::graded(number(in_sigma), Grade::Good),
+            (true, false) => Cell::graded(number(in_sigma), Grade::Limited),
+            (false, _) => Cell::from("-"),
+        };
+        let sigma = if independent { number(k.sigma) } else { "-".into() };
+        let texts = [
+            k.name.clone(),
+            k.unit.clone(),
+            number(k.before),
+            estimate(Some(k.change), Some(k.sigma)),
+            sigma,
+        ];
+        texts.into_iter().map(Cell::from).chain([marked]).collect::<Vec<_>>()
+    });
+    let mut out = vec![Block::table(format!("Changes since {earlier}"), columns, rows)];
+    let mut said: Vec<String> = Vec::new();
+    if let Some(t) = change.together {
+        let outcome = if t.probability < CHANCE {
+            "the coefficients changed"
+        } else {
+            "no change beyond the uncertainties"
+        };
+        said.push(format!(
+            "{outcome}: chi-square {} on {} degrees of freedom, probability {} if nothing changed",
+            number(t.chi_square),
+            t.degrees_of_freedom,
+            words::chance(t.probability)
+        ));
+    }
+    if !independent {
+        let shared = names(change.shared.iter().map(String::as_str));
+        said.push(format!("both rest on {shared}, so that no change has a significance"));
+    }
+    said.extend((!change.differs.is_empty()).then(|| format!("other setup: {}", change.differs.join("; "))));
+    out.extend(said.into_iter().map(|s| Block::Text(format!("{}.", stated::capital(&s)))));
+    out
+}
