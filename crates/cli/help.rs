@@ -140,7 +140,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("filter_carry", CONTROLS, "Make the filter wrong: another carry"),
     ("filter_latitude", CONTROLS, "Make the filter wrong: another latitude in degrees"),
     ("filter_drop", CONTROLS, "Make the filter wrong: it does not know of this position"),
-    ("settle", SHEET, "Time at rest before each recording, in s (default: 0)"),
+    ("settle", SHEET, "Time at rest before each recording, in s"),
     ("tilt", SHEET, "Tilt that a reading may always show, in degrees (default: 1)"),
     ("dialect", SHEET, "Table for a controller: generic or psins"),
     ("start", SHEET, "Attitude at the start of a rotation table"),

@@ -195,6 +195,32 @@ impl Target {
         self.output.as_deref().filter(|path| *path != Path::new("-"))
     }
 
+    /// Removes files of a run before from the folder: those of `names` that are not `kept`.
+    pub(crate) fn drops(&self, names: &[&str], kept: &str) -> Result<(), Failure> {
+        let Some(folder) = self.path().filter(|folder| folder.is_dir()) else { return Ok(()) };
+        for path in names.iter().filter(|name| **name != kept).map(|name| folder.join(name)) {
+            if path.is_file() {
+                std::fs::remove_file(&path)
+                    .map_err(|e| Failure::input(format!("{} cannot be removed: {e}", path.display())))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses, whatever `--force`, a folder whose file `name` has more than `lines` lines: somebody filled
+    /// it.
+    pub(crate) fn keeps(&self, name: &str, lines: usize, what: &str) -> Result<(), Failure> {
+        let Some(path) = self.path().map(|folder| folder.join(name)) else { return Ok(()) };
+        let found = std::fs::read(&path).map_or(0, |text| text.iter().filter(|b| **b == b'\n').count());
+        match found > lines {
+            true => Err(Failure::input(format!(
+                "{} holds {what}: {found} lines; expected another folder, or move it away",
+                path.display()
+            ))),
+            false => Ok(()),
+        }
+    }
+
     /// Refuses, before any work, an existing file (without `--force`) and a path that is no regular file.
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(path) = self.path() else { return Ok(()) };

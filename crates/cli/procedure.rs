@@ -27,6 +27,9 @@ scheme.toml with all conditions, record.csv with the header of the record, and p
 Exit codes: 0 done, 1 the gimbals cannot execute it, or a requirement is missed (with --require-met), 2 bad \
 input, 3 internal error, 130 interrupted.";
 
+/// File of the record in the folder of a run, which a logger fills.
+const RECORD: &str = "record.csv";
+
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder), mut_args(with_latitude))]
 pub(crate) struct Arguments {
@@ -56,6 +59,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let planned = procedure(&a.asked, a.files.read()?, rotations.as_ref())?;
     let requirements = Some(&planned.sheet.requirements);
     a.met.check(requirements)?;
+    a.output.target.keeps(RECORD, 2, "the record of a run")?;
     a.output.write_folder(&planned.sheet, "procedure.json", || planned.files())?;
+    a.output.target.drops(&["controller.csv", "controller.txt"], &planned.controller())?;
     if planned.sheet.executable { a.met.decide(requirements) } else { Err(Failure::check()) }
 }

@@ -185,9 +185,7 @@ def play(sheet: dict[str, Any], address: tuple[str, int], every_s: float) -> lis
                 ask(do="set", gimbals_deg=step["gimbals_deg"])
             elif kind == "turn":
                 ask(do="turn", about_platform=turn["about_platform"], angle_deg=turn["angle_deg"], rate_deg_s=turn["rate_deg_s"])
-            elif kind == "wait":
-                ask(do="rest", seconds=step["duration_s"])
-            elif kind == "record":
+            elif kind in ("wait", "record"):
                 rows = ask(do="read", seconds=step["duration_s"], every_s=every_s)["rows"]
                 for read, expected in zip(rows[0][1:], step["force_g"]):
                     if abs(read - expected) > step["tolerance_g"]:
@@ -212,11 +210,14 @@ def drawn(seed: int, deviations: dict[str, float]) -> dict[str, float]:
 
 def main(folder: Path) -> None:
     """Plays the sheet in a folder of `obsdeg procedure -o`, and fills its record."""
+    if any(line[:1].isdigit() for line in (folder / "record.csv").read_text(encoding="utf-8").splitlines()):
+        sys.exit(f"{folder / 'record.csv'} is filled already")
     sheet = json.loads((folder / "procedure.json").read_text(encoding="utf-8"))
     drifts = drawn(7, {"D_F": 0.4, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
-    platform = Platform(drifts, [0.02, -0.03, 0.01], sheet["conditions"]["latitude_deg"], 1e-5, 7)
+    conditions = sheet["conditions"]
+    platform = Platform(drifts, [0.02, -0.03, 0.01], conditions["latitude_deg"], conditions["accelerometer_noise_g"], 7)
     with Server(platform) as server:
-        rows = play(sheet, ("127.0.0.1", server.server_address[1]), 4.0)
+        rows = play(sheet, ("127.0.0.1", server.server_address[1]), sheet["row_s"])
     write(rows, folder / "record.csv")
     print(f"{len(rows)} rows; true drifts in deg/h, deg/h/g:")
     print("  " + ", ".join(f"{name} {value:.4f}" for name, value in drifts.items()))

@@ -25,6 +25,8 @@ FOLDER = ROOT / "examples" / "rate-table"
 TABLE = runpy.run_path(str(FOLDER / "rate_table.py"))
 LIMITS = {"D_F": 1.0, "D_I": 1.0, "D_O": 0.8, "D_S": 0.8}
 SETTLE = 20
+#: The scheme with the wait, which `obsdeg procedure` writes into its folder.
+SCHEME = f"record = {{ settle = {SETTLE} }}\n" + (FOLDER / "scheme.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +58,7 @@ def calibrated(rows: list[list[Any]]) -> obsdeg.Calibration:
     """Calibration of the scheme from these rows."""
     columns = list(zip(*rows))
     names = ["t [s]", "position", "fx [g]", "fy [g]", "fz [g]"]
-    answer = obsdeg.calibrate(FOLDER / "scheme.toml", dict(zip(names, map(list, columns))))
+    answer = obsdeg.calibrate(obsdeg.Scheme.from_text(SCHEME), dict(zip(names, map(list, columns))))
     assert isinstance(answer, obsdeg.Calibration)
     return answer
 
@@ -76,9 +78,8 @@ def test_a_run_is_what_the_sheet_promises(sheet: Any) -> None:
 def test_what_is_known_early_is_known(sheet: Any) -> None:
     """A record that ends with the position from which all requirements are met has the uncertainties of that position."""
     last = next(after for after in sheet.after if after.met == 12)
-    text = (FOLDER / "scheme.toml").read_text(encoding="utf-8")
     assert last.position == "p5"
-    shorter = text[: text.index('[[position]]\nname = "p6"')]
+    shorter = SCHEME[: SCHEME.index('[[position]]\nname = "p6"')]
     drifts = TABLE["drawn"](5, {"D_F": 0.4, "D_I": 0.3, "D_O": 0.3, "D_S": 0.3})
     rows = [row for row in played(sheet, drifts, 5) if row[1] != "p6"]
     names = ["t [s]", "position", "fx [g]", "fy [g]", "fz [g]"]
@@ -105,7 +106,7 @@ def test_a_wrong_table_is_stopped(sheet: Any) -> None:
         del steps["steps"][3]
 
     stopped = TABLE["StoppedError"]
-    with pytest.raises(stopped, match="step 3, p1: read"):
+    with pytest.raises(stopped, match="step 2, p1: read"):
         played(sheet, drifts, 1, of_platform=exchanged)
     with pytest.raises(stopped, match="p2: read"):
         played(sheet, drifts, 1, of_steps=reversed_sense)
@@ -151,7 +152,7 @@ def test_the_commands_of_the_example(tmp_path: Path) -> None:
     command = [program, "procedure", str(FOLDER / "scheme.toml"), "--settle", "20", "-o", str(run), "--quiet"]
     subprocess.run(command, check=True, capture_output=True)
     done = subprocess.run([sys.executable, str(FOLDER / "rate_table.py"), str(run)], check=True, capture_output=True, text=True)
-    assert done.stdout.startswith("570 rows; true drifts")
+    assert done.stdout.startswith("600 rows; true drifts")
     command = [program, "calibrate", str(run / "scheme.toml"), str(run / "record.csv"), "--require-met"]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     assert "Every coefficient with limits is accepted, 12 of 12." in done.stdout

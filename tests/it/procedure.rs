@@ -46,14 +46,35 @@ fn a_sheet_and_its_files() {
     let again = json(&["procedure", own, "--settle", "20", "--format", "json"]);
     assert_eq!(again["coefficients"], sheet["coefficients"]);
     assert_eq!(again["acceptance"], sheet["acceptance"]);
+    // the wait is in the scheme
+    let own_wait = json(&["procedure", own, "--format", "json"]);
+    assert_eq!(own_wait["coefficients"], sheet["coefficients"]);
     // without a wait the uncertainties are those of the other commands
-    let sheet = json(&["procedure", own, "--format", "json"]);
+    let sheet = json(&["procedure", own, "--settle", "0", "--format", "json"]);
     let run = json(&["simulate", own, "--format", "json"]);
     for c in sheet["coefficients"].as_array().expect("coefficients") {
         let all = run["quantities"].as_array().expect("unknowns");
         let q = all.iter().find(|q| q["name"] == c["name"]).expect("the same unknown");
         assert_eq!(q["predicted_sigma"], c["uncertainty"], "{}", text(c, "name"));
     }
+}
+
+/// A record that somebody filled is kept, whatever `--force`; tables of another dialect are not.
+#[test]
+fn a_filled_record_is_kept() {
+    let (kept, _) = scratch();
+    let folder = kept.path().join("run");
+    let path = folder.to_str().expect("UTF-8");
+    let psins = ["procedure", SCHEME, "--dialect", "psins", "-o", path];
+    assert!(run(&psins).status.success() && folder.join("controller.txt").exists());
+    let forced = ["procedure", SCHEME, "-o", path, "--force"];
+    assert!(run(&forced).status.success());
+    assert!(folder.join("controller.csv").exists() && !folder.join("controller.txt").exists());
+    let record = folder.join("record.csv");
+    let filled = fs::read_to_string(&record).expect("written") + "4,p1,-0.5,0.8,0.1\n";
+    fs::write(&record, &filled).expect("written");
+    refused(&forced, &["record.csv holds the record of a run", "another folder"]);
+    assert_eq!(fs::read_to_string(&record).expect("kept"), filled);
 }
 
 /// A rotation table read back gives the same turns, times and readings.
@@ -103,7 +124,10 @@ fn what_the_gimbals_cannot_do() {
     let output = run(&["procedure", scheme.to_str().expect("UTF-8")]);
     assert_eq!(output.status.code(), Some(1));
     let said = stdout(&output);
-    assert!(said.contains("NOT executable by the gimbals: p2: alpha stops at -90.00 deg"), "{said}");
+    assert!(
+        said.contains("NOT executable from these gimbal angles: p2: alpha stops at -90.00 deg"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -129,7 +153,8 @@ fn wrong_limits_are_named() {
         ("limits = { D_Q = 1 }", "no such unknown"),
         ("limits = { psi = 1 }", "limits are for coefficients"),
         ("limits = { D_F = [1, 1] }", "two ascending numbers"),
-        ("limits = { D_F = -1 }", "two ascending numbers"),
+        ("limits = { D_F = -1 }", "a largest magnitude above 0"),
+        ("limits = { K0 = 1 }", "limits of `K0`: no such unknown"),
         ("limits = { D_F = 'a' }", "limits"),
         ("risk = 0.7\nlimits = { D_F = 1 }", "expected 0.000001 to 0.5"),
         ("risk = 0.1", "a risk without limits"),

@@ -214,7 +214,7 @@ bias_instability_dph = 0\ncorrelation_time_s = 600\npropagation = \"rk4\"\ndrift
 estimates = {{ D = 1 }}\npriors = {{ D = 1 }}
 [document]\nreference = \"r\"\nrevision = \"B\"\ndate = \"2026-03-01\"\nauthor = \"a\"\nsignatures = [\"Checked\"]
 [requirements]\npsi = 1\n[bench]\nK0 = 20\n[ageing]\nD_F = 0.002\n[acceptance]\nrisk = 0.1\nlimits = {{ D_F = 9, D_I = [-1, 1] }}\n[record]\ncolumns = {{ t = \"Time\" }}\nunits = {{ fx = \"1e-5 g\" }}\n\
-static = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\n[gimbals]\n\
+static = {{ initial = 9, window = 3, factor = 9, shortest = 9 }}\ntolerance = 0.1\nmissing = [-9999]\nsettle = 3\n[gimbals]\n\
 alpha_deg = [0, 1]\nbeta_deg = [0, 1]\ngamma_deg = [0, 1]\n"
     );
     assert_eq!(broken(&all), Vec::<String>::new());

@@ -638,6 +638,10 @@ pub struct RecordReport {
     pub psi_at_s: f64,
     /// Number of samples at no position of the scheme.
     pub unused: usize,
+    /// Number of samples at positions that were left out because the platform waits for rest (`settle` of the
+    /// scheme file).
+    #[serde(default)]
+    pub waiting: usize,
     /// Number of bins of the samples.
     pub bins: usize,
     /// First and last time of the record, in s.

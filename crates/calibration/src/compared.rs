@@ -10,7 +10,8 @@ use crate::answer::{Calibration, CovarianceTable};
 pub struct CalibrationChange {
     /// Coefficients that both determine.
     pub coefficients: Vec<CoefficientChange>,
-    /// Records that both rest on: the calibrations are not independent then, and no change has a significance.
+    /// Records that both rest on: the calibrations are not independent then, and no change has a
+    /// significance.
     pub shared: Vec<String>,
     /// Differences of their setups beside the positions, in words; empty if both describe the same platform.
     pub differs: Vec<String>,

@@ -5,7 +5,7 @@ use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Scheme, angles_text};
 use obsdeg_design::procedure::{
     Procedure as Sheet, ProcedureError, ProcedureOptions, TILT_DEG, procedure as sheet, rotation_table,
-    scheme_of_procedure, scheme_of_rotations,
+    scheme_of_procedure, scheme_of_rotations, start_of_table,
 };
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{File, position_figure, procedure_page, record_header, steps_csv};
@@ -42,9 +42,10 @@ pub struct Procedure {
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
 
-    /// Time at rest before each recording, in s, within the dwell of the position (0 to 100000)
-    #[arg(long, value_name = "S", default_value_t = 0.0, help_heading = "Sheet")]
-    pub settle: f64,
+    /// Time at rest before each recording, in s, within the dwell (default: settle of the file, else 0; 0 to
+    /// 100000)
+    #[arg(long, value_name = "S", help_heading = "Sheet")]
+    pub settle: Option<f64>,
 
     /// Tilt that the tolerance of a reading always allows, in degrees (0.01 to 90)
     #[arg(long, value_name = "DEG", default_value_t = TILT_DEG, help_heading = "Sheet")]
@@ -74,7 +75,7 @@ impl Default for Procedure {
     fn default() -> Self {
         Self {
             seed: SEED,
-            settle: 0.0,
+            settle: None,
             tilt: TILT_DEG,
             dialect: Dialect::Generic,
             start: None,
@@ -120,7 +121,8 @@ pub fn procedure(
     };
     a.conditions.concern(std::iter::once(&*scheme))?;
     let conditions: Conditions = a.conditions.conditions(&scheme);
-    let options = ProcedureOptions { settle_s: a.settle, tilt_deg: a.tilt, seed: a.seed };
+    let settle_s = a.settle.or(scheme.recording.settle).unwrap_or(0.0);
+    let options = ProcedureOptions { settle_s, tilt_deg: a.tilt, seed: a.seed };
     let sheet = sheet(&scheme, &conditions, &options).map_err(|e| match e {
         ProcedureError::Simulation(e) => Problem::from(e),
         e => Problem::input(e.to_string()),
@@ -131,42 +133,59 @@ pub fn procedure(
              or more",
         ));
     }
-    Ok(Planned { sheet, scheme: scheme_of_procedure(&scheme, &conditions), dialect: a.dialect })
+    Ok(Planned { sheet, scheme: scheme_of_procedure(&scheme, &conditions, settle_s), dialect: a.dialect })
 }
 
 /// Scheme file of a rotation table.
 fn of_table(a: &Procedure, table: &Source) -> Result<Source, Problem> {
-    let zero = || "0,0,0".parse::<Attitude>().map_err(|e| Problem::internal(e.to_string()));
-    let start = a.start.clone().map_or_else(zero, Ok)?;
+    // a table of obsdeg has its start in a comment
+    let own = start_of_table(&table.text).unwrap_or("0,0,0").parse::<Attitude>();
+    let own = || own.map_err(|e| Problem::input(format!("{}: its start: {e}", table.name)));
+    let start = a.start.clone().map_or_else(own, Ok)?;
     if start.rotation.is_some() || start.angles.iter().any(|angle| angle.generic().is_some()) {
         let found = angles_text(&start.angles);
         return Err(Problem::input(format!("--start {found}: expected three angles in degrees")));
     }
     let scheme = scheme_of_rotations(&table.text, &start.angles);
     let scheme = scheme.map_err(|e| Problem::input(format!("{}: {e}", table.name)))?;
-    let named = Scheme { name: title(&table.name), ..scheme };
+    let description = format!("Rotation table {}, from {}", title(&table.name), angles_text(&start.angles));
+    let named = Scheme { name: title(&table.name), description, ..scheme };
     Ok(Source::new(table.name.clone(), write(&named)))
 }
 
 impl Planned {
+    /// Name of the table for a controller; empty for a sheet that the gimbals cannot execute.
+    pub fn controller(&self) -> String {
+        match (self.sheet.executable, self.dialect) {
+            (false, _) => String::new(),
+            (true, Dialect::Generic) => "controller.csv".into(),
+            (true, Dialect::Psins) => "controller.txt".into(),
+        }
+    }
+
     /// Files beside the JSON: the page, the scheme, the header of the record, the table for a controller.
     ///
     /// # Errors
     /// [`Problem`] of a page that cannot be written.
     pub fn files(&self) -> Result<Vec<File>, Problem> {
-        let controller = match self.dialect {
-            Dialect::Generic => File::new("controller.csv", steps_csv(&self.sheet)?),
-            Dialect::Psins => {
-                let table = rotation_table(&self.sheet.rotations, self.sheet.start_attitude_deg);
-                File::new("controller.txt", table)
-            }
-        };
-        Ok(vec![
+        let mut files = vec![
             procedure_page(&self.sheet, &self.scheme)?,
-            controller,
             File::new("scheme.toml", write(&self.scheme)),
             File::new("record.csv", record_header(&self.sheet)),
             position_figure(&self.scheme),
-        ])
+        ];
+        // a controller gets no steps that the gimbals cannot execute
+        if self.sheet.executable {
+            files.push(match self.dialect {
+                Dialect::Generic => File::new("controller.csv", steps_csv(&self.sheet)?),
+                Dialect::Psins => {
+                    let start =
+                        self.scheme.positions.first().map(|p| angles_text(&p.angles)).unwrap_or_default();
+                    let start_attitude = self.sheet.start_attitude_deg;
+                    File::new("controller.txt", rotation_table(&self.sheet.rotations, start_attitude, &start))
+                }
+            });
+        }
+        Ok(files)
     }
 }

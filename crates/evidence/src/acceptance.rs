@@ -50,6 +50,10 @@ pub struct AcceptanceLimit {
     /// Estimates, in the unit of `unit`, below and above which the coefficient is rejected; null without an
     /// uncertainty.
     pub rejected_beyond: Option<[f64; 2]>,
+    /// True if the samples do not determine the coefficient, so that stated priors alone bound it: it stays
+    /// undecided.
+    #[serde(default)]
+    pub by_prior: bool,
     /// Estimate of the coefficient, in the unit of `unit`; null before a run, and if it is not determined.
     pub estimate: Option<f64>,
     /// Decision on the estimate; null before a run.
@@ -64,8 +68,8 @@ pub enum Decision {
     Accepted,
     /// Estimate beyond a limit by more than the guard band.
     Rejected,
-    /// Estimate within the guard band of a limit, a coefficient that is not determined, or a calibration that
-    /// is not consistent.
+    /// Estimate within the guard band of a limit, a coefficient that is not determined or bounded by priors
+    /// alone, or a calibration that is not consistent.
     Undecided,
 }
 
@@ -87,6 +91,8 @@ pub struct Measured<'a> {
     pub estimate: Option<f64>,
     /// Standard uncertainty; `None` if the unknown is not determined.
     pub uncertainty: Option<f64>,
+    /// True if stated priors alone bound the unknown.
+    pub by_prior: bool,
 }
 
 /// Decisions on `measured` by the stated limits; `None` where none is stated. `consistent` is `None` before a
@@ -116,13 +122,26 @@ fn limit(m: &Measured<'_>, [low, high]: [f64; 2], risk: f64, consistent: Option<
     let rejected_beyond = uncertainty.map(|u| outer_guard(u, high - low, risk)).map(|w| [low - w, high + w]);
     let within = |[low, high]: [f64; 2], y: f64| (low..=high).contains(&y);
     let decision = consistent.map(|consistent| match (m.estimate, accepted, rejected_beyond) {
+        _ if m.by_prior => Decision::Undecided,
         (Some(y), Some(accepted), _) if consistent && within(accepted, y) => Decision::Accepted,
         (Some(y), _, Some(beyond)) if consistent && !within(beyond, y) => Decision::Rejected,
         _ => Decision::Undecided,
     });
     let (name, unit) = (m.name.into(), m.unit.into());
     let estimate = m.estimate.filter(|_| uncertainty.is_some());
-    AcceptanceLimit { name, unit, low, high, uncertainty, accepted, rejected_beyond, estimate, decision }
+    let by_prior = m.by_prior;
+    AcceptanceLimit {
+        name,
+        unit,
+        low,
+        high,
+        uncertainty,
+        accepted,
+        rejected_beyond,
+        by_prior,
+        estimate,
+        decision,
+    }
 }
 
 /// Number of bisections of a guard band.
@@ -158,7 +177,8 @@ mod tests {
 
     fn of(low: f64, high: f64, risk: f64, estimate: f64, uncertainty: Option<f64>) -> AcceptanceLimit {
         let stated = Acceptance { limits: [("D_F".into(), [low, high])].into(), risk: Some(risk) };
-        let measured = Measured { name: "D_FX", unit: "deg/h", estimate: Some(estimate), uncertainty };
+        let measured =
+            Measured { name: "D_FX", unit: "deg/h", estimate: Some(estimate), uncertainty, by_prior: false };
         acceptance(&stated, [measured], Some(true)).expect("a limit").limits.remove(0)
     }
 
@@ -193,11 +213,25 @@ mod tests {
         assert_eq!([decided(18.4), decided(21.6), decided(-8.4)], [Some(Decision::Undecided); 3]);
         assert_eq!(decided(18.3), Some(Decision::Accepted));
         assert_eq!([decided(21.7), decided(-11.7)], [Some(Decision::Rejected); 2]);
+        // by a prior alone nothing is accepted
+        let prior =
+            Measured { name: "D_FX", unit: "", estimate: Some(0.0), uncertainty: Some(0.1), by_prior: true };
+        let wide = Acceptance { limits: [("D_F".into(), [-9.0, 9.0])].into(), risk: None };
+        assert_eq!(
+            acceptance(&wide, [prior], Some(true)).expect("a limit").limits[0].decision,
+            Some(Decision::Undecided)
+        );
         assert_eq!(of(-1.0, 1.0, 0.05, 0.0, None).decision, Some(Decision::Undecided));
         assert_eq!(of(-1.0, 1.0, 0.05, 0.0, Some(0.0)).decision, Some(Decision::Accepted));
         let stated = Acceptance { limits: [("D".into(), [-9.0, 9.0])].into(), risk: None };
         let at = |consistent| {
-            let m = Measured { name: "D_IX", unit: "deg/h/g", estimate: Some(0.0), uncertainty: Some(1.0) };
+            let m = Measured {
+                name: "D_IX",
+                unit: "deg/h/g",
+                estimate: Some(0.0),
+                uncertainty: Some(1.0),
+                by_prior: false,
+            };
             acceptance(&stated, [m], consistent).expect("a limit")
         };
         assert_eq!(at(None).limits[0].decision, None);
@@ -207,9 +241,9 @@ mod tests {
             limits: [("D".into(), [-9.0, 9.0]), ("D_IX".into(), [1.0, 2.0])].into(),
             risk: None,
         };
-        let m = Measured { name: "D_IX", unit: "", estimate: None, uncertainty: None };
+        let m = Measured { name: "D_IX", unit: "", estimate: None, uncertainty: None, by_prior: false };
         assert_eq!(acceptance(&both, [m], None).expect("a limit").limits[0].low, 1.0);
-        let psi = Measured { name: "psi_x", unit: "deg", estimate: None, uncertainty: None };
+        let psi = Measured { name: "psi_x", unit: "deg", estimate: None, uncertainty: None, by_prior: false };
         assert_eq!(acceptance(&both, [psi], None), None);
     }
 }

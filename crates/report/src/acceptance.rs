@@ -41,7 +41,11 @@ pub(crate) fn table(a: &AcceptanceReport) -> Block {
     };
     let row = |l: &AcceptanceLimit| -> Vec<Cell> {
         let (value, decision) = match l.decision {
-            Some(d) => (estimate(l.estimate, l.uncertainty), Cell::graded(word(d), grade(d))),
+            Some(d) => {
+                let why = if l.by_prior { " (prior alone)" } else { "" };
+                (estimate(l.estimate, l.uncertainty), Cell::graded(format!("{}{why}", word(d)), grade(d)))
+            }
+            None if l.by_prior => (String::new(), Cell::from("undecided (prior alone)")),
             None => (String::new(), Cell::from("")),
         };
         let texts = [
@@ -60,7 +64,10 @@ pub(crate) fn table(a: &AcceptanceReport) -> Block {
 
 /// Rule of the decision, in sentences.
 pub(crate) fn rule(a: &AcceptanceReport) -> Vec<String> {
-    let percent = short(100.0 * a.risk);
+    let percent = match short(100.0 * a.risk) {
+        rounded if rounded == "0" => number(100.0 * a.risk),
+        rounded => rounded,
+    };
     vec![
         format!(
             "accepted: the estimate lies inside the limits by the guard band, so that the coefficient lies \
@@ -70,8 +77,24 @@ pub(crate) fn rule(a: &AcceptanceReport) -> Vec<String> {
             "rejected: the estimate lies beyond a limit by the guard band; a coefficient within the limits is \
              rejected with a probability of at most {percent} %"
         ),
-        "undecided between, without an estimate, and after a calibration that is not consistent".into(),
+        "undecided between, without an estimate, for what priors alone bound, and after a calibration that is not \
+         consistent"
+            .into(),
     ]
+}
+
+/// Coefficients of which no estimate can be accepted, in a sentence; `None` without any.
+pub(crate) fn impossible(a: &AcceptanceReport) -> Option<String> {
+    let of = |why: &str, is: &dyn Fn(&&AcceptanceLimit) -> bool| {
+        let none: Vec<&str> = a.limits.iter().filter(is).map(|l| l.name.as_str()).collect();
+        (!none.is_empty()).then(|| format!("{} ({why})", names(none)))
+    };
+    let unknown = of("not determined", &|l| l.uncertainty.is_none() || l.by_prior);
+    let narrow = of("limits too narrow for the uncertainty", &|l| {
+        l.uncertainty.is_some() && !l.by_prior && l.accepted.is_none()
+    });
+    let all: Vec<String> = unknown.into_iter().chain(narrow).collect();
+    (!all.is_empty()).then(|| format!("NO estimate can be accepted of {}", all.join("; ")))
 }
 
 /// Decisions in a sentence; `None` before a run.

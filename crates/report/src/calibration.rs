@@ -462,6 +462,9 @@ fn records(c: &Calibration) -> Vec<String> {
         if !empty.is_empty() {
             out += &format!("; empty cells that were skipped: {}", empty.join(", "));
         }
+        if r.waiting > 0 {
+            out += &format!("; {} samples of waits for rest (settle) were left out", r.waiting);
+        }
         if r.unused > 0 {
             out += &format!("; {} samples at no position were not used", r.unused);
         }

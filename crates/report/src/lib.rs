@@ -375,8 +375,8 @@ pub fn review(
     rendered(review::document(r, calibrations, origin), &r.version, format, folder)
 }
 
-/// The files of the report of the first of some calibrations with names; the others are earlier ones: the text
-/// first, then the pictures that it refers to, in `folder` beside it.
+/// The files of the report of the first of some calibrations with names; the others are earlier ones: the
+/// text first, then the pictures that it refers to, in `folder` beside it.
 ///
 /// # Errors
 /// [`ReportError`].

@@ -1,6 +1,6 @@
 //! Sheet of a run: the page of the crew, and the tables of a controller.
 
-use obsdeg_core::model::Scheme;
+use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 use obsdeg_core::title_block::TitleBlock;
 use obsdeg_design::procedure::{Obstacle, ObstacleKind, Procedure, Step, StepKind, StepTurn};
 
@@ -26,60 +26,105 @@ fn platform_axis(v: &[f64; 3]) -> String {
     }
 }
 
-/// Turn of a step: `90 deg about N (X_p)`.
+/// Turn of a step: `90 deg about N, in the platform X_p, at 2 deg/s`.
 fn turn(t: &StepTurn) -> String {
-    let angle = (t.angle_deg * 1000.0).round() / 1000.0;
-    let rate = t.rate_deg_s.map_or_else(String::new, |r| format!(" at {} deg/s", short(r)));
-    format!("{angle} deg about {} = {}{rate}", words::direction(&t.about), platform_axis(&t.about_platform))
+    let angle = short(t.angle_deg);
+    let rate = t.rate_deg_s.map_or_else(String::new, |r| format!(", at {} deg/s", short(r)));
+    let platform = platform_axis(&t.about_platform);
+    format!("{angle} deg about {}, in the platform {platform}{rate}", words::direction(&t.about))
 }
 
+/// Gimbals that turn much faster than the platform, with their rates.
+fn fast_gimbals(t: &StepTurn) -> Option<String> {
+    let (rate, own) = (t.rate_deg_s?, t.gimbal_rates_deg_s?);
+    let fast = NAMES.iter().zip(own).filter(|(_, r)| *r > FAST * rate);
+    let all: Vec<String> = fast.map(|(name, r)| format!("{name} {} deg/s", short(r))).collect();
+    (!all.is_empty()).then(|| format!("Gimbals reach {}.", all.join(", ")))
+}
+
+/// Names of the gimbals, outer to inner.
+const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
+/// Rate of a gimbal over that of the platform from which the sheet names it.
+const FAST: f64 = 2.0;
+
 /// Instruction of a step.
-fn instruction(s: &Step) -> String {
+fn instruction(p: &Procedure, s: &Step) -> String {
+    let label = &s.position;
     match (s.kind, &s.turn) {
         (StepKind::Set, _) => "Set the gimbals. Level and align the platform.".into(),
-        (StepKind::Wait, _) => "Wait for rest.".into(),
-        (StepKind::Record, _) => format!("Record. Label: {}.", s.position),
-        (StepKind::Rotate, Some(t)) => format!("Record. Label: {}. Turn {} meanwhile.", s.position, turn(t)),
-        (StepKind::Turn, Some(StepTurn { gimbal: Some(gimbal), .. })) => {
-            let t = s.turn.as_ref().map(turn).unwrap_or_default();
-            format!("Turn gimbal {gimbal}: {t}.")
+        (StepKind::Wait, _) => format!("Wait for rest. Label: {label}. Compare the readings."),
+        (StepKind::Record, _) => {
+            let again = p.carry == Carry::Reset && s.start_s > 0.0 && p.settle_s == 0.0;
+            let again = if again { "Level and align the platform again. " } else { "" };
+            format!("{again}Record, a row every {} s or less. Label: {label}.", short(p.row_s))
         }
-        (StepKind::Turn, Some(t)) => format!("Turn {}.", turn(t)),
+        (StepKind::Rotate, Some(t)) => {
+            format!(
+                "Record, a row every {} s or less. Label: {label}. Turn {} meanwhile.",
+                short(p.row_s),
+                turn(t)
+            )
+        }
+        (StepKind::Turn, Some(t)) => match &t.gimbal {
+            Some(gimbal) => {
+                let k = NAMES.iter().position(|name| name == gimbal).unwrap_or(0);
+                let [from, to] = [t.from_deg[k], s.gimbals_deg[k]].map(short);
+                let by = s.gimbals_deg[k] - t.from_deg[k];
+                let rate = t.rate_deg_s.map_or_else(String::new, |r| format!(", at {} deg/s", short(r)));
+                format!(
+                    "Turn gimbal {gimbal} from {from} to {to} deg ({}{}){rate}.",
+                    if by > 0.0 { "+" } else { "" },
+                    short(by)
+                )
+            }
+            None => {
+                let fast = fast_gimbals(t).map_or_else(String::new, |text| format!(" {text}"));
+                format!("Turn the platform {}.{fast}", turn(t))
+            }
+        },
         (StepKind::Turn | StepKind::Rotate, None) => String::new(),
     }
 }
 
-fn angles(of: &[f64; 3]) -> String {
-    of.map(short).join(", ")
+/// Gimbal angles; those without limits are printed from -180 to 180 deg.
+fn angles(p: &Procedure, of: &[f64; 3]) -> String {
+    let shown = |k: usize| match p.free_gimbals[k] {
+        true => short(180.0 - (180.0 - of[k]).rem_euclid(360.0)),
+        false => short(of[k]),
+    };
+    [0, 1, 2].map(shown).join(", ")
 }
 
 fn steps(p: &Procedure) -> Block {
     let columns = [
         right("step"),
-        left("from the start"),
-        left("for"),
-        left("position"),
         left("do"),
-        left("then gimbals alpha, beta, gamma [deg]"),
-        left("accelerometers X_p, Y_p, Z_p read [g]"),
+        left("starts at"),
+        left("lasts"),
+        left("gimbals then: alpha, beta, gamma [deg]"),
+        left("X_p, Y_p, Z_p should read [g]"),
+        left("time, readings"),
         left("done"),
     ];
-    // readings are checked once at each position, before the recording
+    // readings are compared once at each position, before the recording
     let waited = |s: &Step| s.kind == StepKind::Record && p.settle_s > 0.0;
     let row = |s: &Step| -> Vec<String> {
-        let force = s.force_g.filter(|_| !waited(s)).map_or_else(String::new, |f| {
+        let force = s.force_g.filter(|_| !waited(s));
+        let blank = if force.is_some() { "\u{a0}".repeat(24) } else { String::new() };
+        let force = force.map_or_else(String::new, |f| {
             let within = s.tolerance_g.map_or_else(String::new, |t| format!(" +- {t:.3}"));
             format!("{}{within}", f.map(|x| format!("{x:+.4}")).join(", "))
         });
         let lasts = if s.duration_s > 0.0 { clock(s.duration_s) } else { String::new() };
+        let gimbals = angles(p, &s.gimbals_deg);
         vec![
             s.number.to_string(),
+            instruction(p, s),
             clock(s.start_s),
             lasts,
-            s.position.clone(),
-            instruction(s),
-            angles(&s.gimbals_deg),
+            gimbals,
             force,
+            blank,
             "[ ]".into(),
         ]
     };
@@ -93,6 +138,11 @@ fn obstacle(o: &Obstacle) -> String {
             "{name}: {gimbal} stops at {} deg, after {} deg of the turn",
             optional(o.at_deg),
             optional(o.after_deg)
+        ),
+        (ObstacleKind::Stop, None) if o.after_deg == Some(0.0) => format!(
+            "{name}: the position before stands at the gimbal lock (beta {} deg), from which this turn about one \
+             axis does not lead; path = \"gimbals\" turns gimbal by gimbal",
+            optional(o.at_deg)
         ),
         (ObstacleKind::Stop, None) => format!(
             "{name}: beta reaches {} deg after {} deg of the turn, where alpha and gamma cannot follow",
@@ -122,9 +172,14 @@ fn after(p: &Procedure) -> Block {
         true => "-".into(),
         false => names(list.iter().map(String::as_str)),
     };
+    let judged = p.after.len() > 1 || p.coefficients.iter().any(|c| c.determined_from.is_some());
     let rows = p.after.iter().map(|a| {
         let met = if stated == 0 { "-".into() } else { format!("{} of {stated}", a.met) };
-        vec![a.position.clone(), clock(a.end_s), met, all(&a.determines), all(&a.meets)]
+        let [determines, meets] = match judged {
+            true => [all(&a.determines), all(&a.meets)],
+            false => ["not judged (more than 100 positions)"; 2].map(String::from),
+        };
+        vec![a.position.clone(), clock(a.end_s), met, determines, meets]
     });
     Block::table("Known after each position", columns, rows)
 }
@@ -162,7 +217,10 @@ fn needed(p: &Procedure) -> Option<String> {
     let spare: Vec<&str> = p.after[last + 1..].iter().map(|a| a.position.as_str()).collect();
     let spare = match spare.is_empty() || !p.requirements.all_met() {
         true => String::new(),
-        false => format!("; no requirement needs {}", names(spare)),
+        false => format!(
+            "; no requirement needs {} (to end before, delete its [[position]] in scheme.toml)",
+            names(spare)
+        ),
     };
     (p.requirements.stated > 0).then(|| format!("requirements are met {}{spare}", parts.join("; ")))
 }
@@ -174,27 +232,40 @@ fn sentences(p: &Procedure) -> Vec<String> {
     let mut out = vec![format!("{} steps, {positions} {many}, {}{turns}", p.steps.len(), clock(p.total_s))];
     if !p.executable {
         let all: Vec<String> = p.obstacles.iter().map(obstacle).collect();
-        out.insert(0, format!("NOT executable by the gimbals: {}", all.join("; ")));
+        out.insert(0, format!("NOT executable from these gimbal angles: {}", all.join("; ")));
     }
     out.push(stated::capital(&stated::requirements(&p.requirements)));
+    out.extend(p.acceptance.as_ref().and_then(acceptance::impossible).map(|text| stated::capital(&text)));
     out.extend(needed(p).map(|text| stated::capital(&text)));
     out
 }
 
-/// Basis of the tolerances, in words.
-fn tolerance(p: &Procedure) -> String {
+/// Basis of the tolerances, in sentences.
+fn tolerance(p: &Procedure) -> Vec<String> {
     let t = &p.tolerance;
-    let more = match (t.by_values, t.by_priors) {
-        (false, false) => "; no drift is stated (values or priors under [simulation]), so none is added",
-        (true, false) => ", with the tilt that the stated values give by then",
-        (false, true) => ", with three sigma of the tilt by the stated priors",
-        (true, true) => ", with the tilt by the stated values and three sigma of that by the priors",
+    let parts = [
+        (t.by_values, "the tilt that the stated values give by then (linear model)"),
+        (t.by_priors, "three sigma of the tilt by the stated priors"),
+        (t.by_noise, "three sigma of the tilt by the stated random drift"),
+        (t.accelerometers_g > 0.0, "the stated errors of the accelerometers"),
+    ];
+    let parts: Vec<&str> = parts.into_iter().filter(|p| p.0).map(|p| p.1).collect();
+    let drift = match parts.is_empty() {
+        true => "; no drift, since neither values, priors nor random drift are stated".into(),
+        false => format!(", {}", parts.join(", ")),
     };
-    format!(
-        "a reading outside its tolerance means a wrong attitude, a wrong sign or exchanged axes: stop. The \
-         tolerance allows a tilt of {} deg{more}, and the noise",
-        short(t.tilt_deg)
-    )
+    let mut out = vec![
+        "Stop at a reading outside its tolerance: the attitude, a sign or the order of the axes is wrong."
+            .into(),
+        format!("The tolerance allows a tilt of {} deg and the noise{drift}.", short(t.tilt_deg)),
+    ];
+    if !t.wide.is_empty() {
+        out.push(format!(
+            "At {} the tolerance is above 0.25 g: a reading inside it does not exclude a wrong attitude.",
+            names(t.wide.iter().map(String::as_str))
+        ));
+    }
+    out
 }
 
 /// Entries of the title block, and lines for signatures.
@@ -227,28 +298,74 @@ fn rotations(p: &Procedure) -> Option<Block> {
     (!p.rotations.is_empty()).then(|| Block::table(heading, columns, rows))
 }
 
-/// Rules for the record and the readings.
+/// Rules for the platform between the steps.
+fn platform(p: &Procedure) -> String {
+    let [north, up] = p.earth_rate_dph.map(|w| format!("{w:.4}"));
+    let latitude = p.conditions.latitude_deg;
+    let torque = format!(
+        "Torque the platform by the rate of the earth at {latitude} deg throughout: {north} deg/h about North, {up} \
+         deg/h about Up"
+    );
+    match p.carry {
+        Carry::Inertial => format!("{torque}. Do not level or align it again between the positions."),
+        Carry::Platform => format!(
+            "{torque}. Platform carry assumes that the misalignment stays in platform axes from position to \
+             position, as in the paper; a platform that is torqued from one to the next has inertial carry."
+        ),
+        Carry::Reset => format!("{torque}. Level and align the platform again at every position."),
+    }
+}
+
+/// Rules for the platform, the record and the readings.
 fn rules(p: &Procedure) -> Vec<String> {
-    let mut out = vec![
-        "record t [s], position, fx [g], fy [g], fz [g]: the outputs of the accelerometers in platform axes. \
-         Leave the position empty while the platform turns or waits"
+    let mut out = vec![platform(p)];
+    out.push(
+        "Turns are right-handed about their axes. The gimbal angles alpha, beta, gamma are those of C_c^n = \
+         Mx(alpha) My(beta) Mz(gamma): they grow in left-handed turns."
             .into(),
-        tolerance(p),
-    ];
+    );
+    out.push(
+        "Record t [s], position, fx [g], fy [g], fz [g]: the outputs of the accelerometers in platform axes. \
+         Label every row from arrival to departure. Leave the position empty only while the platform turns."
+            .into(),
+    );
     if p.settle_s > 0.0 {
         out.push(format!(
-            "each dwell begins with {} s at rest that are not recorded; the uncertainties count the recorded \
-             time only",
+            "`calibrate` leaves out the first {} s of each position (settle in scheme.toml); the uncertainties \
+             count the time behind them only.",
             short(p.settle_s)
         ));
     }
-    if !p.timed_turns {
-        out.push("times do not count the turns: state the slew rate, or begin each dwell on arrival".into());
+    if p.timed_turns && p.steps.iter().any(|s| s.turn.is_some()) {
+        out.push(
+            "Turn at the stated rates. When late, stay at the position, go on recording, and note the time: \
+             longer dwells are no fault, slower turns are."
+                .into(),
+        );
+    } else if !p.timed_turns {
+        out.push(
+            "Times do not count the turns (no slew rate is stated): begin each dwell on arrival.".into(),
+        );
     }
-    if p.conditions.slew_rate_deg_s.is_some() {
-        out.push("turn at the stated rates: what the turns take is part of the model".into());
-    }
+    out.extend(winding(p));
+    out.extend(tolerance(p));
     out
+}
+
+/// Gimbals without limits that wind up beyond half a turn; `None` if none does.
+fn winding(p: &Procedure) -> Option<String> {
+    let largest = |k: usize| {
+        p.steps.iter().map(|s| s.gimbals_deg[k]).fold(0.0, |m: f64, x| if x.abs() > m.abs() { x } else { m })
+    };
+    let wound = (0..3).filter(|&k| p.free_gimbals[k]).map(|k| (NAMES[k], largest(k)));
+    let wound = wound.filter(|(_, x)| x.abs() > 180.0);
+    let all: Vec<String> = wound.map(|(name, x)| format!("{name} to {} deg", short(x))).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "Gimbals without limits wind up: {}. Angles are printed from -180 to 180 deg.",
+            all.join(", ")
+        )
+    })
 }
 
 impl Answer for Procedure {
@@ -259,8 +376,8 @@ impl Answer for Procedure {
     fn document(&self) -> Document {
         let named = if self.name.is_empty() { String::new() } else { format!(": {}", self.name) };
         let mut blocks: Vec<Block> = title_block(&self.document).into_iter().collect();
-        blocks.push(steps(self));
         blocks.push(Block::list("Rules", rules(self)));
+        blocks.push(steps(self));
         blocks.push(after(self));
         blocks.push(coefficients(self));
         if let Some(a) = &self.acceptance {
@@ -294,9 +411,9 @@ impl Answer for Procedure {
 /// [`ReportError::Csv`].
 pub fn steps_csv(p: &Procedure) -> Result<String, ReportError> {
     let header = "step,kind,position,start [s],duration [s],alpha [deg],beta [deg],gamma [deg],gimbal,about N,\
-                  about U,about E,about X_p,about Y_p,about Z_p,angle [deg],rate [deg/s],fx [g],fy [g],fz [g],\
+                  about U,about E,about X_p,about Y_p,about Z_p,angle [deg],rate [deg/s],alpha rate [deg/s],beta rate [deg/s],gamma rate [deg/s],fx [g],fy [g],fz [g],\
                   tolerance [g]";
-    let text = |x: f64| x.to_string();
+    let text = |x: f64| ((x * 1e9).round() / 1e9 + 0.0).to_string();
     let row = |s: &Step| -> Vec<String> {
         let kind = serde_json::to_value(s.kind).ok().and_then(|k| k.as_str().map(String::from));
         let three =
@@ -311,6 +428,7 @@ pub fn steps_csv(p: &Procedure) -> Result<String, ReportError> {
         out.extend(three(t.map(|t| t.about_platform)));
         out.push(one(t.map(|t| t.angle_deg)));
         out.push(one(t.and_then(|t| t.rate_deg_s)));
+        out.extend(three(t.and_then(|t| t.gimbal_rates_deg_s)));
         out.extend(three(s.force_g));
         out.push(one(s.tolerance_g));
         out
@@ -325,13 +443,23 @@ pub fn steps_csv(p: &Procedure) -> Result<String, ReportError> {
 /// [`ReportError::Page`].
 pub fn procedure_page(p: &Procedure, scheme: &Scheme) -> Result<File, ReportError> {
     let mut document = p.document();
-    let (poses, latitude) = (scheme.poses(), p.conditions.latitude_deg);
+    // with the gimbal angles of the sheet
+    let mut drawn = scheme.clone();
+    for position in &mut drawn.positions {
+        let at = p.steps.iter().find(|s| s.position == position.name && s.force_g.is_some());
+        if let Some(Ok(angles)) = at.map(|s| parse_attitude(&angles(p, &s.gimbals_deg).replace(' ', ""))) {
+            position.angles = angles;
+        }
+    }
+    let (poses, latitude) = (drawn.poses(), p.conditions.latitude_deg);
     let picture = Picture {
         name: "positions".into(),
         caption: poses::caption(&poses, latitude, p.conditions.latitude_by_default),
         drawing: Drawing::Panels(poses::panels(&poses, latitude)),
     };
-    document.blocks.push(Block::Picture(picture));
+    let steps =
+        document.blocks.iter().position(|b| matches!(b, Block::Table { heading, .. } if heading == "Steps"));
+    document.blocks.insert(steps.map_or(0, |at| at + 1), Block::Picture(picture));
     Ok(File::new("procedure.html", html::page(&document, &p.version)?))
 }
 
@@ -340,7 +468,7 @@ pub fn record_header(p: &Procedure) -> String {
     let name = if p.name.is_empty() { "a scheme".into() } else { crate::visible(&p.name).into_owned() };
     let labels: Vec<String> = p.after.iter().map(|a| crate::visible(&a.position).into_owned()).collect();
     format!(
-        "# record of {name}; position: {}, empty while the platform turns or waits\n\
+        "# record of {name}; position: {}, empty while the platform turns\n\
          t [s],position,fx [g],fy [g],fz [g]\n",
         labels.join(", ")
     )

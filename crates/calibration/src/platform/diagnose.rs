@@ -415,6 +415,7 @@ impl Parts<'_> {
             unit: &e.unit,
             estimate: e.estimate,
             uncertainty: total(e, &outside),
+            by_prior: e.from_prior,
         });
         out.acceptance = acceptance(&self.scheme.acceptance, measured, Some(out.consistent));
         if out.requirements.as_ref().is_some_and(Requirements::all_met) {
@@ -443,6 +444,8 @@ impl Parts<'_> {
         let estimated = |p: &Platform| Bench::estimated(stated, p).len();
         out.with_bench =
             self.problem.runs.first().is_some_and(|run| estimated(&run.plan.platform) < stated.len());
+        let on_prior = quantities.iter().filter(|e| e.from_prior && e.required_sigma.is_some());
+        out.on_prior = on_prior.map(|e| e.name.clone()).collect();
         Some(out).filter(|r| r.stated > 0)
     }
 
@@ -535,6 +538,7 @@ impl Parts<'_> {
             empty_cells: run.reading.empty_cells(),
             psi_at_s: run.reading.origin,
             unused: run.reading.unused,
+            waiting: run.reading.waiting,
             bins: run.len(),
             span_s: run.reading.span,
             positions_by: run.reading.by.into(),

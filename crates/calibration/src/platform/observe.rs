@@ -50,6 +50,9 @@ const SOME: usize = 64;
 /// Largest angle of the gimbal readings from the attitude of the scheme, in deg.
 const GIMBALS_DEG: f64 = 5.0;
 
+/// Smallest difference of times, in s: below it they are equal but for rounding.
+const ROUNDING_S: f64 = 1e-6;
+
 /// Interval of progress reports, in samples.
 const OFTEN: usize = 10_000;
 
@@ -110,6 +113,8 @@ pub(crate) struct Reading {
     pub samples: usize,
     /// Number of samples at no position.
     pub unused: usize,
+    /// Number of samples at positions during a wait that the file states.
+    pub waiting: usize,
     /// First and last time by the clock of the record, in s.
     pub span: (f64, f64),
     /// Columns that are not used.
@@ -455,6 +460,8 @@ struct SampleAssignment<'a> {
     rows: Vec<Vec<gross::Row>>,
     /// Number of empty cells at positions, by requested number.
     empty: Vec<usize>,
+    /// Start of every position on the timeline of the scheme, in s.
+    starts: Vec<f64>,
     /// Numbers of the current row.
     numbers: Vec<Option<f64>>,
     /// Position with the largest error of the gimbals, the error in deg, and its line.
@@ -604,6 +611,15 @@ impl SampleAssignment<'_> {
         self.now = Some(p);
         self.out.stays[p].1 = t;
         let c = &self.plan.attitudes[p];
+        let waiting: Vec<Option<f64>>;
+        let numbers = match self.waits(p, t, own_time) {
+            true => {
+                self.out.waiting += 1;
+                waiting = std::iter::once(numbers[0]).chain(numbers[1..].iter().map(|_| None)).collect();
+                &waiting[..]
+            }
+            false => numbers,
+        };
         if let Some(off) = self.layout.gimbals_off(numbers, c)
             && self.gimbals.is_none_or(|(_, most, _)| off > most)
         {
@@ -660,10 +676,22 @@ impl SampleAssignment<'_> {
         let values =
             std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
         self.samples.push(SampleRow { line, t, values, over });
-        for (count, number) in self.empty.iter_mut().zip(numbers) {
-            *count += usize::from(number.is_none());
+        if !self.waits(p, t, own_time) {
+            for (count, number) in self.empty.iter_mut().zip(numbers) {
+                *count += usize::from(number.is_none());
+            }
         }
         Ok(())
+    }
+
+    /// True for a row at time `t` of a position during the wait that the file states: from the first row of
+    /// the position on, or from its start on the timeline of the scheme.
+    fn waits(&self, p: usize, t: f64, own_time: bool) -> bool {
+        let Some(settle) = self.plan.platform.scheme().recording.settle else { return false };
+        match own_time {
+            true => t - self.out.stays[p].0 < settle - ROUNDING_S,
+            false => t - self.starts[p] <= settle + ROUNDING_S,
+        }
     }
 
     fn end(&mut self) {
@@ -861,6 +889,7 @@ pub(crate) fn observe(
         missing: Vec::new(),
         samples: 0,
         unused: 0,
+        waiting: 0,
         span: (0.0, 0.0),
         ignored: layout.ignored.clone(),
         force: None,
@@ -892,6 +921,7 @@ pub(crate) fn observe(
         samples: Vec::new(),
         rows: vec![Vec::new(); positions],
         empty: vec![0; layout.wanted.len()],
+        starts: bounds(plan).into_iter().map(|b| b.0).collect(),
         numbers: Vec::new(),
         gimbals: None,
     };

@@ -39,6 +39,10 @@ impl Acceptance {
                     format!("`{name}`: limits are for coefficients; expected D_F, D_IX or the like");
                 return Some((key, message));
             }
+            if low == &-high && *high <= 0.0 {
+                let expected = "expected a largest magnitude above 0, or the lowest and the highest value";
+                return Some((key, format!("acceptance limit of `{name}`: {high}; {expected}")));
+            }
             let inside = |x: &f64| super::ranges::VALUE.admits(*x);
             (!(inside(low) && inside(high) && low < high)).then(|| {
                 let expected = format!("expected two ascending numbers of {}", super::ranges::VALUE);

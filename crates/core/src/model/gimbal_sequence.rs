@@ -1,7 +1,7 @@
 //! Gimbal angles along a scheme as the platform executes it, turn by turn.
 
 use super::attitude::c_n_f64;
-use super::gimbal_turns::{GimbalStop, clean, degrees};
+use super::gimbal_turns::{GimbalStop, beside, clean, degrees, from_lock};
 use super::path::Path;
 use super::scheme::Scheme;
 use super::slew::Slew;
@@ -15,6 +15,9 @@ pub struct GimbalStation {
     /// Turns of the platform to the position: one about one axis, or up to three gimbal by gimbal. Durations
     /// are those at one deg/s.
     pub turns: Vec<Slew>,
+    /// Largest rates of alpha, beta, gamma during a turn about one axis, over that of the platform
+    /// (dimensionless); zeros gimbal by gimbal.
+    pub fastest: [f64; 3],
     /// True if the platform turns gimbal by gimbal.
     pub by_gimbals: bool,
     /// Gimbal angles at the position, in degrees.
@@ -38,22 +41,76 @@ pub enum GimbalObstacle {
     Misses,
 }
 
+/// Largest rounding of followed gimbal angles, in degrees.
+const ROUNDED: f64 = 1e-4;
+
+/// Followed gimbal angles without their rounding: those of the attitude at `written`, or of its twin, if they
+/// are near.
+fn snapped(reached: [f64; 3], [a, b, g]: [f64; 3]) -> [f64; 3] {
+    let near = |angles: [f64; 3]| -> Option<[f64; 3]> {
+        let placed: [f64; 3] = std::array::from_fn(|k| beside(angles[k], reached[k]));
+        (0..3).all(|k| (placed[k] - reached[k]).abs() < ROUNDED).then(|| placed.map(clean))
+    };
+    near([a, b, g]).or_else(|| near([a + 180.0, 180.0 - b, g + 180.0])).unwrap_or(reached)
+}
+
 impl Scheme {
-    /// Gimbal angles along the scheme. The first position is taken within the limits as written, or at the
-    /// angles of the same attitude that are. A turn about one axis is followed; gimbal by gimbal the angles
-    /// as written are taken. `None` with generic angles.
+    /// Gimbal angles along the scheme. The first position is taken at the angles as written, or at others of
+    /// the same attitude within the limits if the gimbals can follow from there only. A turn about one axis
+    /// is followed; gimbal by gimbal the angles as written are taken. `None` with generic angles.
     pub fn gimbal_sequence(&self) -> Option<Vec<GimbalStation>> {
         if !self.generic_names().is_empty() {
             return None;
         }
-        let rate = 1f64.to_radians();
         let within = self.gimbal_angles();
+        let listed = degrees(within.first()?);
+        let written = self.sequence_from(listed);
+        let possible = |stations: &[GimbalStation]| stations.iter().all(|s| s.obstacle.is_none());
+        // gimbal by gimbal the turns are those between the angles as written
+        if possible(&written) || self.path == Some(Path::Gimbals) {
+            return Some(written);
+        }
+        let others = self.starts(listed).into_iter().map(|start| self.sequence_from(start));
+        Some(others.into_iter().find(|stations| possible(stations)).unwrap_or(written))
+    }
+
+    /// Gimbal angles of the attitude at `angles`, in degrees, within the limits: whole turns, the twin, and
+    /// at `beta = +-90` alpha in steps of 15 degrees.
+    fn starts(&self, [a, b, g]: [f64; 3]) -> Vec<[f64; 3]> {
+        let mut own = vec![[a, b, g], [a + 180.0, 180.0 - b, g + 180.0]];
+        if from_lock(b) < 1e-9 {
+            // at b = 90 only a - g counts, at b = -90 only a + g
+            let sign = b.to_radians().sin().signum();
+            let split = (1..24).map(|k| 15.0 * f64::from(k)).map(|by| [a + by, b, g + sign * by]);
+            own.extend(split);
+        }
+        let limits = self.gimbals.limits.map(|l| l.map(|l| l.map(|x| x as f64 / 1e9)));
+        let placed = |angles: &[f64; 3]| -> Vec<[f64; 3]> {
+            let of = |k: usize| -> Vec<f64> {
+                let Some([low, high]) = limits[k] else { return vec![beside(angles[k], 0.0)] };
+                let first = ((low - angles[k]) / 360.0 - 1e-9).ceil() as i64;
+                let last = ((high - angles[k]) / 360.0 + 1e-9).floor() as i64;
+                (first..=last).map(|n| angles[k] + 360.0 * n as f64).collect()
+            };
+            let (a, b, g) = (of(0), of(1), of(2));
+            let all = a.iter().flat_map(|a| b.iter().flat_map(|b| g.iter().map(|g| [*a, *b, *g])));
+            all.collect()
+        };
+        own.iter().flat_map(placed).collect()
+    }
+
+    /// Gimbal angles along the scheme from those of the first position, in degrees.
+    fn sequence_from(&self, first: [f64; 3]) -> Vec<GimbalStation> {
+        let within = self.gimbal_angles();
+        let rate = 1f64.to_radians();
         let mut out: Vec<GimbalStation> = Vec::with_capacity(self.positions.len());
         for (i, p) in self.positions.iter().enumerate() {
-            let (attitude, listed) = (c_n_f64(&p.angles), degrees(&within[i]));
+            let attitude = c_n_f64(&p.angles);
+            let listed = if i == 0 { first } else { degrees(&within[i]) };
             let mut station = GimbalStation {
                 before_deg: out.last().map_or(listed, |s| s.after_deg),
                 turns: Vec::new(),
+                fastest: [0.0; 3],
                 by_gimbals: false,
                 at_deg: listed,
                 after_deg: listed,
@@ -86,10 +143,11 @@ impl Scheme {
                         Err(_) => station.obstacle = Some(GimbalObstacle::Misses),
                         Ok(None) => station.at_deg = station.before_deg,
                         Ok(Some(slew)) => {
-                            let (stop, reached) = self.gimbals.follow(station.before_deg, &slew);
+                            let (stop, reached, fastest) = self.gimbals.followed(station.before_deg, &slew);
+                            station.fastest = fastest;
                             match stop {
                                 Some(stop) => station.obstacle = Some(GimbalObstacle::Stop(stop)),
-                                None => station.at_deg = reached.map(clean),
+                                None => station.at_deg = snapped(reached.map(clean), degrees(&p.angles)),
                             }
                             station.turns.push(slew);
                         }
@@ -104,7 +162,7 @@ impl Scheme {
             }
             out.push(station);
         }
-        Some(out)
+        out
     }
 }
 
@@ -173,5 +231,25 @@ mod tests {
             matches!(&found[1].obstacle, Some(GimbalObstacle::Stop(s)) if s.at_deg == -90.0),
             "{found:?}"
         );
+    }
+
+    /// From beta = -90 a turn about one axis is possible if alpha and gamma are set so that beta follows;
+    /// with limits of alpha a whole turn further may be the way.
+    #[test]
+    fn another_start_of_the_same_attitude() {
+        let of = |head: &str, positions: &[&str]| {
+            let tables: String = positions.iter().map(|p| format!("[[position]]\n{p}\n")).collect();
+            scheme_file::read(&format!("{head}{tables}"))
+                .expect("a scheme")
+                .gimbal_sequence()
+                .expect("angles")
+        };
+        let found = of("", &["attitude = 'UEN'", "attitude = 'NUE'"]);
+        assert!(found.iter().all(|s| s.obstacle.is_none()), "{found:?}");
+        let start = of("", &["attitude = 'UEN'"]).remove(0).at_deg;
+        assert!(distance(&matrix(found[0].at_deg), &matrix(start)) < 1e-9 && found[0].at_deg != start);
+        let limited = "gimbals = { alpha_deg = [-170, 300] }\n";
+        let found = of(limited, &["angles_deg = [-150, 0, 0]", "angles_deg = [150, 10, 0]"]);
+        assert_eq!((found[0].at_deg, found[1].obstacle.as_ref()), ([210.0, 0.0, 0.0], None));
     }
 }

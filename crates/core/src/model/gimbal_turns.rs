@@ -194,12 +194,12 @@ pub(super) fn clean(deg: f64) -> f64 {
 }
 
 /// Angle in degrees, moved by whole turns to the value nearest to `near`.
-fn beside(deg: f64, near: f64) -> f64 {
+pub(super) fn beside(deg: f64, near: f64) -> f64 {
     deg + ((near - deg) / 360.0).round() * 360.0
 }
 
 /// Distance of beta to the nearer of `+-90`, in degrees.
-fn from_lock(beta: f64) -> f64 {
+pub(super) fn from_lock(beta: f64) -> f64 {
     (beside(beta, 0.0).abs() - 90.0).abs()
 }
 
@@ -224,8 +224,15 @@ impl Gimbals {
     /// Follows a turn from gimbal angles in degrees. Returns the obstacle that stops it, if there is one,
     /// and the gimbal angles reached.
     pub(super) fn follow(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3]) {
+        let (stop, at, _) = self.followed(start, slew);
+        (stop, at)
+    }
+
+    /// Follows a turn as [`Self::follow`] does; returns also the largest turn of each gimbal per turn of the
+    /// platform.
+    pub(super) fn followed(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3], [f64; 3]) {
         let whole = slew.turn().angle_deg;
-        let (mut at, mut done) = (start, 0.0);
+        let (mut at, mut done, mut fastest) = (start, 0.0, [0.0f64; 3]);
         // a turn of very many degrees takes larger steps
         let least = LEAST_DEG.max(whole * LEAST_PART);
         let most = STEP_DEG.max(least);
@@ -235,15 +242,17 @@ impl Gimbals {
             let swing = [0, 2].into_iter().map(|k| (next[k] - at[k]).abs()).fold(0.0, f64::max);
             if swing > FASTEST * step.max(least) {
                 let stop = GimbalStop { gimbal: None, at_deg: clean(at[1]), after_deg: clean(done) };
-                return (Some(stop), at);
+                return (Some(stop), at, fastest);
             }
             if let Some((k, at_deg, part)) = self.first_passed(&at, &next) {
                 let after_deg = clean(done + part * step);
-                return (Some(GimbalStop { gimbal: Some(NAMES[k].into()), at_deg, after_deg }), at);
+                let gimbal = Some(NAMES[k].into());
+                return (Some(GimbalStop { gimbal, at_deg, after_deg }), at, fastest);
             }
+            fastest = std::array::from_fn(|k| fastest[k].max((next[k] - at[k]).abs() / step));
             (at, done) = (next, done + step);
         }
-        (None, at)
+        (None, at, fastest)
     }
 
     /// Gimbal angles in degrees of an attitude, nearest to `near`. At `beta = +-90` alpha is kept, unless

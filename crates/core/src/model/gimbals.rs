@@ -268,7 +268,8 @@ pub fn euler_of(c: &Matrix3<f64>) -> Euler {
 /// Euler angles (rad) of `C_c^n`, beta in -90..90 degrees.
 pub(crate) fn euler_angles(c: &Matrix3<f64>) -> [f64; 3] {
     // C = Mx My Mz: row 0 is (cb cg, cb sg, -sb), column 2 is (-sb, sa cb, ca cb)
-    let beta = (-c[0][2]).clamp(-1.0, 1.0).asin();
+    // near +-90 degrees an arc sine has half the digits
+    let beta = (-c[0][2]).atan2(c[0][0].hypot(c[0][1]));
     if is_locked(c) {
         // only a -+ g is determined: choose gamma = 0; the middle column of Mx My is (0, ca, -sa)
         return [(-c[2][1]).atan2(c[1][1]), beta, 0.0];

@@ -22,6 +22,9 @@ pub struct Recording {
     pub tolerance: Option<f64>,
     /// Codes of missing values in the columns of a scheme's record, as written.
     pub missing: Vec<f64>,
+    /// Time at the start of each position of a scheme, in s, whose measurements are left out; `None` for
+    /// none.
+    pub settle: Option<f64>,
 }
 
 /// Detection of intervals at rest: the variance within a window about each sample, all columns together, is
@@ -64,6 +67,10 @@ pub(crate) struct SchemeRecord {
     /// Codes of missing values, in the unit of their column: `missing = [-9999, 0]`.
     #[serde(default)]
     missing: Vec<f64>,
+    /// Time at the start of each position, in s, 0 to 1e6, whose measurements are left out: the platform
+    /// waits for rest; none when left out.
+    #[serde(default)]
+    settle: Option<f64>,
 }
 
 /// Detection of intervals at rest: the variance within a window about each sample is at most `factor` times
@@ -134,6 +141,7 @@ impl From<SchemeRecord> for Recording {
             still,
             tolerance: r.tolerance,
             missing: r.missing,
+            settle: r.settle,
         }
     }
 }
@@ -154,6 +162,7 @@ impl From<ModelRecord> for Recording {
             still,
             tolerance: None,
             missing: Vec::new(),
+            settle: None,
         }
     }
 }
@@ -194,6 +203,9 @@ impl Recording {
         }
         if let Some(x) = self.tolerance.filter(|x| !(0.0..=0.5).contains(x)) {
             return Err(format!("tolerance is {x}; expected a part of the sample interval, 0 to 0.5"));
+        }
+        if let Some(x) = self.settle.filter(|x| !(0.0..=1e6).contains(x)) {
+            return Err(format!("settle is {x}; expected a time at the start of each position, 0 to 1e6 s"));
         }
         if let Some(x) = self.missing.iter().find(|x| !x.is_finite()) {
             return Err(format!("missing has {x}; expected finite numbers"));

@@ -34,6 +34,12 @@ pub struct Procedure {
     pub total_s: f64,
     /// True if the time of the turns is part of the times: a slew rate is stated.
     pub timed_turns: bool,
+    /// True for each of alpha, beta and gamma that has no limits, so that its angle may wind up.
+    pub free_gimbals: [bool; 3],
+    /// Longest interval between rows that the uncertainties rest on, in s.
+    pub row_s: f64,
+    /// Rate of the earth in North and Up, in deg/h, by which the platform is torqued.
+    pub earth_rate_dph: [f64; 2],
     /// Time at rest before each recording, in s, within the dwell of the position.
     pub settle_s: f64,
     /// Basis of the tolerances of the readings.
@@ -137,6 +143,10 @@ pub struct StepTurn {
     pub angle_deg: f64,
     /// Rate of the turn in deg/s; null if none is stated.
     pub rate_deg_s: Option<f64>,
+    /// Gimbal angles before the turn, in degrees: alpha, beta, gamma.
+    pub from_deg: [f64; 3],
+    /// Largest rates of alpha, beta and gamma during the turn, in deg/s; null if no rate is stated.
+    pub gimbal_rates_deg_s: Option<[f64; 3]>,
     /// Gimbal that makes the turn alone: alpha, beta or gamma; null about one axis.
     pub gimbal: Option<String>,
 }
@@ -150,6 +160,13 @@ pub struct Tolerance {
     pub by_values: bool,
     /// True if priors are stated, of which three sigma are added.
     pub by_priors: bool,
+    /// True if random drift or biases are stated, of whose tilt three sigma are added.
+    pub by_noise: bool,
+    /// Part of the tolerance, in g, for errors of the accelerometers: stated values, and three sigma of the
+    /// stated priors and of the bench.
+    pub accelerometers_g: f64,
+    /// Names of the positions whose tolerance is so large that the readings tell little: above 0.25 g.
+    pub wide: Vec<String>,
 }
 
 /// State of the coefficients after a position.
@@ -180,12 +197,15 @@ pub struct CoefficientProgress {
     /// Uncertainty at the end, in the unit of `unit`; null if neither samples nor stated priors bound the
     /// coefficient.
     pub uncertainty: Option<f64>,
+    /// True if the samples do not determine the coefficient, so that stated priors alone bound it.
+    pub by_prior: bool,
     /// Largest uncertainty allowed, in the unit of `unit`; null without a requirement.
     pub required: Option<f64>,
-    /// Position from whose end on the samples determine the coefficient; null if they do not at the end.
+    /// Position from whose end on the samples determine the coefficient; null if they do not at the end,
+    /// and for a scheme of more than 100 positions.
     pub determined_from: Option<String>,
-    /// Position from whose end on the requirement is met; null without a requirement, and if it is missed at
-    /// the end.
+    /// Position from whose end on the requirement is met; null without a requirement, if it is missed at
+    /// the end, and for a scheme of more than 100 positions.
     pub met_from: Option<String>,
 }
 

@@ -59,12 +59,15 @@ pub(super) fn progress(
     let is_met = |c: usize, k: usize| sigmas[k][c].zip(required(c)).is_some_and(|(s, r)| meets(s, r));
     let (mut coefficients, mut determined, mut met) = (Vec::new(), Vec::new(), Vec::new());
     for (c, name) in names.iter().enumerate() {
-        determined.push(from(&|k| is_determined(name, &judged[k])));
-        met.push(from(&|k| is_met(c, k)));
+        // where only the end is judged, nothing is known of the positions before
+        let known = |of: Option<usize>| of.filter(|_| first == 1);
+        determined.push(known(from(&|k| is_determined(name, &judged[k]))));
+        met.push(known(from(&|k| is_met(c, k))));
         coefficients.push(CoefficientProgress {
             name: name.clone(),
             unit: shown_unit(own.units()[psi + c]).into(),
             uncertainty: sigmas.last().and_then(|s| s[c]),
+            by_prior: last.by_prior[psi + c],
             required: required(c),
             determined_from: determined[c].map(position),
             met_from: met[c].map(position),

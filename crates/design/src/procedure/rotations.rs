@@ -59,12 +59,14 @@ pub(super) fn start(plan: &Plan) -> [f64; 3] {
     [pitch, roll, yaw].map(|x| (x.to_degrees() * 1e9).round() / 1e9 + 0.0)
 }
 
-/// Text of a rotation table, with a comment on its axes and its attitude at the start.
-pub fn rotation_table(rows: &[RotationRow], start_attitude_deg: [f64; 3]) -> String {
+/// Text of a rotation table, with a comment on its axes and its attitude at the start; `start` are the Euler
+/// angles of the first position.
+pub fn rotation_table(rows: &[RotationRow], start_attitude_deg: [f64; 3], start: &str) -> String {
     let [pitch, roll, yaw] = start_attitude_deg;
     let mut out = format!(
         "% rotations of the body: axes right, front, up are Z_p, X_p, Y_p\n\
          % attitude at the start: pitch {pitch}, roll {roll}, yaw {yaw} deg\n\
+         {START}{start}\n\
          % k, Ux, Uy, Uz, angle [deg], T [s], T0 [s], T1 [s]\n"
     );
     for r in rows {
@@ -104,18 +106,36 @@ pub enum RotationError {
     },
     /// A position without rest.
     #[error(
-        "line {line}: no rest before this rotation; expected T0 here or T1 of the row before, at least 1e-3 s: \
-         a position is recorded at rest"
+        "line {line}: no rest before this rotation; expected T0 here or T1 of the row before, at least 1e-3 s: a \
+         position is recorded at rest, and reached by one turn (not gimbal by gimbal)"
     )]
     NoRest {
         /// Number of the line, from 1.
         line: usize,
+    },
+    /// Angles that are all as small as those in rad.
+    #[error("line {line}: the largest angle is {largest}, as in radians; expected degrees")]
+    Radians {
+        /// Number of the line of the first row.
+        line: usize,
+        /// Largest angle that was found.
+        largest: f64,
     },
     /// No row.
     #[error("no row; expected k, Ux, Uy, Uz, angle in degrees, T, T0, T1 in s")]
     Empty,
 }
 
+/// Comment with the Euler angles of the first position.
+const START: &str = "% obsdeg: --start ";
+
+/// Euler angles of the first position by the comment of a table that obsdeg wrote; `None` without one.
+pub fn start_of_table(text: &str) -> Option<&str> {
+    text.lines().find_map(|line| line.trim().strip_prefix(START)).map(str::trim)
+}
+
+/// Largest angle of a table in degrees below which it is taken for one in rad.
+const RADIANS: f64 = 7.0;
 /// Rest of rows that state none, in s.
 const REST_S: f64 = 10.0;
 /// Shortest dwell of a position, in s.
@@ -153,12 +173,21 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
                 _ => return Err(wrong()),
             };
             let length = (x * x + y * y + z * z).sqrt();
+            let whole = number >= 1.0 && number.fract() == 0.0;
             let checks = [
+                ("k", number, whole, "the number of the row, from 1"),
+                ("an axis of length", length, (0.5..1.5).contains(&length), "a unit vector"),
                 ("T", rotate_s, rotate_s > 0.0, "more than 0 s"),
+                ("an angle of", angle_deg, angle_deg != 0.0, "other degrees than 0"),
+                (
+                    "a rate of [deg/s]",
+                    (angle_deg / rotate_s).abs(),
+                    (1e-3..=1e4).contains(&(angle_deg / rotate_s).abs()),
+                    "0.001 to 10000 deg/s",
+                ),
+                ("rests of", before_s.max(after_s), before_s.max(after_s) <= 1e6, "at most 1e6 s"),
                 ("T0", before_s, before_s >= 0.0, "0 s or more"),
                 ("T1", after_s, after_s >= 0.0, "0 s or more"),
-                ("an angle of", angle_deg, angle_deg != 0.0, "other degrees than 0"),
-                ("an axis of length", length, length > 0.0, "a direction"),
             ];
             for (what, found, right, expected) in checks {
                 if !right {
@@ -170,7 +199,12 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
             out.push((line, RotationRow { number, axis, angle_deg, rotate_s, before_s, after_s }));
         }
     }
-    if out.is_empty() { Err(RotationError::Empty) } else { Ok(out) }
+    let largest = out.iter().map(|(_, r): &(usize, RotationRow)| r.angle_deg.abs()).fold(0.0, f64::max);
+    match out.first() {
+        None => Err(RotationError::Empty),
+        Some((line, _)) if largest < RADIANS => Err(RotationError::Radians { line: *line, largest }),
+        Some(_) => Ok(out),
+    }
 }
 
 /// Scheme of a rotation table that begins at the Euler angles `start`, under inertial carry: positions at
@@ -272,10 +306,13 @@ mod tests {
             prop_assert_eq!(forces.len(), scheme.positions.len());
             // attitudes that follow each other without a turn have no row
             prop_assume!(found.rotations.len() + 1 == forces.len());
+            // angles as small as those in rad are refused
+            prop_assume!(found.rotations.iter().any(|r| r.angle_deg > 7.0));
             for (body, force) in read.iter().zip(&forces) {
                 prop_assert!((0..3).all(|k| (body[k] - force[BODY[k]]).abs() < 1e-6), "{body:?} {force:?}");
             }
-            let text = rotation_table(&found.rotations, found.start_attitude_deg);
+            let text = rotation_table(&found.rotations, found.start_attitude_deg, "1,2,3");
+            prop_assert_eq!(start_of_table(&text), Some("1,2,3"));
             let back = scheme_of_rotations(&text, &scheme.positions[0].angles).expect("a scheme");
             for (p, q) in back.positions.iter().zip(&scheme.positions) {
                 let (a, b) = (c_n_f64(&p.angles), c_n_f64(&q.angles));
@@ -318,10 +355,12 @@ mod tests {
             ("1, 0, 0, 1, 90\n", "line 1: `1, 0, 0, 1, 90`"),
             ("% a\n1, 0, 0, 1, x, 9, 9, 9\n", "line 2"),
             ("1, 0, 0, 0, 90, 9, 9, 9\n", "an axis of length 0"),
+            ("0, 1, 0, 90, 9, 70, 70\n", "k 0; expected the number of the row"),
             ("1, 0, 0, 1, 90, 0, 9, 9\n", "T 0; expected more than 0 s"),
             ("1, 0, 0, 1, 90, 9, -1, 9\n", "T0 -1"),
             ("1, 0, 0, 1, 90, 9, 9, 0\n2, 1, 0, 0, 90, 9, 0, 9\n", "line 2: no rest before"),
             ("1, 0, 0, 1, 90, 9, 9, 9, 9\n", "line 1"),
+            ("\n1, 0, 0, 1, 1.5708, 9, 9, 9\n", "line 2: the largest angle is 1.5708, as in radians"),
         ] {
             assert!(message(text).contains(expected), "{text:?}: {}", message(text));
         }

@@ -37,11 +37,16 @@ pub(super) fn sheet(
         let rate = conditions.slew_rate(p);
         let mut at = station.before_deg;
         for (turn, gimbal) in station.turns.iter().zip(gimbals(station)) {
+            let from = at;
             match gimbal {
                 Some(k) => at[k] = station.at_deg[k],
                 None => at = station.at_deg,
             }
-            let turn = step_turn(turn, rate, gimbal);
+            let fastest = match gimbal {
+                Some(own) => std::array::from_fn(|k| f64::from(u8::from(k == own))),
+                None => station.fastest,
+            };
+            let turn = step_turn(turn, rate, gimbal, from, fastest);
             let duration_s = rate.map_or(0.0, |rate| turn.angle_deg / rate);
             list.push(StepKind::Turn, duration_s, at, Some(turn));
         }
@@ -49,7 +54,12 @@ pub(super) fn sheet(
         if let Some(r) = &p.rotation {
             let turn = Slew::about(&plan.attitudes[i], r, dwell_s);
             let rate = turn.turn().angle_deg / dwell_s;
-            list.push(StepKind::Rotate, dwell_s, station.after_deg, Some(step_turn(&turn, Some(rate), None)));
+            list.push(
+                StepKind::Rotate,
+                dwell_s,
+                station.after_deg,
+                Some(step_turn(&turn, Some(rate), None, station.at_deg, [0.0; 3])),
+            );
             continue;
         }
         let settle_s = options.settle_s;
@@ -98,14 +108,24 @@ fn gimbals(station: &GimbalStation) -> Vec<Option<usize>> {
     (0..3).filter(|&k| station.at_deg[k] != station.before_deg[k]).map(Some).collect()
 }
 
-fn step_turn(slew: &Slew, rate_deg_s: Option<f64>, gimbal: Option<usize>) -> StepTurn {
+/// Turn of a step from gimbal angles `from_deg`; `fastest` are the rates of the gimbals over that of the
+/// platform.
+fn step_turn(
+    slew: &Slew,
+    rate_deg_s: Option<f64>,
+    gimbal: Option<usize>,
+    from_deg: [f64; 3],
+    fastest: [f64; 3],
+) -> StepTurn {
     let turn = slew.turn();
-    let clean = |x: f64| (x * 1e12).round() / 1e12 + 0.0;
+    let clean = |x: f64| (x * 1e12).round().clamp(-1e12, 1e12) / 1e12 + 0.0;
     StepTurn {
         about: turn.about,
         about_platform: apply(&transpose(&slew.from), &turn.about).map(clean),
         angle_deg: turn.angle_deg,
         rate_deg_s,
+        from_deg,
+        gimbal_rates_deg_s: rate_deg_s.map(|rate| fastest.map(|k| (k * rate * 100.0).round() / 100.0)),
         gimbal: gimbal.map(|k| GIMBALS[k].into()),
     }
 }

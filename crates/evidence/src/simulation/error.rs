@@ -32,6 +32,15 @@ pub enum SimulationError {
         /// Name of the position.
         name: String,
     },
+    /// A path gimbal by gimbal begins at Euler angles, which a rotation has left.
+    #[error(
+        "`{name}` follows a rotating segment, which leaves the Euler angles that path = \"gimbals\" starts \
+         from: expected a slew of the position, or path = \"one-axis\""
+    )]
+    GimbalsAfterRotation {
+        /// Name of the position.
+        name: String,
+    },
     /// A filter that does not know a position does not know a slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,

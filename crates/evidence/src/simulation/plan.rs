@@ -442,7 +442,8 @@ fn slews(
     let misses = || SimulationError::SlewMisses { name: p.name.clone() };
     let how = p.slew.clone().unwrap_or_default();
     if how.axis.is_none() && scheme.path == Some(Path::Gimbals) {
-        let steps = Path::gimbals(&scheme.positions[position - 1], p).ok_or_else(misses)?;
+        let after = || SimulationError::GimbalsAfterRotation { name: p.name.clone() };
+        let steps = Path::gimbals(&scheme.positions[position - 1], p).ok_or_else(after)?;
         let mut from = ends[position - 1];
         return Ok(steps
             .iter()

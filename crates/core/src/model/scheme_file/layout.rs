@@ -114,7 +114,7 @@ pub(super) struct AcceptanceEntry {
 
 /// Limits of a coefficient in its unit.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number (largest magnitude) or [low, high]")]
 pub(super) enum LimitEntry {
     /// Largest magnitude of the coefficient, in its unit.
     Magnitude(f64),

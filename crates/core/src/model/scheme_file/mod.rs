@@ -207,6 +207,13 @@ impl SchemeReader<'_> {
                 return Err(SchemeFileError { message, span });
             }
         }
+        let concerned = |name: &String| platform.names().iter().any(|n| settings::concerns(name, n));
+        if let Some(name) = scheme.acceptance.limits.keys().find(|name| !concerned(name)) {
+            let message =
+                format!("limits of `{name}`: no such unknown; {}", settings::known(platform.names(), name));
+            let span = self.places.get(&format!("acceptance.limits.{name}")).cloned();
+            return Err(SchemeFileError { message, span });
+        }
         for text in combinations {
             combination::check(text.get_ref(), &platform)
                 .map_err(|e| self.at(self.within(text, e.span()), format!("combination: {e}")))?;

@@ -145,6 +145,9 @@ fn recording(out: &mut String, r: &Recording) {
     if let Some(part) = r.tolerance {
         line(&mut own, "tolerance", &number(part));
     }
+    if let Some(seconds) = r.settle {
+        line(&mut own, "settle", &number(seconds));
+    }
     if !r.missing.is_empty() {
         line(&mut own, "missing", &list(r.missing.iter().map(|x| number(*x))));
     }
@@ -351,6 +354,7 @@ mod tests {
                 units: if mirrored { texts() } else { [].into() },
                 still: mirrored.then_some(still),
                 tolerance: mirrored.then_some(0.25),
+                settle: mirrored.then_some(12.5),
                 missing: if mirrored { vec![-9999.0, 0.0, 1e-7] } else { vec![] },
                 ..Recording::default()
             };

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use obsdeg_core::model::ranges::DWELL_S;
 use obsdeg_core::model::settings::{Assignment, Settings, concerns};
 use obsdeg_core::model::{
-    Angle, Dwell, Position, Scheme, SchemeError, SlewAxis, SlewTo, angles_text, parse_attitude,
+    Acceptance, Angle, Dwell, Platform, Position, Scheme, SchemeError, SlewAxis, SlewTo, angles_text,
+    parse_attitude,
 };
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
@@ -112,8 +113,18 @@ pub(crate) fn under(
         },
         requirements: by_name(&conditions.requirements),
         bench: by_name(&conditions.bench),
+        acceptance: within_terms(base),
         ..base.clone()
     }
+}
+
+/// Acceptance limits of the coefficients that the scheme has.
+fn within_terms(base: &Scheme) -> Acceptance {
+    let names = Platform::new(Scheme { combinations: Vec::new(), ..base.clone() });
+    let names = names.map(|p| p.names().to_vec()).unwrap_or_default();
+    let mut out = base.acceptance.clone();
+    out.limits.retain(|name, _| names.iter().any(|n| concerns(name, n)));
+    if out.limits.is_empty() { Acceptance::default() } else { out }
 }
 
 /// Assignments as a file states them: a value for a single unknown overrides that of its family, in any
