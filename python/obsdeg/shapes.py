@@ -3223,6 +3223,23 @@ class SystemEvidence(Shape):
     """Seed of all random choices."""
 
 
+class TitleBlock(Record):
+    """Title block of a review, as the file states it: nothing of it comes from the clock or from the computer."""
+
+    __slots__ = ()
+
+    reference: str
+    """Number or reference of the document; empty when left out."""
+    revision: str
+    """Revision of the document, such as `B`; empty when left out."""
+    date: str
+    """Date of the document, as a text or a date of TOML; empty when left out."""
+    author: str
+    """Author of the document; empty when left out."""
+    signatures: list[str]
+    """Roles that sign the document, such as `['Checked', 'Approved']`: a line for each in a review."""
+
+
 class ForceLength(Record):
     """Length of the specific force at a position."""
 
@@ -3627,8 +3644,8 @@ class Estimated(Record):
 
 Decision = Literal["accepted", "rejected", "undecided"]
 """Decision on a coefficient with limits. accepted: Estimate within the limits by more than the guard band. rejected: Estimate beyond a
-limit by more than the guard band. undecided: Estimate within the guard band of a limit, a coefficient that is not determined, or a
-calibration that is not consistent.
+limit by more than the guard band. undecided: Estimate within the guard band of a limit, a coefficient that is not determined or
+bounded by priors alone, or a calibration that is not consistent.
 """
 
 
@@ -3651,6 +3668,8 @@ class AcceptanceLimit(Record):
     """Lowest and highest estimate that is accepted, in the unit of `unit`; null if the uncertainty allows none."""
     rejected_beyond: tuple[float, float] | None
     """Estimates, in the unit of `unit`, below and above which the coefficient is rejected; null without an uncertainty."""
+    by_prior: bool
+    """True if the samples do not determine the coefficient, so that stated priors alone bound it: it stays undecided."""
     estimate: float | None
     """Estimate of the coefficient, in the unit of `unit`; null before a run, and if it is not determined."""
     decision: Decision | None
@@ -3958,6 +3977,8 @@ class RecordReport(Record):
     """
     unused: int
     """Number of samples at no position of the scheme."""
+    waiting: int
+    """Number of samples at positions that were left out because the platform waits for rest (`settle` of the scheme file)."""
     bins: int
     """Number of bins of the samples."""
     span_s: tuple[float, float]
@@ -4179,6 +4200,10 @@ class Calibration(Shape):
     """Layout of this answer: `obsdeg.calibration/1`."""
     version: str
     """Version of the program that wrote it."""
+    name: str
+    """Name of the scheme; empty if it has none."""
+    document: TitleBlock
+    """Title block of the scheme's documents."""
     consistent: bool
     """True if the model and its sigmas explain the records."""
     findings: list[Finding]
@@ -4474,23 +4499,6 @@ class SystemCalibration(Shape):
     seed: int
     """Seed of starts and verdicts."""
 
-
-class TitleBlock(Record):
-    """Title block of a review, as the file states it: nothing of it comes from the clock or from the computer."""
-
-    __slots__ = ()
-
-    reference: str
-    """Number or reference of the document; empty when left out."""
-    revision: str
-    """Revision of the document, such as `B`; empty when left out."""
-    date: str
-    """Date of the document, as a text or a date of TOML; empty when left out."""
-    author: str
-    """Author of the document; empty when left out."""
-    signatures: list[str]
-    """Roles that sign the document, such as `['Checked', 'Approved']`: a line for each in a review."""
-
 ObstacleKind = Literal["stop", "limits", "elsewhere", "misses"]
 """Kind of an obstacle of the gimbals. stop: A gimbal stops at its limit or at the lock during the turn. limits: No gimbal angles of the
 attitude lie within the limits. elsewhere: The path gimbal by gimbal starts at other gimbal angles than those where the gimbals stand.
@@ -4533,6 +4541,10 @@ class StepTurn(Record):
     """Angle of the turn in degrees, right-handed about the axis, above 0."""
     rate_deg_s: float | None
     """Rate of the turn in deg/s; null if none is stated."""
+    from_deg: tuple[float, float, float]
+    """Gimbal angles before the turn, in degrees: alpha, beta, gamma."""
+    gimbal_rates_deg_s: tuple[float, float, float] | None
+    """Largest rates of alpha, beta and gamma during the turn, in deg/s; null if no rate is stated."""
     gimbal: str | None
     """Gimbal that makes the turn alone: alpha, beta or gamma; null about one axis."""
 
@@ -4573,6 +4585,14 @@ class Tolerance(Record):
     """True if true values of coefficients or psi are stated, whose drift is added."""
     by_priors: bool
     """True if priors are stated, of which three sigma are added."""
+    by_noise: bool
+    """True if random drift or biases are stated, of whose tilt three sigma are added."""
+    accelerometers_g: float
+    """Part of the tolerance, in g, for errors of the accelerometers: stated values, and three sigma of the stated priors and of the
+    bench.
+    """
+    wide: list[str]
+    """Names of the positions whose tolerance is so large that the readings tell little: above 0.25 g."""
 
 
 class AfterPosition(Record):
@@ -4607,12 +4627,18 @@ class CoefficientProgress(Record):
     """Unit of the uncertainty and the requirement."""
     uncertainty: float | None
     """Uncertainty at the end, in the unit of `unit`; null if neither samples nor stated priors bound the coefficient."""
+    by_prior: bool
+    """True if the samples do not determine the coefficient, so that stated priors alone bound it."""
     required: float | None
     """Largest uncertainty allowed, in the unit of `unit`; null without a requirement."""
     determined_from: str | None
-    """Position from whose end on the samples determine the coefficient; null if they do not at the end."""
+    """Position from whose end on the samples determine the coefficient; null if they do not at the end, and for a scheme of more than
+    100 positions.
+    """
     met_from: str | None
-    """Position from whose end on the requirement is met; null without a requirement, and if it is missed at the end."""
+    """Position from whose end on the requirement is met; null without a requirement, if it is missed at the end, and for a scheme of
+    more than 100 positions.
+    """
 
 
 class RotationRow(Record):
@@ -4657,6 +4683,12 @@ class Procedure(Shape):
     """Total time of the sheet, in s."""
     timed_turns: bool
     """True if the time of the turns is part of the times: a slew rate is stated."""
+    free_gimbals: tuple[bool, bool, bool]
+    """True for each of alpha, beta and gamma that has no limits, so that its angle may wind up."""
+    row_s: float
+    """Longest interval between rows that the uncertainties rest on, in s."""
+    earth_rate_dph: tuple[float, float]
+    """Rate of the earth in North and Up, in deg/h, by which the platform is torqued."""
     settle_s: float
     """Time at rest before each recording, in s, within the dwell of the position."""
     tolerance: Tolerance

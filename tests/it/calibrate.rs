@@ -35,6 +35,7 @@ fn a_day_at_the_bench() {
         [
             "allan.png",
             "allan.svg",
+            "calibration.html",
             "calibration.json",
             "coefficients.csv",
             "covariance.csv",

@@ -577,6 +577,22 @@ fn fronts_of_twenty_candidates() {
 }
 
 /// Requests that cannot be met are named, and so are limits that all candidates together do not reach.
+/// An expression may have the names of outputs: the degrees are those of the expression written out.
+#[test]
+fn names_of_outputs_stand_for_their_expressions() {
+    let text = std::fs::read_to_string("examples/sir/model.toml").expect("a file");
+    let model = model_file::read(&text).expect("a model");
+    let of = |list: &str| {
+        let candidates = model.candidates_of(list).expect("candidates");
+        let options = SensorOptions { candidates, ..SensorOptions::default() };
+        let found = sensors(&model, &options, &|_| true).expect("sets");
+        found.candidates.iter().map(|c| c.degrees.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(of("2*y + S, y*R"), of("2*k*I + S, k*I*R"));
+    let named = model.candidates_of("y + S").expect("candidates");
+    assert_eq!((named[0].named.name.as_str(), named[0].parts[0].text.as_str()), ("y + S", "(k*I) + S"));
+}
+
 #[test]
 fn what_cannot_be_is_said() {
     let text = "name='m'\nparameters=['k','unused']\n[states]\na='-k*a'\nb='a-b'\n[outputs]\ny='b'";

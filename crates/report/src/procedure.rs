@@ -128,7 +128,7 @@ fn steps(p: &Procedure) -> Block {
             "[ ]".into(),
         ]
     };
-    Block::table("Steps", columns, p.steps.iter().map(row))
+    Block::table("", columns, p.steps.iter().map(row))
 }
 
 fn obstacle(o: &Obstacle) -> String {
@@ -181,7 +181,7 @@ fn after(p: &Procedure) -> Block {
         };
         vec![a.position.clone(), clock(a.end_s), met, determines, meets]
     });
-    Block::table("Known after each position", columns, rows)
+    Block::table("", columns, rows)
 }
 
 fn coefficients(p: &Procedure) -> Block {
@@ -368,6 +368,10 @@ fn winding(p: &Procedure) -> Option<String> {
     })
 }
 
+/// Headings of the steps, and of what is known when.
+const STEPS: &str = "Steps";
+const KNOWN: &str = "Known after each position";
+
 impl Answer for Procedure {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -376,19 +380,23 @@ impl Answer for Procedure {
     fn document(&self) -> Document {
         let named = if self.name.is_empty() { String::new() } else { format!(": {}", self.name) };
         let mut blocks: Vec<Block> = title_block(&self.document).into_iter().collect();
-        blocks.push(Block::list("Rules", rules(self)));
-        blocks.push(steps(self));
-        blocks.push(after(self));
-        blocks.push(coefficients(self));
+        let section = |title: &str| Block::Section { level: 1, title: title.into() };
+        blocks.extend([section("Rules"), Block::list("", rules(self)), section(STEPS), steps(self)]);
+        blocks.extend([section(KNOWN), after(self), coefficients(self)]);
         if let Some(a) = &self.acceptance {
-            blocks.push(acceptance::table(a));
-            blocks.push(Block::list("Decision rule", acceptance::rule(a)));
+            blocks.extend([
+                section("Acceptance"),
+                acceptance::table(a),
+                Block::list("Decision rule", acceptance::rule(a)),
+            ]);
         }
-        blocks.extend(rotations(self));
+        if let Some(table) = rotations(self) {
+            blocks.push(Block::fold(1, "Rotation table", vec![table]));
+        }
         let mut conditions = vec![stated::carry(self.carry).into(), stated::predicted(&self.conditions)];
         conditions.extend(stated::measurement(&self.conditions));
         conditions.extend(stated::by_default(&self.conditions));
-        blocks.push(Block::list("Conditions", conditions));
+        blocks.push(Block::fold(1, "Conditions", vec![Block::list("", conditions)]));
         Document {
             title: format!("Procedure{named}"),
             lead: sentences(self).into_iter().map(|s| format!("{s}.")).collect(),
@@ -457,9 +465,9 @@ pub fn procedure_page(p: &Procedure, scheme: &Scheme) -> Result<File, ReportErro
         caption: poses::caption(&poses, latitude, p.conditions.latitude_by_default),
         drawing: Drawing::Panels(poses::panels(&poses, latitude)),
     };
-    let steps =
-        document.blocks.iter().position(|b| matches!(b, Block::Table { heading, .. } if heading == "Steps"));
-    document.blocks.insert(steps.map_or(0, |at| at + 1), Block::Picture(picture));
+    let known = |b: &Block| matches!(b, Block::Section { title, .. } if title == KNOWN);
+    let at = document.blocks.iter().position(known).unwrap_or(document.blocks.len());
+    document.blocks.insert(at, Block::Picture(picture));
     Ok(File::new("procedure.html", html::page(&document, &p.version)?))
 }
 

@@ -123,18 +123,43 @@ impl SystemModel {
             }
         }
         let place = Place { what: format!("the candidate {text}"), offset: None };
-        let read = parse_components(text, &self.shapes()).map_err(|e| ModelError {
+        let expanded = self.with_outputs(text);
+        let read = parse_components(&expanded, &self.shapes()).map_err(|e| ModelError {
             what: place.what.clone(),
             message: e.to_string(),
             span: None,
         })?;
-        let part = |expression| PlacedExpression { text: text.into(), expression, place: place.clone() };
+        let part = |expression| PlacedExpression { text: expanded.clone(), expression, place: place.clone() };
         Ok(Candidate {
             named: Named { name: text.into(), ..Named::default() },
             parts: read.entries.into_iter().map(part).collect(),
             experiment: false,
             cost: 1.0,
         })
+    }
+
+    /// Expression with the names of scalar outputs and candidates of the file replaced by their expressions,
+    /// in parentheses; a name of the model itself stays.
+    fn with_outputs(&self, text: &str) -> String {
+        let own = self.slot_names();
+        let is_own = |name: &str| own.iter().chain(self.definitions.iter().map(|d| &d.0)).any(|n| n == name);
+        let outputs = self.outputs.iter().map(|(named, e)| (named.name.as_str(), e.text.as_str()));
+        let candidates = self.candidates.iter().filter(|c| c.parts.len() == 1);
+        let candidates = candidates.map(|c| (c.named.name.as_str(), c.parts[0].text.as_str()));
+        let known: Vec<(&str, &str)> = outputs.chain(candidates).filter(|(name, _)| !is_own(name)).collect();
+        let in_name = |c: char| c.is_alphanumeric() || c == '_';
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(first) = rest.chars().next() {
+            let word = rest.find(|c| !in_name(c)).unwrap_or(rest.len()).max(first.len_utf8());
+            let (token, after) = rest.split_at(word);
+            match known.iter().find(|(name, _)| *name == token && !after.starts_with('[')) {
+                Some((_, expression)) => out += &format!("({expression})"),
+                None => out += token,
+            }
+            rest = after;
+        }
+        out
     }
 
     /// Shapes of the names that are vectors or matrices.
