@@ -5,9 +5,10 @@
 //! undecided between. The guard bands follow from the stated risk `r` (JCGM 106:2012, 7 and 8, with the
 //! conformance probability of a normal error):
 //!
-//! - `Phi(-g/u) + Phi(-(high - low - g)/u) = r`: an accepted coefficient lies outside with probability at
-//! most   `r`; - `Phi(-w/u) + Phi(-(high - low + w)/u) = r`: a coefficient within the limits is rejected with
-//! probability   at most `r`.
+//! - `Phi(-g/u) + Phi(-(high - low - g)/u) = r`: an accepted coefficient lies outside with probability `r` at
+//!   most;
+//! - `Phi(-w/u) + Phi(-(high - low + w)/u) = r`: a coefficient within the limits is rejected with probability
+//!   `r` at most.
 
 use obsdeg_core::model::Acceptance;
 use obsdeg_core::model::settings::{Assignment, concerns};

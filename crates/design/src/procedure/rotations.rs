@@ -21,9 +21,8 @@ pub(super) fn rows(steps: &[Step]) -> Vec<RotationRow> {
     for step in steps {
         match (&step.turn, step.kind) {
             (Some(turn), StepKind::Turn | StepKind::Rotate) => {
-                match out.last_mut() {
-                    Some(before) => before.after_s = rest,
-                    None => {}
+                if let Some(before) = out.last_mut() {
+                    before.after_s = rest;
                 }
                 let before_s = if out.is_empty() { rest } else { 0.0 };
                 out.push(RotationRow {
