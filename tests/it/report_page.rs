@@ -166,7 +166,8 @@ fn a_browser_shows_it() {
     // accessibility rules for screen readers and keyboards, in light and dark mode
     let axe = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/axe/axe.min.js"));
     let axe = axe.expect("tests/data/axe/axe.min.js");
-    for file in [&several, &paper] {
+    let [procedure, calibration] = bench_pages(folder.path());
+    for file in [&several, &paper, &procedure, &calibration] {
         for scheme in ["light", "dark"] {
             let wanted = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
             browser.call("Emulation.setEmulatedMedia", wanted);
@@ -255,6 +256,110 @@ fn a_browser_shows_it() {
             }
         }
     }
+}
+
+/// Pages of the bench: the sheet of a run with hostile names, and the report of a calibration.
+fn bench_pages(folder: &Path) -> [std::path::PathBuf; 2] {
+    let path = |name: &str| folder.join(name).display().to_string();
+    let text = std::fs::read_to_string("examples/rate-table/scheme.toml").expect("an example");
+    let text = text.replacen("rate table", "<b>rate</b> & table", 1);
+    std::fs::write(folder.join("bench.toml"), text).expect("written");
+    let sheet = run(&["procedure", &path("bench.toml"), "--settle", "20", "-o", &path("sheet"), "--quiet"]);
+    assert!(sheet.status.success());
+    let bench_day = ["examples/bench-day/scheme.toml", "examples/bench-day/record.csv"];
+    let found = run(&["calibrate", bench_day[0], bench_day[1], "-o", &path("calibration"), "--quiet"]);
+    assert!(found.status.success());
+    [folder.join("sheet/procedure.html"), folder.join("calibration/calibration.html")]
+}
+
+/// The sheet of a run and the report of a calibration fit their pages and narrow screens; the decision of a
+/// calibration comes first.
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn pages_of_the_bench() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pages = bench_pages(folder.path());
+    let [sheet, calibration] =
+        pages.each_ref().map(|p| Html::parse_document(&std::fs::read_to_string(p).expect("written")));
+    assert!(sheet.errors.is_empty() && calibration.errors.is_empty());
+    assert_unique_ids(&sheet);
+    assert_unique_ids(&calibration);
+    assert_eq!(texts(&sheet, "h1"), ["Procedure: <b>rate</b> & table"]);
+    assert_eq!(texts(&calibration, "h1"), ["Calibration: bench day"]);
+    let heads = texts(&calibration, "h2");
+    assert_eq!(heads[..3], ["Fit and findings", "Uncertainty", "Details"], "{heads:?}");
+    // the status and the coefficients with their margins stand before the fit
+    let body = texts(&calibration, "body").remove(0);
+    let front = body.split("Fit and findings").next().unwrap_or_default();
+    for answer in
+        ["Requirements", "Consistent", "Recommended action", "D_FX", "margin", "uncertainty / predicted"]
+    {
+        assert!(front.contains(answer), "{answer}");
+    }
+    assert!(!body.contains("Design review"));
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return;
+    };
+    for (page, most) in pages.iter().zip([4, 7]) {
+        let printed = printed_pages(&mut browser, page);
+        assert!((1..=most).contains(&printed), "{}: {printed} pages", page.display());
+        browser.open(page, 400, 900);
+        browser.settle();
+        let wide =
+            browser.value("document.documentElement.scrollWidth > document.documentElement.clientWidth");
+        assert_eq!(wide, json!(false), "{}", page.display());
+        // every legend names its curves
+        let unnamed = browser.value(
+            "[...document.querySelectorAll('.u-legend .u-series')].filter(r => r.checkVisibility() && \
+             !r.querySelector('.u-label').textContent.trim()).length",
+        );
+        assert_eq!(unnamed, json!(0));
+    }
+}
+
+/// The report of a calibration names what changed since an earlier one, by two records and by the same one.
+#[test]
+fn changes_between_calibrations() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let scheme = "examples/bench-day/scheme.toml";
+    let record = std::fs::read_to_string("examples/bench-day/record.csv").expect("a record");
+    // an output that grows by 1e-7 g/s, as a drift of 0.02 deg/h does: drifts change
+    let changed: String = record
+        .lines()
+        .map(|line| match line.split(',').collect::<Vec<_>>()[..] {
+            [t, p, x, y, z] => match (t.parse::<f64>(), x.parse::<f64>()) {
+                (Ok(time), Ok(force)) => format!("{t},{p},{:.9},{y},{z}\n", force + 1e-7 * time),
+                _ => format!("{line}\n"),
+            },
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    std::fs::write(path("changed.csv"), changed).expect("written");
+    for (record, name) in [("examples/bench-day/record.csv", "one"), (&path("changed.csv"), "two")] {
+        run(&["calibrate", scheme, record, "-o", &path(name), "--quiet"]);
+    }
+    let page = |now: &str, before: &str, name: &str| {
+        let (now, before) = (path(now), path(before));
+        let output =
+            run(&["report", "--calibration", &now, "--calibration", &before, "-o", &path(name), "--quiet"]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Html::parse_document(&std::fs::read_to_string(path(name)).expect("written"))
+    };
+    let other = texts(&page("two", "one", "a.html"), "body").remove(0);
+    assert!(
+        other.contains("Changes since one") && other.contains("The coefficients changed: chi-square"),
+        "{other}"
+    );
+    let same = texts(&page("one", "one", "b.html"), "body").remove(0);
+    assert!(
+        same.contains("Both rest on examples/bench-day/record.csv, so that no change has a significance"),
+        "{same}"
+    );
+    let with_conditions = ["report", "--calibration", &path("one"), "--noise", "1e-5", "-o", &path("c.html")];
+    refused(&with_conditions, &["expected no conditions, --runs or --seed without a scheme"]);
+    refused(&["report", "-o", &path("d.html")], &["--calibration"]);
 }
 
 /// Number of A4 pages that a browser prints.
