@@ -225,6 +225,14 @@ impl Target {
     pub(crate) fn check(&self) -> Result<(), Failure> {
         let Some(path) = self.path() else { return Ok(()) };
         files::destination(path).map_err(|e| cannot_write(path, &e))?;
+        let folder = files::folder(path);
+        if !folder.is_dir() {
+            return Err(Failure::input(format!(
+                "cannot write {}: the folder {} does not exist",
+                path.display(),
+                folder.display()
+            )));
+        }
         match path.exists() && !self.force {
             true => Err(Failure::input(format!("{} exists; --force replaces it", path.display()))),
             false => Ok(()),

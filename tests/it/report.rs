@@ -341,6 +341,13 @@ fn a_verdict_leads_with_what_limits_it() {
         main.contains("no run or no evidence: ") && main.contains("expected one under [simulation"),
         "{main}"
     );
+    // of a file for a calibration, which states no noise of its outputs, likewise
+    for name in ["influenza", "theophylline"] {
+        let model = format!("examples/{name}/model.toml");
+        let page = Html::parse_document(&report(folder.path(), &format!("{name}.html"), &[&model]).1);
+        let main = texts(&page, "main").concat();
+        assert!(main.contains("no run or no evidence: the noise of"), "{main}");
+    }
     // D_SZ is excited neither at the start of the turn nor at the second position
     let excited: Vec<[String; 2]> = (table(&page, "Every unknown").iter())
         .filter(|r| r[0].starts_with("D_"))

@@ -359,7 +359,7 @@ fn changes_between_calibrations() {
     );
     let with_conditions = ["report", "--calibration", &path("one"), "--noise", "1e-5", "-o", &path("c.html")];
     refused(&with_conditions, &["expected no conditions, --runs or --seed without a scheme"]);
-    refused(&["report", "-o", &path("d.html")], &["--calibration"]);
+    refused(&["report", "-o", &path("d.html")], &["<FILE>"]);
 }
 
 /// Number of A4 pages that a browser prints.

@@ -163,14 +163,14 @@ impl Figure {
             self.lines.iter().flat_map(|l| &l.points).any(|p| of(p) > 0.0 && of(p).is_finite())
         };
         if self.log_y && anything(|p| p.1) {
-            layout = layout.with_log_y().with_y_tick_format(TickFormat::Sci);
+            layout = layout.with_log_y().with_y_tick_format(decades(self.ordinates()));
         }
         if self.log && anything(|p| p.0) && anything(|p| p.1) {
             layout = layout.with_log_scale();
             // plain numbers if all of them are short
             let short = |p: &(f64, f64)| (0.01..1e4).contains(&p.1);
             if !self.lines.iter().flat_map(|l| &l.points).all(short) {
-                layout = layout.with_y_tick_format(TickFormat::Sci);
+                layout = layout.with_y_tick_format(decades(self.ordinates()));
             }
         }
         if let Some((low, high)) = self.x_range {
@@ -203,12 +203,36 @@ impl Figure {
         layout
     }
 
+    /// Values of all lines.
+    fn ordinates(&self) -> impl Iterator<Item = f64> + '_ {
+        self.lines.iter().flat_map(|l| l.points.iter().map(|p| p.1))
+    }
+
     /// SVG of the figure.
     pub(crate) fn svg(&self) -> String {
         let plots = self.plots();
         let layout = self.layout(&plots);
         numbered(&kuva::render_to_svg(plots, layout))
     }
+}
+
+/// Number of labels of a logarithmic axis that fit a small figure.
+const LABELS: f64 = 6.0;
+
+/// Labels of a logarithmic axis with these values: powers of ten, of many decades every second or third one.
+fn decades(values: impl Iterator<Item = f64>) -> TickFormat {
+    let orders = values.filter(|x| *x > 0.0 && x.is_finite()).map(|x| x.log10().floor());
+    let (low, high) = orders.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    if high - low < 2.0 {
+        return TickFormat::Sci;
+    }
+    let every = ((high - low) / LABELS).ceil();
+    let label = move |x: f64| {
+        let (order, nearest) = (x.log10(), x.log10().round());
+        let shown = (order - nearest).abs() < 1e-6 && nearest.rem_euclid(every) < 0.5;
+        if shown { format!("1e{nearest}") } else { String::new() }
+    };
+    TickFormat::Custom(Arc::new(label))
 }
 
 /// Renumbers the ids of clips from 0. The library numbers them through the process, so that a picture would

@@ -178,6 +178,12 @@ mod tests {
         c_n_from_euler(&Float, &angles.map(|x: f64| (x.to_radians().cos(), x.to_radians().sin())))
     }
 
+    /// Gimbal angles of a scheme with these lines before its positions.
+    fn of(head: &str, positions: &[&str]) -> Vec<GimbalStation> {
+        let tables: String = positions.iter().map(|p| format!("[[position]]\n{p}\n")).collect();
+        scheme_file::read(&format!("{head}{tables}")).expect("a scheme").gimbal_sequence().expect("angles")
+    }
+
     fn distance(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> f64 {
         (0..9).map(|k| (a[k / 3][k % 3] - b[k / 3][k % 3]).abs()).fold(0.0, f64::max)
     }
@@ -213,13 +219,6 @@ mod tests {
     /// By hand: half a turn about North ends at alpha = -180, and the next turn starts there.
     #[test]
     fn turns_follow_each_other() {
-        let of = |head: &str, positions: &[&str]| {
-            let tables: String = positions.iter().map(|p| format!("[[position]]\n{p}\n")).collect();
-            scheme_file::read(&format!("{head}{tables}"))
-                .expect("a scheme")
-                .gimbal_sequence()
-                .expect("angles")
-        };
         let found = of("", &["attitude = 'NUE'", "attitude = 'NDW'", "attitude = 'NUE'"]);
         assert_eq!(found.iter().map(|s| s.at_deg).collect::<Vec<_>>()[..2], [[0.0; 3], [-180.0, 0.0, 0.0]]);
         assert_eq!(found[2].before_deg, [-180.0, 0.0, 0.0]);
@@ -237,13 +236,6 @@ mod tests {
     /// with limits of alpha a whole turn further may be the way.
     #[test]
     fn another_start_of_the_same_attitude() {
-        let of = |head: &str, positions: &[&str]| {
-            let tables: String = positions.iter().map(|p| format!("[[position]]\n{p}\n")).collect();
-            scheme_file::read(&format!("{head}{tables}"))
-                .expect("a scheme")
-                .gimbal_sequence()
-                .expect("angles")
-        };
         let found = of("", &["attitude = 'UEN'", "attitude = 'NUE'"]);
         assert!(found.iter().all(|s| s.obstacle.is_none()), "{found:?}");
         let start = of("", &["attitude = 'UEN'"]).remove(0).at_deg;

@@ -355,6 +355,13 @@ fn rest(worker: Option<&mut Worker>) {
     }
 }
 
+/// True if the file states a run: its duration, and the noise of every output. A file for a calibration may
+/// state a part of it, and is reviewed without a run.
+fn states_run(model: &SystemModel) -> bool {
+    let stated = &model.simulation;
+    stated.duration.is_some() && model.outputs.iter().all(|o| stated.noise.contains_key(&o.0.name))
+}
+
 /// Review of a model, with run and evidence if it has numbers for them.
 fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
     let analysis = analyze_system(model, SystemOptions { seed, ..SystemOptions::default() })?;
@@ -362,7 +369,7 @@ fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
     let run = simulate_system(model, seed);
     let evidence = run.as_ref().ok().map(|_| crosscheck_system(model, seed));
     let mut unless_wrong = |e: RunError| match e {
-        RunError::Model(error) if model.simulation.duration.is_some() => Err(error),
+        RunError::Model(error) if states_run(model) => Err(error),
         e => {
             refused = Some(e);
             Ok(())
