@@ -4588,9 +4588,11 @@ class Tolerance(Record):
     by_noise: bool
     """True if random drift or biases are stated, of whose tilt three sigma are added."""
     accelerometers_g: float
-    """Part of the tolerance, in g, for errors of the accelerometers: stated values, and three sigma of the stated priors and of the
-    bench.
+    """Part of the tolerance, in g, for errors of the accelerometers, of attitudes and of gravity: stated values, and three sigma of the
+    stated priors, of the bench and of the bias instability.
     """
+    not_counted: list[str]
+    """Families of the bench that are not part of the tolerance."""
     wide: list[str]
     """Names of the positions whose tolerance is so large that the readings tell little: above 0.25 g."""
 

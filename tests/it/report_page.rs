@@ -323,23 +323,27 @@ fn pages_of_the_bench() {
 fn changes_between_calibrations() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
-    let scheme = "examples/bench-day/scheme.toml";
-    let record = std::fs::read_to_string("examples/bench-day/record.csv").expect("a record");
-    // an output that grows by 1e-7 g/s, as a drift of 0.02 deg/h does: drifts change
-    let changed: String = record
-        .lines()
-        .map(|line| match line.split(',').collect::<Vec<_>>()[..] {
-            [t, p, x, y, z] => match (t.parse::<f64>(), x.parse::<f64>()) {
-                (Ok(time), Ok(force)) => format!("{t},{p},{:.9},{y},{z}\n", force + 1e-7 * time),
-                _ => format!("{line}\n"),
-            },
-            _ => format!("{line}\n"),
-        })
-        .collect();
-    std::fs::write(path("changed.csv"), changed).expect("written");
-    for (record, name) in [("examples/bench-day/record.csv", "one"), (&path("changed.csv"), "two")] {
-        run(&["calibrate", scheme, record, "-o", &path(name), "--quiet"]);
-    }
+    let bench_day = ["examples/bench-day/scheme.toml", "examples/bench-day/record.csv"];
+    let done = run(&["calibrate", bench_day[0], bench_day[1], "-o", &path("one"), "--quiet"]);
+    assert!(done.status.success());
+    // another record, by which D_FX is larger by five sigma of the change
+    let text = std::fs::read_to_string(path("one/calibration.json")).expect("written");
+    let mut other: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let names = other["covariance"]["names"].as_array().expect("names");
+    let k = names.iter().position(|n| n == "D_FX").expect("D_FX");
+    let variance = other["covariance"]["rescaled"][k][k].as_f64().expect("a variance");
+    let estimate = other["covariance"]["estimates"][k].as_f64().expect("an estimate");
+    other["covariance"]["estimates"][k] = json!(estimate + 5.0 * (2.0 * variance).sqrt());
+    other["rests_on"][0]["digest"] = json!("another");
+    let save = |name: &str, value: &serde_json::Value| {
+        std::fs::create_dir(path(name)).expect("a folder");
+        std::fs::write(path(&format!("{name}/calibration.json")), value.to_string()).expect("written");
+    };
+    save("two", &other);
+    other["consistent"] = json!(false);
+    save("doubtful", &other);
+    other["schema"] = json!("obsdeg.calibration/9");
+    save("newer", &other);
     let page = |now: &str, before: &str, name: &str| {
         let (now, before) = (path(now), path(before));
         let output =
@@ -347,7 +351,11 @@ fn changes_between_calibrations() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         Html::parse_document(&std::fs::read_to_string(path(name)).expect("written"))
     };
-    let other = texts(&page("two", "one", "a.html"), "body").remove(0);
+    let changed = page("two", "one", "a.html");
+    let rows: Vec<Vec<String>> = table(&changed, "Changes since one");
+    let row = rows.iter().find(|r| r[0] == "D_FX").expect("D_FX");
+    assert_eq!(row[5], "5.000", "{row:?}");
+    let other = texts(&changed, "body").remove(0);
     assert!(
         other.contains("Changes since one") && other.contains("The coefficients changed: chi-square"),
         "{other}"
@@ -356,6 +364,15 @@ fn changes_between_calibrations() {
     assert!(
         same.contains("Both rest on examples/bench-day/record.csv, so that no change has a significance"),
         "{same}"
+    );
+    let doubtful = texts(&page("one", "doubtful", "e.html"), "body").remove(0);
+    assert!(
+        doubtful.contains("A calibration here is not consistent")
+            && !doubtful.contains("coefficients changed")
+    );
+    refused(
+        &["report", "--calibration", &path("newer"), "-o", &path("f.html")],
+        &["a calibration of another version (obsdeg.calibration/9)"],
     );
     let with_conditions = ["report", "--calibration", &path("one"), "--noise", "1e-5", "-o", &path("c.html")];
     refused(&with_conditions, &["expected no conditions, --runs or --seed without a scheme"]);

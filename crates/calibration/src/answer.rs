@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::setup::{Basis, Setup};
 
 /// Name and version of the JSON layout.
-pub(crate) const SCHEMA: &str = "obsdeg.calibration/1";
+pub const LAYOUT: &str = "obsdeg.calibration/1";
 
 /// Calibration of a scheme from one or several records.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -440,6 +440,19 @@ pub struct CovarianceTable {
     /// Covariance, in products of the units of row and column, with errors of the data times the root of
     /// chi-square per degree of freedom, where that is above one; prior knowledge stays as it is.
     pub rescaled: Vec<Vec<f64>>,
+}
+
+impl CovarianceTable {
+    /// True if rows and columns are those of the names, with variances that are finite and not negative.
+    pub fn is_square(&self) -> bool {
+        let n = self.names.len();
+        let whole = |table: &Vec<Vec<f64>>| {
+            table.len() == n
+                && table.iter().all(|row| row.len() == n && row.iter().all(|x| x.is_finite()))
+                && (0..n).all(|k| table[k][k] >= 0.0)
+        };
+        self.units.len() == n && self.estimates.len() == n && whole(&self.covariance) && whole(&self.rescaled)
+    }
 }
 
 /// A further run that brings a coefficient closer to its requirement: a dwell at one attitude, calibrated

@@ -10,13 +10,21 @@ use crate::answer::{Calibration, CovarianceTable};
 pub struct CalibrationChange {
     /// Coefficients that both determine.
     pub coefficients: Vec<CoefficientChange>,
+    /// Coefficients that stated priors alone bound in one of the calibrations: they are not compared.
+    pub by_prior: Vec<String>,
+    /// True if both calibrations are consistent.
+    pub consistent: bool,
+    /// True if a bench or a suspected error adds to an uncertainty: it is part of the sigmas of the changes,
+    /// and all changes together have no significance.
+    pub with_bench: bool,
     /// Records that both rest on: the calibrations are not independent then, and no change has a
     /// significance.
     pub shared: Vec<String>,
     /// Differences of their setups beside the positions, in words; empty if both describe the same platform.
     pub differs: Vec<String>,
     /// Chi-square of all changes together, with its degrees of freedom and the probability of a larger one by
-    /// chance; `None` if the calibrations share records or no coefficient.
+    /// chance; `None` if the calibrations share records or no coefficient, are not consistent, or have a
+    /// bench.
     pub together: Option<ChangeTest>,
 }
 
@@ -64,7 +72,19 @@ fn part(table: &CovarianceTable, of: &[&String]) -> Option<DMatrix<f64>> {
 pub fn compared(now: &Calibration, before: &Calibration) -> CalibrationChange {
     let (here, there) = (&now.covariance, &before.covariance);
     let is_common = |name: &&String| !name.starts_with("psi") && there.names.contains(name);
-    let names: Vec<&String> = here.names.iter().filter(is_common).collect();
+    let estimated =
+        |c: &'_ Calibration, name: &String| c.quantities.iter().find(|e| e.name == *name).cloned();
+    let is_bound =
+        |name: &String| [now, before].iter().any(|c| estimated(c, name).is_some_and(|e| e.from_prior));
+    let (by_prior, names): (Vec<&String>, Vec<&String>) =
+        here.names.iter().filter(is_common).partition(|name| is_bound(name));
+    // what a bench and suspected errors add to the variance of an estimate
+    let outside = |c: &Calibration, name: &String| {
+        let Some(e) = estimated(c, name) else { return 0.0 };
+        let own = e.sigma.map_or(0.0, |s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
+        e.total.map_or(0.0, |t| (t * t - own * own).max(0.0))
+    };
+    let outside = |name: &String| outside(now, name) + outside(before, name);
     let value = |table: &CovarianceTable, name: &String| {
         let k = table.names.iter().position(|n| n == name)?;
         Some((*table.estimates.get(k)?, table.units.get(k)?.clone()))
@@ -72,14 +92,17 @@ pub fn compared(now: &Calibration, before: &Calibration) -> CalibrationChange {
     let both = part(here, &names).zip(part(there, &names)).map(|(a, b)| a + b);
     let changes = names.iter().enumerate().filter_map(|(k, name)| {
         let ((now, unit), (before, _)) = value(here, name).zip(value(there, name))?;
-        let sigma = both.as_ref()?[(k, k)].max(0.0).sqrt();
+        let sigma = (both.as_ref()?[(k, k)].max(0.0) + outside(name)).sqrt();
         Some(CoefficientChange { name: (*name).clone(), unit, before, change: now - before, sigma })
     });
     let coefficients: Vec<CoefficientChange> = changes.collect();
     let shares = |b: &&crate::setup::Basis| before.rests_on.iter().any(|o| o.digest == b.digest);
     let shared: Vec<String> = now.rests_on.iter().filter(shares).map(|b| b.record.clone()).collect();
     let positions = |c: &Calibration| crate::setup::Setup { positions: Vec::new(), ..c.setup.clone() };
-    let together = both.filter(|_| shared.is_empty() && !coefficients.is_empty()).and_then(|covariance| {
+    let with_bench = names.iter().any(|name| outside(name) > 0.0);
+    let consistent = now.consistent && before.consistent;
+    let is_tested = shared.is_empty() && !coefficients.is_empty() && consistent && !with_bench;
+    let together = both.filter(|_| is_tested).and_then(|covariance| {
         let d = DVector::from_iterator(coefficients.len(), coefficients.iter().map(|c| c.change));
         // entries differ by orders of magnitude: scaled to unit variances
         let scale = DMatrix::from_diagonal(&covariance.diagonal().map(|v| 1.0 / v.sqrt()));
@@ -91,5 +114,6 @@ pub fn compared(now: &Calibration, before: &Calibration) -> CalibrationChange {
     });
     let differs = positions(now).differences(&positions(before));
     let differs = differs.into_iter().filter(|d| !d.starts_with("number of positions")).collect();
-    CalibrationChange { coefficients, shared, differs, together }
+    let by_prior = by_prior.into_iter().cloned().collect();
+    CalibrationChange { coefficients, by_prior, consistent, with_bench, shared, differs, together }
 }

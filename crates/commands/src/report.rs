@@ -1,6 +1,7 @@
 //! Design review of schemes and models.
 
 use clap::Args;
+use obsdeg_calibration::answer::LAYOUT;
 use obsdeg_calibration::{Calibration, Setup};
 use obsdeg_core::system::SystemModel;
 use obsdeg_design::review::{DesignReview, ReviewError, ReviewOptions, review};
@@ -209,11 +210,22 @@ fn wrong_calibration(source: &Source, found: &str) -> Problem {
 /// Reads the calibration of a scheme.
 fn read_calibration(source: &Source) -> Result<Calibration, Problem> {
     let of_model = source.text.contains("\"obsdeg.system-calibration/");
-    serde_json::from_str(&source.text).map_err(|e| match of_model {
+    let read: Result<Calibration, _> = serde_json::from_str(&source.text);
+    let found = read.map_err(|e| match of_model {
         true => wrong_calibration(source, "the calibration of a model"),
         false if !source.text.trim_start().starts_with('{') => wrong_calibration(source, "no JSON"),
         false => wrong_calibration(source, &format!("no calibration, or one of another version ({e})")),
-    })
+    })?;
+    if found.schema != LAYOUT {
+        return Err(wrong_calibration(
+            source,
+            &format!("a calibration of another version ({})", found.schema),
+        ));
+    }
+    match found.covariance.is_square() {
+        true => Ok(found),
+        false => Err(wrong_calibration(source, "a covariance that is not one of its coefficients")),
+    }
 }
 
 /// Reads a calibration; returns it with the index of its scheme among `entries`.

@@ -23,7 +23,7 @@ fn grade(d: Decision) -> Grade {
 }
 
 /// Table of the limits with their guard bands. Before a run estimate and decision are blank.
-pub(crate) fn table(a: &AcceptanceReport) -> Block {
+pub(crate) fn table(heading: &str, a: &AcceptanceReport) -> Block {
     let filled = a.limits.iter().any(|l| l.decision.is_some());
     let uncertainty = if filled { "uncertainty" } else { "predicted uncertainty" };
     let columns = [
@@ -59,7 +59,7 @@ pub(crate) fn table(a: &AcceptanceReport) -> Block {
         ];
         texts.into_iter().map(Cell::from).chain([decision]).collect()
     };
-    Block::table("Acceptance", columns, a.limits.iter().map(row))
+    Block::table(heading, columns, a.limits.iter().map(row))
 }
 
 /// Rule of the decision, in sentences.

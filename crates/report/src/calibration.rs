@@ -738,7 +738,7 @@ impl Answer for Calibration {
             ));
         }
         if let Some(a) = &self.acceptance {
-            blocks.push(acceptance::table(a));
+            blocks.push(acceptance::table("Acceptance", a));
             blocks.push(Block::list("Decision rule", acceptance::rule(a)));
         }
         blocks.push(Block::list("Mode", mode(self)));

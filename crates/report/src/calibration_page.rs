@@ -26,7 +26,7 @@ pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) 
     blocks.push(Block::Status(vec![status(c, named)]));
     blocks.push(coefficients(c, before.first().map(|b| &b.1)));
     if let Some(a) = &c.acceptance {
-        blocks.push(acceptance::table(a));
+        blocks.push(acceptance::table("Acceptance", a));
         blocks.push(Block::list("Decision rule", acceptance::rule(a)));
     }
     for (earlier, b) in before {
@@ -151,7 +151,8 @@ fn budget(c: &Calibration) -> Block {
 
 /// Changes since an earlier calibration.
 fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
-    let independent = change.shared.is_empty();
+    let independent = change.shared.is_empty() && change.consistent;
+    let shares = !change.shared.is_empty();
     let columns = [
         left("coefficient"),
         left("unit"),
@@ -192,7 +193,22 @@ fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
             words::chance(t.probability)
         ));
     }
-    if !independent {
+    if !change.by_prior.is_empty() {
+        let all = names(change.by_prior.iter().map(String::as_str));
+        said.push(format!("not compared, since stated priors alone bound them: {all}"));
+    }
+    if !change.consistent {
+        said.push("a calibration here is not consistent: its sigmas are not to be relied upon, and no change has a \
+                   significance".into());
+    }
+    if change.with_bench {
+        said.push(
+            "the sigmas of the changes hold what the bench and suspected errors add to each calibration, as if the \
+             two were independent; all changes together have no significance"
+                .into(),
+        );
+    }
+    if shares {
         let shared = names(change.shared.iter().map(String::as_str));
         said.push(format!("both rest on {shared}, so that no change has a significance"));
     }

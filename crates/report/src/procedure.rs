@@ -259,6 +259,10 @@ fn tolerance(p: &Procedure) -> Vec<String> {
             .into(),
         format!("The tolerance allows a tilt of {} deg and the noise{drift}.", short(t.tilt_deg)),
     ];
+    if !t.not_counted.is_empty() {
+        let all = names(t.not_counted.iter().map(String::as_str));
+        out.push(format!("Not in the tolerance: the errors {all} of the bench."));
+    }
     if !t.wide.is_empty() {
         out.push(format!(
             "At {} the tolerance is above 0.25 g: a reading inside it does not exclude a wrong attitude.",
@@ -338,8 +342,8 @@ fn rules(p: &Procedure) -> Vec<String> {
     }
     if p.timed_turns && p.steps.iter().any(|s| s.turn.is_some()) {
         out.push(
-            "Turn at the stated rates. When late, stay at the position, go on recording, and note the time: \
-             longer dwells are no fault, slower turns are."
+            "Turn at the stated rates. When late, stay at the position, go on recording, and note the time; before \
+             `calibrate`, state the true dwell (dwell_s of the position in scheme.toml)."
                 .into(),
         );
     } else if !p.timed_turns {
@@ -386,7 +390,7 @@ impl Answer for Procedure {
         if let Some(a) = &self.acceptance {
             blocks.extend([
                 section("Acceptance"),
-                acceptance::table(a),
+                acceptance::table("", a),
                 Block::list("Decision rule", acceptance::rule(a)),
             ]);
         }

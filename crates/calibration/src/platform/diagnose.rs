@@ -25,8 +25,8 @@ use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
 use crate::answer::{
-    Assumed, Calibration, ChannelFit, CovarianceTable, Curvature, Estimated, FamilyLimit, Moved, PositionFit,
-    RecordReport, SCHEMA, SecondPath,
+    Assumed, Calibration, ChannelFit, CovarianceTable, Curvature, Estimated, FamilyLimit, LAYOUT, Moved,
+    PositionFit, RecordReport, SecondPath,
 };
 use crate::least_squares::{Information, Linearised, Rows, Solution, State};
 use crate::setup::{self, Setup};
@@ -371,7 +371,7 @@ impl Parts<'_> {
         let asked = (&self.conditions.bench[..], self.options.seed);
         let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, self.later, asked)?;
         let mut out = Calibration {
-            schema: SCHEMA.into(),
+            schema: LAYOUT.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             name: self.scheme.name.clone(),
             document: self.scheme.document.clone(),

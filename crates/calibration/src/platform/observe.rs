@@ -1003,6 +1003,14 @@ pub(crate) fn observe(
             record: out.name,
             position: scheme.positions[p].name.clone(),
             hint: match by {
+                By::Label | By::Both | By::Static if out.stays.len() <= p && p > 0 => {
+                    "its label does not occur (where the run ended before it, delete its [[position]] in the scheme)"
+                        .into()
+                }
+                By::Label | By::Both | By::Static if out.waiting > 0 => format!(
+                    "settle of {} s leaves none of its rows",
+                    scheme.recording.settle.unwrap_or_default()
+                ),
                 By::Label | By::Both | By::Static => "its label does not occur".into(),
                 By::Timeline => format!(
                     "the record is of {:.3} to {:.3} s, the scheme of 0 to {:.3} s (a column `position` says \

@@ -21,6 +21,8 @@ const STEP_DEG: f64 = 1.0;
 const LEAST_DEG: f64 = 0.01;
 /// Smallest step as a fraction of the turn.
 const LEAST_PART: f64 = 1e-5;
+/// Number of points in a step at which the rates of the gimbals are taken.
+const RATES: u32 = 8;
 /// Largest rate of a gimbal that can follow, as a multiple of the platform's rate.
 const FASTEST: f64 = 100.0;
 
@@ -184,6 +186,19 @@ impl Scheme {
     }
 }
 
+/// Magnitudes of the rates of alpha, beta, gamma at the attitude `c` for a turn about `about` in n, over the
+/// rate of the platform; zeros at `beta = +-90`, where they are not determined.
+fn gimbal_rates(c: &Matrix3<f64>, about: &[f64; 3]) -> [f64; 3] {
+    if is_locked(c) {
+        return [0.0; 3];
+    }
+    let [a, b, _] = euler_angles(c);
+    let ((sa, ca), (sb, cb)) = (a.sin_cos(), b.sin_cos());
+    // the gimbals turn left-handed about North, the middle axis Mx(alpha) e_y and Z_p
+    let inner = -(about[1] * sa + about[2] * ca) / cb;
+    [-about[0] + inner * sb, -(about[1] * ca - about[2] * sa), inner].map(f64::abs)
+}
+
 pub(super) fn degrees(angles: &Euler) -> [f64; 3] {
     angles.each_ref().map(|a| a.nanodeg() as f64 / 1e9)
 }
@@ -231,7 +246,8 @@ impl Gimbals {
     /// Follows a turn as [`Self::follow`] does; returns also the largest turn of each gimbal per turn of the
     /// platform.
     pub(super) fn followed(&self, start: [f64; 3], slew: &Slew) -> (Option<GimbalStop>, [f64; 3], [f64; 3]) {
-        let whole = slew.turn().angle_deg;
+        let turn = slew.turn();
+        let whole = turn.angle_deg;
         let (mut at, mut done, mut fastest) = (start, 0.0, [0.0f64; 3]);
         // a turn of very many degrees takes larger steps
         let least = LEAST_DEG.max(whole * LEAST_PART);
@@ -249,7 +265,10 @@ impl Gimbals {
                 let gimbal = Some(NAMES[k].into());
                 return (Some(GimbalStop { gimbal, at_deg, after_deg }), at, fastest);
             }
-            fastest = std::array::from_fn(|k| fastest[k].max((next[k] - at[k]).abs() / step));
+            for part in (0..=RATES).map(|j| (done + step * f64::from(j) / f64::from(RATES)) / whole) {
+                let own = gimbal_rates(&slew.at(part * slew.duration_s), &turn.about);
+                fastest = std::array::from_fn(|k| fastest[k].max(own[k]));
+            }
             (at, done) = (next, done + step);
         }
         (None, at, fastest)

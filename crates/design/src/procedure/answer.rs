@@ -162,9 +162,11 @@ pub struct Tolerance {
     pub by_priors: bool,
     /// True if random drift or biases are stated, of whose tilt three sigma are added.
     pub by_noise: bool,
-    /// Part of the tolerance, in g, for errors of the accelerometers: stated values, and three sigma of the
-    /// stated priors and of the bench.
+    /// Part of the tolerance, in g, for errors of the accelerometers, of attitudes and of gravity: stated
+    /// values, and three sigma of the stated priors, of the bench and of the bias instability.
     pub accelerometers_g: f64,
+    /// Families of the bench that are not part of the tolerance.
+    pub not_counted: Vec<String>,
     /// Names of the positions whose tolerance is so large that the readings tell little: above 0.25 g.
     pub wide: Vec<String>,
 }

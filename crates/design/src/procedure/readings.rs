@@ -8,7 +8,7 @@ use obsdeg_core::model::OmittedModel;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{
-    Conditions, Plan, SegmentKind, SimulationError, is_rate, resolve, si_per_shown,
+    Conditions, Plan, SegmentKind, Sensor, SimulationError, is_rate, resolve, si_per_shown,
 };
 
 use super::answer::{Step, StepKind, Tolerance};
@@ -62,6 +62,7 @@ pub(super) fn add(
         by_priors: some(&priors),
         by_noise: noisy(plan),
         accelerometers_g,
+        not_counted: not_counted(plan, conditions)?,
         wide: steps.iter().filter(wide).map(|s| s.position.clone()).collect(),
     })
 }
@@ -83,19 +84,35 @@ fn accelerometers(
     let stated: f64 = own.iter().map(|&c| values[c].abs()).sum();
     let model = OmittedModel::new(&plan.platform);
     let bench = Bench::of(&conditions.bench, &model).map_err(SimulationError::from)?;
-    let sizes = model
-        .terms()
-        .iter()
-        .zip(&bench.sizes)
-        .filter(|(t, _)| ["K", "M"].iter().any(|k| t.family.starts_with(k)));
-    let bench: f64 = sizes.map(|(t, size)| (size.unwrap_or(0.0) * si_per_shown(t.unit)).powi(2)).sum();
+    let sizes = model.terms().iter().zip(&bench.sizes).filter(|(t, _)| is_counted(t.family));
+    let mut bench: f64 = sizes.map(|(t, size)| (size.unwrap_or(0.0) * si_per_shown(t.unit)).powi(2)).sum();
+    let biases = plan.biases.iter().zip(plan.bias_sigmas());
+    let instability = biases.filter(|(b, _)| matches!(b.sensor, Sensor::Accelerometer(_)));
+    bench += instability.map(|(_, sigma)| sigma * sigma).sum::<f64>();
     let known: f64 = own.iter().map(|&c| priors[c].powi(2)).sum();
     Ok(stated + SIGMAS * (bench + known).sqrt())
 }
 
+/// True for a family of the bench that changes readings directly.
+fn is_counted(family: &str) -> bool {
+    family.starts_with('K') || family == "M" || family == "M3" || ["attitude", "gravity"].contains(&family)
+}
+
+/// Families of the bench that are not part of the tolerances.
+fn not_counted(plan: &Plan, conditions: &Conditions) -> Result<Vec<String>, ProcedureError> {
+    let model = OmittedModel::new(&plan.platform);
+    let bench = Bench::of(&conditions.bench, &model).map_err(SimulationError::from)?;
+    let stated = model.terms().iter().zip(&bench.sizes).filter(|(_, size)| size.is_some_and(|s| s > 0.0));
+    let mut out: Vec<String> =
+        stated.filter(|(t, _)| !is_counted(t.family)).map(|(t, _)| t.family.to_string()).collect();
+    out.dedup();
+    Ok(out)
+}
+
 /// True if random drift or biases are stated.
 fn noisy(plan: &Plan) -> bool {
-    !plan.biases.is_empty() || plan.noise_roots.iter().any(|root| root.iter().any(|x| *x != 0.0))
+    plan.biases.iter().any(|b| matches!(b.sensor, Sensor::Gyro(_)))
+        || plan.noise_roots.iter().any(|root| root.iter().any(|x| *x != 0.0))
 }
 
 /// Largest tilt of the platform in each position, in rad, by the linear model: that of the true values
