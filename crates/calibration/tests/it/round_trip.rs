@@ -339,7 +339,11 @@ fn faults_are_named() {
     assert!(e.contains("found `p4`, expected p3"), "{e}");
     let fewer: Vec<_> = samples.iter().filter(|s| s.label != "p6").cloned().collect();
     let e = of_csv(&bench, "F,I,O,S", csv(&fewer)).expect_err("no p6").to_string();
-    assert_eq!(e, "run.csv: the position p6 of the scheme has no samples: its label does not occur");
+    assert_eq!(
+        e,
+        "run.csv: the position p6 of the scheme has no samples: its label does not occur (where the run ended before \
+         it, delete its [[position]] in the scheme)"
+    );
     let e = of_csv(&bench, "F,I,O,S", csv(&samples).replace(",p5,", ",P5,")).expect_err("no P5").to_string();
     assert!(
         e.contains("column `position`: no position is called `P5`; expected p1, p2, p3, p4, p5, p6"),
