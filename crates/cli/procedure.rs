@@ -54,12 +54,12 @@ pub(crate) struct Arguments {
 pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     interrupt::ends()?;
     a.output.check_folder()?;
+    a.output.target.keeps(RECORD, 2, "the record of a run")?;
     a.asked.input.given = given;
     let rotations = a.rotations.as_deref().map(|path| read(path, "rotation table")).transpose()?;
     let planned = procedure(&a.asked, a.files.read()?, rotations.as_ref())?;
     let requirements = Some(&planned.sheet.requirements);
     a.met.check(requirements)?;
-    a.output.target.keeps(RECORD, 2, "the record of a run")?;
     a.output.write_folder(&planned.sheet, "procedure.json", || planned.files())?;
     a.output.target.drops(&["controller.csv", "controller.txt"], &planned.controller())?;
     if planned.sheet.executable { a.met.decide(requirements) } else { Err(Failure::check()) }

@@ -65,8 +65,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "PROGRAM", help_heading = "Output")]
     pdf_by: Option<PdfBy>,
 
-    /// What `obsdeg calibrate -o` wrote of a run: its folder, or calibration.json; may be given several
-    /// times. Without a FILE the report is that of the calibration
+    /// Folder that `obsdeg calibrate -o` wrote, or its calibration.json; may be given several times. Without
+    /// a FILE the report is that of the calibration
     #[arg(long, value_name = "FOLDER")]
     calibration: Vec<PathBuf>,
 

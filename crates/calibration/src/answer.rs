@@ -426,6 +426,26 @@ pub struct Estimated {
     pub left_open: bool,
 }
 
+impl Estimated {
+    /// Larger one of sigma and rescaled sigma, in the unit of `unit`; `None` if not determined.
+    pub fn larger_sigma(&self) -> Option<f64> {
+        self.sigma.map(|s| self.sigma_rescaled.map_or(s, |r| r.max(s)))
+    }
+
+    /// Uncertainty that requirements are judged by, in the unit of `unit`: the total, where something adds to
+    /// the larger sigma.
+    pub fn uncertainty(&self) -> Option<f64> {
+        self.total.or_else(|| self.larger_sigma())
+    }
+
+    /// Root sum of squares of what a bench and a suspected error add to the larger sigma, in the unit of
+    /// `unit`; `None` where nothing does.
+    pub fn outside(&self) -> Option<f64> {
+        let own = self.larger_sigma()?;
+        self.total.map(|t| (t * t - own * own).max(0.0).sqrt())
+    }
+}
+
 /// Estimates with the covariance of their errors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct CovarianceTable {

@@ -72,19 +72,14 @@ fn part(table: &CovarianceTable, of: &[&String]) -> Option<DMatrix<f64>> {
 pub fn compared(now: &Calibration, before: &Calibration) -> CalibrationChange {
     let (here, there) = (&now.covariance, &before.covariance);
     let is_common = |name: &&String| !name.starts_with("psi") && there.names.contains(name);
-    let estimated =
-        |c: &'_ Calibration, name: &String| c.quantities.iter().find(|e| e.name == *name).cloned();
-    let is_bound =
-        |name: &String| [now, before].iter().any(|c| estimated(c, name).is_some_and(|e| e.from_prior));
+    let estimated = |c: &Calibration, name: &String| c.quantities.iter().find(|e| e.name == *name).cloned();
+    let both_of =
+        |name: &String| [now, before].into_iter().filter_map(|c| estimated(c, name)).collect::<Vec<_>>();
     let (by_prior, names): (Vec<&String>, Vec<&String>) =
-        here.names.iter().filter(is_common).partition(|name| is_bound(name));
-    // what a bench and suspected errors add to the variance of an estimate
-    let outside = |c: &Calibration, name: &String| {
-        let Some(e) = estimated(c, name) else { return 0.0 };
-        let own = e.sigma.map_or(0.0, |s| e.sigma_rescaled.map_or(s, |r| r.max(s)));
-        e.total.map_or(0.0, |t| (t * t - own * own).max(0.0))
-    };
-    let outside = |name: &String| outside(now, name) + outside(before, name);
+        here.names.iter().filter(is_common).partition(|name| both_of(name).iter().any(|e| e.from_prior));
+    // variance that a bench and suspected errors add
+    let outside =
+        |name: &String| both_of(name).iter().filter_map(|e| Some(e.outside()?.powi(2))).sum::<f64>();
     let value = |table: &CovarianceTable, name: &String| {
         let k = table.names.iter().position(|n| n == name)?;
         Some((*table.estimates.get(k)?, table.units.get(k)?.clone()))

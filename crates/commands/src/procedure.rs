@@ -52,7 +52,10 @@ pub struct Procedure {
     pub tilt: f64,
 
     /// Table for a controller
-    #[arg(long, value_name = "DIALECT", default_value = "generic", help_heading = "Sheet", value_parser = one_of(DIALECTS))]
+    #[arg(
+        long, value_name = "DIALECT", default_value = "generic", help_heading = "Sheet",
+        value_parser = one_of(DIALECTS)
+    )]
     pub dialect: Dialect,
 
     /// With --rotations: attitude at the start, as for --angles

@@ -1,7 +1,6 @@
-//! Report of a calibration: what was found and whether it is enough, how well the record is explained, what
-//! the uncertainty consists of, and what changed since the calibration before.
+//! Report of a calibration: decision and coefficients, fit, budget of the uncertainty, and changes since
+//! earlier calibrations.
 
-use obsdeg_calibration::answer::Estimated;
 use obsdeg_calibration::{Calibration, CalibrationChange, compared};
 
 use crate::document::{Block, Cell, Document, Grade, estimate, left, number, optional, right};
@@ -20,7 +19,7 @@ pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) 
     let Some(((name, c), before)) = calibrations.split_first() else {
         return Document { title: String::new(), lead: Vec::new(), blocks: Vec::new() };
     };
-    let scheme = if c.name.is_empty() { "" } else { c.name.as_str() };
+    let scheme = c.name.as_str();
     let mut blocks = vec![title::of_one(&c.document, scheme), Block::Text(title::made(&c.version, origin))];
     let named = if name.is_empty() { "Calibration".into() } else { format!("Calibration {name}") };
     blocks.push(Block::Status(vec![status(c, named)]));
@@ -74,16 +73,6 @@ fn is_of_the_fit(b: &Block) -> bool {
     ["Fit", "Next runs", "Positions"].iter().any(|name| is_named(b, name))
 }
 
-/// Uncertainty by which requirements are judged: the total, else the larger sigma.
-fn uncertainty(e: &Estimated) -> Option<f64> {
-    e.total.or_else(|| larger(e))
-}
-
-/// Larger one of sigma and rescaled sigma.
-fn larger(e: &Estimated) -> Option<f64> {
-    e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)))
-}
-
 /// Coefficients with what decides about them; psi is that of the start of a record.
 fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
     let mut columns = vec![
@@ -98,14 +87,15 @@ fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
     ];
     columns.extend(before.is_some().then(|| right("before")));
     let rows = c.quantities.iter().filter(|e| !e.name.starts_with("psi")).map(|e| {
-        let u = uncertainty(e);
+        let u = e.uncertainty();
         let margin = u.zip(e.required_sigma).map(|(u, r)| r / u);
         let margin = match margin {
+            Some(m) if e.from_prior => Cell::graded(format!("{} (prior alone)", number(m)), Grade::Limited),
             Some(m) => Cell::graded(number(m), if m >= 1.0 { Grade::Good } else { Grade::Missed }),
             None if e.required_sigma.is_some() => Cell::graded("not determined", Grade::Missed),
             None => Cell::from("-"),
         };
-        let ratio = larger(e).zip(e.predicted_sigma).map(|(s, p)| s / p);
+        let ratio = e.larger_sigma().zip(e.predicted_sigma).map(|(s, p)| s / p);
         let texts = [
             e.name.clone(),
             e.unit.clone(),
@@ -118,14 +108,14 @@ fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
         row.extend([optional(e.predicted_sigma), optional(ratio)].map(Cell::from));
         if let Some(b) = before {
             let own = b.quantities.iter().find(|q| q.name == e.name);
-            row.push(Cell::from(own.map_or_else(|| "-".into(), |q| estimate(q.estimate, uncertainty(q)))));
+            row.push(Cell::from(own.map_or_else(|| "-".into(), |q| estimate(q.estimate, q.uncertainty()))));
         }
         row
     });
     Block::table("Coefficients", columns, rows)
 }
 
-/// What the uncertainty of each coefficient consists of.
+/// Budget of the uncertainty of each coefficient.
 fn budget(c: &Calibration) -> Block {
     let columns = [
         left("coefficient"),
@@ -137,9 +127,8 @@ fn budget(c: &Calibration) -> Block {
         right("of the requirement [%]"),
     ];
     let rows = c.quantities.iter().filter(|e| !e.name.starts_with("psi")).map(|e| {
-        let outside = e.total.zip(larger(e)).map(|(t, s)| (t * t - s * s).max(0.0).sqrt());
-        let used = uncertainty(e).zip(e.required_sigma).map(|(u, r)| 100.0 * u / r);
-        let numbers = [e.sigma, e.sigma_rescaled, outside, uncertainty(e), used].map(optional);
+        let used = e.uncertainty().zip(e.required_sigma).map(|(u, r)| 100.0 * u / r);
+        let numbers = [e.sigma, e.sigma_rescaled, e.outside(), e.uncertainty(), used].map(optional);
         [vec![e.name.clone(), e.unit.clone()], numbers.to_vec()].concat()
     });
     Block::table(

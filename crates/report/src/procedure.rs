@@ -1,6 +1,6 @@
 //! Sheet of a run: the page of the crew, and the tables of a controller.
 
-use obsdeg_core::model::{Carry, Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, GIMBAL_NAMES, Scheme, parse_attitude};
 use obsdeg_core::title_block::TitleBlock;
 use obsdeg_design::procedure::{Obstacle, ObstacleKind, Procedure, Step, StepKind, StepTurn};
 
@@ -37,25 +37,28 @@ fn turn(t: &StepTurn) -> String {
 /// Gimbals that turn much faster than the platform, with their rates.
 fn fast_gimbals(t: &StepTurn) -> Option<String> {
     let (rate, own) = (t.rate_deg_s?, t.gimbal_rates_deg_s?);
-    let fast = NAMES.iter().zip(own).filter(|(_, r)| *r > FAST * rate);
+    let fast = GIMBAL_NAMES.iter().zip(own).filter(|(_, r)| *r > FAST * rate);
     let all: Vec<String> = fast.map(|(name, r)| format!("{name} {} deg/s", short(r))).collect();
     (!all.is_empty()).then(|| format!("Gimbals reach {}.", all.join(", ")))
 }
 
-/// Names of the gimbals, outer to inner.
-const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
 /// Rate of a gimbal over that of the platform from which the sheet names it.
 const FAST: f64 = 2.0;
+
+/// Instruction on arrival at a position under reset carry; empty for the first position and other carries.
+fn again(p: &Procedure, s: &Step) -> &'static str {
+    let is_first = p.steps.first().is_some_and(|first| first.position == s.position);
+    if p.carry == Carry::Reset && !is_first { "Level and align the platform again. " } else { "" }
+}
 
 /// Instruction of a step.
 fn instruction(p: &Procedure, s: &Step) -> String {
     let label = &s.position;
     match (s.kind, &s.turn) {
         (StepKind::Set, _) => "Set the gimbals. Level and align the platform.".into(),
-        (StepKind::Wait, _) => format!("Wait for rest. Label: {label}. Compare the readings."),
+        (StepKind::Wait, _) => format!("{}Wait for rest. Label: {label}. Compare the readings.", again(p, s)),
         (StepKind::Record, _) => {
-            let again = p.carry == Carry::Reset && s.start_s > 0.0 && p.settle_s == 0.0;
-            let again = if again { "Level and align the platform again. " } else { "" };
+            let again = if p.settle_s > 0.0 { "" } else { again(p, s) };
             format!("{again}Record, a row every {} s or less. Label: {label}.", short(p.row_s))
         }
         (StepKind::Rotate, Some(t)) => {
@@ -67,7 +70,7 @@ fn instruction(p: &Procedure, s: &Step) -> String {
         }
         (StepKind::Turn, Some(t)) => match &t.gimbal {
             Some(gimbal) => {
-                let k = NAMES.iter().position(|name| name == gimbal).unwrap_or(0);
+                let k = GIMBAL_NAMES.iter().position(|name| name == gimbal).unwrap_or(0);
                 let [from, to] = [t.from_deg[k], s.gimbals_deg[k]].map(short);
                 let by = s.gimbals_deg[k] - t.from_deg[k];
                 let rate = t.rate_deg_s.map_or_else(String::new, |r| format!(", at {} deg/s", short(r)));
@@ -361,7 +364,7 @@ fn winding(p: &Procedure) -> Option<String> {
     let largest = |k: usize| {
         p.steps.iter().map(|s| s.gimbals_deg[k]).fold(0.0, |m: f64, x| if x.abs() > m.abs() { x } else { m })
     };
-    let wound = (0..3).filter(|&k| p.free_gimbals[k]).map(|k| (NAMES[k], largest(k)));
+    let wound = (0..3).filter(|&k| p.free_gimbals[k]).map(|k| (GIMBAL_NAMES[k], largest(k)));
     let wound = wound.filter(|(_, x)| x.abs() > 180.0);
     let all: Vec<String> = wound.map(|(name, x)| format!("{name} to {} deg", short(x))).collect();
     (!all.is_empty()).then(|| {
@@ -423,8 +426,8 @@ impl Answer for Procedure {
 /// [`ReportError::Csv`].
 pub fn steps_csv(p: &Procedure) -> Result<String, ReportError> {
     let header = "step,kind,position,start [s],duration [s],alpha [deg],beta [deg],gamma [deg],gimbal,about N,\
-                  about U,about E,about X_p,about Y_p,about Z_p,angle [deg],rate [deg/s],alpha rate [deg/s],beta rate [deg/s],gamma rate [deg/s],fx [g],fy [g],fz [g],\
-                  tolerance [g]";
+                  about U,about E,about X_p,about Y_p,about Z_p,angle [deg],rate [deg/s],\
+                  alpha rate [deg/s],beta rate [deg/s],gamma rate [deg/s],fx [g],fy [g],fz [g],tolerance [g]";
     let text = |x: f64| ((x * 1e9).round() / 1e9 + 0.0).to_string();
     let row = |s: &Step| -> Vec<String> {
         let kind = serde_json::to_value(s.kind).ok().and_then(|k| k.as_str().map(String::from));
@@ -478,7 +481,8 @@ pub fn procedure_page(p: &Procedure, scheme: &Scheme) -> Result<File, ReportErro
 /// Header of the record of a sheet, to be filled by the logger.
 pub fn record_header(p: &Procedure) -> String {
     let name = if p.name.is_empty() { "a scheme".into() } else { crate::visible(&p.name).into_owned() };
-    let labels: Vec<String> = p.after.iter().map(|a| crate::visible(&a.position).into_owned()).collect();
+    let mut labels: Vec<String> = p.steps.iter().map(|s| crate::visible(&s.position).into_owned()).collect();
+    labels.dedup();
     format!(
         "# record of {name}; position: {}, empty while the platform turns\n\
          t [s],position,fx [g],fy [g],fz [g]\n",

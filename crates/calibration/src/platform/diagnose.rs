@@ -622,8 +622,7 @@ impl MapBoth for (f64, f64) {
 /// error.
 fn total(e: &Estimated, outside: &Outside) -> Option<f64> {
     let named = |of: &[(String, f64)]| of.iter().find(|(name, _)| *name == e.name).map_or(0.0, |(_, x)| *x);
-    let own = e.sigma.map(|s| e.sigma_rescaled.map_or(s, |r| r.max(s)))?;
-    Some(own.hypot(named(&outside.bench)).hypot(named(&outside.suspected)))
+    Some(e.larger_sigma()?.hypot(named(&outside.bench)).hypot(named(&outside.suspected)))
 }
 
 /// Smallest size of each open family at which a total reaches its requirement, beside the bench.

@@ -1,8 +1,10 @@
 //! Gimbal angles along a scheme as the platform executes it, turn by turn.
 
-use super::attitude::c_n_f64;
+use super::attitude::{Matrix3, c_n_f64};
 use super::gimbal_turns::{GimbalStop, beside, clean, degrees, from_lock};
 use super::path::Path;
+use super::position::Position;
+use super::rotation::SlewTo;
 use super::scheme::Scheme;
 use super::slew::Slew;
 
@@ -102,10 +104,8 @@ impl Scheme {
     /// Gimbal angles along the scheme from those of the first position, in degrees.
     fn sequence_from(&self, first: [f64; 3]) -> Vec<GimbalStation> {
         let within = self.gimbal_angles();
-        let rate = 1f64.to_radians();
         let mut out: Vec<GimbalStation> = Vec::with_capacity(self.positions.len());
         for (i, p) in self.positions.iter().enumerate() {
-            let attitude = c_n_f64(&p.angles);
             let listed = if i == 0 { first } else { degrees(&within[i]) };
             let mut station = GimbalStation {
                 before_deg: out.last().map_or(listed, |s| s.after_deg),
@@ -122,47 +122,69 @@ impl Scheme {
                 let how = p.slew.clone().unwrap_or_default();
                 station.by_gimbals = how.axis.is_none() && self.path == Some(Path::Gimbals);
                 if station.by_gimbals {
-                    station.at_deg = degrees(&p.angles);
-                    let as_written = degrees(&before.angles) == station.before_deg;
-                    let mut from = start;
-                    for step in Path::gimbals(before, p).into_iter().flatten() {
-                        let turn = step.at_f64(&from);
-                        let slew = Slew::by(&from, &turn.axis.map(|x| x * turn.angle), rate);
-                        from = slew.at(slew.duration_s);
-                        station.turns.push(slew);
-                    }
-                    let inside = self.gimbals.hold(&before.angles) && self.gimbals.hold(&p.angles);
-                    station.obstacle = match (before.rotation.is_none(), inside, as_written) {
-                        (false, _, _) => Some(GimbalObstacle::Misses),
-                        (_, false, _) => Some(GimbalObstacle::Limits),
-                        (_, _, false) => Some(GimbalObstacle::Elsewhere),
-                        _ => None,
-                    };
+                    self.turn_gimbals(&mut station, before, p, start);
                 } else {
-                    match Slew::to(&start, &attitude, &how, rate) {
-                        Err(_) => station.obstacle = Some(GimbalObstacle::Misses),
-                        Ok(None) => station.at_deg = station.before_deg,
-                        Ok(Some(slew)) => {
-                            let (stop, reached, fastest) = self.gimbals.followed(station.before_deg, &slew);
-                            station.fastest = fastest;
-                            match stop {
-                                Some(stop) => station.obstacle = Some(GimbalObstacle::Stop(stop)),
-                                None => station.at_deg = snapped(reached.map(clean), degrees(&p.angles)),
-                            }
-                            station.turns.push(slew);
-                        }
-                    }
+                    self.turn_platform(&mut station, p, &start, &how);
                 }
             }
             station.after_deg = station.at_deg;
             if let Some(r) = &p.rotation {
-                let (stop, reached) = self.gimbals.follow(station.at_deg, &Slew::about(&attitude, r, 1.0));
+                let (stop, reached) =
+                    self.gimbals.follow(station.at_deg, &Slew::about(&c_n_f64(&p.angles), r, 1.0));
                 station.after_deg = reached.map(clean);
                 station.obstacle = station.obstacle.take().or(stop.map(GimbalObstacle::Stop));
             }
             out.push(station);
         }
         out
+    }
+
+    /// Adds the turns of the gimbals from one position, at the attitude `start`, to the next.
+    fn turn_gimbals(
+        &self,
+        station: &mut GimbalStation,
+        before: &Position,
+        p: &Position,
+        start: Matrix3<f64>,
+    ) {
+        let as_written = degrees(&before.angles) == station.before_deg;
+        let mut from = start;
+        for step in Path::gimbals(before, p).into_iter().flatten() {
+            let turn = step.at_f64(&from);
+            let slew = Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1f64.to_radians());
+            from = slew.at(slew.duration_s);
+            station.turns.push(slew);
+        }
+        let inside = self.gimbals.hold(&before.angles) && self.gimbals.hold(&p.angles);
+        station.at_deg = degrees(&p.angles);
+        station.obstacle = match (before.rotation.is_none(), inside, as_written) {
+            (false, _, _) => Some(GimbalObstacle::Misses),
+            (_, false, _) => Some(GimbalObstacle::Limits),
+            (_, _, false) => Some(GimbalObstacle::Elsewhere),
+            _ => None,
+        };
+    }
+
+    /// Adds the turn about one axis from the attitude `start` to a position, as `how` describes it.
+    fn turn_platform(&self, station: &mut GimbalStation, p: &Position, start: &Matrix3<f64>, how: &SlewTo) {
+        let slew = match Slew::to(start, &c_n_f64(&p.angles), how, 1f64.to_radians()) {
+            Ok(Some(slew)) => slew,
+            Ok(None) => {
+                station.at_deg = station.before_deg;
+                return;
+            }
+            Err(_) => {
+                station.obstacle = Some(GimbalObstacle::Misses);
+                return;
+            }
+        };
+        let (stop, reached, fastest) = self.gimbals.followed(station.before_deg, &slew);
+        station.fastest = fastest;
+        match stop {
+            Some(stop) => station.obstacle = Some(GimbalObstacle::Stop(stop)),
+            None => station.at_deg = snapped(reached.map(clean), degrees(&p.angles)),
+        }
+        station.turns.push(slew);
     }
 }
 

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::attitude::{Euler, Matrix3, angles_text, c_n_f64};
-use super::gimbals::{Gimbals, NAMES, ROUNDING, euler_angles, is_locked};
+use super::gimbals::{GIMBAL_NAMES, Gimbals, ROUNDING, euler_angles, is_locked};
 use super::path::Path;
 use super::scheme::{Position, Scheme};
 use super::slew::{Slew, Turn};
@@ -262,7 +262,7 @@ impl Gimbals {
             }
             if let Some((k, at_deg, part)) = self.first_passed(&at, &next) {
                 let after_deg = clean(done + part * step);
-                let gimbal = Some(NAMES[k].into());
+                let gimbal = Some(GIMBAL_NAMES[k].into());
                 return (Some(GimbalStop { gimbal, at_deg, after_deg }), at, fastest);
             }
             for part in (0..=RATES).map(|j| (done + step * f64::from(j) / f64::from(RATES)) / whole) {
@@ -363,7 +363,7 @@ mod tests {
                     let after_deg = stop.after_deg;
                     prop_assert_eq!(
                         (stop.gimbal.as_deref(), stop.at_deg),
-                        (Some(NAMES[k]), limits[k] as f64 * at[k].signum())
+                        (Some(GIMBAL_NAMES[k]), limits[k] as f64 * at[k].signum())
                     );
                     prop_assert!((after_deg - (step + 1) as f64 * h).abs() < 0.5, "{after_deg}");
                     return Ok(());

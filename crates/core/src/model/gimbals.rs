@@ -41,8 +41,8 @@ pub struct GimbalError {
     pub found: String,
 }
 
-/// The names of the Euler angles.
-pub(super) const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
+/// Names of the Euler angles and their gimbals, outer to inner.
+pub const GIMBAL_NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
 
 impl Gimbals {
     /// Sets one limit from a text such as `beta=-80:80`.
@@ -53,7 +53,7 @@ impl Gimbals {
         let parse = || {
             let (name, range) = text.split_once('=')?;
             let (low, high) = range.split_once(':')?;
-            let k = NAMES.iter().position(|n| *n == name.trim())?;
+            let k = GIMBAL_NAMES.iter().position(|n| *n == name.trim())?;
             let limits = [parse_decimal(low.trim()).ok()?, parse_decimal(high.trim()).ok()?];
             (limits[0] <= limits[1]).then_some((k, limits))
         };
@@ -246,7 +246,7 @@ fn is_singular(beta: i64) -> bool {
 
 impl fmt::Display for Gimbals {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let limited = NAMES.iter().zip(self.limits).filter_map(|(name, limit)| {
+        let limited = GIMBAL_NAMES.iter().zip(self.limits).filter_map(|(name, limit)| {
             limit
                 .map(|[low, high]| format!("{name} from {} to {}", format_decimal(low), format_decimal(high)))
         });

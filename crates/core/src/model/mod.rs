@@ -42,7 +42,7 @@ pub use error_model::{Columns, ErrorModel};
 pub use geometry::{Accelerometers, GYROS, Geometry, GeometryError, GyroAxes, SignedAxis};
 pub use gimbal_sequence::{GimbalObstacle, GimbalStation};
 pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
-pub use gimbals::{GimbalError, Gimbals, euler_of};
+pub use gimbals::{GIMBAL_NAMES, GimbalError, Gimbals, euler_of};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
 pub use omitted::{MAX_ATTITUDES, OmittedEffect, OmittedModel, OmittedTerm};

@@ -1,6 +1,4 @@
-//! What is known after each position of a sheet.
-
-use std::collections::BTreeSet;
+//! State of the coefficients after each position of a sheet.
 
 use obsdeg_core::model::{Platform, Scheme};
 use obsdeg_evidence::requirements::{Requirements, meets};
@@ -81,7 +79,7 @@ pub(super) fn progress(
         AfterPosition {
             position: position(k),
             end_s: judged[k].plan.duration_s(),
-            met: (0..names.len()).filter(|&c| is_met(c, k)).collect::<BTreeSet<_>>().len(),
+            met: (0..names.len()).filter(|&c| is_met(c, k)).count(),
             determines: named(&determined),
             meets: named(&met),
             uncertainty: sigmas[k].clone(),

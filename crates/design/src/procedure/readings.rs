@@ -2,7 +2,8 @@
 //!
 //! A platform without errors reads `f^c = -C_n^c g^n` in g. A tilt by an angle `a` changes each component by
 //! at most `2 sin(a/2)`. The tilt is the allowed one, the one that the stated true values give by the linear
-//! model, and three sigma of that by the stated priors.
+//! model, and three sigma of that by the stated priors and random drift. Stated errors of the accelerometers,
+//! of attitudes and of gravity add to it.
 
 use obsdeg_core::model::OmittedModel;
 use obsdeg_core::model::settings::Assignment;
@@ -40,7 +41,7 @@ pub(super) fn add(
     };
     let values = sizes("true value", conditions.stated_values())?;
     let priors = sizes("prior", conditions.stated_priors())?;
-    let accelerometers_g = accelerometers(plan, conditions, &values, &priors)?;
+    let (accelerometers_g, not_counted) = accelerometers(plan, conditions, &values, &priors)?;
     let tilts = tilts(plan, &values, &priors);
     let mut at_rest = 0;
     for step in steps.iter_mut().filter(|s| matches!(s.kind, StepKind::Record | StepKind::Wait)) {
@@ -62,7 +63,7 @@ pub(super) fn add(
         by_priors: some(&priors),
         by_noise: noisy(plan),
         accelerometers_g,
-        not_counted: not_counted(plan, conditions)?,
+        not_counted,
         wide: steps.iter().filter(wide).map(|s| s.position.clone()).collect(),
     })
 }
@@ -72,41 +73,35 @@ fn plan_position(plan: &Plan, i: usize) -> &str {
 }
 
 /// Largest change of a reading, in g, by errors of the accelerometers: the stated values, and three sigma of
-/// their priors and of the bench. A factor of g is at most 1.
+/// their priors, of the bench and of the bias instability. A factor of g is at most 1. Also the families of
+/// the bench that are not part of it.
 fn accelerometers(
     plan: &Plan,
     conditions: &Conditions,
     values: &[f64],
     priors: &[f64],
-) -> Result<f64, ProcedureError> {
+) -> Result<(f64, Vec<String>), ProcedureError> {
     let units = plan.platform.units();
     let own: Vec<usize> = (0..units.len()).filter(|&c| !is_rate(units[c]) && units[c] != "rad").collect();
     let stated: f64 = own.iter().map(|&c| values[c].abs()).sum();
     let model = OmittedModel::new(&plan.platform);
     let bench = Bench::of(&conditions.bench, &model).map_err(SimulationError::from)?;
-    let sizes = model.terms().iter().zip(&bench.sizes).filter(|(t, _)| is_counted(t.family));
-    let mut bench: f64 = sizes.map(|(t, size)| (size.unwrap_or(0.0) * si_per_shown(t.unit)).powi(2)).sum();
+    let sizes = model.terms().iter().zip(&bench.sizes).filter_map(|(t, size)| Some((t, (*size)?)));
+    let (counted, others): (Vec<_>, Vec<_>) =
+        sizes.filter(|(_, size)| *size > 0.0).partition(|(t, _)| is_counted(t.family));
+    let mut bench: f64 = counted.iter().map(|(t, size)| (size * si_per_shown(t.unit)).powi(2)).sum();
     let biases = plan.biases.iter().zip(plan.bias_sigmas());
     let instability = biases.filter(|(b, _)| matches!(b.sensor, Sensor::Accelerometer(_)));
     bench += instability.map(|(_, sigma)| sigma * sigma).sum::<f64>();
     let known: f64 = own.iter().map(|&c| priors[c].powi(2)).sum();
-    Ok(stated + SIGMAS * (bench + known).sqrt())
+    let mut others: Vec<String> = others.iter().map(|(t, _)| t.family.to_string()).collect();
+    others.dedup();
+    Ok((stated + SIGMAS * (bench + known).sqrt(), others))
 }
 
 /// True for a family of the bench that changes readings directly.
 fn is_counted(family: &str) -> bool {
     family.starts_with('K') || family == "M" || family == "M3" || ["attitude", "gravity"].contains(&family)
-}
-
-/// Families of the bench that are not part of the tolerances.
-fn not_counted(plan: &Plan, conditions: &Conditions) -> Result<Vec<String>, ProcedureError> {
-    let model = OmittedModel::new(&plan.platform);
-    let bench = Bench::of(&conditions.bench, &model).map_err(SimulationError::from)?;
-    let stated = model.terms().iter().zip(&bench.sizes).filter(|(_, size)| size.is_some_and(|s| s > 0.0));
-    let mut out: Vec<String> =
-        stated.filter(|(t, _)| !is_counted(t.family)).map(|(t, _)| t.family.to_string()).collect();
-    out.dedup();
-    Ok(out)
 }
 
 /// True if random drift or biases are stated.

@@ -1,7 +1,7 @@
 //! Steps of a sheet, with their times and gimbal angles.
 
 use obsdeg_core::model::slew::{Slew, apply, transpose};
-use obsdeg_core::model::{Dwell, GimbalObstacle, GimbalStation, Scheme};
+use obsdeg_core::model::{Dwell, GIMBAL_NAMES, GimbalObstacle, GimbalStation, Scheme};
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use super::answer::{Obstacle, ObstacleKind, Step, StepKind, StepTurn};
@@ -13,9 +13,6 @@ pub(super) struct Sheet {
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) total_s: f64,
 }
-
-/// Names of the gimbals, outer to inner.
-const GIMBALS: [&str; 3] = ["alpha", "beta", "gamma"];
 
 /// Steps of a scheme. Turns take time only where a rate is stated.
 ///
@@ -126,7 +123,7 @@ fn step_turn(
         rate_deg_s,
         from_deg,
         gimbal_rates_deg_s: rate_deg_s.map(|rate| fastest.map(|k| (k * rate * 100.0).round() / 100.0)),
-        gimbal: gimbal.map(|k| GIMBALS[k].into()),
+        gimbal: gimbal.map(|k| GIMBAL_NAMES[k].into()),
     }
 }
 
