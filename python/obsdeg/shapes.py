@@ -4522,9 +4522,10 @@ class Obstacle(Record):
     after_deg: float | None
     """Angle that the platform has turned by then, in degrees; null for other kinds."""
 
-StepKind = Literal["set", "turn", "wait", "record", "rotate"]
-"""Kind of a step of the sheet. set: Set the gimbals to the first position. turn: Turn to the next position, without recording. wait:
-Wait at rest, without recording. record: Record the outputs at rest. rotate: Record the outputs during a rotation.
+StepKind = Literal["set", "gimbals", "turn", "wait", "record", "rotate"]
+"""Kind of a step of the sheet. set: Set the gimbals to the first position. gimbals: Turn alpha and gamma together at beta = +-90 deg,
+while the platform rests and is recorded. turn: Turn to the next position, without recording. wait: Wait at rest, without recording.
+record: Record the outputs at rest. rotate: Record the outputs during a rotation.
 """
 
 

@@ -56,6 +56,13 @@ fn instruction(p: &Procedure, s: &Step) -> String {
     let label = &s.position;
     match (s.kind, &s.turn) {
         (StepKind::Set, _) => "Set the gimbals. Level and align the platform.".into(),
+        (StepKind::Gimbals, _) => {
+            let [alpha, _, gamma] = s.gimbals_deg.map(short);
+            format!(
+                "Before departure, the platform at rest and recorded: turn alpha to {alpha} deg and gamma to {gamma} \
+                 deg together, so that the attitude stays."
+            )
+        }
         (StepKind::Wait, _) => format!("{}Wait for rest. Label: {label}. Compare the readings.", again(p, s)),
         (StepKind::Record, _) => {
             let again = if p.settle_s > 0.0 { "" } else { again(p, s) };

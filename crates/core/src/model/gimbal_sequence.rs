@@ -14,6 +14,9 @@ pub struct GimbalStation {
     /// Gimbal angles alpha, beta, gamma before the turn to the position, in degrees; those of the position
     /// itself for the first.
     pub before_deg: [f64; 3],
+    /// True if `before_deg` are not the angles at the end of the position before: there, at `beta = +-90`,
+    /// alpha and gamma turn together while the platform rests.
+    pub shifted: bool,
     /// Turns of the platform to the position: one about one axis, or up to three gimbal by gimbal. Durations
     /// are those at one deg/s.
     pub turns: Vec<Slew>,
@@ -59,21 +62,30 @@ fn snapped(reached: [f64; 3], [a, b, g]: [f64; 3]) -> [f64; 3] {
 impl Scheme {
     /// Gimbal angles along the scheme. The first position is taken at the angles as written, or at others of
     /// the same attitude within the limits if the gimbals can follow from there only. A turn about one axis
-    /// is followed; gimbal by gimbal the angles as written are taken. `None` with generic angles.
+    /// is followed; where it begins at `beta = +-90` and cannot go on, alpha and gamma are turned together
+    /// before. Gimbal by gimbal the angles as written are taken. `None` with generic angles.
     pub fn gimbal_sequence(&self) -> Option<Vec<GimbalStation>> {
         if !self.generic_names().is_empty() {
             return None;
         }
         let within = self.gimbal_angles();
         let listed = degrees(within.first()?);
-        let written = self.sequence_from(listed);
+        let written = self.sequence_from(listed, false);
         let possible = |stations: &[GimbalStation]| stations.iter().all(|s| s.obstacle.is_none());
         // gimbal by gimbal the turns are those between the angles as written
         if possible(&written) || self.path == Some(Path::Gimbals) {
             return Some(written);
         }
-        let others = self.starts(listed).into_iter().map(|start| self.sequence_from(start));
-        Some(others.into_iter().find(|stations| possible(stations)).unwrap_or(written))
+        let starts = self.starts(listed);
+        let mut others = starts.iter().map(|start| self.sequence_from(*start, false));
+        if let Some(found) = others.find(|stations| possible(stations)) {
+            return Some(found);
+        }
+        let all = std::iter::once(&listed).chain(&starts).map(|start| self.sequence_from(*start, true));
+        // with alpha and gamma turned together at the lock, as far as that helps
+        let mut all: Vec<_> = all.collect();
+        let best = all.iter().position(|stations| possible(stations)).unwrap_or(0);
+        Some(all.swap_remove(best))
     }
 
     /// Gimbal angles of the attitude at `angles`, in degrees, within the limits: whole turns, the twin, and
@@ -101,14 +113,16 @@ impl Scheme {
         own.iter().flat_map(placed).collect()
     }
 
-    /// Gimbal angles along the scheme from those of the first position, in degrees.
-    fn sequence_from(&self, first: [f64; 3]) -> Vec<GimbalStation> {
+    /// Gimbal angles along the scheme from those of the first position, in degrees. `shifts`: alpha and gamma
+    /// may turn together at `beta = +-90`.
+    fn sequence_from(&self, first: [f64; 3], shifts: bool) -> Vec<GimbalStation> {
         let within = self.gimbal_angles();
         let mut out: Vec<GimbalStation> = Vec::with_capacity(self.positions.len());
         for (i, p) in self.positions.iter().enumerate() {
             let listed = if i == 0 { first } else { degrees(&within[i]) };
             let mut station = GimbalStation {
                 before_deg: out.last().map_or(listed, |s| s.after_deg),
+                shifted: false,
                 turns: Vec::new(),
                 fastest: [0.0; 3],
                 by_gimbals: false,
@@ -124,7 +138,7 @@ impl Scheme {
                 if station.by_gimbals {
                     self.turn_gimbals(&mut station, before, p, start);
                 } else {
-                    self.turn_platform(&mut station, p, &start, &how);
+                    self.turn_platform(&mut station, p, &start, &how, shifts);
                 }
             }
             station.after_deg = station.at_deg;
@@ -137,6 +151,28 @@ impl Scheme {
             out.push(station);
         }
         out
+    }
+
+    /// Gimbal angles of the same attitude at `beta = +-90` from which a turn goes on with beta, the nearest
+    /// first: the middle axis `Mx(alpha) e_y` lies along the part of the turn's axis across North. Empty
+    /// elsewhere.
+    fn shifted(&self, [a, b, g]: [f64; 3], slew: &Slew) -> Vec<[f64; 3]> {
+        let [_, up, east] = slew.turn().about;
+        if from_lock(b) > ROUNDED || up.hypot(east) < 1e-9 {
+            return Vec::new();
+        }
+        // at b = 90 only a - g counts, at b = -90 only a + g
+        let sign = b.to_radians().sin().signum();
+        let along = (-east).atan2(up).to_degrees();
+        let near = beside(along, a) - a;
+        let mut by: Vec<f64> = (-4..=4).map(|k| near + 180.0 * f64::from(k)).collect();
+        by.sort_by(|x, y| x.abs().total_cmp(&y.abs()));
+        let limits = self.gimbals.limits.map(|l| l.map(|l| l.map(|x| x as f64 / 1e9)));
+        let inside = |angles: &[f64; 3]| {
+            (0..3)
+                .all(|k| limits[k].is_none_or(|[low, high]| (low - 1e-9..=high + 1e-9).contains(&angles[k])))
+        };
+        by.into_iter().map(|by| [a + by, b, g + sign * by].map(clean)).filter(inside).collect()
     }
 
     /// Adds the turns of the gimbals from one position, at the attitude `start`, to the next.
@@ -166,7 +202,14 @@ impl Scheme {
     }
 
     /// Adds the turn about one axis from the attitude `start` to a position, as `how` describes it.
-    fn turn_platform(&self, station: &mut GimbalStation, p: &Position, start: &Matrix3<f64>, how: &SlewTo) {
+    fn turn_platform(
+        &self,
+        station: &mut GimbalStation,
+        p: &Position,
+        start: &Matrix3<f64>,
+        how: &SlewTo,
+        shifts: bool,
+    ) {
         let slew = match Slew::to(start, &c_n_f64(&p.angles), how, 1f64.to_radians()) {
             Ok(Some(slew)) => slew,
             Ok(None) => {
@@ -178,7 +221,16 @@ impl Scheme {
                 return;
             }
         };
-        let (stop, reached, fastest) = self.gimbals.followed(station.before_deg, &slew);
+        let mut followed = self.gimbals.followed(station.before_deg, &slew);
+        if shifts && followed.0.is_some() {
+            let others = self.shifted(station.before_deg, &slew).into_iter();
+            let found =
+                others.map(|from| (from, self.gimbals.followed(from, &slew))).find(|f| f.1.0.is_none());
+            if let Some((from, way)) = found {
+                (station.before_deg, station.shifted, followed) = (from, true, way);
+            }
+        }
+        let (stop, reached, fastest) = followed;
         station.fastest = fastest;
         match stop {
             Some(stop) => station.obstacle = Some(GimbalObstacle::Stop(stop)),
@@ -265,5 +317,21 @@ mod tests {
         let limited = "gimbals = { alpha_deg = [-170, 300] }\n";
         let found = of(limited, &["angles_deg = [-150, 0, 0]", "angles_deg = [150, 10, 0]"]);
         assert_eq!((found[0].at_deg, found[1].obstacle.as_ref()), ([210.0, 0.0, 0.0], None));
+    }
+
+    /// Positions at beta = +-90 in the middle of a scheme: alpha and gamma turn together at rest, which
+    /// leaves the attitude as it is, and every turn is possible.
+    #[test]
+    fn alpha_and_gamma_turn_together_at_the_lock() {
+        let names = ["NUE", "WND", "EDN", "DES", "USE"];
+        let positions: Vec<String> = names.iter().map(|n| format!("attitude = '{n}'")).collect();
+        let found = of("", &positions.iter().map(String::as_str).collect::<Vec<_>>());
+        assert!(found.iter().all(|s| s.obstacle.is_none()), "{found:?}");
+        assert!(found.iter().any(|s| s.shifted));
+        for pair in found.windows(2) {
+            let (end, start) = (matrix(pair[0].after_deg), matrix(pair[1].before_deg));
+            assert!(distance(&end, &start) < 1e-6, "{pair:?}");
+            assert!(pair[1].shifted || pair[0].after_deg == pair[1].before_deg);
+        }
     }
 }

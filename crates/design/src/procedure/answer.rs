@@ -122,6 +122,8 @@ pub struct Step {
 pub enum StepKind {
     /// Set the gimbals to the first position.
     Set,
+    /// Turn alpha and gamma together at beta = +-90 deg, while the platform rests and is recorded.
+    Gimbals,
     /// Turn to the next position, without recording.
     Turn,
     /// Wait at rest, without recording.

@@ -31,6 +31,9 @@ pub(super) fn sheet(
         if i == 0 {
             list.push(StepKind::Set, 0.0, station.at_deg, None);
         }
+        if station.shifted {
+            list.push(StepKind::Gimbals, 0.0, station.before_deg, None);
+        }
         let rate = conditions.slew_rate(p);
         let mut at = station.before_deg;
         for (turn, gimbal) in station.turns.iter().zip(gimbals(station)) {
