@@ -58,6 +58,8 @@ mod validator;
 mod whole_platform;
 mod why;
 mod workbench;
+mod workbench_design;
+mod workbench_fields;
 mod workbench_links;
 mod workbench_page;
 mod workbench_positions;

@@ -82,6 +82,15 @@ pub(crate) fn says(browser: &mut Browser, name: &str, column: usize, text: &str)
     wait(browser, name, &condition);
 }
 
+/// Condition that a field is marked as wrong, for a reason that contains `text`.
+pub(crate) fn wrong(id: &str, text: &str) -> String {
+    format!(
+        "(f => f.getAttribute('aria-invalid') == 'true' && \
+         f.getAttribute('aria-describedby').split(' ').includes('{id}-wrong') && \
+         document.getElementById('{id}-wrong').textContent.includes({text:?}))(document.getElementById({id:?}))"
+    )
+}
+
 pub(crate) fn click(browser: &mut Browser, selector: &str) {
     browser.mouse(selector, true);
 }

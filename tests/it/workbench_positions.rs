@@ -9,6 +9,7 @@ use crate::browser::Browser;
 use crate::program::run;
 use crate::workbench_page::{
     choose, click, drag, key, names, opened, place, quiet, root, says, scheme, swipe, thumb, wait, write,
+    wrong,
 };
 
 #[test]
@@ -78,7 +79,7 @@ fn positions_are_edited() {
     wait(b, "letters", "obsdeg.scheme().includes('attitude = \"UEN\"')");
     says(b, "D_IX", 3, "inseparable");
     write(b, "#letters", "NNE");
-    wait(b, "wrong letters", "document.getElementById('notice').textContent.includes('NNE')");
+    wait(b, "wrong letters", &wrong("letters", "NNE"));
     let answers = "performance.getEntriesByName('table').length";
     let before = b.value(answers);
     write(b, "#beta-number", "12.5");
@@ -86,7 +87,7 @@ fn positions_are_edited() {
     // the answer to an earlier question does not remove the refusal
     write(b, "#beta-number", "x");
     wait(b, "the answer before", &format!("{answers} > {before}"));
-    wait(b, "no number", "document.getElementById('notice').textContent.includes('beta: expected a number')");
+    wait(b, "no number", &wrong("beta-number", "beta: expected a number of degrees"));
     choose(b, "#snap", "45");
     assert_eq!(b.value("document.getElementById('gamma').step"), json!("45"));
     b.value("document.getElementById('gamma').focus(), 1");
@@ -101,7 +102,7 @@ fn positions_are_edited() {
     );
     // a refusal by the engine is shown, and the table is not presented as its verdict
     write(b, "#name", "<b>");
-    wait(b, "refused", "document.getElementById('notice').textContent.includes('position name')");
+    wait(b, "refused", &wrong("name", "position name"));
     wait(b, "stale", "document.getElementById('summary').textContent.startsWith('not judged')");
     write(b, "#name", "second");
     wait(b, "judged again", "document.getElementById('summary').textContent.startsWith('rank')");

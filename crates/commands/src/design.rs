@@ -376,6 +376,10 @@ impl Answer for Searched {
         self.found.document()
     }
 
+    fn sentences(&self) -> Vec<String> {
+        self.found.sentences()
+    }
+
     fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
         self.found.tables()
     }

@@ -625,6 +625,10 @@ impl Answer for Design {
         Document { title: format!("Design: {what}, {} carry", self.carry), lead: lead(self), blocks }
     }
 
+    fn sentences(&self) -> Vec<String> {
+        lead(self)
+    }
+
     fn main_table(&self) -> &'static str {
         if self.found.is_empty() { "answer" } else { "found" }
     }

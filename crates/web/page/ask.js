@@ -24,6 +24,7 @@ async function verdictsNow() {
     verdicts.now = null;
     $('verdicts').replaceChildren();
     drawSentences($('sentences'));
+    drawRemedies(null);
     put($('summary'), 'no position yet: add one');
     return;
   }
@@ -31,9 +32,10 @@ async function verdictsNow() {
   const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed);
   if (!found) return;
   $('verdicts').classList.toggle('stale', !!found.problem);
+  mendKind('engine');
   if (found.problem) {
     put($('summary'), 'not judged: what is below is of the scheme before');
-    return wrong(found.problem);
+    return wrongAt(found.problem, request.sources[0].text);
   }
   // a refusal that came after this question stays on the page
   if (Number($('notice').dataset.problem) <= before) { say(''); delete $('notice').dataset.problem; }
@@ -69,9 +71,11 @@ function askRest() {
     if (run && still()) {
       verdicts.sigmasOf = asked;
       verdicts.sigmas = null;
+      if (run.problem) wrongAt(run.problem, named[0].text);
     }
     if (run?.text && still()) {
       const { quantities, requirements, omitted } = JSON.parse(run.text);
+      verdicts.omitted = omitted;
       drawOmitted(omitted);
       const missed = new Map(requirements.missed.map((m) => [m.name, m.why]));
       const totals = new Map((omitted?.budgets ?? []).map((b) => [b.unknown, b.total]));
@@ -135,7 +139,7 @@ const needed = { of: null, by: [] };
 function drawNeeds(needs) {
   [...$('positions').children].forEach((li, i) => {
     const n = needs?.[i];
-    put(li.querySelector('.need'), !n ? '' : n.lost.length ? `needed for ${n.lost.length}` : n.later.length ? `lowers ${n.later.length} degree${n.later.length > 1 ? 's' : ''}` : 'not needed');
+    put(li.querySelector('.need'), !n ? '' : n.lost.length ? `needed for ${n.lost.length}` : n.later.length ? `degree lower for ${n.later.length}` : 'not needed');
   });
 }
 

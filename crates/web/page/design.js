@@ -1,19 +1,52 @@
-// Search for the best schemes of the cardinal attitudes; the text of schemes and models.
+// Search for the best schemes; the text of schemes and models.
 
-async function search() {
+// numbers that limit a search, by their field: option of the request, least value, unit
+const LIMITS = { 'design-slew-rate': ['slew_rate', 0.001, 'deg/s'], 'design-max-slew': ['max_slew', 0, 's'], 'design-max-time': ['max_time', 0, 's'] };
+// fields of a search by what its errors say
+const OF_SEARCH = [[/^gimbal|gimbal limit/, 'design-gimbals'], [/^slew_rate|^slews of finite/, 'design-slew-rate'], [/^max_slew/, 'design-max-slew'],
+  [/^max_time/, 'design-max-time'], [/no coefficient of this scheme/, 'design-observable'], [/^criterion/, 'design-criterion'], [/^meet/, 'design-meet']];
+// words of the page for the options that the engine's texts name
+const OPTIONS = [[/requirement NAME=SIGMA \(.*\), or \[requirements\] in a scheme file/, 'requirements under Positions, such as D = 0.05, psi = 0.01'],
+  [/by slew_rate or the file of candidates/, 'by a slew rate'], [/^gimbal\b/, 'Gimbal limits'], [/^slew_rate\b/, 'Slew rate'], [/^max_slew\b/, 'Longest slew'], [/^max_time\b/, 'Total time'],
+  [/^meet\b/, 'Only schemes that meet every requirement'], [/^criterion margin/, 'The criterion margin'], [/\(--bench\)/, '(Bench under Positions)']];
+const inWords = (text) => OPTIONS.reduce((words, [option, name]) => words.replace(option, name), text);
+
+/** Entries of a list in a field. */
+const listIn = (id) => $(id).value.split(',').map((t) => t.trim()).filter(Boolean);
+
+/** The request of a search; null if a field holds something wrong, which is then shown there. */
+function searched() {
+  mendAll(['design-k', 'design-gimbals', 'design-observable', 'design-criterion', 'design-meet', ...Object.keys(LIMITS)]);
   const k = Number($('design-k').value);
-  if (!Number.isInteger(k) || k < 1) return void refuse(`K: expected a whole number from 1, found "${$('design-k').value}"`);
-  say('');
-  // the 24 cardinal attitudes under the conditions of the scheme
+  if (!Number.isInteger(k) || k < 1 || k > 100) fault('design-k', `K: expected a whole number from 1 to 100, found "${$('design-k').value}"`);
+  // the candidates under the conditions of the scheme
   const own = copy(state.scheme);
   if (!own.position?.length) own.position = [{ attitude: 'NUE' }];
-  const request = { positions: k, conditions_file: { name: state.name, text: toToml(own) }, criterion: $('design-criterion').value };
-  const wanted = $('design-observable').value.split(',').map((t) => t.trim()).filter(Boolean);
-  if (wanted.length) request.observable = wanted;
+  // more than are shown: rows of equal figures are folded
+  const request = { positions: k, keep: KEPT, conditions_file: { name: state.name, text: toToml(own) }, candidates: $('design-candidates').value, criterion: $('design-criterion').value, meet: $('design-meet').checked };
+  for (const [id, [key, least, unit]] of Object.entries(LIMITS)) {
+    const x = numberIn($(id));
+    if (x === undefined) continue;
+    if (x >= least) request[key] = x; else fault(id, `${labelOf(id)}: expected a number of ${unit}${least ? ` from ${least}` : ''}, found "${$(id).value}"`);
+  }
+  const [gimbal, observable] = [listIn('design-gimbals'), listIn('design-observable')];
+  const odd = gimbal.find((t) => !/^(alpha|beta|gamma)\s*=\s*[\d.+\-\u2212]+\s*:\s*[\d.+\-\u2212]+$/.test(t));
+  if (odd) fault('design-gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${odd}"`);
+  if (gimbal.length) request.gimbal = gimbal.map((t) => t.replaceAll('\u2212', '-').replaceAll(' ', ''));
+  if (observable.length) request.observable = observable;
+  const first = [...faults.keys()].find((id) => id.startsWith('design-'));
+  if (first) $(first).focus();
+  return first ? null : request;
+}
+
+async function search() {
+  const request = searched();
+  if (!request) return;
+  say('');
   $('design-go').disabled = true;
   $('design-stop').disabled = false;
-  $('found').replaceChildren();
-  foundOf = null;
+  // what was found before stays until this search has found something
+  searching = true;
   drawFoundOf();
   $('design-progress').removeAttribute('value');
   put($('design-said'), 'searching');
@@ -27,48 +60,109 @@ async function search() {
   try {
     const said = await searcher.ask('call', ['design', request], { going });
     if (said.problem) throw said.problem;
-    drawFound(JSON.parse(said.text), performance.now() - began, wanted);
+    drawFound(JSON.parse(said.text), performance.now() - began, request);
+    drawSentences($('found-sentences'), said.sentences.map(inWords));
     foundOf = conditions();
     ended = 1;
   } catch (problem) {
-    put($('design-said'), problem.message ?? String(problem));
+    const message = inWords(problem.message ?? String(problem)), id = OF_SEARCH.find(([of]) => of.test(problem.message ?? ''))?.[1];
+    if (id) fault(id, message);
+    put($('design-said'), id ? 'Not searched.' : message);
   }
+  searching = false;
+  drawFoundOf();
   $('design-progress').value = ended;
   $('design-go').disabled = false;
   $('design-stop').disabled = true;
 }
 
 // conditions of the listed schemes
-let foundOf = null;
+let foundOf = null, searching = false;
 const conditions = () => JSON.stringify({ ...state.scheme, position: 0, combinations: 0, name: 0, description: 0 });
 
 function drawFoundOf() {
   const old = foundOf !== null && foundOf !== conditions();
-  $('found').classList.toggle('stale', old);
+  for (const id of ['found', 'found-sentences', 'winner']) $(id).classList.toggle('stale', searching || old);
   put($('found-old'), old ? 'The conditions have changed since this search: its figures are of those before.' : '');
 }
 
-function drawFound(design, took, wanted) {
+/** Says which limits hold where the fields of the search are empty. */
+function drawLimits() {
+  const { gimbals = {}, simulation = {} } = state.scheme;
+  const limits = AXES.filter((axis) => gimbals[`${axis}_deg`]).map((axis) => `${axis}=${gimbals[`${axis}_deg`].join(':')}`).join(', ');
+  const rate = simulation.slew_rate_deg_s;
+  put($('design-limits'), `Where these are empty, the scheme's own hold: ${limits ? `gimbal limits ${limits}` : 'free gimbals'}, ${rate ? `slews at ${rate} deg/s` : 'slews that take no time'}. Slews that take time need inertial carry.`);
+}
+
+/** Loads a scheme that was found, with the limits of its search. */
+function load(f, number, request) {
+  edit((s) => {
+    for (const t of request.gimbal ?? []) {
+      const [angle, low, high] = t.split(/[=:]/);
+      (s.gimbals ??= {})[`${angle}_deg`] = [Number(low), Number(high)];
+    }
+    if (request.slew_rate !== undefined) (s.simulation ??= {}).slew_rate_deg_s = request.slew_rate;
+    s.position = f.angles.map((a) => positionOf(a, s.gimbals));
+    // the direction of a half turn is part of the scheme
+    f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
+    state.selected = 0;
+  });
+  show('scheme');
+  say(`Scheme ${number} of the search is loaded.`, 'fine');
+}
+
+/** Draws the positions of the best scheme. */
+function drawWinner(f) {
+  const pictures = f.angles.map((text, i) => {
+    const angles = text.split(',').map(Number);
+    const canvas = element('canvas'), caption = element('figcaption', { textContent: `${i + 1}: ${f.positions[i]}` });
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute('aria-label', `Position ${i + 1} of the best scheme: ${f.positions[i]}`);
+    return { angles, canvas, figure: element('figure', {}, canvas, caption) };
+  });
+  $('winner').replaceChildren(...pictures.map((p) => p.figure));
+  drawWinner.again = () => pictures.forEach(({ angles, canvas }) => {
+    if (canvas.clientWidth && angles.every(Number.isFinite)) drawPlatform(canvas, matrixOf(angles), { small: true });
+  });
+  drawWinner.again();
+}
+drawWinner.again = () => {};
+
+// schemes that are asked for, most rows of different figures, and most schemes in one row
+const KEPT = 300, ROWS = 10, EQUAL = 20;
+
+function drawFound(design, took, request) {
   const { search: how, minimum } = design;
   const proven = how.proven ? 'proven best' : 'best found';
   put($('design-said'), `${proven} of ${how.examined} sequences examined in ${(took / 1000).toFixed(1)} s`
-    + (minimum?.proven ? `; fewer than ${minimum.positions} of these attitudes do not make ${wanted.length ? wanted.join(', ') : 'every coefficient'} observable` : ''));
-  const rows = design.found.map((f, i) => {
-    const load = element('button', { type: 'button', textContent: 'Load' });
-    load.setAttribute('aria-label', `Load scheme ${i + 1} as positions`);
-    load.addEventListener('click', () => {
-      edit((s) => {
-        s.position = f.angles.map((a) => positionOf(a, s.gimbals));
-        // the direction of a half turn is part of the scheme
-        f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
-        state.selected = 0;
-      });
-      show('scheme');
-      say(`Scheme ${i + 1} of the search is loaded.`, 'fine');
-    });
-    return [load, f.positions.join(' '), `${f.value.toPrecision(4)} ${how.unit ?? ''}`, f.worst ?? '', String(f.worst_degree), f.requirements.stated ? `${f.requirements.met} of ${f.requirements.stated}` : 'none stated'];
+    + (minimum?.proven ? `; fewer than ${minimum.positions} of these attitudes do not make ${request.observable ? request.observable.join(', ') : 'every coefficient'} observable` : ''));
+  drawWinner(design.found[0]);
+  const loads = (f, i) => {
+    const button = element('button', { type: 'button', textContent: 'Load' });
+    button.setAttribute('aria-label', `Load scheme ${i + 1} as positions`);
+    button.addEventListener('click', () => load(f, i + 1, request));
+    return button;
+  };
+  // one row for all schemes of the same figures
+  const groups = new Map();
+  design.found.forEach((f, i) => {
+    const figures = [`${f.value.toPrecision(4)} ${how.unit ?? ''}`, f.worst ?? '', String(f.worst_degree), f.requirements.stated ? `${f.requirements.met} of ${f.requirements.stated}` : 'none stated', `${(f.total_s / 60).toFixed(0)} min`];
+    // the worst coefficient of the same scheme in other axes has another name
+    const key = JSON.stringify([figures[0], ...figures.slice(2)]);
+    if (!groups.has(key)) groups.set(key, { figures, schemes: [] });
+    groups.get(key).schemes.push([f, i]);
   });
-  $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met'], rows));
+  // the last scheme's row goes on where the list is cut
+  const last = design.found.length === KEPT ? [...groups.keys()].at(-1) : null;
+  const rows = [...groups].slice(0, ROWS).map(([key, { figures, schemes: [[f, i], ...others] }]) => {
+    const listed = others.slice(0, EQUAL).map(([g, j]) => element('p', {}, loads(g, j), ` ${g.positions.join(' ')}`));
+    // where as many as were asked for are listed, there may be more
+    const count = `${last === key ? 'at least ' : ''}${others.length} more with these figures`;
+    const same = element('details', {}, element('summary', { textContent: count }), ...listed,
+      ...(others.length > EQUAL ? [element('p', { className: 'soft', textContent: `The first ${EQUAL} of ${others.length}; the command line lists all (--keep).` })] : []));
+    return [loads(f, i), element('div', {}, f.positions.join(' '), ...(others.length ? [same] : [])), ...figures];
+  });
+  $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met', 'total time'], rows));
 }
 
 /** Position from the angles of an answer: by letters, unless gimbal limits require these angles. */
@@ -94,8 +188,9 @@ async function judgeText() {
   const area = $('text'), { problem, answer, math, sentences } = found;
   area.setAttribute('aria-invalid', problem ? 'true' : 'false');
   $('text-problem').replaceChildren();
-  $('text-why').hidden = true;
-  $('text-why').replaceChildren();
+  // the last answer stays while the text is wrong
+  for (const id of ['text-verdicts', 'text-why']) $(id).classList.toggle('stale', !!problem);
+  put($('text-old'), problem && $('text-verdicts').children.length ? 'The text is wrong: what follows is of the text before.' : '');
   if (problem) {
     const { place, message } = problem;
     $('text-problem').append(place ? `Line ${place.line}, column ${place.column}: ${message} ` : message);
@@ -111,9 +206,10 @@ async function judgeText() {
       });
       $('text-problem').append(go);
     }
-    $('text-verdicts').replaceChildren();
     return;
   }
+  $('text-why').hidden = true;
+  $('text-why').replaceChildren();
   const named = (q) => {
     const e = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
     putName(e, math[q.name ?? q.expression], q.name ?? q.expression);
@@ -129,15 +225,19 @@ async function judgeText() {
   const rows = answer.quantities.map((q) => [named(q), q.unit, WORDS[q.status] ?? q.status.replaceAll('_', ' '), String(q.degree ?? '\u2013'),
     q.degree === null ? (q.partners?.length ? `not told from ${q.partners.join(', ')}` : '') : solved(q.solution)]);
   const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
-  parts.unshift(...(sentences ?? []).map((text) => element('p', { textContent: `${text}.` })));
+  const lines = element('div');
+  drawSentences(lines, sentences);
+  parts.unshift(lines);
   if (answer.quantities.some((q) => q.degree !== null && !q.solution)) {
     parts.push(element('p', { className: 'soft', textContent: 'Solutions that are not here need the symbolic engine, which the command line has.' }));
   }
   const list = (title, items) => items?.length && parts.push(element('h3', { textContent: title }), element('ul', {}, ...items.map((t) => element('li', { textContent: t }))));
   list('Symmetries: these changes move no output', answer.symmetries?.map((s) => s.words));
-  list('Other directions', answer.other_directions?.map((d) => d.words ?? JSON.stringify(d)));
-  list('Invariants', answer.invariants?.map((i) => `${i.expression}${i.degree === null ? '' : `, degree ${i.degree}`}`));
-  list('Combinations', answer.combinations?.map((i) => `${i.expression ?? i.name}${i.degree === null ? '' : `, degree ${i.degree}`}`));
+  list('No other polynomial change is known', answer.other_directions?.map((names) => `${names.join(', ')} move together`));
+  const none = answer.rests_on_bound ? `not seen up to order ${answer.last_order}` : 'not observable';
+  const judged = (c) => `${c.expression}: ${c.degree === null ? none : `observable, degree ${c.degree}`}`;
+  list('Identifiable combinations', answer.invariants?.map(judged));
+  list('Combinations', answer.combinations?.map(judged));
   $('text-verdicts').replaceChildren(...parts);
 }
 
@@ -155,7 +255,7 @@ async function take() {
   if (await openText($('text').value, name)) {
     writing.own = false;
     show('scheme');
-  } else if ($('text').getAttribute('aria-invalid') !== 'true') refuse(`${name} is a model; expected a scheme, with [[position]] tables`);
+  } else if ($('text').getAttribute('aria-invalid') !== 'true') wrong({ message: `${name} is a model; expected a scheme, with [[position]] tables` });
 }
 
 /** Opens a text: a scheme as positions, anything else in the editor. */
@@ -198,5 +298,5 @@ function wireDesign() {
     put($('about'), '');
     setText(toToml(state.scheme), state.name);
   });
-  listeners.push(drawFoundOf);
+  listeners.push(drawFoundOf, drawLimits);
 }

@@ -20,6 +20,7 @@ function describe(p) {
 }
 
 function select(i, focus = false) {
+  if (i !== state.selected) mendAll(OF_POSITION);
   state.selected = i;
   gesture = null;
   drawPositions();
@@ -105,6 +106,7 @@ function lift(e) {
 
 /** Sets one Euler angle of the selected position. */
 function setAngle(axis, value, as) {
+  mendAll(['letters', `${AXES[axis]}-number`]);
   // the other two angles stay, also if they are names
   const { angles_deg: own } = chosen();
   const before = anglesOfPosition(chosen()) ?? (own?.length === 3 ? own : [0, 0, 0]);
@@ -131,8 +133,8 @@ function makeSliders() {
     });
     range.addEventListener('focus', () => { strip.axis = k; drawStrip(); });
     number.addEventListener('change', () => {
-      const x = Number(number.value.replace('\u2212', '-'));
-      if (!Number.isFinite(x) || number.value.trim() === '') return void refuse(`${axis}: expected a number of degrees, found "${number.value}"`);
+      const x = finite(number.value);
+      if (Number.isNaN(x)) return void fault(number.id, `${axis}: expected a number of degrees, found "${number.value}"`);
       strip.axis = k;
       setAngle(k, x);
     });
@@ -148,16 +150,16 @@ function drawSelected() {
   $('attitude').disabled = !p;
   $('which').textContent = p ? nameOfPosition(p, state.selected) : 'no position';
   const angles = p && anglesOfPosition(p);
-  const idle = (e) => document.activeElement !== e;
   AXES.forEach((axis, k) => {
     if (angles) $(axis).value = angles[k];
     $(axis).disabled = !angles;
     $(axis).setAttribute('aria-valuetext', angles ? `${shown(angles[k])} degrees` : 'by name');
-    $(`${axis}-number`).value = angles ? shown(angles[k]) : String(p?.angles_deg?.[k] ?? '');
+    // what is typed has been taken over, or refused
+    if (faults.get(`${axis}-number`) !== 'own') $(`${axis}-number`).value = angles ? shown(angles[k]) : String(p?.angles_deg?.[k] ?? '');
   });
-  if (idle($('letters'))) $('letters').value = (angles && lettersOf(matrixOf(angles))) ?? '';
-  if (idle($('name'))) $('name').value = p?.name ?? '';
-  if (idle($('own-dwell'))) $('own-dwell').value = p?.dwell_s ?? '';
+  fill('letters', angles && lettersOf(matrixOf(angles)));
+  fill('name', p?.name);
+  fill('own-dwell', p?.dwell_s);
   canvasSoon();
 }
 
@@ -167,7 +169,6 @@ const finite = (text) => {
   const x = text?.trim() ? Number(text.trim().replace('\u2212', '-')) : NaN;
   return Number.isFinite(x) ? x : NaN;
 };
-const refuse = (message) => wrong({ message });
 
 /** Sets a value of the scheme, or removes it. */
 function setKey(path, value, as) {
@@ -185,8 +186,10 @@ function wireConditions() {
   const field = (id, path, read) => $(id).addEventListener('change', () => {
     const value = read($(id));
     if (Number.isNaN(value) || (isPlain(value) && Object.values(value).some(Number.isNaN))) {
-      return void refuse(`${path}: expected ${isPlain(value) ? 'names and numbers such as D = 0.05' : 'a number'}, found "${$(id).value}"`);
+      const wanted = isPlain(value) ? `names and numbers such as ${id === 'bench' ? 'K0 = 20' : 'D = 0.05'}` : 'a number';
+      return void fault(id, `${labelOf(id)}: expected ${wanted}, found "${$(id).value}"`);
     }
+    mend(id);
     setKey(path, value);
   });
   const text = (e) => e.value.trim() || undefined;
@@ -198,16 +201,24 @@ function wireConditions() {
   field('latitude-number', 'latitude_deg', numberIn);
   for (const table of ['requirements', 'bench']) field(table, table, (e) => (e.value.trim() ? assignments(e.value) : undefined));
   $('latitude').addEventListener('pointerdown', () => { gesture = null; });
-  $('latitude').addEventListener('input', () => setKey('latitude_deg', Number($('latitude').value), 'latitude'));
-  $('generic').addEventListener('click', () => setKey('latitude_deg', undefined));
+  $('latitude').addEventListener('input', () => {
+    mend('latitude-number');
+    setKey('latitude_deg', Number($('latitude').value), 'latitude');
+  });
+  $('generic').addEventListener('click', () => {
+    mend('latitude-number');
+    setKey('latitude_deg', undefined);
+  });
   $('letters').addEventListener('change', () => {
     const letters = $('letters').value.trim().toUpperCase();
-    if (!matrixOfLetters(letters)) return void refuse(`X_p Y_p Z_p: expected directions of right-handed axes such as NUE, found "${letters}"`);
+    if (!matrixOfLetters(letters)) return void fault('letters', `X_p Y_p Z_p: expected directions of right-handed axes such as NUE, found "${letters}"`);
+    mendAll(['letters', ...AXES.map((axis) => `${axis}-number`)]);
     edit(() => { const p = chosen(); delete p.angles_deg; p.attitude = letters; });
   });
   const own = (id, key, read) => $(id).addEventListener('change', () => {
     const value = read($(id));
-    if (Number.isNaN(value)) return void refuse(`${key}: expected a number, found "${$(id).value}"`);
+    if (Number.isNaN(value)) return void fault(id, `${labelOf(id)}: expected a number of seconds, found "${$(id).value}"`);
+    mend(id);
     edit(() => { if (value === undefined) delete chosen()[key]; else chosen()[key] = value; });
   });
   own('name', 'name', text);
@@ -238,15 +249,14 @@ function wireConditions() {
 
 function drawConditions() {
   const s = state.scheme, run = s.simulation ?? {};
-  const put = (id, value) => { if (document.activeElement !== $(id)) $(id).value = value ?? ''; };
-  put('carry', s.carry ?? 'platform');
-  put('terms', Array.isArray(s.terms) ? s.terms.join(',') : s.terms ?? 'F,I,O,S');
-  put('dwell', run.dwell_s);
-  put('noise', run.accelerometer_noise_g);
-  put('drift-noise', run.drift_noise);
-  put('latitude-number', s.latitude_deg);
+  fill('carry', s.carry ?? 'platform');
+  fill('terms', Array.isArray(s.terms) ? s.terms.join(',') : s.terms ?? 'F,I,O,S');
+  fill('dwell', run.dwell_s);
+  fill('noise', run.accelerometer_noise_g);
+  fill('drift-noise', run.drift_noise);
+  fill('latitude-number', s.latitude_deg);
   $('latitude').value = s.latitude_deg ?? 28.2;
   $('latitude-note').textContent = s.latitude_deg === undefined ? 'Verdicts hold at nearly every latitude; sigmas and the arrow of the earth rate are of 28.2 deg.' : '';
   $('latitude').setAttribute('aria-valuetext', s.latitude_deg === undefined ? 'generic' : `${s.latitude_deg} degrees`);
-  for (const table of ['requirements', 'bench']) put(table, Object.entries(s[table] ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
+  for (const table of ['requirements', 'bench']) fill(table, Object.entries(s[table] ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
 }

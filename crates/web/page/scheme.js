@@ -84,6 +84,7 @@ function restore(from, to) {
   [state.scheme, state.selected, state.name] = JSON.parse(from.pop());
   gesture = null;
   emphasise();
+  mendAll([...faults.keys()]);
   changed();
 }
 
@@ -92,6 +93,7 @@ const redo = () => restore(future, past);
 
 /** Replaces the scheme by another. */
 function replace(scheme, name = 'scheme.toml') {
+  mendAll([...faults.keys()]);
   edit(() => {
     state.scheme = scheme;
     state.scheme.position ??= [];

@@ -2,7 +2,7 @@
 
 const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
 // verdicts of the current scheme and of the one before the last gesture; sigmas by name
-const verdicts = { now: null, before: null, sigmas: null, sigmasOf: null, solutions: null, solutionsOf: null };
+const verdicts = { now: null, before: null, sigmas: null, omitted: null, sigmasOf: null, solutions: null, solutionsOf: null };
 
 /** Makes the verdicts of the table those that later changes are compared with. */
 function emphasise() { verdicts.before = verdicts.now ?? verdicts.before; }
@@ -69,7 +69,8 @@ function drawVerdicts() {
     const degree = cell(tr, 2, 'degree');
     const text = q.degree ?? '\u2013', was = differs ? ` was ${verdictOf(before)}` : '';
     if (degree.textContent !== text + was) degree.replaceChildren(String(text), ...(was ? [element('small', { textContent: was })] : []));
-    put(cell(tr, 3, 'status'), q.combined ? 'combination' : WORDS[q.status] ?? q.status);
+    const status = WORDS[q.status] ?? q.status;
+    put(cell(tr, 3, 'status'), q.combined ? `combination, ${q.degree === null ? 'not observable' : status}` : status);
     drawSigma(cell(tr, 4, 'sigma'), q.combined ? null : name);
     drawSolution(cell(tr, 5, 'solution'), q, name);
   });
@@ -87,6 +88,7 @@ function drawVerdicts() {
   const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}${!judged.missed.length && verdicts.limited ? ', while no error uses up a margin (Errors that are not estimated)' : ''}` : '';
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
   drawSentences($('sentences'), verdicts.now.sentences);
+  drawRemedies(answer.to_resolve);
   offerStrip(rows);
 }
 
@@ -100,23 +102,91 @@ function classes(f) {
 /** Draws the families of errors that are not estimated, and the change of the estimates per unit of each. */
 function drawOmitted(omitted) {
   $('not-estimated').hidden = !omitted;
+  $('omitted-terms').hidden = !omitted || $('omitted-terms').hidden;
   if (!omitted) return;
   const used = omitted.families.some((f) => f.uses_up);
   const head = ['family (terms)', 'class', 'worst change', 'of', 'as large as sigma at', 'seen from (3 sigma)', ...(used ? ['uses up a margin at'] : [])];
   const usedUp = (f) => (f.uses_up ? `${two(f.uses_up.size)} ${f.unit} (${f.uses_up.unknown})` : '\u2013');
-  const rows = omitted.families.map((f) => [`${f.family} (${f.terms})`, classes(f),
+  const opens = (f) => {
+    const open = element('button', { type: 'button', className: 'why', textContent: `${f.family} (${f.terms})`, title: 'What each of its terms changes' });
+    open.addEventListener('click', () => drawTerms(omitted, f.family));
+    return open;
+  };
+  const rows = omitted.families.map((f) => [opens(f), classes(f),
     f.worst ? `${Math.abs(f.worst.per_unit).toPrecision(4)} ${f.worst.unit} per ${f.unit}` : '\u2013', f.worst?.unknown ?? '\u2013',
     f.worst_in_sigmas ? `${two(1 / f.worst_in_sigmas)} ${f.unit}` : '\u2013', f.visible_from === null ? '\u2013' : `${two(f.visible_from)} ${f.unit}`, ...(used ? [usedUp(f)] : [])]);
-  const row = (cells, kind, more = {}) => element('tr', {}, ...cells.map((textContent) => element(kind, { textContent, ...more })));
-  const table = element('table', {}, element('thead', {}, row(head, 'th', { scope: 'col' })), element('tbody', {}, ...rows.map((cells) => row(cells, 'td'))));
-  $('omitted').replaceChildren(table);
+  $('omitted').replaceChildren(tableOf(head, rows));
+  if (!$('omitted-terms').hidden) drawTerms(omitted, $('omitted-terms').dataset.family);
 }
 
-/** Shows the first lines of the answer, and remedies for unknowns that are not observable. */
+const perUnit = (x) => `${x.per_unit.toPrecision(3)} ${x.unit}`;
+
+/** Draws the terms of a family of errors that are not estimated: what one unit of each changes. */
+function drawTerms(omitted, family) {
+  const box = $('omitted-terms'), terms = omitted.terms.filter((t) => t.family === family);
+  box.hidden = !terms.length;
+  box.dataset.family = family;
+  const size = (t) => (t.size === null ? [] : [`${two(t.size)} ${t.unit}`]);
+  const stated = terms.some((t) => t.size !== null);
+  const largest = (t) => [...t.sensitivities].sort((a, b) => Math.abs(b.per_unit) - Math.abs(a.per_unit));
+  const rows = terms.map((t) => [t.name, ...(stated ? [size(t)[0] ?? '\u2013'] : []), t.class?.replace('_', ' ') ?? '\u2013',
+    largest(t).map((x) => `${x.unknown} ${perUnit(x)}`).join(', ') || 'nothing', t.visible_from === null ? '\u2013' : `${two(t.visible_from)} ${t.unit}`]);
+  const heads = ['error', ...(stated ? ['stated size'] : []), 'class', `changes per ${terms[0]?.unit ?? 'unit'}: estimate minus truth`, 'seen from (3 sigma)'];
+  box.replaceChildren(closable(box, `${family}: each error by itself`), tableOf(heads, rows));
+}
+
+/**
+ * Errors that are not estimated and change the estimate of an unknown, those of a stated size first, the
+ * largest change before; null if there are none.
+ */
+function changersOf(omitted, name) {
+  const found = (omitted?.terms ?? []).flatMap((t) => t.sensitivities.filter((x) => x.unknown === name).map((x) => [t, x]));
+  if (!found.length) return null;
+  const effect = ([t, x]) => Math.abs(x.per_unit) * (t.size ?? 0);
+  const stated = found.some(([t]) => t.size !== null), sigma = verdicts.sigmas?.get(name)?.predicted_sigma;
+  found.sort((a, b) => effect(b) - effect(a));
+  const rows = found.map(([t, x]) => [t.name, `${perUnit(x)} per ${t.unit}`, ...(stated ? [t.size === null ? '\u2013' : `${two(t.size)} ${t.unit}`, t.size === null ? '\u2013' : `${two(Math.abs(x.per_unit) * t.size)} ${x.unit}`] : []),
+    sigma ? `${two(sigma / Math.abs(x.per_unit))} ${t.unit}` : '\u2013']);
+  const heads = ['error', 'change of the estimate', ...(stated ? ['stated size', 'its change'] : []), 'as large as sigma at'];
+  const count = rows.length === 1 ? 'One error that is not estimated changes' : `${rows.length} errors that are not estimated change`;
+  return element('details', { className: 'changers' }, element('summary', { textContent: `${count} the estimate of ${name}` }), tableOf(heads, rows));
+}
+
+const RESOLVE = 'To resolve ';
+
+/** Shows the first lines of the answer: the verdict in a sentence, then what resolves the rest. */
 function drawSentences(e, sentences = []) {
   if (e.dataset.of === sentences.join('\n')) return;
   e.dataset.of = sentences.join('\n');
-  e.replaceChildren(...sentences.map((text) => element('p', { textContent: `${text}.` })));
+  const [rest, remedies] = [false, true].map((of) => sentences.filter((text) => text.startsWith(RESOLVE) === of));
+  const lines = remedies.map((text) => element('li', { textContent: `${text.slice(RESOLVE.length)}.` }));
+  e.replaceChildren(...rest.map((text) => element('p', { textContent: text.endsWith('.') ? text : `${text}.` })),
+    ...(lines.length ? [element('h3', { textContent: 'To resolve' }), element('ul', {}, ...lines)] : []));
+}
+
+/** A change of a remedy that the page can make: its words, and the edit of the scheme. */
+function changeOf(change) {
+  if (change.kind === 'attitude') {
+    return [`Add ${change.attitude}`, (s) => {
+      s.position.push({ attitude: change.attitude });
+      state.selected = s.position.length - 1;
+    }];
+  }
+  return change.kind === 'carry' ? [`Take ${change.carry} carry`, (s) => { s.carry = change.carry; }] : null;
+}
+
+/** Buttons that make single changes which resolve unknowns. */
+function drawRemedies(resolve) {
+  const all = (resolve?.remedies ?? []).filter((r) => r.changes.length === 1).map((r) => [r, changeOf(r.changes[0])]).filter(([, change]) => change);
+  const key = JSON.stringify(all);
+  if ($('remedies').dataset.of === key) return;
+  $('remedies').dataset.of = key;
+  $('remedies').replaceChildren(...all.map(([{ resolves, loses }, [words, change]]) => {
+    const gains = resolves.map((r) => `${r.name} (degree ${r.degree})`).join(', ');
+    const button = element('button', { type: 'button', textContent: words, title: `resolves ${gains}${loses.length ? `; loses ${loses.join(', ')}` : ''}` });
+    button.addEventListener('click', () => edit(change));
+    return button;
+  }));
 }
 
 const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };

@@ -40,11 +40,12 @@ function axisOf(c, text) {
   return c.map((row) => (text[0] === '-' ? -1 : 1) * row[j]);
 }
 
-function drawView() {
-  const canvas = $('view');
-  if (!canvas.clientWidth) return;
-  const [c, w, h] = sheet(canvas), p = chosen();
-  const angles = p && anglesOfPosition(p), unit = Math.min(w, h) * 0.3;
+/**
+ * Draws the platform at an attitude (its axes as columns, in North, Up, East), on a canvas; without an attitude
+ * the directions of the site alone. Returns the directions of the axes in words. `small` leaves out the gyros.
+ */
+function drawPlatform(canvas, m, { small = false } = {}) {
+  const [c, w, h] = sheet(canvas), unit = Math.min(w, h) * (small ? 0.27 : 0.3);
   const at = (v, k = 1) => { const [x, y] = seen(v); return [w / 2 + unit * k * x, h / 2 + unit * k * y]; };
   const line = (from, to, stroke, width, dash = []) => {
     c.beginPath(); c.moveTo(...from); c.lineTo(...to);
@@ -71,13 +72,14 @@ function drawView() {
   };
   for (const [name, v] of [['N', [1, 0, 0]], ['U', [0, 1, 0]], ['E', [0, 0, 1]]]) {
     line(at([0, 0, 0]), at(v, 1.4), color('grey'), 1);
-    label(name, v, 1.45, color('grey'));
+    label(name, v, small ? 1.5 : 1.45, color('grey'));
   }
   const latitude = (state.scheme.latitude_deg ?? 28.2) * RAD, rate = [Math.cos(latitude), Math.sin(latitude), 0];
-  arrow([0, -1, 0], color('black'), 5, 1.12, 0.5); label('g', [0, -1, 0], 1.12, color('black'));
-  arrow(rate, color('purple'), 5, 1.12, 0.5); label('\u03c9', rate, 1.12, color('purple'));
-  if (!angles) { $('view-caption').textContent = p ? 'These angles are names: they have no picture.' : ''; return; }
-  const m = onTheWay ?? matrixOf(angles), geometry = state.scheme.geometry ?? GYROS;
+  arrow([0, -1, 0], color('black'), 5, 1.12, 0.5);
+  arrow(rate, color('purple'), 5, 1.12, 0.5);
+  if (!small) { label('g', [0, -1, 0], 1.12, color('black')); label('\u03c9', rate, 1.12, color('purple')); }
+  if (!m) return '';
+  const geometry = state.scheme.geometry ?? GYROS;
   const [x, y, z] = [0, 1, 2].map((j) => m.map((r) => r[j]));
   c.beginPath();
   [[1, 1], [1, -1], [-1, -1], [-1, 1]].forEach(([a, b]) => c.lineTo(...at(x.map((xi, i) => 0.42 * (a * xi + b * z[i])))));
@@ -85,7 +87,8 @@ function drawView() {
   c.strokeStyle = color('grey'); c.lineWidth = 1; c.stroke();
   [['X', x, 'blue'], ['Y', y, 'orange'], ['Z', z, 'green']].sort((a, b) => seen(a[1])[2] - seen(b[1])[2]).forEach(([name, v, hue]) => {
     arrow(v, color(hue), 2.4);
-    label(`${name}_p`, v, 1.04, color(hue), true);
+    label(small ? name : `${name}_p`, v, 1.04, color(hue), true);
+    if (small) return;
     const gyro = geometry[name] ?? geometry[name.toLowerCase()] ?? GYROS[name];
     // a ring about the input axis of the gyro, a square for the accelerometer
     const input = axisOf(m, gyro.I ?? GYROS[name].I), [rx, ry] = at(input, 0.62), [qx, qy] = at(v, 0.82);
@@ -105,7 +108,15 @@ function drawView() {
       .find(([, d]) => d.every((xi, i) => Math.abs(xi - v[i]) < 1e-6));
     return name ? name[0] : `(${v.map((xi) => shown(Math.round(xi * 1000) / 1000)).join(', ')})`;
   };
-  const text = `X_p points ${words(x)}, Y_p ${words(y)}, Z_p ${words(z)} in North, Up, East.`;
+  return `X_p points ${words(x)}, Y_p ${words(y)}, Z_p ${words(z)} in North, Up, East.`;
+}
+
+/** Draws the selected position. */
+function drawView() {
+  const canvas = $('view');
+  if (!canvas.clientWidth) return;
+  const p = chosen(), angles = p && anglesOfPosition(p);
+  const text = drawPlatform(canvas, angles && (onTheWay ?? matrixOf(angles))) || (p ? 'These angles are names: they have no picture.' : '');
   if ($('view-caption').textContent !== text) {
     $('view-caption').textContent = text;
     canvas.setAttribute('aria-label', `The platform: ${text} Arrow keys turn the view.`);
@@ -157,5 +168,5 @@ let soon = false;
 function canvasSoon() {
   if (soon) return;
   soon = true;
-  requestAnimationFrame(() => { soon = false; drawView(); drawStrip(); });
+  requestAnimationFrame(() => { soon = false; drawView(); drawStrip(); drawWinner.again(); });
 }

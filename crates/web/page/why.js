@@ -19,6 +19,13 @@ function noWhy(td) {
   return td;
 }
 
+/** The heading of a box, with a button that closes it. */
+function closable(box, heading) {
+  const close = element('button', { type: 'button', textContent: 'Close' });
+  close.addEventListener('click', () => { box.hidden = true; box.replaceChildren(); });
+  return element('div', { className: 'titled' }, element('h3', { textContent: heading }), close);
+}
+
 const questionOf = (named, name) => JSON.stringify([named, name]);
 
 /** Explains the verdict on an unknown of a text; the answer replaces the content of a box. `more` has options. */
@@ -33,22 +40,31 @@ async function explain(box, named, name, more = {}) {
   const said = await behind.ask('call', ['analyze', request], { lane: box.id }).catch((problem) => ({ problem }));
   if (!said || box.hidden || box.dataset.question !== question) return;
   box.classList.remove('stale');
-  const close = element('button', { type: 'button', textContent: 'Close' });
-  close.addEventListener('click', () => { box.hidden = true; box.replaceChildren(); });
   const [e] = said.explanations ?? [];
-  const head = element('div', { className: 'titled' }, element('h3', { textContent: e?.heading ?? name }), close);
+  const head = closable(box, e?.heading ?? name);
   if (!e) return void box.replaceChildren(head, element('p', { textContent: said.problem?.message ?? '' }));
   const lines = element('ul', {}, ...e.lines.map((textContent) => element('li', { textContent })));
   const changes = e.rows.length ? tableOf(e.columns, e.rows, e.improvements) : element('p', { textContent: `${e.improvements}: ${e.no_change}.` });
   box.replaceChildren(head, lines, changes);
+  addChangers();
   box.scrollIntoView({ block: 'nearest' });
 }
 
 /** Explains the verdict on an unknown of the scheme. */
 const explainScheme = (name) => explain($('why'), source(state.scheme), name, { omitted: false });
 
+/** Adds to an open explanation the errors that change the estimate, once the figures of the scheme are there. */
+function addChangers() {
+  const box = $('why');
+  if (box.hidden || box.querySelector('.changers') || verdicts.sigmasOf !== JSON.stringify(state.scheme)) return;
+  if (box.dataset.question !== questionOf(source(state.scheme), box.dataset.name) || !box.querySelector('ul')) return;
+  const changers = changersOf(verdicts.omitted, box.dataset.name);
+  if (changers) box.append(changers);
+}
+
 /** Asks again for an open explanation of an earlier scheme. */
 function explainAgain() {
+  addChangers();
   const box = $('why');
   if (!box.hidden && box.dataset.question !== questionOf(source(state.scheme), box.dataset.name)) explainScheme(box.dataset.name);
 }

@@ -17,10 +17,11 @@ const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/page.css");
 const WORKER: &str = include_str!("../page/worker.js");
 /// Scripts of the page, in the order in which they run.
-const SCRIPTS: [&str; 11] = [
+const SCRIPTS: [&str; 12] = [
     include_str!("../page/engine.js"),
     include_str!("../page/geometry.js"),
     include_str!("../page/scheme.js"),
+    include_str!("../page/fields.js"),
     include_str!("../page/positions.js"),
     include_str!("../page/view.js"),
     include_str!("../page/table.js"),
