@@ -291,8 +291,7 @@ fn pages_of_the_bench() {
     // the status and the coefficients with their margins stand before the fit
     let body = texts(&calibration, "body").remove(0);
     let front = body.split("Fit and findings").next().unwrap_or_default();
-    for answer in
-        ["Requirements", "Consistent", "Recommended action", "D_FX", "margin", "uncertainty / predicted"]
+    for answer in ["Requirements", "Consistent", "Recommended action", "D_FX", "margin", "sigma / predicted"]
     {
         assert!(front.contains(answer), "{answer}");
     }

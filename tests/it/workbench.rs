@@ -387,6 +387,17 @@ fn the_tour_shows_what_it_says() {
     assert_eq!(b.value("document.querySelectorAll('.lit').length"), json!(0));
     assert_eq!(scheme(b), own);
     says(b, "D_FX", 2, "1");
+    // a file that is opened during the tour ends it, and stays
+    click(b, "#start-tour");
+    b.value(
+        "(() => { const held = new DataTransfer(); held.items.add(new File(['[[position]]\\nattitude = \"EUS\"'], \
+         'other.toml')); document.dispatchEvent(new DragEvent('drop', { dataTransfer: held, bubbles: true, cancelable: \
+         true })); })()",
+    );
+    wait(b, "no tour", "document.getElementById('tour').hidden && obsdeg.scheme().includes('EUS')");
+    click(b, "#undo");
+    click(b, "#undo");
+    wait(b, "the own scheme", "obsdeg.scheme().includes('mine')");
     // undo brings the scheme of the tour back
     click(b, "#undo");
     wait(b, "the tour's scheme", "document.querySelectorAll('#positions li').length == 6");

@@ -50,6 +50,17 @@ fn the_best_positions_are_found() {
     assert!(value.as_str().is_some_and(|v| v.starts_with(&best.to_string()[..4])), "{value} {best}");
     choose(b, "#design-criterion", "worst");
     write(b, "#design-observable", "");
+    // what was found under conditions that changed meanwhile says so
+    write(b, "#design-k", "5");
+    click(b, "#design-go");
+    choose(b, "#carry", "reset");
+    wait(
+        b,
+        "of those before",
+        "document.getElementById('design-stop').disabled && document.getElementById('found-old').textContent != ''",
+    );
+    choose(b, "#carry", "inertial");
+    wait(b, "of these", FOUND);
     // a longer search is stopped, and the next one starts
     click(b, "#tab-design");
     write(b, "#design-k", "9");
@@ -176,6 +187,8 @@ fn a_search_has_limits() {
     let stated = found[0]["worst_sigma_dph"].as_f64().expect("a number");
     assert!((sigma / stated - 1.0).abs() < 0.02, "{sigma} {stated}");
     click(b, "#tab-design");
+    // loading changes the conditions to those of the search, not away from them
+    assert_eq!(b.value("document.getElementById('found-old').textContent"), json!(""));
     let limits = b.value("document.getElementById('design-limits').textContent");
     assert!(
         limits.as_str().is_some_and(|t| t.contains("alpha=-100:100, beta=-100:100, slews at 2 deg/s")),
@@ -206,7 +219,7 @@ fn errors_of_a_search_stand_at_their_fields() {
         b,
         "design-slew-rate",
         "fast",
-        "Slew rate: expected a number of deg/s from 0.001, found \"fast\"",
+        "Slew rate: expected a number of deg/s from 0.001 to 10000, found \"fast\"",
     );
     // slews that take time need inertial carry
     refused(b, "design-slew-rate", "2", "expected inertial");
@@ -225,6 +238,13 @@ fn errors_of_a_search_stand_at_their_fields() {
             _ => choose(b, "#design-criterion", "worst"),
         }
     }
+    // a mended field is no longer marked
+    write(b, "#design-k", "x");
+    click(b, "#design-go");
+    wait(b, "wrong", &wrong("design-k", "found \"x\""));
+    assert_eq!(b.value("document.getElementById('design-said').textContent"), json!("Not searched."));
+    write(b, "#design-k", "4");
+    wait(b, "mended", "!document.querySelector('#panel-design .wrong')");
     // a mended request is searched
     write(b, "#design-k", "5");
     click(b, "#design-go");

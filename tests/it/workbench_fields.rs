@@ -1,5 +1,5 @@
-//! Fields of the workbench with wrong content, and what the page says beside its table: combinations, remedies,
-//! errors that are not estimated.
+//! Fields of the workbench with wrong content, and what the page says beside its table: combinations,
+//! remedies, errors that are not estimated.
 
 use serde_json::{Value, json};
 
@@ -16,6 +16,11 @@ fn errors_stand_at_their_fields() {
     let good = scheme(b);
     // refused by the page: the scheme and its verdicts stay, and so does the text
     for (field, text, said) in [
+        ("dwell", "0x10", "Dwell: expected a number, found \"0x10\""),
+        ("requirements", "D = 0.05 = 7", "Requirements: expected names and numbers"),
+        ("requirements", "= 5", "Requirements: expected names and numbers"),
+        ("requirements", "D = 1, D = 2", "Requirements: expected names and numbers"),
+        ("gimbals", "alpha=3", "Gimbal limits: expected angles and degrees"),
         ("dwell", "long", "Dwell: expected a number, found \"long\""),
         ("own-dwell", "1 h", "Dwell: expected a number of seconds"),
         ("latitude-number", "north", "Latitude: expected a number"),
@@ -27,14 +32,14 @@ fn errors_stand_at_their_fields() {
         assert_eq!(b.value(&format!("document.getElementById({field:?}).value")), json!(text));
         assert_eq!(scheme(b), good);
     }
-    assert_eq!(b.value("document.querySelectorAll('[aria-invalid=true]').length"), json!(5));
+    assert_eq!(b.value("document.querySelectorAll('[aria-invalid=true]').length"), json!(6));
     assert_eq!(b.value("document.getElementById('verdicts').classList.contains('stale')"), json!(false));
     // another edit keeps them, a good value removes its own, undo and redo remove all
     write(b, "#name", "first");
     wait(b, "named", "obsdeg.scheme().includes('first')");
-    assert_eq!(b.value("document.querySelectorAll('.wrong').length"), json!(5));
+    assert_eq!(b.value("document.querySelectorAll('.wrong').length"), json!(6));
     write(b, "#dwell", "200");
-    wait(b, "mended", "document.querySelectorAll('.wrong').length == 4");
+    wait(b, "mended", "document.querySelectorAll('.wrong').length == 5");
     assert_eq!(b.value("document.getElementById('dwell').hasAttribute('aria-invalid')"), json!(false));
     click(b, "#undo");
     assert_eq!(b.value("document.querySelectorAll('.wrong, [aria-invalid=true]').length"), json!(0));
@@ -50,7 +55,11 @@ fn errors_stand_at_their_fields() {
         ("latitude-number", "100", "latitude 100 is out of range"),
         ("requirements", "QQ = 3", "`QQ`: no such unknown"),
         ("bench", "QQ = 3", "`QQ`: no such error"),
+        ("requirements", "D_F = 0.1, D_IX = -1", "Requirements: D_IX is -1"),
         ("own-dwell", "-1", "-1"),
+        ("beta-number", "0.00000000001", "decimals"),
+        ("gamma-number", "0.1234567891234", "13 decimals"),
+        ("name", "p2", "two positions are named"),
     ] {
         write(b, &format!("#{field}"), text);
         wait(b, field, &wrong(field, said));
@@ -61,17 +70,71 @@ fn errors_stand_at_their_fields() {
         wait(b, "judged", "!document.getElementById('verdicts').classList.contains('stale')");
         wait(b, "no error", "!document.querySelector('.wrong')");
     }
-    // an error of a position is at that position's fields, and above all by its name while another is selected
+    // an error of a position is at that position's fields, and above all by its name while another is
+    // selected
     write(b, "#own-dwell", "-1");
     wait(b, "at the field", &wrong("own-dwell", "-1"));
     click(b, "#positions li:nth-child(2) .name");
     assert_eq!(b.value("document.getElementById('own-dwell').hasAttribute('aria-invalid')"), json!(false));
+    assert_eq!(b.value("document.getElementById('notice').textContent.includes(': ')"), json!(true));
+    click(b, "#positions li:nth-child(1) .name");
+    wait(b, "again", &wrong("own-dwell", "-1"));
+    assert_eq!(b.value("document.getElementById('notice').textContent"), json!(""));
+    click(b, "#positions li:nth-child(2) .name");
     write(b, "#name", "second");
     wait(
         b,
         "by name",
         "document.getElementById('notice').textContent.startsWith('first: ') || document.getElementById('notice').textContent.startsWith('p1: ')",
     );
+    quiet(b);
+}
+
+/// Several wrong values stay marked until each is mended; a refused text stays with its position; a slew rate
+/// under platform carry is named at its field, and angles by name are no error.
+#[test]
+fn errors_stay_until_they_are_mended() {
+    let Some((mut browser, _)) = opened(1280) else { return };
+    let b = &mut browser;
+    write(b, "#dwell", "-5");
+    wait(b, "the dwell", &wrong("dwell", "Dwell is -5"));
+    write(b, "#noise", "-1");
+    wait(b, "still", &wrong("dwell", "Dwell is -5"));
+    write(b, "#dwell", "100");
+    wait(b, "the noise", &wrong("noise", "Noise of Z is -1"));
+    assert_eq!(b.value("document.getElementById('dwell').hasAttribute('aria-invalid')"), json!(false));
+    // explanations name the field too
+    click(b, "#verdicts tr[data-name=psi_y] button.why");
+    wait(b, "why", "document.getElementById('why').textContent.includes('Noise of Z is -1')");
+    write(b, "#noise", "1e-5");
+    wait(b, "judged", "!document.querySelector('.wrong, #verdicts.stale')");
+    // a text that was refused does not follow to another position
+    for (field, action) in
+        [("own-dwell", "#add"), ("gamma-number", "#duplicate"), ("own-dwell", "#remedies button")]
+    {
+        write(b, &format!("#{field}"), "zz");
+        wait(b, field, &wrong(field, "zz"));
+        click(b, action);
+        wait(b, "the new position's", "!document.querySelector('.wrong')");
+        assert_ne!(b.value(&format!("document.getElementById({field:?}).value")), json!("zz"));
+        click(b, "#undo");
+    }
+    write(b, "#slew-rate", "2");
+    wait(b, "slews", &wrong("slew-rate", "expected inertial"));
+    write(b, "#slew-rate", "");
+    wait(b, "no slews", "!document.querySelector('.wrong')");
+    click(b, "#tab-text");
+    write(
+        b,
+        "#text",
+        "[document]\ndate = 2026-03-01\n[[position]]\nangles_deg = [\"alpha\", 0, 0]\n[[position]]\nangles_deg = [0, 0, 0]\n",
+    );
+    wait(b, "judged", "document.getElementById('text-verdicts').textContent.includes(' of 15')");
+    click(b, "#take");
+    wait(b, "said beside the rank", "document.getElementById('summary').textContent.includes('no sigmas: ')");
+    assert_eq!(b.value("document.getElementById('notice').dataset.problem ?? 'none'"), json!("none"));
+    // a date of TOML is written as one
+    assert!(scheme(b).contains("date = 2026-03-01\n"), "{}", scheme(b));
     quiet(b);
 }
 
@@ -90,14 +153,12 @@ fn combinations_say_what_they_are() {
     wait(b, "a scheme", &format!("{listed}.includes('D_FZ: not observable')"));
     wait(b, "and", &format!("{listed}.includes('D_FX - D_FY: observable, degree 2')"));
     click(b, "#take");
-    says(b, "D_FX - D_FY", 3, "combination, observable");
+    says(b, "D_FX - D_FY", 3, "asked for, observable");
     let row = "[...document.querySelectorAll('#verdicts tbody tr')].at(-1)";
     wait(
         b,
         "the row",
-        &format!(
-            "{row}.dataset.name == 'D_FZ' && {row}.cells[3].textContent == 'combination, not observable'"
-        ),
+        &format!("{row}.dataset.name == 'D_FZ' && {row}.cells[3].textContent == 'asked for, not observable'"),
     );
     click(b, "#tab-text");
     write(
@@ -110,8 +171,8 @@ fn combinations_say_what_they_are() {
     quiet(b);
 }
 
-/// What resolves the rest stands under a heading of its own, and a change that the page can make gives what it
-/// is said to give.
+/// What resolves the rest stands under a heading of its own, and a change that the page can make gives what
+/// it is said to give.
 #[test]
 fn remedies_are_applied() {
     let Some((mut browser, _)) = opened(1400) else { return };

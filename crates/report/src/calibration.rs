@@ -530,18 +530,26 @@ fn moment(records: &[RecordReport]) -> String {
     }
 }
 
+/// Further runs for requirements that are missed; one sentence for all that the bench alone uses up.
+fn next_runs(all: &[NextRun]) -> Vec<String> {
+    let (used_up, open): (Vec<&NextRun>, Vec<&NextRun>) = all.iter().partition(|n| n.required_sigma == 0.0);
+    let mut out: Vec<String> = open.into_iter().map(next_run).collect();
+    if !used_up.is_empty() {
+        out.push(format!(
+            "{}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of the bench \
+             too, or make them smaller.",
+            words::names(used_up.iter().map(|n| n.unknown.as_str()))
+        ));
+    }
+    out
+}
+
 /// A further run for a requirement that is missed.
 fn next_run(n: &NextRun) -> String {
     let now = n.sigma.map_or_else(
         || format!("{} is not determined", n.unknown),
         |s| format!("sigma of {} is {} {}", n.unknown, number(s), n.unit),
     );
-    if n.required_sigma == 0.0 {
-        return format!(
-            "{now}: the bench alone uses up the requirement, so no run can meet it. Estimate the errors of \
-             the bench too, or make them smaller."
-        );
-    }
     let required = format!("{now}, required {} {}", number(n.required_sigma), n.unit);
     let (Some(attitude), Some(dwell), Some(then)) = (&n.attitude, n.dwell_s, n.sigma_then) else {
         return format!(
@@ -743,7 +751,7 @@ impl Answer for Calibration {
         }
         blocks.push(Block::list("Mode", mode(self)));
         blocks.push(Block::list("Fit", fit(self)));
-        blocks.extend(Block::list_if_any("Next runs", self.next_runs.iter().map(next_run).collect()));
+        blocks.extend(Block::list_if_any("Next runs", next_runs(&self.next_runs)));
         blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
         let each = self.positions.len() / self.records.len().max(1);
         let force = self.positions.iter().any(|p| p.force_g.is_some());

@@ -82,8 +82,8 @@ fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
         right("uncertainty"),
         right("required"),
         right("margin"),
-        right("predicted sigma"),
-        right("uncertainty / predicted"),
+        right("predicted sigma (without bench)"),
+        right("sigma / predicted"),
     ];
     columns.extend(before.is_some().then(|| right("before")));
     let rows = c.quantities.iter().filter(|e| !e.name.starts_with("psi")).map(|e| {

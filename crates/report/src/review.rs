@@ -20,7 +20,7 @@ use obsdeg_evidence::simulation::Outcome;
 use crate::analysis::null_vector;
 use crate::document::{Block, Cell, Document, Fold, Typeset, left, number, optional, right};
 use crate::excess::Excess;
-use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, simulation, stated, words};
+use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, resolve, simulation, stated, words};
 
 /// Note on the effect of a calibration on the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
@@ -574,7 +574,10 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
     if let Some(kept) = &alternatives.kept {
         lines.push(match kept.positions {
             Some(k) if k == s.positions.len() => {
-                format!("all {k} positions are needed to observe {}", alternatives.required.join(", "))
+                format!(
+                    "all {k} positions are needed to observe {} by repositioning at once",
+                    alternatives.required.join(", ")
+                )
             }
             Some(k) => format!(
                 "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
@@ -600,6 +603,7 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
             alternatives.required.join(", "),
         ));
     }
+    lines.extend(resolve::position_to_drop(review));
     blocks.push(Block::list("", lines));
     let row = |d: &obsdeg_evidence::compare::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
@@ -611,9 +615,11 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
         ]
     };
     if !review.drop_one.is_empty() {
-        let columns =
-            ["without", "not observable any more", "worst sigma(D) [deg/h, /g]", compare::REQUIREMENTS[0]]
-                .map(left);
+        let sigma = match review.conditions.bench.is_some() {
+            true => "largest total uncertainty (D) [deg/h, /g]",
+            false => "largest sigma (D) [deg/h, /g]",
+        };
+        let columns = ["without", "not observable any more", sigma, compare::REQUIREMENTS[0]].map(left);
         let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
         blocks.push(table.without(&left_out(review)));
     }

@@ -4,6 +4,7 @@
  * Shows a message, also to screen readers. `kind`: `fine`, or `unseen` where the page shows the text anyway.
  */
 function say(text, kind = '') {
+  delete $('notice').dataset.engine;
   $('notice').className = kind;
   $('notice').textContent = text;
 }
@@ -13,6 +14,10 @@ let resting = null, answered = null, problems = 0;
 const isStale = () => $('verdicts').classList.contains('stale');
 
 function askVerdicts() { answered = verdictsNow(); }
+
+// ms after which an answer that is not there yet makes the one before faint
+const LATE = 400;
+const fade = (on) => ['verdicts', 'sentences', 'remedies', 'not-estimated'].forEach((id) => $(id).classList.toggle('stale', on));
 
 async function verdictsNow() {
   put($('drop-one'), '\u00a0');
@@ -25,29 +30,42 @@ async function verdictsNow() {
     $('verdicts').replaceChildren();
     drawSentences($('sentences'));
     drawRemedies(null);
+    fade(false);
+    mendKind('engine');
+    refused = null;
     put($('summary'), 'no position yet: add one');
     return;
   }
   const request = { sources: [source(scheme)], solutions: false, omitted: false };
-  const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed);
+  const late = setTimeout(() => { fade(true); put($('summary'), 'judging: what is below is of the scheme before'); }, LATE);
+  const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed).finally(() => clearTimeout(late));
   if (!found) return;
-  $('verdicts').classList.toggle('stale', !!found.problem);
-  mendKind('engine');
+  fade(!!found.problem);
   if (found.problem) {
     put($('summary'), 'not judged: what is below is of the scheme before');
+    // fields that were refused before stay marked: what they hold is still in the scheme
     return wrongAt(found.problem, request.sources[0].text);
   }
+  refused = null;
+  mendKind('engine');
   // a refusal that came after this question stays on the page
-  if (Number($('notice').dataset.problem) <= before) { say(''); delete $('notice').dataset.problem; }
+  if (Number($('notice').dataset.problem) <= before) clearNotice();
   verdicts.now = found;
   drawVerdicts();
   performance.measure('table', { start: began, end: performance.now() });
   if (performance.getEntriesByName('table').length > 2000) performance.clearMeasures();
 }
 
-function wrong(problem) {
+/** Shows an error above all; `engine` marks a refusal of the scheme, which the next answer replaces. */
+function wrong(problem, engine = false) {
   $('notice').dataset.problem = ++problems;
-  say(problem.message);
+  say(inPageWords(problem.message));
+  if (engine) $('notice').dataset.engine = 'yes';
+}
+
+function clearNotice() {
+  say('');
+  delete $('notice').dataset.problem;
 }
 
 function failed(problem) {
@@ -71,7 +89,8 @@ function askRest() {
     if (run && still()) {
       verdicts.sigmasOf = asked;
       verdicts.sigmas = null;
-      if (run.problem) wrongAt(run.problem, named[0].text);
+      verdicts.without = run.problem && !run.problem.place ? inPageWords(run.problem.message) : null;
+      if (run.problem && (run.problem.place || fieldOf(run.problem, { keys: [] }))) wrongAt(run.problem, named[0].text);
     }
     if (run?.text && still()) {
       const { quantities, requirements, omitted } = JSON.parse(run.text);
@@ -325,7 +344,7 @@ function drawStrip() {
     c.fillText(two(10 ** max), 0, h - foot - low + 9);
     c.fillText(two(10 ** min), 0, h - foot - 6);
   }
-  const angles = anglesOfPosition(p), here = x((angles[strip.axis] + 180) / 5) + step / 2;
+  const angles = anglesOfPosition(p), here = x((withinTurn(angles[strip.axis]) + 180) / 5) + step / 2;
   c.strokeStyle = color('text'); c.lineWidth = 1.5; c.strokeRect(here - step / 2 - 0.5, 1, step + 1, h - foot - 2);
   const range = known.length ? ` Below, sigma of ${strip.of}: ${two(10 ** Math.min(...known))} to ${two(10 ** Math.max(...known))} ${verdicts.sigmas?.get(strip.of)?.unit ?? ''}.` : '';
   const highest = Math.max(0, ...found.degrees.flatMap((d) => (d ? Object.values(d) : [])).map((d) => d ?? 0));

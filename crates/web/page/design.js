@@ -1,22 +1,27 @@
 // Search for the best schemes; the text of schemes and models.
 
-// numbers that limit a search, by their field: option of the request, least value, unit
-const LIMITS = { 'design-slew-rate': ['slew_rate', 0.001, 'deg/s'], 'design-max-slew': ['max_slew', 0, 's'], 'design-max-time': ['max_time', 0, 's'] };
+// numbers that limit a search, by their field: option of the request, what is expected, and its test
+const LIMITS = {
+  'design-slew-rate': ['slew_rate', 'a number of deg/s from 0.001 to 10000', (x) => x >= 0.001 && x <= 1e4],
+  'design-max-slew': ['max_slew', 'a number of s', (x) => x >= 0], 'design-max-time': ['max_time', 'a number of s above 0', (x) => x > 0],
+};
 // fields of a search by what its errors say
 const OF_SEARCH = [[/^gimbal|gimbal limit/, 'design-gimbals'], [/^slew_rate|^slews of finite/, 'design-slew-rate'], [/^max_slew/, 'design-max-slew'],
-  [/^max_time/, 'design-max-time'], [/no coefficient of this scheme/, 'design-observable'], [/^criterion/, 'design-criterion'], [/^meet/, 'design-meet']];
+  [/^max_time/, 'design-max-time'], [/no coefficient of this scheme/, 'design-observable'], [/^criterion|^worst compares/, 'design-criterion'], [/^meet/, 'design-meet']];
 // words of the page for the options that the engine's texts name
 const OPTIONS = [[/requirement NAME=SIGMA \(.*\), or \[requirements\] in a scheme file/, 'requirements under Positions, such as D = 0.05, psi = 0.01'],
+  [/^worst compares/, 'The largest sigma compares'], [/criterion margin \(over requirements\), or D \(their geometric mean\), or observable with/, 'the criterion margin or determinant, or under Must be observable'],
   [/by slew_rate or the file of candidates/, 'by a slew rate'], [/^gimbal\b/, 'Gimbal limits'], [/^slew_rate\b/, 'Slew rate'], [/^max_slew\b/, 'Longest slew'], [/^max_time\b/, 'Total time'],
-  [/^meet\b/, 'Only schemes that meet every requirement'], [/^criterion margin/, 'The criterion margin'], [/\(--bench\)/, '(Bench under Positions)']];
-const inWords = (text) => OPTIONS.reduce((words, [option, name]) => words.replace(option, name), text);
+  [/^meet\b/, 'Only schemes that meet every requirement'], [/^criterion margin/, 'The criterion margin'], [/\(--bench\)/, '(Bench under Positions)'],
+  [/ \(see Gimbals\)/, ' (under Text, path = "gimbals" turns gimbal by gimbal)']];
+const inWords = (text) => inPageWords(OPTIONS.reduce((words, [option, name]) => words.replace(option, name), text));
 
 /** Entries of a list in a field. */
 const listIn = (id) => $(id).value.split(',').map((t) => t.trim()).filter(Boolean);
 
 /** The request of a search; null if a field holds something wrong, which is then shown there. */
 function searched() {
-  mendAll(['design-k', 'design-gimbals', 'design-observable', 'design-criterion', 'design-meet', ...Object.keys(LIMITS)]);
+  mendAll([...faults.keys()].filter((id) => id.startsWith('design-')));
   const k = Number($('design-k').value);
   if (!Number.isInteger(k) || k < 1 || k > 100) fault('design-k', `K: expected a whole number from 1 to 100, found "${$('design-k').value}"`);
   // the candidates under the conditions of the scheme
@@ -24,15 +29,14 @@ function searched() {
   if (!own.position?.length) own.position = [{ attitude: 'NUE' }];
   // more than are shown: rows of equal figures are folded
   const request = { positions: k, keep: KEPT, conditions_file: { name: state.name, text: toToml(own) }, candidates: $('design-candidates').value, criterion: $('design-criterion').value, meet: $('design-meet').checked };
-  for (const [id, [key, least, unit]] of Object.entries(LIMITS)) {
+  for (const [id, [key, expected, holds]] of Object.entries(LIMITS)) {
     const x = numberIn($(id));
     if (x === undefined) continue;
-    if (x >= least) request[key] = x; else fault(id, `${labelOf(id)}: expected a number of ${unit}${least ? ` from ${least}` : ''}, found "${$(id).value}"`);
+    if (holds(x)) request[key] = x; else fault(id, `${labelOf(id)}: expected ${expected}, found "${$(id).value}"`);
   }
-  const [gimbal, observable] = [listIn('design-gimbals'), listIn('design-observable')];
-  const odd = gimbal.find((t) => !/^(alpha|beta|gamma)\s*=\s*[\d.+\-\u2212]+\s*:\s*[\d.+\-\u2212]+$/.test(t));
-  if (odd) fault('design-gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${odd}"`);
-  if (gimbal.length) request.gimbal = gimbal.map((t) => t.replaceAll('\u2212', '-').replaceAll(' ', ''));
+  const limits = gimbalLimits($('design-gimbals').value), observable = [...new Set(listIn('design-observable'))];
+  if (!limits) fault('design-gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$('design-gimbals').value}"`);
+  else if (Object.keys(limits).length) request.gimbal = limitsText(limits).split(', ');
   if (observable.length) request.observable = observable;
   const first = [...faults.keys()].find((id) => id.startsWith('design-'));
   if (first) $(first).focus();
@@ -41,10 +45,13 @@ function searched() {
 
 async function search() {
   const request = searched();
-  if (!request) return;
+  if (!request) return void put($('design-said'), 'Not searched.');
   say('');
-  $('design-go').disabled = true;
+  const asked = { conditions: conditions(request), request };
   $('design-stop').disabled = false;
+  // the focus stays on a button that works
+  if (document.activeElement === $('design-go')) $('design-stop').focus();
+  $('design-go').disabled = true;
   // what was found before stays until this search has found something
   searching = true;
   drawFoundOf();
@@ -62,26 +69,37 @@ async function search() {
     if (said.problem) throw said.problem;
     drawFound(JSON.parse(said.text), performance.now() - began, request);
     drawSentences($('found-sentences'), said.sentences.map(inWords));
-    foundOf = conditions();
+    foundOf = asked;
     ended = 1;
   } catch (problem) {
     const message = inWords(problem.message ?? String(problem)), id = OF_SEARCH.find(([of]) => of.test(problem.message ?? ''))?.[1];
-    if (id) fault(id, message);
-    put($('design-said'), id ? 'Not searched.' : message);
+    // an error about an empty field is about the scheme
+    const field = id && ($(id).value !== '' || id === 'design-meet') ? id : null;
+    if (field) fault(field, message);
+    put($('design-said'), field ? 'Not searched.' : message);
   }
   searching = false;
   drawFoundOf();
   $('design-progress').value = ended;
   $('design-go').disabled = false;
+  if (document.activeElement === $('design-stop')) $('design-go').focus();
   $('design-stop').disabled = true;
 }
 
-// conditions of the listed schemes
+// conditions and request of the listed schemes
 let foundOf = null, searching = false;
-const conditions = () => JSON.stringify({ ...state.scheme, position: 0, combinations: 0, name: 0, description: 0 });
+/** The conditions of a search: those of the scheme, with the limits of the request. */
+const conditions = (request) => JSON.stringify({ ...withLimits(copy(state.scheme), request), position: 0, combinations: 0, name: 0, description: 0 });
+
+/** A scheme with the gimbal limits and the slew rate of a search. */
+function withLimits(s, request) {
+  if (request.gimbal) s.gimbals = { ...s.gimbals, ...gimbalLimits(request.gimbal.join(',')) };
+  if (request.slew_rate !== undefined) s.simulation = { ...s.simulation, slew_rate_deg_s: request.slew_rate };
+  return s;
+}
 
 function drawFoundOf() {
-  const old = foundOf !== null && foundOf !== conditions();
+  const old = foundOf !== null && foundOf.conditions !== conditions(foundOf.request);
   for (const id of ['found', 'found-sentences', 'winner']) $(id).classList.toggle('stale', searching || old);
   put($('found-old'), old ? 'The conditions have changed since this search: its figures are of those before.' : '');
 }
@@ -89,7 +107,7 @@ function drawFoundOf() {
 /** Says which limits hold where the fields of the search are empty. */
 function drawLimits() {
   const { gimbals = {}, simulation = {} } = state.scheme;
-  const limits = AXES.filter((axis) => gimbals[`${axis}_deg`]).map((axis) => `${axis}=${gimbals[`${axis}_deg`].join(':')}`).join(', ');
+  const limits = limitsText(gimbals);
   const rate = simulation.slew_rate_deg_s;
   put($('design-limits'), `Where these are empty, the scheme's own hold: ${limits ? `gimbal limits ${limits}` : 'free gimbals'}, ${rate ? `slews at ${rate} deg/s` : 'slews that take no time'}. Slews that take time need inertial carry.`);
 }
@@ -97,11 +115,7 @@ function drawLimits() {
 /** Loads a scheme that was found, with the limits of its search. */
 function load(f, number, request) {
   edit((s) => {
-    for (const t of request.gimbal ?? []) {
-      const [angle, low, high] = t.split(/[=:]/);
-      (s.gimbals ??= {})[`${angle}_deg`] = [Number(low), Number(high)];
-    }
-    if (request.slew_rate !== undefined) (s.simulation ??= {}).slew_rate_deg_s = request.slew_rate;
+    withLimits(s, request);
     s.position = f.angles.map((a) => positionOf(a, s.gimbals));
     // the direction of a half turn is part of the scheme
     f.half_turns.forEach((t) => { s.position[t.to - 1].slew = { about: t.about, angle_deg: 180 }; });
@@ -146,7 +160,7 @@ function drawFound(design, took, request) {
   // one row for all schemes of the same figures
   const groups = new Map();
   design.found.forEach((f, i) => {
-    const figures = [`${f.value.toPrecision(4)} ${how.unit ?? ''}`, f.worst ?? '', String(f.worst_degree), f.requirements.stated ? `${f.requirements.met} of ${f.requirements.stated}` : 'none stated', `${(f.total_s / 60).toFixed(0)} min`];
+    const figures = [f.value.toPrecision(4), f.worst ?? '', String(f.worst_degree), f.requirements.stated ? `${f.requirements.met} of ${f.requirements.stated}` : 'none stated', `${(f.total_s / 60).toFixed(0)} min`];
     // the worst coefficient of the same scheme in other axes has another name
     const key = JSON.stringify([figures[0], ...figures.slice(2)]);
     if (!groups.has(key)) groups.set(key, { figures, schemes: [] });
@@ -154,6 +168,8 @@ function drawFound(design, took, request) {
   });
   // the last scheme's row goes on where the list is cut
   const last = design.found.length === KEPT ? [...groups.keys()].at(-1) : null;
+  // sigmas of coefficients per g are in deg/h/g
+  const mixed = how.unit === 'deg/h' && request.criterion === 'worst', unit = mixed ? ' [deg/h, per g]' : how.unit ? ` [${how.unit}]` : '';
   const rows = [...groups].slice(0, ROWS).map(([key, { figures, schemes: [[f, i], ...others] }]) => {
     const listed = others.slice(0, EQUAL).map(([g, j]) => element('p', {}, loads(g, j), ` ${g.positions.join(' ')}`));
     // where as many as were asked for are listed, there may be more
@@ -162,7 +178,7 @@ function drawFound(design, took, request) {
       ...(others.length > EQUAL ? [element('p', { className: 'soft', textContent: `The first ${EQUAL} of ${others.length}; the command line lists all (--keep).` })] : []));
     return [loads(f, i), element('div', {}, f.positions.join(' '), ...(others.length ? [same] : [])), ...figures];
   });
-  $('found').replaceChildren(tableOf(['', 'positions', 'criterion', 'worst', 'largest degree', 'requirements met', 'total time'], rows));
+  $('found').replaceChildren(tableOf(['', 'positions', `criterion${unit}`, 'worst', 'largest degree', 'requirements met', 'total time'], rows));
 }
 
 /** Position from the angles of an answer: by letters, unless gimbal limits require these angles. */
@@ -183,13 +199,18 @@ function placed(text, { line, start, end }) {
 /** Judges the text in the editor. */
 async function judgeText() {
   const text = $('text').value;
-  const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { lane: 'text' }).catch((p) => ({ problem: p }));
+  const faint = (on) => ['text-verdicts', 'text-why'].forEach((id) => $(id).classList.toggle('stale', on));
+  const late = setTimeout(() => {
+    faint(true);
+    put($('text-old'), $('text-verdicts').children.length ? 'Judging: what follows is of the text before.' : 'Judging\u2026');
+  }, LATE);
+  const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { lane: 'text' }).catch((p) => ({ problem: p })).finally(() => clearTimeout(late));
   if (!found || text !== $('text').value) return;
   const area = $('text'), { problem, answer, math, sentences } = found;
   area.setAttribute('aria-invalid', problem ? 'true' : 'false');
   $('text-problem').replaceChildren();
   // the last answer stays while the text is wrong
-  for (const id of ['text-verdicts', 'text-why']) $(id).classList.toggle('stale', !!problem);
+  faint(!!problem);
   put($('text-old'), problem && $('text-verdicts').children.length ? 'The text is wrong: what follows is of the text before.' : '');
   if (problem) {
     const { place, message } = problem;
@@ -252,10 +273,7 @@ function setText(text, name) {
 /** Takes the text over as positions. */
 async function take() {
   const name = writing.name;
-  if (await openText($('text').value, name)) {
-    writing.own = false;
-    show('scheme');
-  } else if ($('text').getAttribute('aria-invalid') !== 'true') wrong({ message: `${name} is a model; expected a scheme, with [[position]] tables` });
+  if (!(await openText($('text').value, name)) && $('text').getAttribute('aria-invalid') !== 'true') wrong({ message: `${name} is a model; expected a scheme, with [[position]] tables` });
 }
 
 /** Opens a text: a scheme as positions, anything else in the editor. */
@@ -264,7 +282,10 @@ async function openText(text, name) {
     .catch((p) => [{ problem: p }, {}]);
   const value = read.value, scheme = value && Array.isArray(value.position) && !value.states;
   if (scheme && !judged.problem) {
+    quitTour();
     replace(value, name);
+    writing.own = false;
+    show('scheme');
     say(`${name} is open.`, 'fine');
     return true;
   }
@@ -278,6 +299,11 @@ async function openText(text, name) {
 
 function wireDesign() {
   $('design-go').addEventListener('click', search);
+  $('panel-design').addEventListener('keydown', (e) => {
+    if (e.key === 'Enter' && e.target.matches('input')) { e.preventDefault(); if (!searching) search(); }
+  });
+  // what is changed there is examined by the next search
+  $('panel-design').addEventListener('change', (e) => mend(e.target.id));
   $('design-stop').addEventListener('click', () => searcher.stop());
   DATA.examples.forEach((e, i) => $('gallery').append(element('option', { value: i, textContent: e.kind === 'model' ? `${e.name} (model)` : e.name })));
   $('gallery').addEventListener('change', () => {

@@ -6,10 +6,19 @@ const faults = new Map();
 const OF_POSITION = ['alpha-number', 'beta-number', 'gamma-number', 'letters', 'name', 'own-dwell'];
 // fields by the key of a scheme file; a table stands for all its keys
 const FIELDS = {
-  carry: 'carry', terms: 'terms', latitude_deg: 'latitude-number', requirements: 'requirements', bench: 'bench',
-  'simulation.dwell_s': 'dwell', 'simulation.accelerometer_noise_g': 'noise', 'simulation.drift_noise': 'drift-noise',
-  'position.name': 'name', 'position.dwell_s': 'own-dwell', 'position.attitude': 'letters', 'position.angles_deg': 'alpha-number',
+  carry: 'carry', terms: 'terms', latitude_deg: 'latitude-number', requirements: 'requirements', bench: 'bench', gimbals: 'gimbals',
+  'simulation.dwell_s': 'dwell', 'simulation.accelerometer_noise_g': 'noise', 'simulation.drift_noise': 'drift-noise', 'simulation.slew_rate_deg_s': 'slew-rate',
+  'position.name': 'name', 'position.dwell_s': 'own-dwell', 'position.attitude': 'letters',
 };
+// fields by what an error without a key says
+const SAID = [[/positions are named/, 'name'], [/gimbals do not reach/, 'gimbals'], [/^slews of finite/, 'slew-rate']];
+
+/** A text of the engine with the names of fields in place of keys. */
+function inPageWords(text) {
+  const dotted = Object.entries(FIELDS).filter(([key]) => key.includes('.')).reduce((words, [key, id]) => words.replaceAll(key, labelOf(id)), text);
+  const tables = ['requirements', 'bench', 'gimbals'].reduce((words, id) => words.replace(new RegExp(`\\b${id}\\.(?=[A-Za-z])`, 'g'), `${labelOf(id)}: `), dotted);
+  return tables.replace(/\bslew_rate_deg_s\b/, labelOf('slew-rate'));
+}
 
 /** Shows an error under a field. */
 function fault(id, message, kind = 'own') {
@@ -35,8 +44,9 @@ function mend(id) {
   if (hint) field.setAttribute('aria-describedby', hint); else field.removeAttribute('aria-describedby');
 }
 
-/** Removes the errors of some fields, or of a kind. */
+/** Removes the errors of some fields, of all fields of the scheme, or of a kind. */
 const mendAll = (ids) => ids.forEach(mend);
+const mendScheme = () => mendAll([...faults.keys()].filter((id) => !id.startsWith('design-')));
 const mendKind = (kind) => mendAll([...faults].filter(([, k]) => k === kind).map(([id]) => id));
 
 /** Sets the value of a field, unless it has the focus or a text that was refused. */
@@ -44,25 +54,43 @@ function fill(id, value) {
   if (document.activeElement !== $(id) && faults.get(id) !== 'own') $(id).value = value ?? '';
 }
 
-/** Key of a scheme file at an offset of its text, and the index of its position. */
+/** Key of a scheme file at an offset of its text, the index of its position, and the index in a list. */
 function keyAt(text, offset) {
+  const lines = text.slice(0, text.indexOf('\n', offset) + 1 || undefined).trimEnd().split('\n');
   let table = '', position = -1, key = '';
-  for (const line of text.slice(0, text.indexOf('\n', offset) + 1 || undefined).split('\n')) {
+  for (const line of lines) {
     const head = /^\[+([\w-]+)\]+$/.exec(line), name = /^("(?:[^"\\]|\\.)*"|[\w-]+) =/.exec(line);
     if (head) { table = head[1]; key = ''; position += table === 'position'; }
     if (name) key = name[1];
   }
-  return { position: table === 'position' ? position : null, keys: table ? [`${table}.${key}`, table] : [key] };
+  const before = text.slice(text.lastIndexOf('\n', offset - 1) + 1, offset), index = before.includes('[') ? before.split(',').length - 1 : 0;
+  return { position: table === 'position' ? position : null, keys: table ? [`${table}.${key}`, table] : [key], index };
 }
+
+/** Field that an error of the engine is about; null if it has no field here. */
+function fieldOf(problem, { keys, index }) {
+  const said = SAID.find(([of]) => of.test(problem.message))?.[1];
+  return said ?? (keys[0] === 'position.angles_deg' ? `${AXES[index] ?? AXES[0]}-number` : keys.map((key) => FIELDS[key]).find(Boolean)) ?? null;
+}
+
+// the last refusal of the scheme by the engine, and the text that it is of; null for a scheme that was judged
+let refused = null;
 
 /** Shows an error of the engine at the field of its value, or above all if it has no field here. */
 function wrongAt(problem, text) {
-  const { place } = problem, { position, keys } = place ? keyAt(text, place.start) : { position: null, keys: [] };
-  const id = keys.map((key) => FIELDS[key]).find(Boolean);
-  if (id && (position === null || position === state.selected)) {
-    // the field's name instead of the key
-    return fault(id, keys[0].includes('.') ? problem.message.replace(keys[0], labelOf(id)) : problem.message, 'engine');
+  refused = { problem, text };
+  const { place } = problem, at = place ? keyAt(text, place.start) : { position: null, keys: [], index: 0 };
+  const id = fieldOf(problem, at), here = !OF_POSITION.includes(id) || at.position === null || at.position === state.selected;
+  if (!id || !here) {
+    const where = at.position === null ? '' : `${nameOfPosition(state.scheme.position[at.position], at.position)}: `;
+    return wrong({ message: `${where}${problem.message}` }, true);
   }
-  const where = position === null ? '' : `${nameOfPosition(state.scheme.position[position], position)}: `;
-  return wrong({ message: `${where}${problem.message}` });
+  if ($('notice').dataset.engine) clearNotice();
+  // what is typed there and was refused before comes first
+  if (faults.get(id) !== 'own') fault(id, inPageWords(problem.message), 'engine');
+}
+
+/** Shows the last refusal again, for the position that is selected now. */
+function wrongAgain() {
+  if (refused) wrongAt(refused.problem, refused.text);
 }

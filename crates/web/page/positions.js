@@ -20,11 +20,11 @@ function describe(p) {
 }
 
 function select(i, focus = false) {
-  if (i !== state.selected) mendAll(OF_POSITION);
   state.selected = i;
   gesture = null;
   drawPositions();
   drawSelected();
+  wrongAgain();
   askBehind();
   if (focus) $('positions').children[i]?.querySelector('.name').focus();
 }
@@ -145,17 +145,26 @@ function makeSliders() {
   snap();
 }
 
+// the position that the fields are of
+let drawn = null;
+/** An angle in degrees as the sliders have it, from -180 to 180. */
+const withinTurn = (angle) => (Math.abs(angle) <= 180 ? angle : angle - 360 * Math.round(angle / 360));
+
 function drawSelected() {
   const p = chosen();
+  // errors of another position are not errors of this one
+  if (p !== drawn) mendAll(OF_POSITION);
+  drawn = p;
   $('attitude').disabled = !p;
   $('which').textContent = p ? nameOfPosition(p, state.selected) : 'no position';
   const angles = p && anglesOfPosition(p);
   AXES.forEach((axis, k) => {
-    if (angles) $(axis).value = angles[k];
+    if (angles) $(axis).value = withinTurn(angles[k]);
     $(axis).disabled = !angles;
     $(axis).setAttribute('aria-valuetext', angles ? `${shown(angles[k])} degrees` : 'by name');
     // what is typed has been taken over, or refused
-    if (faults.get(`${axis}-number`) !== 'own') $(`${axis}-number`).value = angles ? shown(angles[k]) : String(p?.angles_deg?.[k] ?? '');
+    const kind = faults.get(`${axis}-number`);
+    if (kind !== 'own') $(`${axis}-number`).value = angles && kind !== 'engine' ? shown(angles[k]) : String(p?.angles_deg?.[k] ?? '');
   });
   fill('letters', angles && lettersOf(matrixOf(angles)));
   fill('name', p?.name);
@@ -166,7 +175,7 @@ function drawSelected() {
 /** Number in a field; undefined if the field is empty, NaN if it holds no number. */
 const numberIn = (e) => (e.value.trim() === '' ? undefined : finite(e.value));
 const finite = (text) => {
-  const x = text?.trim() ? Number(text.trim().replace('\u2212', '-')) : NaN;
+  const plain = text?.trim().replace('\u2212', '-') ?? '', x = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
   return Number.isFinite(x) ? x : NaN;
 };
 
@@ -179,8 +188,27 @@ function setKey(path, value, as) {
   }, as);
 }
 
-const assignments = (text) => Object.fromEntries(text.split(',').map((t) => t.split('=').map((x) => x.trim())).filter(([k]) => k)
-  .map(([k, v]) => [k, finite(v)]));
+/** Names and numbers such as `D = 0.05, psi = 0.01`; NaN for what is no number, or a name that comes twice. */
+function assignments(text) {
+  const out = {};
+  for (const part of text.split(',').filter((t) => t.trim())) {
+    const [name, ...values] = part.split('=').map((x) => x.trim());
+    out[name || part] = !name || values.length !== 1 || name in out ? NaN : finite(values[0]);
+  }
+  return out;
+}
+
+/** Limits of gimbals such as `alpha=-90:90, beta=-80:80` as a table of a scheme file; null for another text. */
+function gimbalLimits(text) {
+  const out = {};
+  for (const part of text.split(',').filter((t) => t.trim())) {
+    const found = /^\s*(alpha|beta|gamma)\s*=\s*([^:]+):([^:]+)$/.exec(part), ends = found?.slice(2).map(finite);
+    if (!found || ends.some(Number.isNaN) || `${found[1]}_deg` in out) return null;
+    out[`${found[1]}_deg`] = ends;
+  }
+  return out;
+}
+const limitsText = (gimbals = {}) => AXES.filter((axis) => gimbals[`${axis}_deg`]).map((axis) => `${axis}=${gimbals[`${axis}_deg`].join(':')}`).join(', ');
 
 function wireConditions() {
   const field = (id, path, read) => $(id).addEventListener('change', () => {
@@ -199,6 +227,13 @@ function wireConditions() {
   field('noise', 'simulation.accelerometer_noise_g', numberIn);
   field('drift-noise', 'simulation.drift_noise', text);
   field('latitude-number', 'latitude_deg', numberIn);
+  field('slew-rate', 'simulation.slew_rate_deg_s', numberIn);
+  $('gimbals').addEventListener('change', () => {
+    const limits = gimbalLimits($('gimbals').value);
+    if (!limits) return void fault('gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$('gimbals').value}"`);
+    mend('gimbals');
+    setKey('gimbals', Object.keys(limits).length ? limits : undefined);
+  });
   for (const table of ['requirements', 'bench']) field(table, table, (e) => (e.value.trim() ? assignments(e.value) : undefined));
   $('latitude').addEventListener('pointerdown', () => { gesture = null; });
   $('latitude').addEventListener('input', () => {
@@ -255,6 +290,8 @@ function drawConditions() {
   fill('noise', run.accelerometer_noise_g);
   fill('drift-noise', run.drift_noise);
   fill('latitude-number', s.latitude_deg);
+  fill('slew-rate', run.slew_rate_deg_s);
+  fill('gimbals', limitsText(s.gimbals));
   $('latitude').value = s.latitude_deg ?? 28.2;
   $('latitude-note').textContent = s.latitude_deg === undefined ? 'Verdicts hold at nearly every latitude; sigmas and the arrow of the earth rate are of 28.2 deg.' : '';
   $('latitude').setAttribute('aria-valuetext', s.latitude_deg === undefined ? 'generic' : `${s.latitude_deg} degrees`);

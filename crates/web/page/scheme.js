@@ -8,11 +8,14 @@ const past = [], future = [], listeners = [];
 // edits of one gesture, such as dragging a slider, are undone in one step
 let gesture = null;
 
+const DATE = '$__toml_private_datetime';
 const isPlain = (x) => x !== null && typeof x === 'object' && !Array.isArray(x);
 
 function tomlValue(v) {
   if (typeof v === 'string') return JSON.stringify(v).replaceAll('\u007f', '\\u007f');
   if (Array.isArray(v)) return `[${v.map(tomlValue).join(', ')}]`;
+  // a date of TOML, as the engine hands it over
+  if (isPlain(v) && /^[\dTtZz:.+ -]+$/.test(v[DATE] ?? '')) return v[DATE];
   if (isPlain(v)) return `{ ${Object.entries(v).map(([k, x]) => `${tomlKey(k)} = ${tomlValue(x)}`).join(', ')} }`;
   return typeof v === 'number' ? decimal(v) : String(v);
 }
@@ -33,8 +36,8 @@ function toToml(scheme) {
   const lines = (table) => Object.entries(table).filter(([, v]) => v !== undefined)
     .forEach(([k, v]) => out.push(`${tomlKey(k)} = ${tomlValue(v)}`));
   const { position = [], ...rest } = scheme;
-  const tables = Object.entries(rest).filter(([, v]) => isPlain(v));
-  lines(Object.fromEntries(Object.entries(rest).filter(([, v]) => !isPlain(v))));
+  const isTable = (v) => isPlain(v) && !(DATE in v), tables = Object.entries(rest).filter(([, v]) => isTable(v));
+  lines(Object.fromEntries(Object.entries(rest).filter(([, v]) => !isTable(v))));
   for (const [k, v] of tables) {
     if (!Object.keys(v).length) continue;
     out.push('', `[${tomlKey(k)}]`);
@@ -67,6 +70,7 @@ function edit(change, as = null) {
     emphasise();
   }
   gesture = as;
+  if ($('notice').className === 'fine') say('');
   future.length = 0;
   change(state.scheme);
   changed();
@@ -84,7 +88,8 @@ function restore(from, to) {
   [state.scheme, state.selected, state.name] = JSON.parse(from.pop());
   gesture = null;
   emphasise();
-  mendAll([...faults.keys()]);
+  mendScheme();
+  if (state.name !== TOUR_FILE) quitTour();
   changed();
 }
 
@@ -93,7 +98,7 @@ const redo = () => restore(future, past);
 
 /** Replaces the scheme by another. */
 function replace(scheme, name = 'scheme.toml') {
-  mendAll([...faults.keys()]);
+  mendScheme();
   edit(() => {
     state.scheme = scheme;
     state.scheme.position ??= [];

@@ -2,7 +2,7 @@
 
 const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
 // verdicts of the current scheme and of the one before the last gesture; sigmas by name
-const verdicts = { now: null, before: null, sigmas: null, omitted: null, sigmasOf: null, solutions: null, solutionsOf: null };
+const verdicts = { now: null, before: null, sigmas: null, without: null, omitted: null, sigmasOf: null, solutions: null, solutionsOf: null };
 
 /** Makes the verdicts of the table those that later changes are compared with. */
 function emphasise() { verdicts.before = verdicts.now ?? verdicts.before; }
@@ -70,7 +70,7 @@ function drawVerdicts() {
     const text = q.degree ?? '\u2013', was = differs ? ` was ${verdictOf(before)}` : '';
     if (degree.textContent !== text + was) degree.replaceChildren(String(text), ...(was ? [element('small', { textContent: was })] : []));
     const status = WORDS[q.status] ?? q.status;
-    put(cell(tr, 3, 'status'), q.combined ? `combination, ${q.degree === null ? 'not observable' : status}` : status);
+    put(cell(tr, 3, 'status'), q.combined ? `${q.requested ? 'asked for' : 'combination'}, ${q.degree === null ? 'not observable' : status}` : status);
     drawSigma(cell(tr, 4, 'sigma'), q.combined ? null : name);
     drawSolution(cell(tr, 5, 'solution'), q, name);
   });
@@ -86,7 +86,7 @@ function drawVerdicts() {
   const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
   const judged = verdicts.sigmasOf === asked && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
   const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}${!judged.missed.length && verdicts.limited ? ', while no error uses up a margin (Errors that are not estimated)' : ''}` : '';
-  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}`);
+  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}${verdicts.sigmasOf === asked && verdicts.without ? `; no sigmas: ${verdicts.without}` : ''}`);
   drawSentences($('sentences'), verdicts.now.sentences);
   drawRemedies(answer.to_resolve);
   offerStrip(rows);
@@ -128,9 +128,8 @@ function drawTerms(omitted, family) {
   box.dataset.family = family;
   const size = (t) => (t.size === null ? [] : [`${two(t.size)} ${t.unit}`]);
   const stated = terms.some((t) => t.size !== null);
-  const largest = (t) => [...t.sensitivities].sort((a, b) => Math.abs(b.per_unit) - Math.abs(a.per_unit));
   const rows = terms.map((t) => [t.name, ...(stated ? [size(t)[0] ?? '\u2013'] : []), t.class?.replace('_', ' ') ?? '\u2013',
-    largest(t).map((x) => `${x.unknown} ${perUnit(x)}`).join(', ') || 'nothing', t.visible_from === null ? '\u2013' : `${two(t.visible_from)} ${t.unit}`]);
+    t.sensitivities.map((x) => `${x.unknown} ${perUnit(x)}`).join(', ') || 'nothing', t.visible_from === null ? '\u2013' : `${two(t.visible_from)} ${t.unit}`]);
   const heads = ['error', ...(stated ? ['stated size'] : []), 'class', `changes per ${terms[0]?.unit ?? 'unit'}: estimate minus truth`, 'seen from (3 sigma)'];
   box.replaceChildren(closable(box, `${family}: each error by itself`), tableOf(heads, rows));
 }

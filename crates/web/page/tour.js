@@ -51,7 +51,9 @@ function drawTour() {
   put($('tour-text'), text);
   put($('tour-count'), `step ${tourStep + 1} of ${TOUR.length}`);
   $('tour-back').disabled = tourStep === 0;
-  $('tour-next').disabled = tourStep === TOUR.length - 1;
+  const last = tourStep === TOUR.length - 1;
+  if (last && document.activeElement === $('tour-next')) $('tour-show').focus();
+  $('tour-next').disabled = last;
 }
 
 /** Frames a control; without one, none. */
@@ -67,18 +69,23 @@ function goToControl() {
   (control.matches('input, [tabindex]') ? control : control.querySelector('button, input'))?.focus({ preventScroll: true });
 }
 
-/** Ends the tour: the scheme from before it is back, unless another was opened since. */
-function endTour() {
+/** Closes the tour: the scheme stays as it is now. */
+function quitTour() {
+  if ($('tour').hidden) return;
   $('tour').hidden = true;
   light(null);
-  if (beforeTour && state.name === TOUR_FILE) {
-    const { scheme, name, selected } = beforeTour;
-    replace(scheme, name);
-    select(selected);
-    verdicts.before = null;
-    say('Your scheme is back as it was before the tour; Undo returns to the scheme of the tour.', 'fine');
-  }
+  if (writing.name === TOUR_FILE) writing.name = beforeTour.name;
   beforeTour = null;
+}
+
+/** Ends the tour: the scheme from before it is back. */
+function endTour() {
+  const { scheme, name, selected } = beforeTour;
+  quitTour();
+  replace(scheme, name);
+  select(selected);
+  verdicts.before = null;
+  say('Your scheme is back as it was before the tour; Undo returns to the scheme of the tour.', 'fine');
   $('start-tour').focus();
 }
 

@@ -39,10 +39,10 @@ async function explain(box, named, name, more = {}) {
   const request = { sources: [named], why: [name], solutions: false, ...more };
   const said = await behind.ask('call', ['analyze', request], { lane: box.id }).catch((problem) => ({ problem }));
   if (!said || box.hidden || box.dataset.question !== question) return;
-  box.classList.remove('stale');
+  box.classList.toggle('stale', box === $('text-why') && $('text').getAttribute('aria-invalid') === 'true');
   const [e] = said.explanations ?? [];
   const head = closable(box, e?.heading ?? name);
-  if (!e) return void box.replaceChildren(head, element('p', { textContent: said.problem?.message ?? '' }));
+  if (!e) return void box.replaceChildren(head, element('p', { textContent: inPageWords(said.problem?.message ?? '') }));
   const lines = element('ul', {}, ...e.lines.map((textContent) => element('li', { textContent })));
   const changes = e.rows.length ? tableOf(e.columns, e.rows, e.improvements) : element('p', { textContent: `${e.improvements}: ${e.no_change}.` });
   box.replaceChildren(head, lines, changes);
@@ -77,7 +77,7 @@ async function nextPosition() {
   const request = { next: 1, keep: 3, conditions_file: source(scheme) };
   const said = await behind.ask('call', ['design', request], { lane: 'next' }).catch((problem) => ({ problem }));
   if (!said || box.hidden || JSON.stringify(scheme) !== JSON.stringify(state.scheme)) return;
-  if (said.problem) return void box.replaceChildren(element('p', { textContent: said.problem.message }));
+  if (said.problem) return void box.replaceChildren(element('p', { textContent: inPageWords(said.problem.message) }));
   const { found } = JSON.parse(said.text);
   const rows = found.map(({ positions: [p], then }) => {
     const add = element('button', { type: 'button', textContent: 'Add' });

@@ -27,6 +27,16 @@ fn what_rests_on_a_prior_says_on_whose() {
     assert!(text.contains(line), "{text}");
 }
 
+/// A combination with psi belongs to the unknowns of the scheme's own carry; the other carries are judged
+/// beside it all the same.
+#[test]
+fn a_combination_with_psi_is_of_the_own_carry() {
+    let combination = ["--combination", "D_FZ - wN*psi_y"];
+    let text = stdout(&run(&[&P1P2[..], &combination].concat()));
+    assert!(text.contains("D_FZ - wN*psi_y"), "{text}");
+    assert!(text.contains("under the other carries"), "{text}");
+}
+
 /// The smallest margin is attributed to "the others" if some missed unknowns have no margin.
 #[test]
 fn a_margin_is_not_said_to_be_the_worst_of_what_it_leaves_out() {

@@ -48,6 +48,8 @@ pub enum GimbalObstacle {
 
 /// Largest rounding of followed gimbal angles, in degrees.
 const ROUNDED: f64 = 1e-4;
+/// Largest rounding of followed gimbal angles at the end of a turn that leads to `beta = +-90`, in degrees.
+const ROUNDED_AT_LOCK: f64 = 0.01;
 
 /// Followed gimbal angles without their rounding: those of the attitude at `written`, or of its twin, if they
 /// are near.
@@ -57,6 +59,23 @@ fn snapped(reached: [f64; 3], [a, b, g]: [f64; 3]) -> [f64; 3] {
         (0..3).all(|k| (placed[k] - reached[k]).abs() < ROUNDED).then(|| placed.map(clean))
     };
     near([a, b, g]).or_else(|| near([a + 180.0, 180.0 - b, g + 180.0])).unwrap_or(reached)
+}
+
+/// Gimbal angles at the end of a turn about `about` (North, Up, East) that leads to `beta = +-90`, without
+/// the rounding of those that were followed: the middle axis `Mx(alpha) e_y` lies along the part of the
+/// turn's axis across North, and alpha and gamma together give the attitude at `written`. `None` elsewhere,
+/// and for turns about North.
+fn snapped_at_lock(reached: [f64; 3], [a, b, g]: [f64; 3], [_, up, east]: [f64; 3]) -> Option<[f64; 3]> {
+    if from_lock(b) > 1e-9 || up.hypot(east) < 1e-9 {
+        return None;
+    }
+    let along = (-east).atan2(up).to_degrees();
+    // at b = 90 only a - g counts, at b = -90 only a + g
+    let sign = b.to_radians().sin().signum();
+    [along, along + 180.0].into_iter().find_map(|alpha| {
+        let placed = [(alpha, 0), (b, 1), (g + sign * (alpha - a), 2)].map(|(x, k)| beside(x, reached[k]));
+        (0..3).all(|k| (placed[k] - reached[k]).abs() < ROUNDED_AT_LOCK).then(|| placed.map(clean))
+    })
 }
 
 impl Scheme {
@@ -234,7 +253,11 @@ impl Scheme {
         station.fastest = fastest;
         match stop {
             Some(stop) => station.obstacle = Some(GimbalObstacle::Stop(stop)),
-            None => station.at_deg = snapped(reached.map(clean), degrees(&p.angles)),
+            None => {
+                let (reached, written) = (reached.map(clean), degrees(&p.angles));
+                station.at_deg = snapped_at_lock(reached, written, slew.turn().about)
+                    .unwrap_or_else(|| snapped(reached, written));
+            }
         }
         station.turns.push(slew);
     }
@@ -317,6 +340,27 @@ mod tests {
         let limited = "gimbals = { alpha_deg = [-170, 300] }\n";
         let found = of(limited, &["angles_deg = [-150, 0, 0]", "angles_deg = [150, 10, 0]"]);
         assert_eq!((found[0].at_deg, found[1].obstacle.as_ref()), ([210.0, 0.0, 0.0], None));
+    }
+
+    /// Turns between cardinal attitudes that lead to beta = +-90 end at multiples of 15 degrees: the axes of
+    /// such turns are diagonals of the axes, and what was followed has no rounding left.
+    #[test]
+    fn turns_to_the_lock_end_at_their_limit() {
+        let names = cardinal_names();
+        let mut ends = 0;
+        for from in &names {
+            for to in &names {
+                let tables = [from, to].map(|n| format!("attitude = '{n}'"));
+                for s in of("", &[&tables[0], &tables[1]]) {
+                    if s.obstacle.is_none() && from_lock(s.at_deg[1]) < 1e-6 {
+                        let multiple = |x: f64| (x / 15.0 - (x / 15.0).round()).abs() < 1e-9;
+                        assert!(s.at_deg.iter().all(|x| multiple(*x)), "{from} {to}: {s:?}");
+                        ends += 1;
+                    }
+                }
+            }
+        }
+        assert!(ends > 100, "{ends}");
     }
 
     /// Positions at beta = +-90 in the middle of a scheme: alpha and gamma turn together at rest, which

@@ -101,10 +101,21 @@ fn judged(
     let conditions = conditions.as_stated();
     let conditions = conditions.within(&Platform::new(scheme.clone())?);
     let plan = Plan::new(&scheme, &conditions)?;
-    let settle_s = options.settle_s;
-    if settle_s == 0.0 {
-        return Attained::of_plan(plan, &conditions, None, options.seed);
-    }
+    let plan = match options.settle_s {
+        0.0 => plan,
+        settle_s => waited(plan, &conditions, settle_s, |plan, k| plan.stages[k].outputs.clear())?,
+    };
+    Attained::of_plan(plan, &conditions, None, options.seed)
+}
+
+/// The plan with steps that end where the waits of `settle_s` s end; `silence` is called with the indices of
+/// the segments of the waits.
+fn waited(
+    plan: Plan,
+    conditions: &Conditions,
+    settle_s: f64,
+    silence: impl Fn(&mut Plan, usize),
+) -> Result<Plan, SimulationError> {
     // the wait, then the samples at the same steps
     let parts = |s: &Segment| {
         if s.kind != SegmentKind::Dwell {
@@ -117,17 +128,51 @@ fn judged(
         out.retain(|(steps, dt)| *steps > 0 && *dt > 1e-9);
         out
     };
-    let mut plan = plan.in_steps(&conditions, parts)?;
-    let mut begins = vec![f64::INFINITY; count];
+    let mut plan = plan.in_steps(conditions, parts)?;
+    let mut begins = vec![f64::INFINITY; plan.attitudes.len()];
     for k in 0..plan.segments.len() {
         let s = &plan.segments[k];
         if s.kind == SegmentKind::Dwell {
             begins[s.position] = begins[s.position].min(s.start_s);
             let end = s.start_s + s.dt * s.steps as f64 - begins[s.position];
             if end <= settle_s + 1e-9 {
-                plan.stages[k].outputs.clear();
+                silence(&mut plan, k);
             }
         }
     }
-    Attained::of_plan(plan, &conditions, None, options.seed)
+    Ok(plan)
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::scheme_file;
+
+    use super::*;
+
+    /// Samples that are left out count as samples of a noise a million times larger do, also for the bench:
+    /// errors that are not estimated enter the samples that remain at their own times.
+    #[test]
+    fn left_out_samples_are_samples_of_great_noise() {
+        let text = "carry = 'inertial'\nlatitude_deg = 40\n[simulation]\nslew_rate_deg_s = 2\ndwell_s = 300\n\
+                    [bench]\nK0 = 20\nM = 5\nlatitude = 10\n[requirements]\nD = 0.1\n\
+                    [[position]]\nattitude = 'NUE'\n[[position]]\nattitude = 'USE'\n\
+                    [[position]]\nattitude = 'EDN'\n[[position]]\nattitude = 'WND'\n[[position]]\nattitude = 'DNE'\n";
+        let scheme = scheme_file::read(text).expect("a scheme");
+        let stated = Conditions::of(&scheme).as_stated();
+        let conditions = stated.within(&Platform::new(scheme.clone()).expect("a platform"));
+        for settle_s in [20.0, 47.0, 150.0] {
+            let options = ProcedureOptions { settle_s, ..Default::default() };
+            let left_out = judged(&scheme, 5, &Conditions::of(&scheme), &options).expect("a state");
+            let plan = Plan::new(&scheme, &conditions).expect("a plan");
+            let plan = waited(plan, &conditions, settle_s, |plan, k| {
+                plan.stages[k].outputs.iter_mut().for_each(|o| o.r *= 1e12);
+            });
+            let noisy = Attained::of_plan(plan.expect("a plan"), &conditions, None, 1).expect("a state");
+            assert!(left_out.totals.iter().flatten().count() > 10);
+            for (a, b) in left_out.totals.iter().zip(&noisy.totals) {
+                let (Some(a), Some(b)) = (a, b) else { panic!("{a:?} {b:?}") };
+                assert!((a / b - 1.0).abs() < 1e-4, "{settle_s} s: {a} {b}");
+            }
+        }
+    }
 }

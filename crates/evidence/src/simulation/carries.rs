@@ -30,9 +30,9 @@ pub struct OtherCarry {
 }
 
 /// Scheme and conditions under another carry; `None` where torquer errors act on turns that the scheme does
-/// not state.
+/// not state. Combinations are those of the scheme's own unknowns and are left out.
 pub(crate) fn under(scheme: &Scheme, conditions: &Conditions, carry: Carry) -> Option<(Scheme, Conditions)> {
-    let other = Scheme { carry, ..scheme.clone() };
+    let other = Scheme { carry, combinations: Vec::new(), ..scheme.clone() };
     other.paths().is_ok().then(|| (other, Conditions { slews: false, ..conditions.clone() }))
 }
 

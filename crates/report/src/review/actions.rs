@@ -226,8 +226,16 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
         ));
     }
     let missed = c.requirements.iter().flat_map(|r| r.missed.iter().map(|m| m.name.as_str()));
-    let missed: Vec<&str> =
-        missed.filter(|name| c.quantities.iter().any(|q| q.name == *name && q.determined)).collect();
+    let missed = missed.filter(|name| c.quantities.iter().any(|q| q.name == *name && q.determined));
+    let by_bench = |name: &&str| c.next_runs.iter().any(|n| n.unknown == *name && n.required_sigma == 0.0);
+    let (by_bench, missed): (Vec<&str>, Vec<&str>) = missed.partition(by_bench);
+    if !by_bench.is_empty() {
+        out.push(format!(
+            "Estimate the errors of the bench too, or make them smaller, for {}: the bench alone uses up their \
+             requirements, so that no longer record meets them.",
+            words::names(by_bench)
+        ));
+    }
     if !missed.is_empty() {
         out.push(format!(
             "Record longer, or one more position, for {}: by this record their requirements are NOT met (`obsdeg \

@@ -107,6 +107,10 @@ impl<'a> OmittedColumns<'a> {
             SegmentKind::Slew(slew) => self.turn(slew, segment.dt, false),
             SegmentKind::Rotation(slew) => self.turn(slew, segment.dt, true),
         }
+        // a step during which nothing is sampled, such as one of a wait, has no rows
+        if self.plan.stages[self.segment].outputs.is_empty() {
+            self.rows.clear();
+        }
         self.step += 1;
         self.done += 1;
         if self.step == segment.steps {
