@@ -412,3 +412,24 @@ fn the_decision_comes_first() {
     assert_eq!(row[4], format!("({:.2})", b / a));
     assert!(text(&["--format", "markdown"]).contains("Without one position"));
 }
+
+/// With a bench the worst figure is the total uncertainty, and every table names it so: the figure equals the
+/// largest total of `simulate`.
+#[test]
+fn the_worst_figure_with_a_bench_is_a_total() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("bench.toml");
+    let positions: String =
+        ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n")).concat();
+    std::fs::write(&file, format!("carry = 'inertial'\nbench = {{ K0 = 20 }}\n{positions}"))
+        .expect("written");
+    let file = file.to_str().expect("UTF-8");
+    let text = printed(&[file]);
+    assert!(text.contains("worst total(D)") && !text.contains("worst sigma(D)"), "{text}");
+    let worst = json(&["compare", file, "--format", "json"])["schemes"][0]["worst"]["sigma_dph"].clone();
+    let simulated = json(&["simulate", file, "--format", "json"]);
+    let totals = simulated["omitted"]["budgets"].as_array().expect("budgets").iter();
+    let drifts = totals.filter(|b| b["unknown"].as_str().is_some_and(|n| n.starts_with("D_")));
+    let largest = drifts.filter_map(|b| b["total"].as_f64()).fold(0.0, f64::max);
+    assert!((worst.as_f64().expect("a figure") / largest - 1.0).abs() < 1e-6, "{worst} {largest}");
+}

@@ -9,8 +9,8 @@ use crate::program::{json as answer_of, run};
 use crate::workbench_page::{choose, click, opened, quiet, scheme, wait, write, wrong};
 
 /// Condition that a search has ended and its schemes are listed.
-const FOUND: &str = "document.querySelector('#found tbody tr') && !document.querySelector('#found').classList.contains('stale') && \
-                     document.getElementById('design-stop').disabled";
+const FOUND: &str = "document.querySelector('#found tbody tr') && document.getElementById('design-stop').disabled && \
+                     !document.getElementById('found').classList.contains('stale')";
 
 #[test]
 fn the_best_positions_are_found() {
@@ -164,7 +164,8 @@ fn a_search_has_limits() {
          return [f.textContent, data.some(x => x)]; })",
     );
     let first = b.value(
-        "(r => [r.cells[1].firstChild.firstChild.textContent, r.cells[3].textContent])(document.querySelector('#found tbody tr'))",
+        "(r => [r.cells[1].firstChild.firstChild.textContent, \
+         r.cells[3].textContent])(document.querySelector('#found tbody tr'))",
     );
     let names = first[0].as_str().expect("names").split(' ').enumerate();
     let captions: Vec<Value> = names.map(|(i, name)| json!([format!("{}: {name}", i + 1), true])).collect();

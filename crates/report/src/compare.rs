@@ -11,6 +11,11 @@ pub(crate) fn worst(w: Option<&Worst>) -> String {
     w.map_or_else(|| "-".into(), |w| format!("{} ({})", number(w.sigma_dph), w.name))
 }
 
+/// Name of the figure of [`worst`]: with a bench it is the total uncertainty.
+fn worst_heading(with_bench: bool) -> &'static str {
+    if with_bench { "worst total(D), with the bench" } else { "worst sigma(D)" }
+}
+
 fn list(items: &[String]) -> String {
     if items.is_empty() { "-".into() } else { items.join(" ") }
 }
@@ -62,13 +67,18 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
             right("positions"),
             right("total [s]"),
             right("rank with dwell"),
-            left("worst sigma(D)"),
+            left(worst_heading(has_bench(schemes))),
             left(REQUIREMENTS[0]),
             left("observable without"),
             left(REQUIREMENTS[1]),
         ],
         schemes.iter().map(row),
     )
+}
+
+/// True if a scheme has a bench; then all are compared with one.
+fn has_bench(schemes: &[ComparedScheme]) -> bool {
+    schemes.iter().any(|r| r.conditions.bench.is_some())
 }
 
 /// Uncertainty that requirements are compared with: the total with a bench, else sigma.
@@ -302,8 +312,8 @@ impl Answer for Comparison {
                 ]
             })
         });
-        let columns =
-            ["scheme", "without", "not observable any more", "worst sigma(D)", REQUIREMENTS[0]].map(left);
+        let figure = worst_heading(has_bench(&self.schemes));
+        let columns = ["scheme", "without", "not observable any more", figure, REQUIREMENTS[0]].map(left);
         blocks.push(Block::table("Without one position", columns, drop_rows).without(left_out));
         let conditions = self.schemes.first().map_or(&[][..], |r| &r.sensitivity);
         let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
@@ -325,8 +335,6 @@ impl Answer for Comparison {
                 }
             }
         }
-        let with_bench = self.schemes.iter().any(|r| r.conditions.bench.is_some());
-        let figure = if with_bench { "worst total(D), with the bench" } else { "worst sigma(D)" };
         blocks.push(Block::table(
             format!("Sensitivity of the {figure}"),
             [left("condition"), left("scheme"), right("rank with dwell"), left(figure)],

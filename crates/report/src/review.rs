@@ -574,8 +574,13 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
     if let Some(kept) = &alternatives.kept {
         lines.push(match kept.positions {
             Some(k) if k == s.positions.len() => {
+                // what slews determine besides is in the rows without one position
+                let beside = match review.slews.is_empty() {
+                    true => "",
+                    false => "; what follows counts the slews too",
+                };
                 format!(
-                    "all {k} positions are needed to observe {} by repositioning at once",
+                    "all {k} positions are needed to observe {} by repositioning at once{beside}",
                     alternatives.required.join(", ")
                 )
             }
@@ -615,11 +620,11 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
         ]
     };
     if !review.drop_one.is_empty() {
-        let sigma = match review.conditions.bench.is_some() {
-            true => "largest total uncertainty (D) [deg/h, /g]",
-            false => "largest sigma (D) [deg/h, /g]",
+        let figure = match review.conditions.bench.is_some() {
+            true => "worst total(D), with the bench [deg/h, /g]",
+            false => "worst sigma(D) [deg/h, /g]",
         };
-        let columns = ["without", "not observable any more", sigma, compare::REQUIREMENTS[0]].map(left);
+        let columns = ["without", "not observable any more", figure, compare::REQUIREMENTS[0]].map(left);
         let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
         blocks.push(table.without(&left_out(review)));
     }

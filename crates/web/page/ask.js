@@ -17,6 +17,7 @@ function askVerdicts() { answered = verdictsNow(); }
 
 // ms after which an answer that is not there yet makes the one before faint
 const LATE = 400;
+const NOT_JUDGED = 'not judged: what is below is of the scheme before';
 const fade = (on) => ['verdicts', 'sentences', 'remedies', 'not-estimated'].forEach((id) => $(id).classList.toggle('stale', on));
 
 async function verdictsNow() {
@@ -38,11 +39,16 @@ async function verdictsNow() {
   }
   const request = { sources: [source(scheme)], solutions: false, omitted: false };
   const late = setTimeout(() => { fade(true); put($('summary'), 'judging: what is below is of the scheme before'); }, LATE);
-  const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(failed).finally(() => clearTimeout(late));
+  const ended = (problem) => {
+    fade(true);
+    put($('summary'), NOT_JUDGED);
+    return failed(problem);
+  };
+  const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(ended).finally(() => clearTimeout(late));
   if (!found) return;
   fade(!!found.problem);
   if (found.problem) {
-    put($('summary'), 'not judged: what is below is of the scheme before');
+    put($('summary'), NOT_JUDGED);
     // fields that were refused before stay marked: what they hold is still in the scheme
     return wrongAt(found.problem, request.sources[0].text);
   }
@@ -88,7 +94,7 @@ function askRest() {
     const run = await behind.ask('call', ['simulate', { sources: named }], { lane: 'sigmas' }).catch(failed);
     if (run && still()) {
       verdicts.sigmasOf = asked;
-      verdicts.sigmas = null;
+      verdicts.sigmas = verdicts.omitted = null;
       verdicts.without = run.problem && !run.problem.place ? inPageWords(run.problem.message) : null;
       if (run.problem && (run.problem.place || fieldOf(run.problem, { keys: [] }))) wrongAt(run.problem, named[0].text);
     }

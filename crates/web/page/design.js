@@ -22,7 +22,7 @@ const listIn = (id) => $(id).value.split(',').map((t) => t.trim()).filter(Boolea
 /** The request of a search; null if a field holds something wrong, which is then shown there. */
 function searched() {
   mendAll([...faults.keys()].filter((id) => id.startsWith('design-')));
-  const k = Number($('design-k').value);
+  const k = numberIn($('design-k'));
   if (!Number.isInteger(k) || k < 1 || k > 100) fault('design-k', `K: expected a whole number from 1 to 100, found "${$('design-k').value}"`);
   // the candidates under the conditions of the scheme
   const own = copy(state.scheme);
@@ -34,9 +34,8 @@ function searched() {
     if (x === undefined) continue;
     if (holds(x)) request[key] = x; else fault(id, `${labelOf(id)}: expected ${expected}, found "${$(id).value}"`);
   }
-  const limits = gimbalLimits($('design-gimbals').value), observable = [...new Set(listIn('design-observable'))];
-  if (!limits) fault('design-gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$('design-gimbals').value}"`);
-  else if (Object.keys(limits).length) request.gimbal = limitsText(limits).split(', ');
+  const limits = limitsIn('design-gimbals'), observable = [...new Set(listIn('design-observable'))];
+  if (limits && Object.keys(limits).length) request.gimbal = limitsText(limits).split(', ');
   if (observable.length) request.observable = observable;
   const first = [...faults.keys()].find((id) => id.startsWith('design-'));
   if (first) $(first).focus();

@@ -208,6 +208,12 @@ function gimbalLimits(text) {
   }
   return out;
 }
+/** Gimbal limits in a field; null for another text, which is marked there. */
+function limitsIn(id) {
+  const limits = gimbalLimits($(id).value);
+  if (!limits) fault(id, `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$(id).value}"`);
+  return limits;
+}
 const limitsText = (gimbals = {}) => AXES.filter((axis) => gimbals[`${axis}_deg`]).map((axis) => `${axis}=${gimbals[`${axis}_deg`].join(':')}`).join(', ');
 
 function wireConditions() {
@@ -229,8 +235,8 @@ function wireConditions() {
   field('latitude-number', 'latitude_deg', numberIn);
   field('slew-rate', 'simulation.slew_rate_deg_s', numberIn);
   $('gimbals').addEventListener('change', () => {
-    const limits = gimbalLimits($('gimbals').value);
-    if (!limits) return void fault('gimbals', `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$('gimbals').value}"`);
+    const limits = limitsIn('gimbals');
+    if (!limits) return;
     mend('gimbals');
     setKey('gimbals', Object.keys(limits).length ? limits : undefined);
   });

@@ -102,7 +102,6 @@ function classes(f) {
 /** Draws the families of errors that are not estimated, and the change of the estimates per unit of each. */
 function drawOmitted(omitted) {
   $('not-estimated').hidden = !omitted;
-  $('omitted-terms').hidden = !omitted || $('omitted-terms').hidden;
   if (!omitted) return;
   const used = omitted.families.some((f) => f.uses_up);
   const head = ['family (terms)', 'class', 'worst change', 'of', 'as large as sigma at', 'seen from (3 sigma)', ...(used ? ['uses up a margin at'] : [])];
@@ -126,10 +125,10 @@ function drawTerms(omitted, family) {
   const box = $('omitted-terms'), terms = omitted.terms.filter((t) => t.family === family);
   box.hidden = !terms.length;
   box.dataset.family = family;
-  const size = (t) => (t.size === null ? [] : [`${two(t.size)} ${t.unit}`]);
+  const inUnit = (x, t) => (x === null ? '\u2013' : `${two(x)} ${t.unit}`);
   const stated = terms.some((t) => t.size !== null);
-  const rows = terms.map((t) => [t.name, ...(stated ? [size(t)[0] ?? '\u2013'] : []), t.class?.replace('_', ' ') ?? '\u2013',
-    t.sensitivities.map((x) => `${x.unknown} ${perUnit(x)}`).join(', ') || 'nothing', t.visible_from === null ? '\u2013' : `${two(t.visible_from)} ${t.unit}`]);
+  const rows = terms.map((t) => [t.name, ...(stated ? [inUnit(t.size, t)] : []), t.class?.replace('_', ' ') ?? '\u2013',
+    t.sensitivities.map((x) => `${x.unknown} ${perUnit(x)}`).join(', ') || 'nothing', inUnit(t.visible_from, t)]);
   const heads = ['error', ...(stated ? ['stated size'] : []), 'class', `changes per ${terms[0]?.unit ?? 'unit'}: estimate minus truth`, 'seen from (3 sigma)'];
   box.replaceChildren(closable(box, `${family}: each error by itself`), tableOf(heads, rows));
 }

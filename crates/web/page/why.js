@@ -31,6 +31,8 @@ const questionOf = (named, name) => JSON.stringify([named, name]);
 /** Explains the verdict on an unknown of a text; the answer replaces the content of a box. `more` has options. */
 async function explain(box, named, name, more = {}) {
   const question = questionOf(named, name);
+  // an explanation that follows an edit leaves the page where the edit is
+  const again = !box.hidden && box.dataset.name === name;
   box.hidden = false;
   box.dataset.name = name;
   box.dataset.question = question;
@@ -47,7 +49,7 @@ async function explain(box, named, name, more = {}) {
   const changes = e.rows.length ? tableOf(e.columns, e.rows, e.improvements) : element('p', { textContent: `${e.improvements}: ${e.no_change}.` });
   box.replaceChildren(head, lines, changes);
   addChangers();
-  box.scrollIntoView({ block: 'nearest' });
+  if (!again) box.scrollIntoView({ block: 'nearest' });
 }
 
 /** Explains the verdict on an unknown of the scheme. */
