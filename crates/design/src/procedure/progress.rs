@@ -150,28 +150,33 @@ mod tests {
     use super::*;
 
     /// Samples that are left out count as samples of a noise a million times larger do, also for the bench:
-    /// errors that are not estimated enter the samples that remain at their own times.
+    /// errors that are not estimated enter the samples that remain at their own times. So by the information
+    /// of all samples, and by a filter with random drift.
     #[test]
     fn left_out_samples_are_samples_of_great_noise() {
-        let text = "carry = 'inertial'\nlatitude_deg = 40\n[simulation]\nslew_rate_deg_s = 2\ndwell_s = 300\n\
-                    [bench]\nK0 = 20\nM = 5\nlatitude = 10\n[requirements]\nD = 0.1\n\
-                    [[position]]\nattitude = 'NUE'\n[[position]]\nattitude = 'USE'\n\
-                    [[position]]\nattitude = 'EDN'\n[[position]]\nattitude = 'WND'\n[[position]]\nattitude = 'DNE'\n";
-        let scheme = scheme_file::read(text).expect("a scheme");
-        let stated = Conditions::of(&scheme).as_stated();
-        let conditions = stated.within(&Platform::new(scheme.clone()).expect("a platform"));
-        for settle_s in [20.0, 47.0, 150.0] {
-            let options = ProcedureOptions { settle_s, ..Default::default() };
-            let left_out = judged(&scheme, 5, &Conditions::of(&scheme), &options).expect("a state");
-            let plan = Plan::new(&scheme, &conditions).expect("a plan");
-            let plan = waited(plan, &conditions, settle_s, |plan, k| {
-                plan.stages[k].outputs.iter_mut().for_each(|o| o.r *= 1e12);
-            });
-            let noisy = Attained::of_plan(plan.expect("a plan"), &conditions, None, 1).expect("a state");
-            assert!(left_out.totals.iter().flatten().count() > 10);
-            for (a, b) in left_out.totals.iter().zip(&noisy.totals) {
-                let (Some(a), Some(b)) = (a, b) else { panic!("{a:?} {b:?}") };
-                assert!((a / b - 1.0).abs() < 1e-4, "{settle_s} s: {a} {b}");
+        let names = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
+        for drift in ["", "drift_noise = '0.001 deg/sqrt(h)'\n"] {
+            let text = format!(
+                "carry = 'inertial'\nlatitude_deg = 40\n[simulation]\nslew_rate_deg_s = 2\ndwell_s = 300\n{drift}\
+                 [bench]\nK0 = 20\nM = 5\nlatitude = 10\n[requirements]\nD = 0.1\n{}",
+                names.concat()
+            );
+            let scheme = scheme_file::read(&text).expect("a scheme");
+            let stated = Conditions::of(&scheme).as_stated();
+            let conditions = stated.within(&Platform::new(scheme.clone()).expect("a platform"));
+            for settle_s in [20.0, 47.0, 150.0] {
+                let options = ProcedureOptions { settle_s, ..Default::default() };
+                let left_out = judged(&scheme, 5, &Conditions::of(&scheme), &options).expect("a state");
+                let plan = Plan::new(&scheme, &conditions).expect("a plan");
+                let plan = waited(plan, &conditions, settle_s, |plan, k| {
+                    plan.stages[k].outputs.iter_mut().for_each(|o| o.r *= 1e12);
+                });
+                let noisy = Attained::of_plan(plan.expect("a plan"), &conditions, None, 1).expect("a state");
+                assert!(left_out.totals.iter().flatten().count() > 10);
+                for (a, b) in left_out.totals.iter().zip(&noisy.totals) {
+                    let (Some(a), Some(b)) = (a, b) else { panic!("{a:?} {b:?}") };
+                    assert!((a / b - 1.0).abs() < 1e-4, "{drift} {settle_s} s: {a} {b}");
+                }
             }
         }
     }
