@@ -704,6 +704,8 @@ class MeasurementReport(Record):
     """Dwell, in s, of positions that do not state their own."""
     step_s: float
     """Largest step between samples in s; a position is divided into equal steps."""
+    settle_s: float | None
+    """Time at the start of each position at rest, in s, whose samples do not count; left out where all count."""
     accelerometer_noise_g: float
     """Noise of the observation per sample and axis, in g."""
     accelerometer_bias: AccelerometerBias | None
@@ -2485,6 +2487,8 @@ class ConditionsReport(Record):
     """True if the program chose the latitude."""
     step_s: float
     """Largest step between samples, in s."""
+    settle_s: float | None
+    """Time at the start of each position at rest, in s, whose samples do not count; left out where all count."""
     slew_rate_deg_s: float | None
     """Rate of slews in deg/s unless a position states its own; null for instantaneous slews."""
     accelerometer_noise_g: float

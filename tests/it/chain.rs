@@ -188,9 +188,16 @@ fn what_design_says_every_command_repeats_in_200_tasks() {
 }
 
 /// Sigmas at the end with random drift and a prior, by normal equations of all samples with one more unknown
-/// for the drift of each step. No filter takes part.
+/// for the drift of each step; also without the samples of the first 20 s of each position. No filter takes
+/// part.
 #[test]
 fn predicted_sigmas_are_those_of_least_squares() {
+    for (settle, left_out) in [("", 0), ("[record]\nsettle = 20\n", 2)] {
+        are_those_of_least_squares(settle, left_out);
+    }
+}
+
+fn are_those_of_least_squares(settle: &str, left_out: usize) {
     let scheme = "carry = \"inertial\"\nlatitude_deg = 40\n[simulation]\ndwell_s = 60\nstep_s = 10\n\
                   accelerometer_noise_g = 2e-5\ndrift_noise = \"3 deg/h\"\n\
                   priors = { D_F = 20, D_I = 10, D_O = 10, D_S = 10, psi = 0.2 }\n[requirements]\npsi = 0.1\nD_F = 19\n\
@@ -198,7 +205,8 @@ fn predicted_sigmas_are_those_of_least_squares() {
                   angles_deg = [-95, 33, -160]\n";
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scheme.toml");
-    std::fs::write(&file, scheme).expect("a file");
+    std::fs::write(&file, scheme.replace("[requirements]", &format!("{settle}[requirements]")))
+        .expect("a file");
     let answer = json(&["compare", &file.display().to_string(), "--format", "json"]);
     let found: Vec<f64> = answer["schemes"][0]["quantities"]
         .as_array()
@@ -206,7 +214,7 @@ fn predicted_sigmas_are_those_of_least_squares() {
         .iter()
         .map(|q| q["sigma"].as_f64().expect("a sigma"))
         .collect();
-    let expected = by_normal_equations();
+    let expected = by_normal_equations(left_out);
     for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
         assert!((a / b - 1.0).abs() < 2e-3, "unknown {i}: {a} against {b}");
     }
@@ -216,8 +224,8 @@ fn predicted_sigmas_are_those_of_least_squares() {
 }
 
 /// Reference computation: psi' = -[w x] psi + C E D + n in n, Z1 = psi_z, Z3 = -psi_x, steps of 0.1 s, n
-/// constant over 10 s.
-fn by_normal_equations() -> Vec<f64> {
+/// constant over 10 s. Of each position the first `left_out` samples do not count.
+fn by_normal_equations(left_out: usize) -> Vec<f64> {
     const STEPS: usize = 6;
     let (dph, deg) = (1f64.to_radians() / 3600.0, 1f64.to_radians());
     let w = 7.292115e-5;
@@ -268,6 +276,9 @@ fn by_normal_equations() -> Vec<f64> {
                 let k4 = slope(&(&psi + &k3 * h));
                 psi += (k1 + k2 * 2.0 + k3 * 2.0 + k4) * (h / 6.0);
             }
+            if step < left_out {
+                continue;
+            }
             for row in [psi.row(2).into_owned(), -psi.row(0).into_owned()] {
                 information += row.transpose() * &row * 2e-5f64.powi(-2);
             }
@@ -279,4 +290,72 @@ fn by_normal_equations() -> Vec<f64> {
     let unit = |i: usize| DMatrix::from_fn(1, n, |_, j| f64::from(u8::from(i == j)));
     let angles = (0..3).map(|k| sigma(&end.rows(k, 1).into_owned()) / deg);
     angles.chain((3..15).map(|i| sigma(&unit(i)) / dph)).collect()
+}
+
+/// Samples at the start of positions that the record leaves out count in no command: `simulate`, `compare`,
+/// `procedure`, `design` and the engine of the page give the same uncertainty of every coefficient. Its sigma is
+/// larger than with all samples; a total with a bench need not be.
+#[test]
+fn samples_that_the_record_leaves_out_count_nowhere() {
+    let positions = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
+    let slews = "slew_rate_deg_s = 2\n";
+    let cases = [
+        ("inertial", slews, ""),
+        ("inertial", "", "[bench]\nK0 = 20\nlatitude = 10\n"),
+        ("platform", "drift_noise = '0.001 deg/sqrt(h)'\n", ""),
+        ("reset", "accelerometer_bias_instability_ug = 2\n", ""),
+    ];
+    for (carry, conditions, bench) in cases {
+        let with = |settle: &str| {
+            let text = format!(
+                "carry = '{carry}'\nlatitude_deg = 40\n[simulation]\ndwell_s = 300\n{conditions}\
+                 priors = {{ psi = 0.1 }}\n{bench}[requirements]\nD = 0.1\n{settle}{}",
+                positions.concat()
+            );
+            uncertainties(&text, &format!("{carry} {conditions}{bench}{settle}"))
+        };
+        // 200 s are more than half of a dwell, which `compare` tries too
+        let found = ["", "[record]\nsettle = 47\n", "[record]\nsettle = 200\n"].map(with);
+        for (all, fewer) in found[0].iter().zip(&found[1]).chain(found[1].iter().zip(&found[2])) {
+            let (Some(all), Some(fewer)) = (all.as_f64(), fewer.as_f64()) else { continue };
+            assert!(fewer > 1.01 * all, "{carry} {conditions}{bench}: {all} {fewer}");
+        }
+    }
+}
+
+/// Sigma of each coefficient, the same by every command, as is its uncertainty with the bench.
+fn uncertainties(text: &str, name: &str) -> Vec<Value> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("settling.toml").display().to_string();
+    std::fs::write(&file, text).expect("a file");
+    let coefficients = |of: &Value| {
+        let all = of.as_array().expect("a list").iter();
+        all.filter(|q| q["name"].as_str().is_some_and(|n| n.starts_with("D_"))).cloned().collect::<Vec<_>>()
+    };
+    let compared = &json(&["compare", &file, "--format", "json"])["schemes"][0];
+    let expected = coefficients(&compared["quantities"]);
+    let simulated = json(&["simulate", &file, "--format", "json"]);
+    let sheet = json(&["procedure", &file, "--format", "json"]);
+    let total = |q: &Value| if q["total"].is_null() { q["sigma"].clone() } else { q["total"].clone() };
+    for ((q, s), c) in
+        expected.iter().zip(coefficients(&simulated["quantities"])).zip(coefficients(&sheet["coefficients"]))
+    {
+        assert!(same(&q["sigma"], &s["predicted_sigma"]), "{name}: {q} {s}");
+        assert!(same(&total(q), &c["uncertainty"]), "{name}: {q} {c}");
+    }
+    agree(name, "procedure", compared, &sheet);
+    let positions = compared["positions"].as_array().map_or(0, Vec::len).to_string();
+    let design = json(&["design", &file, "--positions", &positions, "--format", "json"]);
+    let found = &design["found"][0];
+    let [best, own] = [&found["worst_sigma_dph"], &compared["worst"]["sigma_dph"]].map(Value::as_f64);
+    assert!(best.is_some() && best <= own.map(|s| 1.000001 * s), "{name}: {best:?} {own:?}");
+    let winner = folder.path().join("w").display().to_string();
+    assert!(run(&["design", &file, "--positions", &positions, "-o", &winner]).status.success(), "{name}");
+    let again = &json(&["compare", &format!("{winner}/winner.toml"), "--format", "json"])["schemes"][0];
+    assert!(same(&found["worst_sigma_dph"], &again["worst"]["sigma_dph"]), "{name}: {found} {again}");
+    let asked = object!({ "sources": [{ "name": "settling.toml", "text": text }] });
+    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true });
+    let page: Value = serde_json::from_str(&page.expect("an answer").text).expect("JSON");
+    assert!(&page["schemes"][0] == compared, "{name}: the page");
+    expected.iter().map(|q| q["sigma"].clone()).collect()
 }

@@ -49,8 +49,7 @@ fn a_sheet_and_its_files() {
     // the wait is in the scheme
     let own_wait = json(&["procedure", own, "--format", "json"]);
     assert_eq!(own_wait["coefficients"], sheet["coefficients"]);
-    // without a wait the uncertainties are those of the other commands
-    let sheet = json(&["procedure", own, "--settle", "0", "--format", "json"]);
+    // the uncertainties are those of the other commands
     let run = json(&["simulate", own, "--format", "json"]);
     for c in sheet["coefficients"].as_array().expect("coefficients") {
         let all = run["quantities"].as_array().expect("unknowns");
@@ -134,9 +133,9 @@ fn what_the_gimbals_cannot_do() {
 fn wrong_inputs_are_named() {
     refused(
         &["procedure", SCHEME, "--settle", "400"],
-        &["a wait of 400 s leaves nothing of the dwell of `p1`"],
+        &["a wait of 400 s for rest leaves no sample of the dwell of `p1` (400 s)"],
     );
-    refused(&["procedure", SCHEME, "--settle", "-1"], &["a wait of -1", "0 to 100000 s"]);
+    refused(&["procedure", SCHEME, "--settle", "-1"], &["settle_s is -1", "0 to 1e6 s"]);
     refused(&["procedure", SCHEME, "--tilt", "0"], &["a tilt of 0"]);
     refused(&["procedure", "examples/sir/model.toml"], &["a model has no sheet"]);
     refused(&["procedure", "--angles", "alpha,0,0"], &["alpha"]);

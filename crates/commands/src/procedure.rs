@@ -123,9 +123,9 @@ pub fn procedure(
         return Err(Problem::input("a model has no sheet; expected a scheme, or --angles once per position"));
     };
     a.conditions.concern(std::iter::once(&*scheme))?;
-    let conditions: Conditions = a.conditions.conditions(&scheme);
-    let settle_s = a.settle.or(scheme.recording.settle).unwrap_or(0.0);
-    let options = ProcedureOptions { settle_s, tilt_deg: a.tilt, seed: a.seed };
+    let mut conditions: Conditions = a.conditions.conditions(&scheme);
+    conditions.settle_s = a.settle.unwrap_or(conditions.settle_s);
+    let options = ProcedureOptions { tilt_deg: a.tilt, seed: a.seed };
     let sheet = sheet(&scheme, &conditions, &options).map_err(|e| match e {
         ProcedureError::Simulation(e) => Problem::from(e),
         e => Problem::input(e.to_string()),
@@ -136,7 +136,7 @@ pub fn procedure(
              or more",
         ));
     }
-    Ok(Planned { sheet, scheme: scheme_of_procedure(&scheme, &conditions, settle_s), dialect: a.dialect })
+    Ok(Planned { sheet, scheme: scheme_of_procedure(&scheme, &conditions), dialect: a.dialect })
 }
 
 /// Scheme file of a rotation table.

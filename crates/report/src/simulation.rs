@@ -49,6 +49,7 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
         format!("repositioning {slew}"),
         format!("timeline {}", parts.join(", ")),
     ];
+    out.extend(c.settle_s.map(words::settle));
     if c.drift_scale != 1.0 {
         out.push(format!("true drifts and their priors times {}", c.drift_scale));
     }

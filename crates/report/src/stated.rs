@@ -305,6 +305,7 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
         format!("latitude {} deg{by}", m.latitude_deg),
     ];
+    out.extend(m.settle_s.map(words::settle));
     out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
     out.extend(m.gyro_noise.as_ref().map(gyro_noise));

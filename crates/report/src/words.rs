@@ -563,6 +563,11 @@ pub(crate) fn consistency(c: &Consistency) -> Vec<String> {
     ]
 }
 
+/// Samples at the start of positions that are left out.
+pub(crate) fn settle(seconds: f64) -> String {
+    format!("samples of the first {seconds} s at each position left out (settle under [record])")
+}
+
 /// The bias instability of the accelerometers.
 pub(crate) fn accelerometer_bias(b: &AccelerometerBias) -> String {
     format!(

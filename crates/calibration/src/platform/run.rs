@@ -114,10 +114,11 @@ pub(crate) struct Key {
     pub channel: usize,
 }
 
-/// Conditions of an estimate: random drift is a density, since the bins of a record have different lengths.
+/// Conditions of an estimate: random drift is a density, since the bins of a record have different lengths,
+/// and rows that are left out are no bins.
 pub(crate) fn conditions(of: &Conditions) -> Conditions {
     let density = of.drift_noise.density_deg_sqrt_h(of.drift_noise_step_s);
-    Conditions { drift_noise: DriftNoise::RandomWalk(density), ..of.clone() }
+    Conditions { drift_noise: DriftNoise::RandomWalk(density), settle_s: 0.0, ..of.clone() }
 }
 
 /// Parts of a position that begins at `begin`: the steps to its bins, and the rest. Bins lie inside the

@@ -22,6 +22,8 @@ const fn range(low: f64, high: f64, unit: &'static str) -> Range {
 pub const STEP_S: Range = range(1e-6, 1e6, "s");
 /// Dwell of a position.
 pub const DWELL_S: Range = range(1e-3, 1e6, "s");
+/// Time at the start of a position whose samples are left out.
+pub const SETTLE_S: Range = range(0.0, 1e6, "s");
 /// Largest turn from one position to the next.
 pub const TURN_DEG: Range = range(1e-3, 180.0, "degrees");
 /// Rate of slews.

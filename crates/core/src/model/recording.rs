@@ -67,8 +67,8 @@ pub(crate) struct SchemeRecord {
     /// Codes of missing values, in the unit of their column: `missing = [-9999, 0]`.
     #[serde(default)]
     missing: Vec<f64>,
-    /// Time at the start of each position, in s, 0 to 1e6, whose measurements are left out: the platform
-    /// waits for rest; none when left out.
+    /// Time at the start of each position at rest, in s, 0 to 1e6, whose measurements do not count: not in a
+    /// calibration, and not in predicted uncertainties; none when left out.
     #[serde(default)]
     settle: Option<f64>,
 }

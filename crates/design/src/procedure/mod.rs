@@ -25,7 +25,7 @@ mod readings;
 mod rotations;
 mod steps;
 
-use obsdeg_core::model::{Recording, Scheme};
+use obsdeg_core::model::Scheme;
 use obsdeg_evidence::acceptance::{Measured, acceptance};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, Plan};
 
@@ -49,9 +49,9 @@ pub fn procedure(
     check(options)?;
     let stated = conditions.as_stated();
     let plan = Plan::new(scheme, &stated)?;
-    let steps::Sheet { mut steps, obstacles, total_s } = steps::sheet(scheme, &stated, &plan, options)?;
+    let steps::Sheet { mut steps, obstacles, total_s } = steps::sheet(scheme, &stated, &plan);
     let tolerance = readings::add(&mut steps, &plan, conditions, options)?;
-    let progress = progress(scheme, conditions, options)?;
+    let progress = progress(scheme, conditions, options.seed)?;
     let timed_turns = steps.iter().all(|s| s.turn.as_ref().is_none_or(|t| t.rate_deg_s.is_some()));
     let measured = progress.coefficients.iter().map(|c| Measured {
         name: &c.name,
@@ -77,7 +77,7 @@ pub fn procedure(
         steps,
         total_s,
         timed_turns,
-        settle_s: options.settle_s,
+        settle_s: conditions.settle_s,
         tolerance,
         after: progress.after,
         coefficients: progress.coefficients,
@@ -88,12 +88,11 @@ pub fn procedure(
     })
 }
 
-/// Scheme of a sheet, with all conditions that its figures rest on, and the wait of `settle_s` s.
-pub fn scheme_of_procedure(scheme: &Scheme, conditions: &Conditions, settle_s: f64) -> Scheme {
+/// Scheme of a sheet, with all conditions that its figures rest on.
+pub fn scheme_of_procedure(scheme: &Scheme, conditions: &Conditions) -> Scheme {
     let all = under(scheme, conditions, scheme.positions.clone(), Some(conditions.dwell_s));
     let (name, description) = (scheme.name.clone(), scheme.description.clone());
-    let recording = Recording { settle: Some(settle_s).filter(|s| *s > 0.0), ..scheme.recording.clone() };
-    Scheme { name, description, combinations: scheme.combinations.clone(), recording, ..all }
+    Scheme { name, description, combinations: scheme.combinations.clone(), ..all }
 }
 
 #[cfg(test)]
@@ -142,8 +141,13 @@ mod tests {
     fn a_wait_costs_samples() {
         let scheme = scheme(HEAD, &FOUR);
         let at = |settle_s: f64| {
-            made(&scheme, &ProcedureOptions { settle_s, ..Default::default() }).expect("a sheet")
+            let conditions = Conditions { settle_s, ..Conditions::of(&scheme) };
+            procedure(&scheme, &conditions, &ProcedureOptions::default())
         };
+        let refused = at(300.0).expect_err("no time").to_string();
+        assert!(refused.contains("leaves no sample of the dwell of `p1` (300 s)"), "{refused}");
+        assert!(at(-1.0).is_err() && at(f64::NAN).is_err());
+        let at = |settle_s: f64| at(settle_s).expect("a sheet");
         let sigma = |p: &Procedure| p.coefficients.iter().map(|c| c.uncertainty).collect::<Vec<_>>();
         let (none, some, more) = (at(0.0), at(50.0), at(150.0));
         assert_eq!((none.total_s, some.total_s), (some.total_s, more.total_s));
@@ -153,13 +157,6 @@ mod tests {
         }
         let steps: Vec<(StepKind, f64)> = some.steps.iter().map(|s| (s.kind, s.duration_s)).collect();
         assert_eq!(steps[1..3], [(StepKind::Wait, 50.0), (StepKind::Record, 250.0)]);
-        let refused = made(&scheme, &ProcedureOptions { settle_s: 300.0, ..Default::default() });
-        assert!(
-            refused.expect_err("no time").to_string().contains("leaves nothing of the dwell of `p1` (300 s)")
-        );
-        for settle_s in [-1.0, f64::NAN] {
-            assert!(made(&scheme, &ProcedureOptions { settle_s, ..Default::default() }).is_err());
-        }
     }
 
     /// Gimbal by gimbal every turn is one of a gimbal, and limits that are exceeded are named.

@@ -5,8 +5,6 @@ use obsdeg_evidence::simulation::SimulationError;
 /// Options of a sheet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProcedureOptions {
-    /// Time at rest before each recording, in s, within the dwell of the position.
-    pub settle_s: f64,
     /// Tilt that is always allowed in the readings, in degrees.
     pub tilt_deg: f64,
     /// Seed of the verdicts.
@@ -15,7 +13,7 @@ pub struct ProcedureOptions {
 
 impl Default for ProcedureOptions {
     fn default() -> Self {
-        Self { settle_s: 0.0, tilt_deg: TILT_DEG, seed: 1 }
+        Self { tilt_deg: TILT_DEG, seed: 1 }
     }
 }
 
@@ -28,16 +26,6 @@ pub enum ProcedureError {
     /// Error of the scheme or its conditions.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// A wait that leaves no time to record.
-    #[error("a wait of {settle_s} s leaves nothing of the dwell of `{position}` ({dwell_s} s) to record")]
-    Settle {
-        /// Time at rest before a recording, in s.
-        settle_s: f64,
-        /// Name of the position.
-        position: String,
-        /// Dwell of the position, in s.
-        dwell_s: f64,
-    },
     /// A number out of its range.
     #[error("{what} of {found}: expected {expected}")]
     Number {
@@ -55,14 +43,9 @@ pub enum ProcedureError {
 /// # Errors
 /// [`ProcedureError::Number`].
 pub(super) fn check(options: &ProcedureOptions) -> Result<(), ProcedureError> {
-    let numbers = [
-        ("a wait", options.settle_s, 0.0..=1e5, "0 to 100000 s"),
-        ("a tilt", options.tilt_deg, 0.01..=90.0, "0.01 to 90 degrees"),
-    ];
-    for (what, found, range, expected) in numbers {
-        if !range.contains(&found) {
-            return Err(ProcedureError::Number { what, found, expected });
-        }
+    let (what, range, expected) = ("a tilt", 0.01..=90.0, "0.01 to 90 degrees");
+    match options.tilt_deg {
+        found if !range.contains(&found) => Err(ProcedureError::Number { what, found, expected }),
+        _ => Ok(()),
     }
-    Ok(())
 }

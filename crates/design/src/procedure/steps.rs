@@ -5,7 +5,6 @@ use obsdeg_core::model::{Dwell, GIMBAL_NAMES, GimbalObstacle, GimbalStation, Sch
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use super::answer::{Obstacle, ObstacleKind, Step, StepKind, StepTurn};
-use super::options::{ProcedureError, ProcedureOptions};
 
 /// Steps with the obstacles of the gimbals.
 pub(super) struct Sheet {
@@ -15,15 +14,7 @@ pub(super) struct Sheet {
 }
 
 /// Steps of a scheme. Turns take time only where a rate is stated.
-///
-/// # Errors
-/// [`ProcedureError::Settle`].
-pub(super) fn sheet(
-    scheme: &Scheme,
-    conditions: &Conditions,
-    plan: &Plan,
-    options: &ProcedureOptions,
-) -> Result<Sheet, ProcedureError> {
+pub(super) fn sheet(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Sheet {
     let stations = scheme.gimbal_sequence().unwrap_or_default();
     let mut list = StepList { steps: Vec::new(), now: 0.0, position: String::new() };
     for (i, (p, station)) in scheme.positions.iter().zip(&stations).enumerate() {
@@ -62,10 +53,7 @@ pub(super) fn sheet(
             );
             continue;
         }
-        let settle_s = options.settle_s;
-        if settle_s >= dwell_s {
-            return Err(ProcedureError::Settle { settle_s, position: p.name.clone(), dwell_s });
-        }
+        let settle_s = conditions.settle_s;
         if settle_s > 0.0 {
             list.push(StepKind::Wait, settle_s, station.at_deg, None);
         }
@@ -73,7 +61,7 @@ pub(super) fn sheet(
     }
     let named = scheme.positions.iter().zip(&stations);
     let obstacles = named.filter_map(|(p, s)| Some(obstacle(&p.name, s.obstacle.as_ref()?)));
-    Ok(Sheet { obstacles: obstacles.collect(), total_s: list.now, steps: list.steps })
+    Sheet { obstacles: obstacles.collect(), total_s: list.now, steps: list.steps }
 }
 
 /// Steps so far, and their time.

@@ -275,18 +275,22 @@ fn latitudes(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Swee
 }
 
 fn dwells(scheme: &Scheme, conditions: &Conditions, seed: u64) -> Result<Sweep, SimulationError> {
+    let factors = (0..=4 * OCTAVES).map(|k| 2f64.powf(f64::from(k - 2 * OCTAVES) / 2.0));
+    let scaled = factors.map(|f| Ok((f, scheme.with_dwells(conditions.dwell_s, f)?)));
+    let scaled = scaled.collect::<Result<Vec<_>, SimulationError>>()?;
+    // shorter dwells have no sample after the time that the record leaves out
+    let scaled: Vec<_> = scaled.into_iter().filter(|(_, other)| conditions.leaves_samples(other)).collect();
     let at = |k: usize| {
-        let factor = 2f64.powf(f64::from(k as i32 - 2 * OCTAVES) / 2.0);
-        let other = scheme.with_dwells(conditions.dwell_s, factor)?;
+        let (factor, other) = &scaled[k];
         // a step is at most half a dwell
         let shortest = other.positions.iter().filter_map(|p| p.dwell).map(Dwell::seconds);
         let step_s = shortest.fold(conditions.step_s, |step, dwell| step.min(dwell / 2.0));
         Ok::<_, SimulationError>((
-            factor,
-            predicted(&other, &Conditions { step_s, ..conditions.clone() }, seed)?,
+            *factor,
+            predicted(other, &Conditions { step_s, ..conditions.clone() }, seed)?,
         ))
     };
-    Ok(Sweep::of(parallel::try_map(4 * OCTAVES as usize + 1, at)?))
+    Ok(Sweep::of(parallel::try_map(scaled.len(), at)?))
 }
 
 /// Smallest subset that keeps the same coefficients observable, smallest scheme for all coefficients,

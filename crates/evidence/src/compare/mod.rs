@@ -293,7 +293,9 @@ fn sensitivity(
     }
     for factor in DWELLS {
         let other = scheme.with_dwells(conditions.dwell_s, factor)?;
-        others.push((format!("dwell x {factor}"), other, conditions.clone()));
+        if conditions.leaves_samples(&other) {
+            others.push((format!("dwell x {factor}"), other, conditions.clone()));
+        }
     }
     let without = if slews { ", no slews" } else { "" };
     for carry in Carry::ALL.into_iter().filter(|c| *c != scheme.carry) {

@@ -137,6 +137,7 @@ pub fn crosscheck(
     options: &CrossCheckOptions,
     progress: &dyn Fn(usize) -> bool,
 ) -> Result<CrossCheck, SimulationError> {
+    let conditions = &every_sample(conditions);
     let truth = truth(scheme, conditions, options)?;
     let rates = [truth.point.w_n, truth.point.w_u];
     let prediction = Prediction::new(&truth.platform, rates, options.seed)?;
@@ -155,8 +156,15 @@ pub fn crosscheck_against(
     options: &CrossCheckOptions,
     progress: &dyn Fn(usize) -> bool,
 ) -> Result<CrossCheck, SimulationError> {
+    let conditions = &every_sample(conditions);
     let truth = truth(scheme, conditions, options)?;
     against(prediction, &truth, scheme, conditions, options, progress)
+}
+
+/// Conditions with the samples at the start of positions that a record leaves out: slopes are those of dwells
+/// that begin with a sample, as the verdicts do.
+fn every_sample(conditions: &Conditions) -> Conditions {
+    Conditions { settle_s: 0.0, ..conditions.clone() }
 }
 
 /// Plan of the truth.

@@ -109,6 +109,10 @@ pub struct ConditionsReport {
     pub latitude_by_default: bool,
     /// Largest step between samples, in s.
     pub step_s: f64,
+    /// Time at the start of each position at rest, in s, whose samples do not count; left out where all
+    /// count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settle_s: Option<f64>,
     /// Rate of slews in deg/s unless a position states its own; null for instantaneous slews.
     pub slew_rate_deg_s: Option<f64>,
     /// Noise of the observation per sample, in g.
@@ -182,6 +186,10 @@ pub struct MeasurementReport {
     pub dwell_s: f64,
     /// Largest step between samples in s; a position is divided into equal steps.
     pub step_s: f64,
+    /// Time at the start of each position at rest, in s, whose samples do not count; left out where all
+    /// count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settle_s: Option<f64>,
     /// Noise of the observation per sample and axis, in g.
     pub accelerometer_noise_g: f64,
     /// Bias instability of the accelerometers; left out where there is none.
@@ -218,6 +226,7 @@ impl MeasurementReport {
             latitude_by_default: scheme.latitude.is_none(),
             dwell_s: conditions.dwell_s,
             step_s: conditions.step_s,
+            settle_s: conditions.stated_settle_s(),
             accelerometer_noise_g: conditions.accelerometer_noise_g,
             accelerometer_bias: AccelerometerBias::of(conditions),
             azimuth_noise_deg: scheme.measured_azimuth.then_some(conditions.azimuth_noise_deg),

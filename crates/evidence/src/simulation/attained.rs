@@ -101,12 +101,8 @@ impl Attained {
         Self::of_plan(Plan::new(scheme, &conditions)?, &conditions, beforehand, seed)
     }
 
-    /// Accuracy of a plan made of `conditions` without random drift that is not stated, such as one with
-    /// steps without samples; with a covariance that is known beforehand.
-    ///
-    /// # Errors
-    /// [`SimulationError`].
-    pub fn of_plan(
+    /// Accuracy of a plan made of `conditions` without random drift that is not stated.
+    fn of_plan(
         plan: Plan,
         conditions: &Conditions,
         beforehand: Option<&KnownCovariance>,
@@ -321,4 +317,53 @@ fn filter_prior(
         return Ok(Covariance::new("P0", &information.covariance()?, Form::Ud)?);
     }
     RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)
+}
+
+#[cfg(test)]
+mod tests {
+    use obsdeg_core::model::scheme_file;
+
+    use super::super::plan::{Segment, SegmentKind, left_out};
+    use super::*;
+
+    /// Samples that are left out count as samples of a noise a million times larger do, also for the bench:
+    /// errors that are not estimated enter the samples that remain at their own times. So by the information
+    /// of all samples, and by a filter with random drift.
+    #[test]
+    fn left_out_samples_are_samples_of_great_noise() {
+        let names = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
+        for drift in ["", "drift_noise = '0.001 deg/sqrt(h)'\n"] {
+            let text = format!(
+                "carry = 'inertial'\nlatitude_deg = 40\n[simulation]\nslew_rate_deg_s = 2\ndwell_s = 300\n{drift}\
+                 [bench]\nK0 = 20\nM = 5\nlatitude = 10\n[requirements]\nD = 0.1\n{}",
+                names.concat()
+            );
+            let scheme = scheme_file::read(&text).expect("a scheme");
+            let all = Conditions::of(&scheme).as_stated();
+            for settle_s in [20.0, 47.0, 150.0] {
+                let settling = Conditions { settle_s, ..all.clone() };
+                let found = Attained::new(&scheme, &settling, 1).expect("sigmas");
+                let parts = |s: &Segment| {
+                    let first = left_out(settle_s, s.dt);
+                    vec![(first, s.dt), (s.steps - first, s.dt)]
+                };
+                let plan = Plan::new(&scheme, &all).expect("a plan").in_steps(&all, parts);
+                let mut noisy = plan.expect("a plan");
+                let mut before = None;
+                for k in 0..noisy.segments.len() {
+                    let s = &noisy.segments[k];
+                    if s.kind == SegmentKind::Dwell && before != Some(s.position) {
+                        before = Some(s.position);
+                        noisy.stages[k].outputs.iter_mut().for_each(|o| o.r *= 1e12);
+                    }
+                }
+                let noisy = Attained::of_plan(noisy, &all, None, 1).expect("sigmas");
+                assert!(found.totals.iter().flatten().count() > 10);
+                for (a, b) in found.totals.iter().zip(&noisy.totals) {
+                    let (Some(a), Some(b)) = (a, b) else { panic!("{a:?} {b:?}") };
+                    assert!((a / b - 1.0).abs() < 1e-4, "{drift} {settle_s} s: {a} {b}");
+                }
+            }
+        }
+    }
 }

@@ -25,6 +25,9 @@ pub struct Conditions {
     pub step_s: f64,
     /// Dwell of positions that state none, in s.
     pub dwell_s: f64,
+    /// Time at the start of every position at rest, in s, whose samples are left out (`settle` of the record;
+    /// 0: none). A rotating segment has no rest, and none of its samples is left out.
+    pub settle_s: f64,
     /// Rate of the rotations between positions, in deg/s; `None`: instantaneous, unless the position states a
     /// rate.
     pub slew_rate_deg_s: Option<f64>,
@@ -113,6 +116,7 @@ impl Default for Conditions {
             filter: None,
             step_s: 10.0,
             dwell_s: 1000.0,
+            settle_s: 0.0,
             slew_rate_deg_s: None,
             slews: true,
             accelerometer_noise_g: 1e-5,
@@ -210,6 +214,7 @@ impl Conditions {
     pub fn of(scheme: &Scheme) -> Self {
         let mut out = Self::default();
         out.apply(&scheme.simulation);
+        out.settle_s = scheme.recording.settle.unwrap_or(0.0);
         out.requirements.extend(by_family(&scheme.requirements));
         out.bench.extend(by_family(&scheme.bench));
         out
@@ -309,6 +314,17 @@ impl Conditions {
         Self { drift_noise, ..self.clone() }
     }
 
+    /// Time at the start of a position whose samples are left out, in s; `None` where none is.
+    pub fn stated_settle_s(&self) -> Option<f64> {
+        Some(self.settle_s).filter(|s| *s > 0.0)
+    }
+
+    /// True if every position of `scheme` has samples that count.
+    pub fn leaves_samples(&self, scheme: &Scheme) -> bool {
+        let dwells = scheme.positions.iter().map(|p| p.dwell.map_or(self.dwell_s, |d| d.seconds()));
+        dwells.fold(f64::INFINITY, f64::min) > 1.001 * self.settle_s
+    }
+
     /// Rate at which a position is reached, in deg/s; `None`: instantaneously.
     pub fn slew_rate(&self, position: &Position) -> Option<f64> {
         let own = position.slew.as_ref().and_then(|s| s.rate_deg_s);
@@ -340,6 +356,7 @@ impl Conditions {
         let single = [
             ("step_s", self.step_s, ranges::STEP_S),
             ("dwell_s", self.dwell_s, ranges::DWELL_S),
+            ("settle_s", self.settle_s, ranges::SETTLE_S),
             ("slew_rate_deg_s", self.slew_rate_deg_s.unwrap_or(1.0), ranges::SLEW_RATE_DEG_S),
             ("accelerometer_noise_g", self.accelerometer_noise_g, ranges::NOISE_G),
             ("azimuth_noise_deg", self.azimuth_noise_deg, ranges::AZIMUTH_NOISE_DEG),

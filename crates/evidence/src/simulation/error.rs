@@ -41,6 +41,19 @@ pub enum SimulationError {
         /// Name of the position.
         name: String,
     },
+    /// A platform that is not at rest before the end of a position.
+    #[error(
+        "a wait of {settle_s} s for rest leaves no sample of the dwell of {place} ({dwell_s} s); expected a \
+         longer dwell or a shorter wait (settle under [record])"
+    )]
+    Settle {
+        /// Time at the start of the position whose samples are left out, in s.
+        settle_s: f64,
+        /// Position, in words.
+        place: String,
+        /// Dwell of the position, in s.
+        dwell_s: f64,
+    },
     /// A filter that does not know a position does not know a slew to it.
     #[error("a dropped position goes with instantaneous repositioning; found a slew rate")]
     DroppedSlew,

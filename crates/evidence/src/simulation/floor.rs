@@ -8,7 +8,8 @@
 //! of the floor. A coefficient whose sigma comes that close only in the last two octaves still falls, and has
 //! no floor in this range. One that is there at the shortest dwell may have its least sigma at a shorter one.
 //! Within a long position samples are merged at constant noise density: twice as many after every 20 steps,
-//! from its start and from its end, since the walk erases information in between.
+//! from its start and from its end, since the walk erases information in between. All samples count, also
+//! those at the start of a position that the record leaves out.
 //!
 //! # One position in closed form
 //! About an axis that the earth does not turn (psi_x at the equator, X_p to the North) `psi' = D + b + w`,
@@ -173,7 +174,7 @@ pub fn sigmas_without_prior(
     let density = conditions.drift_noise.density_deg_sqrt_h(conditions.step_s);
     let drift_noise = DriftNoise::RandomWalk(density);
     // one step per position, which is then divided into parts
-    let whole = Conditions { step_s: f64::MAX, drift_noise, ..conditions.clone() };
+    let whole = Conditions { step_s: f64::MAX, settle_s: 0.0, drift_noise, ..conditions.clone() };
     let plan = Plan::derived(&scaled, &whole)?;
     let mut plan = plan.in_steps(&whole, |s| parts(s.steps as f64 * s.dt, conditions.step_s))?;
     for (stage, segment) in plan.stages.iter_mut().zip(&plan.segments) {

@@ -48,7 +48,7 @@ pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_witho
 pub use iterated::iterated;
 pub use known::KnownCovariance;
 pub use noise::Noise;
-pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, steps};
+pub use plan::{Plan, PlatformProcess, Segment, SegmentKind, left_out, steps};
 pub use record::{Record, Series, Traces, run};
 pub use reports::{conditions_report, timeline_report};
 pub use seen::{no_prior, predict, predict_run};

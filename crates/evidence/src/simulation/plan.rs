@@ -42,6 +42,11 @@ pub fn steps(dwell_s: f64, step_s: f64) -> Result<usize, SimulationError> {
     counted("steps", (dwell_s / step_s - 1e-9).ceil().max(1.0), MAX_STEPS)
 }
 
+/// Number of the first samples of a position at rest, `dt` s apart, that lie within `settle_s` s of its start.
+pub fn left_out(settle_s: f64, dt: f64) -> usize {
+    (settle_s / dt + 1e-9).floor().max(0.0) as usize
+}
+
 /// Number of integration steps for a turn of `turn` rad.
 ///
 /// # Errors
@@ -74,6 +79,8 @@ pub struct Segment {
     pub steps: usize,
     /// Length of a step, in s.
     pub dt: f64,
+    /// True if its samples are left out since the platform comes to rest.
+    pub left_out: bool,
 }
 
 /// Scheme and conditions in SI units, ready to run.
@@ -334,6 +341,7 @@ impl Plan {
             }
         }
         let outputs = match s.kind {
+            _ if s.left_out => Vec::new(),
             SegmentKind::Slew(_) => Vec::new(),
             SegmentKind::Dwell | SegmentKind::Rotation(_) => self
                 .output_rows(segment)
@@ -469,9 +477,9 @@ fn timeline(
 ) -> Result<Vec<Segment>, SimulationError> {
     let mut segments: Vec<Segment> = Vec::new();
     let mut start_s = 0.0;
-    let mut push = |position, kind, duration: f64, steps: usize| {
+    let mut push = |position, kind, duration: f64, steps: usize, left_out| {
         let dt = duration / steps as f64;
-        segments.push(Segment { position, kind, start_s, steps, dt });
+        segments.push(Segment { position, kind, start_s, steps, dt, left_out });
         start_s += duration;
     };
     let (mut all, mut turning, mut integration) = (0.0, 0.0, 0.0);
@@ -482,7 +490,7 @@ fn timeline(
                 all += 1.0;
                 integration += slew.turned(duration) / MAX_TURN;
                 counted("integration steps", integration, MAX_INTEGRATION)?;
-                push(position, SegmentKind::Slew(slew), duration, 1);
+                push(position, SegmentKind::Slew(slew), duration, 1, false);
             }
         }
         let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
@@ -490,10 +498,21 @@ fn timeline(
         all += steps as f64;
         counted("steps", all, MAX_STEPS)?;
         counted("steps times unknowns", all * unknowns as f64, MAX_NUMBERS)?;
+        let dt = dwell / steps as f64;
         match p.rotation.as_ref() {
-            None => push(position, SegmentKind::Dwell, dwell, steps),
+            None => {
+                let first = left_out(conditions.settle_s, dt);
+                if first >= steps {
+                    let (settle_s, place) = (conditions.settle_s, format!("`{}`", p.name));
+                    return Err(SimulationError::Settle { settle_s, place, dwell_s: dwell });
+                }
+                let waited = dt * first as f64;
+                if first > 0 {
+                    push(position, SegmentKind::Dwell, waited, first, true);
+                }
+                push(position, SegmentKind::Dwell, dwell - waited, steps - first, false);
+            }
             Some(r) => {
-                let dt = dwell / steps as f64;
                 let whole = Slew::about(&attitudes[position], r, dwell);
                 turning += steps as f64;
                 integration += whole.turned(dwell) / MAX_TURN;
@@ -506,6 +525,7 @@ fn timeline(
                         SegmentKind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }),
                         dt,
                         1,
+                        false,
                     );
                 }
             }

@@ -24,6 +24,7 @@ pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) 
         latitude_deg: plan.platform.scheme().latitude.map_or(0.0, |l| l.degrees()),
         latitude_by_default: scheme.latitude.is_none(),
         step_s: conditions.step_s,
+        settle_s: conditions.stated_settle_s(),
         slew_rate_deg_s: conditions.slew_rate_deg_s,
         accelerometer_noise_g: conditions.accelerometer_noise_g,
         accelerometer_bias: AccelerometerBias::of(conditions),

@@ -10,7 +10,7 @@ use obsdeg_core::model::{
 };
 use obsdeg_ekf::BiasState;
 use obsdeg_ekf::integrate::van_loan;
-use obsdeg_evidence::simulation::{Conditions, Plan, steps};
+use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, left_out, steps};
 
 use crate::design::measure::elimination::eliminate;
 use crate::design::measure::noise_process::{BiasDistribution, DwellInformation, Output, of_dwell};
@@ -136,7 +136,7 @@ impl Evaluator {
         Ok(self)
     }
 
-    /// Dwell of `dwell_s` seconds at a position.
+    /// Dwell of `dwell_s` seconds at a position, without the samples that the record leaves out.
     pub(crate) fn dwelling(&self, dwell_s: f64) -> Result<Dwelling, DesignError> {
         let f = local_dynamics(&Float, &self.w[1][2], &-self.w[0][2]);
         let f = DMatrix::from_fn(LOCAL, LOCAL, |i, j| f[i][j]);
@@ -154,10 +154,19 @@ impl Evaluator {
         let (mut local, mut full) = ([[0.0; LOCAL]; LOCAL], [[0.0; LOCAL]; LOCAL]);
         let counted = if self.omitted.is_some() { &outputs[..] } else { &[] };
         let with_errors: Vec<_> = counted.iter().map(|o| with_accelerometer(o.component, o.row)).collect();
-        let of = |bias| Box::new(of_dwell(&outputs, bias, &step, steps, dwell_s / steps as f64));
+        let dt = dwell_s / steps as f64;
+        let settle_s = self.conditions.settle_s;
+        let first = left_out(settle_s, dt);
+        if first >= steps {
+            return Err(SimulationError::Settle { settle_s, place: "each position".into(), dwell_s }.into());
+        }
+        let of = |bias| Box::new(of_dwell(&outputs, bias, &step, first..steps, dt));
         let correlated = self.bias.as_ref().map(of);
-        for _ in 0..steps {
+        for k in 0..steps {
             now = &step * now;
+            if k < first {
+                continue;
+            }
             for Output { row: h, weight, .. } in &outputs {
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
                 add_square(&mut local, &row, *weight);
@@ -339,6 +348,11 @@ impl Evaluator {
     /// Largest time between samples, in s.
     pub(crate) fn step_s(&self) -> f64 {
         self.conditions.step_s
+    }
+
+    /// Time at the start of a position whose samples are left out, in s.
+    pub(crate) fn settle_s(&self) -> f64 {
+        self.conditions.settle_s
     }
 
     /// Dwell of each position, in s; of the first if dwells differ.

@@ -1,6 +1,8 @@
 //! Correlated noise of Z: the bias process b of each accelerometer beside its white noise, over waits
 //! and dwells.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Matrix3 as Small};
 use obsdeg_core::model::{AZIMUTH, LOCAL};
 use obsdeg_ekf::BiasState;
@@ -59,20 +61,20 @@ pub(crate) struct Output {
     pub(crate) weight: f64,
 }
 
-/// Information of the `steps` samples of a dwell, `dt` s apart, where the noise of Z is correlated;
+/// Information of the samples `counted` of a dwell, `dt` s apart, where the noise of Z is correlated;
 /// `transition` is that of the local unknowns from sample to sample.
 pub(crate) fn of_dwell(
     outputs: &[Output],
     bias: &BiasState,
     transition: &DMatrix<f64>,
-    steps: usize,
+    counted: Range<usize>,
     dt: f64,
 ) -> DwellInformation {
     let (left, variance) = step(bias, dt);
     let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
     // order: b of the previous sample, local unknowns, b at the start, b of this sample
     let mut all = [[0.0; STEP]; STEP];
-    for k in 0..steps {
+    for k in 0..counted.end {
         now = transition * now;
         // for the first sample, b of the previous one is b at the start
         let before = if k == 0 { 3 + LOCAL } else { 0 };
@@ -83,7 +85,7 @@ pub(crate) fn of_dwell(
             all[c][c] += 1.0 / variance;
         }
         eliminate(&mut all, STEP, if k == 0 { 0..0 } else { 0..3 });
-        for Output { component, row: h, weight } in outputs {
+        for Output { component, row: h, weight } in outputs.iter().filter(|_| k >= counted.start) {
             let mut row = [0.0; STEP];
             for (j, x) in row[3..3 + LOCAL].iter_mut().enumerate() {
                 *x = (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum();
@@ -97,7 +99,7 @@ pub(crate) fn of_dwell(
                 }
             }
         }
-        if k + 1 < steps {
+        if k + 1 < counted.end {
             // b of this sample becomes that of the previous one
             let from = |i: usize| if i < 3 { 6 + LOCAL + i } else { i };
             let gone = |i: usize| i >= 6 + LOCAL;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_evidence::simulation::steps;
+use obsdeg_evidence::simulation::{left_out, steps};
 
 use crate::design::measure::criterion::Criterion;
 use crate::design::measure::evaluator::{Dwelling, Evaluator};
@@ -14,8 +14,8 @@ use crate::design::request::error::DesignError;
 const FINEST: usize = 256;
 
 /// Dwells of the positions of `path` with a smaller criterion than equal ones; candidates of
-/// `evaluator` are its positions in order. Dwells are multiples of the time between samples, at least
-/// one, with the same sum. Moving the smallest time from one position to another makes none of them
+/// `evaluator` are its positions in order. Dwells are multiples of the time between samples with the same
+/// sum, each with at least one sample that counts. Moving the smallest time from one position to another makes none of them
 /// better. `allowed` is true if dwells keep the constraints. `None` if equal dwells are as good.
 ///
 /// # Errors
@@ -29,6 +29,7 @@ pub(crate) fn divide(
     let equal = evaluator.dwell_s();
     let samples = steps(equal, evaluator.step_s())?;
     let unit = equal / samples as f64;
+    let first_counted = left_out(evaluator.settle_s(), unit);
     let mut known: BTreeMap<usize, Dwelling> = BTreeMap::new();
     let mut of = |samples: usize| -> Result<Dwelling, DesignError> {
         if let Some(dwelling) = known.get(&samples) {
@@ -46,7 +47,7 @@ pub(crate) fn divide(
     while moved * FINEST >= samples.max(FINEST) {
         let before = best;
         for (from, to) in (0..path.len()).flat_map(|a| (0..path.len()).map(move |b| (a, b))) {
-            if from == to || counts[from] <= moved {
+            if from == to || counts[from] <= moved + first_counted {
                 continue;
             }
             let held = [from, to].map(|i| now.dwelling_of(i).clone());

@@ -146,6 +146,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         filter,
         step_s,
         dwell_s,
+        settle_s,
         slew_rate_deg_s,
         slews,
         accelerometer_noise_g,
@@ -215,7 +216,8 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         ("bench", bench),
         ("stated conditions", stated),
     ];
-    of.into_iter().map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
+    let settle = (*settle_s > 0.0).then_some(("settle", settle_s as &dyn std::fmt::Debug));
+    of.into_iter().chain(settle).map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
 }
 
 /// Text `simulation.dwell_s is 999.0, here 1000.0`: inputs that differ; long values are left out.

@@ -153,6 +153,7 @@ pub fn check_certifiable(
         (conditions.accelerometer_instability_ug > 0.0, "a bias instability of the accelerometers"),
         (limits_psi, "a requirement on psi"),
         (!(1.0..=89.0).contains(&latitude), "a latitude within 1 degree of the equator or a pole"),
+        (conditions.settle_s > 0.0, "samples that the record leaves out (settle under [record])"),
         (!(10.0..=1e6).contains(&conditions.dwell_s), "a dwell outside 10 s to 1e6 s"),
         (
             !samples.is_ok_and(|n| (5..=10_000).contains(&n)),

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use obsdeg_core::model::ranges::DWELL_S;
 use obsdeg_core::model::settings::{Assignment, Settings, concerns};
 use obsdeg_core::model::{
-    Acceptance, Angle, Dwell, Platform, Position, Scheme, SchemeError, SlewAxis, SlewTo, angles_text,
-    parse_attitude,
+    Acceptance, Angle, Dwell, Platform, Position, Recording, Scheme, SchemeError, SlewAxis, SlewTo,
+    angles_text, parse_attitude,
 };
 use obsdeg_evidence::simulation::{AccelerometerBias, Conditions, latitude_of};
 
@@ -114,6 +114,10 @@ pub(crate) fn under(
         requirements: by_name(&conditions.requirements),
         bench: by_name(&conditions.bench),
         acceptance: within_terms(base),
+        recording: Recording {
+            settle: Some(conditions.settle_s).filter(|s| *s > 0.0),
+            ..base.recording.clone()
+        },
         ..base.clone()
     }
 }
