@@ -11,7 +11,6 @@ use kuva::prelude::{
 use kuva::render::figure::Figure as Grid;
 use resvg::{tiny_skia, usvg};
 
-use crate::panels::escaped;
 use crate::visible;
 
 /// Colours that colour-blind readers can distinguish (Okabe and Ito).
@@ -273,7 +272,7 @@ impl Figure {
                 l.color,
                 x + 30.0,
                 y + 4.5,
-                escaped(&l.label)
+                shown(&l.label).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
             );
         }
         (out, ENTRY * named.len().div_ceil(columns) as f64 + 4.0)
