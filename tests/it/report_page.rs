@@ -450,7 +450,7 @@ fn smallest_text(browser: &mut Browser, file: &Path) -> f64 {
         "(() => { document.querySelectorAll('details').forEach(d => { d.open = true; }); \
           return Math.min(...[...document.querySelectorAll('svg text')].filter(t => \
           t.textContent.trim() && t.checkVisibility() && t.getBoundingClientRect().width > 0).map(t => \
-          parseFloat(getComputedStyle(t).fontSize) * Math.abs(t.getScreenCTM().a || t.getScreenCTM().b))); })()",
+          parseFloat(getComputedStyle(t).fontSize) * Math.hypot(t.getScreenCTM().a, t.getScreenCTM().b))); })()",
     );
     browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
     smallest.as_f64().expect("a size")
