@@ -44,15 +44,21 @@ fn several_schemes_are_compared_first() {
     let [recommended, alike] = &findings(&page, "Comparison of 3 schemes")[..] else { panic!("two rows") };
     assert_eq!(recommended[0], "Recommended");
     assert!(
-        recommended[1].contains("short: the shortest of 2 that meet every requirement by prediction, 2400 s"),
+        recommended[1]
+            .contains("short: the shortest of 2 that meet every requirement by prediction, 2400 s (40 min)"),
         "{recommended:?}"
     );
-    assert_eq!(alike[1], "good: ok same conditions, unknowns and requirements; they take 1200 to 3600 s");
+    let same = "good: ok same conditions, unknowns and requirements; they take 1200 s (20 min) to 3600 s (1 h 0 min)";
+    assert_eq!(alike[1], same);
     // one column per scheme; a margin is called met exactly if sigma meets the requirement
     let matrix = table(&page, "Margins (required over predicted sigma");
-    assert_eq!(texts(&page, ".front thead th"), ["long", "short", "one"]);
+    let heads = texts(&page, ".front thead th");
+    assert_eq!(heads[heads.len() - 3..], ["long", "short", "one"]);
+    // a file without a title block has a row
+    let titles = texts(&page, ".front .wide:first-child tbody tr");
+    assert!(titles.len() == 3 && titles.iter().all(|t| t.contains("no document stated")), "{titles:?}");
     let side = table(&page, "By unknown");
-    for row in matrix.iter().skip(5) {
+    for row in matrix.iter().skip(3) {
         for (cell, scheme) in row[1..].iter().zip(["long", "short", "one"]) {
             let of = side.iter().find(|r| r[0] == row[0] && r[1] == scheme).expect("a row");
             match (of[4].parse::<f64>(), of[6].parse::<f64>()) {
@@ -64,7 +70,7 @@ fn several_schemes_are_compared_first() {
         }
     }
     assert_eq!(texts(&page, ".front .graded.missed").iter().filter(|t| *t == "not determined").count(), {
-        matrix.iter().skip(5).flatten().filter(|c| *c == "not determined").count()
+        matrix.iter().skip(3).flatten().filter(|c| *c == "not determined").count()
     });
     // schemes under other carries are not compared
     let other = write("other", 600, &four, "measured_azimuth = true");
@@ -389,44 +395,114 @@ fn printed_pages(browser: &mut Browser, file: &Path) -> usize {
     pdf.matches("/Type /Page").count() - pdf.matches("/Type /Pages").count()
 }
 
-/// On paper one scheme takes at most eight pages with its appendix, three take at most twelve, and what
-/// stands before the appendix answers the questions of a board.
+/// Questions of a board, as the table of answers names them.
+const QUESTIONS: [&str; 9] = [
+    "Carry",
+    "Assumed",
+    "Chosen by the program",
+    "What limits it",
+    "Accelerometers off by 20 ug",
+    "Duration",
+    "Position to drop",
+    "Proven by",
+    "Verified by",
+];
+
+/// Beginnings or parts of answers that every scheme of the examples below has.
+const ANSWERS: [(&str, &str); 6] = [
+    ("Assumed", "noise of Z 1e-5 g per sample"),
+    ("Accelerometers off by 20 ug", "K0 of 20 ug (1 sigma each) change D_"),
+    ("Duration", " positions; "),
+    ("Proven by", "a verdict is wrong with probability below"),
+    ("Verified by", "Monte Carlo runs"),
+    ("Verified by", "with its truth"),
+];
+
+/// Asserts that the table of answers has every question, with an answer for each of `schemes` schemes.
+fn assert_answers(page: &Html, schemes: usize, name: &str) {
+    let answers = table(page, "Answers in brief");
+    let of = |question: &str| {
+        let row = answers.iter().find(|r| r[0] == question);
+        row.unwrap_or_else(|| panic!("{name}: {question}: {answers:?}"))
+    };
+    for question in QUESTIONS {
+        let row = of(question);
+        assert!(row.len() == schemes + 1 && row.iter().all(|cell| cell.len() > 1), "{name}: {row:?}");
+    }
+    for (question, answer) in ANSWERS {
+        assert!(of(question)[1..].iter().all(|cell| cell.contains(answer)), "{name}: {:?}", of(question));
+    }
+    let said =
+        |cell: &String| ["Drop ", "You can drop ", "Keep all "].iter().any(|start| cell.starts_with(start));
+    assert!(of("Position to drop")[1..].iter().all(said), "{name}: {:?}", of("Position to drop"));
+    let body = texts(page, "body").remove(0);
+    for part in ["Made by obsdeg", "Recommended action", "OPEN: not stated", "Margin: what is required"] {
+        assert!(body.contains(part), "{name}: {part}");
+    }
+}
+
+/// Smallest text of the pictures outside folded details, in CSS pixels, at the width of a printed page.
+fn smallest_text(browser: &mut Browser, file: &Path) -> f64 {
+    browser.open(file, 695, 900);
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "print", "features": [] }));
+    browser.settle();
+    let smallest = browser.value(
+        "(() => { document.querySelectorAll('details').forEach(d => { d.open = true; }); \
+          return Math.min(...[...document.querySelectorAll('svg text')].filter(t => \
+          t.textContent.trim() && t.checkVisibility() && t.getBoundingClientRect().width > 0).map(t => \
+          parseFloat(getComputedStyle(t).fontSize) * Math.hypot(t.getScreenCTM().a, t.getScreenCTM().b))); })()",
+    );
+    browser.call("Emulation.setEmulatedMedia", json!({ "media": "", "features": [] }));
+    smallest.as_f64().expect("a size")
+}
+
+/// On paper one scheme takes at most eight pages with its appendix, three take at most twelve. The first
+/// pages answer the questions of a board, and no text of a picture is smaller than 6 pt (8 pixels).
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
 fn a_review_fits_its_pages() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let example = |name: &str| format!("examples/{name}/scheme.toml");
+    let mut files = Vec::new();
+    for name in ["six-positions", "bench-errors", "paper-p1-p2", "rate-table"] {
+        let (file, text) = report(folder.path(), &format!("{name}.html"), &[&example(name)]);
+        assert_answers(&Html::parse_document(&text), 1, name);
+        files.push((file, 3, 8));
+    }
+    let three = ["five-positions", "six-positions", "paper-p1-p2"].map(example);
+    let (file, text) = report(folder.path(), "three.html", &three.each_ref().map(String::as_str));
+    assert_answers(&Html::parse_document(&text), 3, "three");
+    files.push((file, 4, 12));
     let Some(mut browser) = Browser::start() else {
         eprintln!("skipped: no Chromium on this machine");
         return;
     };
-    let folder = tempfile::tempdir().expect("a folder");
-    let example = |name: &str| format!("examples/{name}/scheme.toml");
-    for name in ["six-positions", "bench-errors", "paper-p1-p2"] {
-        let (file, text) = report(folder.path(), &format!("{name}.html"), &[&example(name)]);
+    for (file, least, most) in files {
         let pages = printed_pages(&mut browser, &file);
-        assert!((3..=8).contains(&pages), "{name}: {pages} pages");
-        let page = Html::parse_document(&text);
-        let body = texts(&page, "body").remove(0);
-        let first = body.split("Every unknown, best first").next().unwrap_or_default();
-        for answer in [
-            "carry ",
-            "noise of Z 1e-5 g",
-            "Recommended action",
-            "errors K0 of 20 ug",
-            " s, a sample after each",
-            "Without one position",
-            "Made by obsdeg",
-            "a verdict is wrong with probability below",
-            "Filter and exact verdicts",
-            "dwell [s]",
-        ] {
-            assert!(first.contains(answer), "{name}: {answer}");
-        }
-        assert!(body.len() > 2 * first.len(), "an appendix");
+        assert!((least..=most).contains(&pages), "{}: {pages} pages", file.display());
+        let smallest = smallest_text(&mut browser, &file);
+        assert!(smallest > 7.9, "{}: {smallest} px", file.display());
     }
-    let three = ["five-positions", "six-positions", "paper-p1-p2"].map(example);
-    let (file, _) = report(folder.path(), "three.html", &three.each_ref().map(String::as_str));
-    let pages = printed_pages(&mut browser, &file);
-    assert!((4..=12).contains(&pages), "{pages} pages");
+}
+
+/// The effect of accelerometers that are off by 20 ug is that of 20 ug where the bench states another size:
+/// changes are linear in the size.
+#[test]
+fn twenty_micro_g_whatever_the_bench_states() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string("examples/bench-errors/scheme.toml").expect("the example");
+    let of = |size: &str| {
+        let file = folder.path().join(format!("{size}.toml"));
+        std::fs::write(&file, text.replace("K0 = 20", &format!("K0 = {size}"))).expect("written");
+        let (_, page) = report(folder.path(), &format!("{size}.html"), &[&file.display().to_string()]);
+        let answers = table(&Html::parse_document(&page), "Answers in brief");
+        let row = answers.iter().find(|r| r[0].starts_with("Accelerometers")).expect("a row");
+        row[1].clone()
+    };
+    let (stated, other) = (of("20"), of("5"));
+    assert!(stated.ends_with("; the bench states this size"), "{stated}");
+    let same = stated.trim_end_matches("; the bench states this size");
+    assert!(other.starts_with(same) && other.contains("; 5 ug, as the bench states, by "), "{other}");
 }
 
 /// A title block is printed as it is stated, with a place for each signature, and never from the clock.

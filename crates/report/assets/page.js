@@ -19,8 +19,8 @@
     const text = variable("--text");
     const line = variable("--line");
     const color = (c) => (names[c.toUpperCase()] ? variable(names[c.toUpperCase()]) : c);
-    const axis = (label, log, whole, space) => ({
-      ...(whole ? { incrs: [1, 2, 5, 10, 20, 50] } : {}), label, stroke: text, grid: { stroke: line, width: 0.5 }, ticks: { stroke: line }, size: 64,
+    const axis = (label, log, whole, space, along) => ({
+      ...(whole ? { incrs: [1, 2, 5, 10, 20, 50] } : {}), label, stroke: text, grid: { stroke: line, width: 0.5 }, ticks: { stroke: line }, size: along ? 50 : (u, marks) => 20 + 8 * Math.max(4, ...(marks || []).map((m) => String(m).length)),
       values: (u, marks) => marks.map((v) => (v == null ? "" : shown(v))),
       ...(log ? {} : { space }),
     });
@@ -30,7 +30,7 @@
     const options = {
       title: spec.title, width: Math.max(240, holder.clientWidth), height: 320,
       scales: { x: scale(spec.log_x, null), y: scale(spec.log_y, spec.y_range && !spec.log_y ? spec.y_range : null) },
-      axes: [axis(spec.x, spec.log_x, spec.orders, 60), axis(spec.y, spec.log_y, spec.orders, 28)],
+      axes: [axis(spec.x, spec.log_x, spec.orders, 60, true), axis(spec.y, spec.log_y, spec.orders, 28)],
       series: [{ label: spec.x, value: (u, v) => shown(v) }].concat(spec.series.map((s) => ({
         label: s.label, stroke: color(s.color), width: s.width, dash: s.dash,
         points: { show: false }, value: (u, v) => shown(v),

@@ -134,6 +134,9 @@ impl<T: Into<String>> From<T> for Cell {
     }
 }
 
+/// First column of the tables whose rows a narrow page shows one below the other: the steps of a procedure.
+const CARDS: &str = "step";
+
 /// A table for the templates of pages.
 pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>]) -> Value {
     let cell = |c: &Cell| json!({ "text": c.text, "grade": c.grade.map(Grade::name) });
@@ -141,6 +144,7 @@ pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>
     json!({
         "kind": "table",
         "heading": heading,
+        "cards": columns.first().is_some_and(|c| c.name == CARDS),
         "header": columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
         "numbers": columns.iter().map(|c| c.number).collect::<Vec<_>>(),
         "rows": rows.iter().map(texts).collect::<Vec<_>>(),

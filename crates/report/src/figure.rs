@@ -1,5 +1,6 @@
 //! Pictures: the only module that names the plotting library. PNG is made from SVG.
 
+use std::fmt::Write;
 use std::sync::{Arc, OnceLock};
 
 use kuva::plot::LabelStyle;
@@ -94,6 +95,13 @@ pub(crate) struct Figure {
 
 /// Width and height of one figure, in pixels.
 const SIZE: (f64, f64) = (640.0, 400.0);
+/// Width and height of a figure in a page, without its legend, height of a line of the legend, and size of
+/// its texts, in pixels. A third of a printed page shows it at two thirds of its size, texts of 6 pt.
+const SMALL: (f64, f64) = (340.0, 220.0);
+const ENTRY: f64 = 18.0;
+const SMALL_TEXT: u32 = 13;
+/// Largest number of letters of a label that has half the width of a small figure.
+const SHORT_LABEL: usize = 19;
 /// Left and right margins in pixels: labels of the axes are wider than the library assumes.
 const MARGINS: (f64, f64) = (88.0, 28.0);
 /// Number of characters from which a title is broken.
@@ -141,7 +149,6 @@ impl Figure {
 
     fn layout(&self, plots: &[Plot]) -> Layout {
         let mut layout = Layout::auto_from_plots(plots)
-            .with_title(shown(&self.title))
             .with_x_label(shown(&self.x_label))
             .with_y_label(shown(&self.y_label))
             .with_width(SIZE.0)
@@ -151,6 +158,9 @@ impl Figure {
             // powers of ten are narrower than the library assumes, other numbers wider
             .with_y_label_offset(if self.log || self.log_y { 7.0 } else { -7.0 }, 0.0)
             .with_legend_box(false);
+        if !self.title.is_empty() {
+            layout = layout.with_title(shown(&self.title));
+        }
         layout.force_margin_left = Some(MARGINS.0);
         if self.lines.iter().filter(|l| !l.label.is_empty()).count() > 4 {
             layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
@@ -166,7 +176,7 @@ impl Figure {
             layout = layout.with_log_y().with_y_tick_format(decades(self.ordinates()));
         }
         if self.log && anything(|p| p.0) && anything(|p| p.1) {
-            layout = layout.with_log_scale();
+            layout = layout.with_log_scale().with_x_tick_format(decades_only(self.abscissas()));
             // plain numbers if all of them are short
             let short = |p: &(f64, f64)| (0.01..1e4).contains(&p.1);
             if !self.lines.iter().flat_map(|l| &l.points).all(short) {
@@ -203,6 +213,10 @@ impl Figure {
         layout
     }
 
+    fn abscissas(&self) -> impl Iterator<Item = f64> + '_ {
+        self.lines.iter().flat_map(|l| l.points.iter().map(|p| p.0))
+    }
+
     /// Values of all lines.
     fn ordinates(&self) -> impl Iterator<Item = f64> + '_ {
         self.lines.iter().flat_map(|l| l.points.iter().map(|p| p.1))
@@ -214,6 +228,72 @@ impl Figure {
         let layout = self.layout(&plots);
         numbered(&kuva::render_to_svg(plots, layout))
     }
+
+    /// SVG for a page, whose caption stands for the title: small, with large texts.
+    pub(crate) fn small_svg(&self) -> String {
+        let mut bare = Self { title: String::new(), ..self.clone() };
+        bare.lines.iter_mut().for_each(|l| l.label.clear());
+        let plots = bare.plots();
+        let mut layout = bare
+            .layout(&plots)
+            .with_width(SMALL.0)
+            .with_height(SMALL.1)
+            .with_label_size(SMALL_TEXT)
+            .with_tick_size(SMALL_TEXT)
+            .with_body_size(SMALL_TEXT)
+            .with_ticks(4);
+        layout.force_margin_right = Some(MARGINS.1);
+        let svg = numbered(&kuva::render_to_svg(plots, layout));
+        let (legend, height) = self.legend();
+        let svg =
+            svg.replacen(&format!("height=\"{}\"", SMALL.1), &format!("height=\"{}\"", SMALL.1 + height), 1);
+        svg.replacen("</svg>", &format!("{legend}</svg>"), 1)
+    }
+
+    /// Legend below a small figure, in two columns if its labels are short, and its height in pixels.
+    fn legend(&self) -> (String, f64) {
+        let named: Vec<&Line> = self.lines.iter().filter(|l| !l.label.is_empty()).collect();
+        let columns = if named.iter().all(|l| l.label.chars().count() <= SHORT_LABEL) { 2 } else { 1 };
+        let mut out = String::new();
+        for (i, l) in named.iter().enumerate() {
+            let x = 8.0 + SMALL.0 / 2.0 * (i % columns) as f64;
+            let y = SMALL.1 + ENTRY * ((i / columns) as f64 + 0.5);
+            let dashes = match l.stroke {
+                Stroke::Solid => "",
+                Stroke::Dashed => " stroke-dasharray=\"8 4\"",
+                Stroke::DashDot => " stroke-dasharray=\"8 4 2 4\"",
+                Stroke::Dotted => " stroke-dasharray=\"2 3\"",
+            };
+            let _ = write!(
+                out,
+                "<line x1=\"{x}\" y1=\"{y}\" x2=\"{}\" y2=\"{y}\" stroke=\"{}\" stroke-width=\"2\"{dashes} />\
+                 <text x=\"{}\" y=\"{}\" font-family=\"{FONT}\" font-size=\"{SMALL_TEXT}\" fill=\"{BLACK}\">{}</text>",
+                x + 24.0,
+                l.color,
+                x + 30.0,
+                y + 4.5,
+                shown(&l.label).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+            );
+        }
+        (out, ENTRY * named.len().div_ceil(columns) as f64 + 4.0)
+    }
+}
+
+/// Labels of a logarithmic axis of times: powers of ten, at most five.
+fn decades_only(values: impl Iterator<Item = f64>) -> TickFormat {
+    let orders = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10);
+    let (low, high) = orders.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let every = ((high.ceil() - low.floor()) / 4.0).ceil().max(1.0);
+    let label = move |x: f64| {
+        let order = x.log10().round();
+        let power = (x.log10() - order).abs() < 1e-6 && order.rem_euclid(every) < 0.5;
+        match order as i32 {
+            _ if !power => String::new(),
+            k @ 0..=4 => 10i32.pow(k as u32).to_string(),
+            k => format!("1e{k}"),
+        }
+    };
+    TickFormat::Custom(Arc::new(label))
 }
 
 /// Number of labels of a logarithmic axis that fit a small figure.
@@ -297,6 +377,7 @@ pub(crate) fn heat(
         .with_x_tick_rotate(-60.0)
         .with_width(180.0 + 30.0 * columns.len().max(8) as f64)
         .with_height(180.0 + 28.0 * rows.len() as f64)
+        .with_tick_size(14)
         .with_font_family(FONT);
     numbered(&kuva::render_to_svg(plots, layout))
 }

@@ -205,7 +205,10 @@ fn terms(latex: &str, long: usize) -> Vec<String> {
 
 /// The SVG with ids of its own, in the colours of the page.
 fn inlined(p: &Picture) -> String {
-    let svg = p.svg();
+    let svg = match &p.drawing {
+        Drawing::Curves(figure) => figure.small_svg(),
+        _ => p.svg(),
+    };
     let attribute = |name: &str| {
         let rest = svg.split_once(&format!(" {name}=\""))?.1;
         rest.split_once('"').map(|(value, _)| value.to_string())

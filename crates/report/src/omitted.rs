@@ -4,6 +4,7 @@ use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Omitted, SilentError};
 use obsdeg_calibration::levels::SUSPECT;
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts};
+use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::simulation::omitted::{
     Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, FamilyEffect, OmittedEffects,
     SAMPLES, SuspectedChange,
@@ -139,33 +140,55 @@ pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
     (blocks(&alone, ""), budgets.map(|b| budget(b, "", usize::MAX)).collect())
 }
 
-/// Sizes of a bench by which a review shows what errors outside the model do.
-const TYPICAL: [(&str, f64); 4] = [("K0", 20.0), ("M", 10.0), ("M3", 10.0), ("M6", 10.0)];
+/// Bias of the accelerometers by which a review shows what they do, in ug.
+const OFF_UG: f64 = 20.0;
+/// Sizes of a bench by which a review shows what other errors outside the model do.
+const TYPICAL: [(&str, f64); 3] = [("M", 10.0), ("M3", 10.0), ("M6", 10.0)];
 
 /// Sentences on the largest change by errors of a typical bench, one for each family that is not estimated.
-pub(crate) fn typical(of: &OmittedEffects) -> Vec<String> {
-    // the size that is stated, where all terms of the family have the same
-    let stated = |f: &FamilyEffect| {
-        let own: Vec<Option<f64>> =
-            of.terms.iter().filter(|t| t.family == f.family).map(|t| t.size).collect();
-        own.first().copied().flatten().filter(|size| own.iter().all(|s| *s == Some(*size)))
+pub(crate) fn typical(review: &ComparedScheme) -> Vec<String> {
+    TYPICAL
+        .iter()
+        .filter_map(|(name, size)| Some(format!("errors {}", by_size(review, name, *size)?)))
+        .collect()
+}
+
+/// Sentence on the effect of accelerometers that are off by 20 ug.
+pub(crate) fn accelerometers_off(review: &ComparedScheme) -> String {
+    by_size(review, "K0", OFF_UG).map_or_else(
+        || {
+            format!(
+                "Nothing changes: the scheme estimates K0, so that {OFF_UG} ug do not enter other estimates"
+            )
+        },
+        |text| format!("Errors {text}"),
+    )
+}
+
+/// Largest change of a coefficient by a family of errors, all of one size, against its requirement, and the
+/// change by the size that the bench states; `None` for a family that is estimated.
+fn by_size(review: &ComparedScheme, family: &str, size: f64) -> Option<String> {
+    let of = &review.omitted;
+    let f = of.families.iter().find(|f| f.family == family)?;
+    let Some(w) = &f.worst else { return Some(format!("{family} of any size change no estimate")) };
+    let own: Vec<Option<f64>> = of.terms.iter().filter(|t| t.family == family).map(|t| t.size).collect();
+    let same = own.first().copied().flatten().filter(|size| own.iter().all(|s| *s == Some(*size)));
+    let by = |size: f64| format!("{} {}", number(size * w.per_unit), w.unit);
+    let stated = match same {
+        Some(own) if own != size => format!("; {own} {}, as the bench states, by {}", f.unit, by(own)),
+        None if own.iter().any(Option::is_some) => "; the bench states sizes of single terms".into(),
+        Some(_) => "; the bench states this size".into(),
+        None => String::new(),
     };
-    let families = TYPICAL.iter().filter_map(|(name, size)| {
-        let f = of.families.iter().find(|f| f.family == *name)?;
-        Some((f, stated(f).unwrap_or(*size)))
-    });
-    let sentence = |(f, size): (&FamilyEffect, f64)| match &f.worst {
-        Some(w) => format!(
-            "errors {} of {size} {} (1 sigma each) change {} most, by {} {}",
-            f.family,
-            f.unit,
-            w.unknown,
-            number(size * w.per_unit),
-            w.unit
-        ),
-        None => format!("errors {} of any size change no estimate", f.family),
-    };
-    families.map(sentence).collect()
+    let required = review.quantities.iter().find(|q| q.name == w.unknown).and_then(|q| q.requirement);
+    let required = required
+        .map_or_else(String::new, |r| format!(" ({} times what is required)", short(size * w.per_unit / r)));
+    Some(format!(
+        "{family} of {size} {} (1 sigma each) change {} most, by {}{required}{stated}",
+        f.unit,
+        w.unknown,
+        by(size)
+    ))
 }
 
 /// Sigma, bias and total of the worst drift coefficient under every carry; `None` without a bench.
@@ -348,26 +371,39 @@ fn first_lines(all: Vec<(&str, String)>) -> Vec<String> {
 /// First sentences: errors that the bench does not count, and sizes of errors without a stated size that
 /// would use up a margin.
 pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
+    let not_counted = not_counted(of, bench, all_met);
+    if !all_met {
+        return not_counted;
+    }
+    match met_while(of, bench, true) {
+        Some(met) => Some(not_counted.into_iter().chain([met]).collect::<Vec<_>>().join(" ")),
+        None => not_counted.filter(|_| bench),
+    }
+}
+
+/// Sentence on errors that the bench does not count; `None` where it counts all that it states.
+pub(crate) fn not_counted(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<String> {
     let estimated = of.estimated.join(", ");
     let (is, does) = match of.estimated.len() {
         1 => ("is", "its size does"),
         _ => ("are", "their sizes do"),
     };
-    let not_counted = || format!("Of the bench, {estimated} {is} estimated: {does} not count.");
-    let not_counted = (!of.estimated.is_empty()).then(not_counted);
-    if !all_met {
-        return not_counted;
-    }
-    let stated = match (bench, of.estimated.is_empty()) {
+    match (bench || !all_met, of.estimated.is_empty()) {
         (false, true) => Some("No bench is stated (--bench).".to_string()),
         (false, false) => Some(format!("No size of the bench counts: {estimated} {is} estimated.")),
-        (true, _) => not_counted,
-    };
+        (true, true) => None,
+        (true, false) => Some(format!("Of the bench, {estimated} {is} estimated: {does} not count.")),
+    }
+}
+
+/// Sentence on the sizes of errors without a stated size below which every requirement stays met; `None`
+/// where no error uses up a margin. `single` adds the sizes of single terms.
+pub(crate) fn met_while(of: &OmittedEffects, bench: bool, single: bool) -> Option<String> {
     // a family counts as stated if the bench states every term, also with size zero
     let open = |f: &&FamilyEffect| of.terms.iter().any(|t| t.family == f.family && t.size.is_none());
     let limit = |f: &'_ FamilyEffect| {
         let [all, one] = [f.uses_up.as_ref()?, f.one_uses_up.as_ref()?].map(|u| u.size);
-        let alone = if below(one) == below(all) {
+        let alone = if !single || below(one) == below(all) {
             String::new()
         } else {
             format!(" (one term alone: {})", below(one))
@@ -378,17 +414,13 @@ pub(crate) fn lead(of: &OmittedEffects, bench: bool, all_met: bool) -> Option<St
     let listed = limits(open.filter_map(|f| {
         let (size, more) = limit(f)?;
         Some((f.family.as_str(), size, f.unit.as_str(), more))
-    }));
-    let Some(listed) = listed else {
-        return if bench { stated } else { None };
-    };
-    let met = format!(
+    }))?;
+    Some(format!(
         "{}, each family by itself, 1 sigma of each of its terms: {}{}.",
         if bench { "Met while, of what the bench does not state" } else { "Met while" },
         listed,
         if of.attitudes { "" } else { "; attitudes are not computed here" }
-    );
-    Some(stated.into_iter().chain([met]).collect::<Vec<_>>().join(" "))
+    ))
 }
 
 /// The silent errors of a calibration, as the condition of "consistent"; empty if none changes a

@@ -22,7 +22,7 @@ const ELEVATION_DEG: f64 = 20.0;
 
 /// Height of a panel without its lines of text, and of one line, in pixels.
 const HEIGHT: f64 = 232.0;
-const LINE: f64 = 14.0;
+const LINE: f64 = 16.0;
 /// Length of a unit vector, in pixels.
 const UNIT: f64 = 70.0;
 /// Projection of a vector of n: pixels from the origin (right, down), and its component towards the reader.
@@ -96,7 +96,7 @@ fn label(out: &mut String, [x, y]: [f64; 2], text: &str, color: &str, bold: bool
     let weight = if bold { " font-weight=\"bold\"" } else { "" };
     let _ = write!(
         out,
-        "<text x=\"{x:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-size=\"11\"{weight} fill=\"{color}\">{text}</text>",
+        "<text x=\"{x:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-size=\"13\"{weight} fill=\"{color}\">{text}</text>",
         y + 4.0
     );
 }
@@ -190,7 +190,7 @@ fn body(pose: &Pose, texts: &[String], latitude_deg: f64, top: f64) -> String {
     let mut out = String::new();
     let name = pose.letters.as_ref().map_or_else(|| pose.name.clone(), |l| format!("{}: {l}", pose.name));
     for (i, text) in std::iter::once(&name).chain(texts).enumerate() {
-        let weight = if i == 0 { "13\" font-weight=\"bold" } else { "11" };
+        let weight = if i == 0 { "14\" font-weight=\"bold" } else { "13" };
         let y = 16.0 + LINE * i as f64;
         let _ = write!(
             out,

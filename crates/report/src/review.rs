@@ -1,6 +1,7 @@
 //! Design review: its sections in the order of a review.
 
 mod actions;
+mod answers;
 pub(crate) mod calibrated;
 mod first;
 mod generic;
@@ -26,7 +27,17 @@ use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, resolve, s
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
                           model holds, are of a platform with these estimates in place of the values that \
                           the scheme states (of several calibrations those of the last); what is not \
-                          determined has the values of the scheme.";
+                          determined has the values of the scheme. The calibration has margins of its \
+                          own: what is required over the uncertainty at the times of the record, with its \
+                          noise. Margins of the design are for the dwells, steps and noise that the scheme \
+                          states. Where the record has more samples or other noise, the two differ by the \
+                          root of their ratio.";
+
+/// Meaning of the grades of a status, and of a margin.
+const GRADES: &str = "OK: a requirement is met or a check passes. LIMITED: limits the validity of other \
+                      answers. NOT MET: a requirement or a check fails. OPEN: not stated or not computed, so \
+                      nothing is judged. Margin: what is required over the predicted sigma (with a bench over \
+                      the total uncertainty); 1 or more is met.";
 
 /// Review as one document: status, verdict and conditions, then the positions with what limits them and what
 /// to change (some two printed pages), then the appendix. Several schemes are compared first.
@@ -37,10 +48,11 @@ pub(crate) fn document(
 ) -> Document {
     let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
     let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
-    let mut blocks = vec![title::block(r), Block::Text(title::made_from(r, origin))];
+    let mut blocks = vec![title::block(r, origin), Block::Text(title::made_from(r, origin))];
     if r.schemes.len() > 1 {
-        first::comparison(&mut blocks, r);
+        first::comparison(&mut blocks, r, origin);
     }
+    blocks.push(Block::Text(GRADES.into()));
     let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
     let all = (reviewed().map(|(s, review)| verdict::status(s, review)))
         .chain(r.generic.iter().map(generic::status))
@@ -48,6 +60,7 @@ pub(crate) fn document(
         .chain(run);
     blocks.push(Block::Status(all.collect()));
     if alone {
+        blocks.extend((!r.schemes.is_empty()).then(|| answers::table(r, origin)));
         blocks.extend(reviewed().map(|(s, review)| first::margins(s, review, "s1")));
         blocks.extend(r.generic.iter().map(|g| first::generic_degrees(g, "g1")));
         blocks.extend(r.models.iter().map(|m| first::model_degrees(&m.analysis, "m1")));
@@ -163,10 +176,9 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, al
     positions(blocks, s, id);
     blocks.push(section(level, "What limits it, and what to change"));
     fewest(blocks, s, review);
-    blocks.extend(Block::list_if_any(
-        "What errors outside the model would do",
-        omitted::typical(&review.omitted),
-    ));
+    let typical = omitted::typical(review);
+    blocks.extend(Block::list_if_any("What errors outside the model would do", typical));
+    blocks.extend(met_while(review).map(Block::Text));
     blocks.extend(correlated(s));
     let caption =
         "Uncertainty budgets: shares of samples and of the errors of the bench in the squared total";
@@ -215,9 +227,12 @@ fn verdict(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, c
         blocks.push(Block::Text(text));
     }
     blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
-    let carry = words::assumptions(a).into_iter().filter(|l| l.starts_with("carry"));
-    let lines = carry.chain(stated::measurement(&review.conditions)).chain([words::certainty(a)]).collect();
-    blocks.push(Block::list("Conditions", lines));
+}
+
+/// Sentence on the sizes of errors outside the model that use up a margin, also of single terms.
+fn met_while(review: &ComparedScheme) -> Option<String> {
+    let r = &review.requirements;
+    omitted::met_while(&review.omitted, r.with_bench, true).filter(|_| r.all_met() && r.stated > 0)
 }
 
 /// Notes, with those on several unknowns that say the same in one.
@@ -409,6 +424,19 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
 fn seconds(t: f64) -> String {
     let text = format!("{t:.1}");
     text.strip_suffix(".0").map_or(text.clone(), String::from)
+}
+
+/// A time in s, and in minutes, hours or days if it is long: `2628.1 s (44 min)`, `5000 s (1 h 23 min)`.
+fn duration(t_s: f64) -> String {
+    let minutes = (t_s / 60.0).round() as u64;
+    let (hours, days) = (minutes / 60, minutes / 1440);
+    let long = match (days, hours) {
+        (2.., _) => format!(" ({days} d {} h)", hours % 24),
+        (_, 1..) => format!(" ({hours} h {} min)", minutes % 60),
+        _ if minutes >= 2 => format!(" ({minutes} min)"),
+        _ => String::new(),
+    };
+    format!("{} s{long}", seconds(t_s))
 }
 
 fn positions(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::document::Grade;
 use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
-use crate::visible;
+use crate::panels::escaped;
 
 /// Row of a chart.
 pub(crate) struct Row {
@@ -39,7 +39,7 @@ const NAMES: f64 = 96.0;
 const REMARKS: f64 = 52.0;
 const AXIS: f64 = 200.0;
 const TEXTS: f64 = 122.0;
-const ROW: f64 = 19.0;
+const ROW: f64 = 16.0;
 /// Distance between the marks of two series in a row, in pixels.
 const APART: f64 = 7.0;
 
@@ -112,8 +112,9 @@ impl Chart {
         );
         for (i, name) in self.series.iter().enumerate() {
             let y = 9.0 + 16.0 * i as f64;
-            self.mark(&mut out, i, left + 5.0, y, Grade::Good);
-            text(&mut out, left + 14.0, y + 4.0, "start", name);
+            self.mark(&mut out, i, 10.0, y, Grade::Good);
+            let room = width - 22.0;
+            fitting(&mut out, [18.0, y + 4.0], "start", name, room);
         }
         text(&mut out, left + AXIS / 2.0, legend + 14.0, "middle", &self.label);
         text(&mut out, NAMES + REMARKS / 2.0 - 4.0, legend + 30.0, "middle", self.remark);
@@ -131,7 +132,7 @@ impl Chart {
         }
         for (i, row) in self.rows.iter().enumerate() {
             let y = top + height * (i as f64 + 0.5);
-            text(&mut out, 4.0, y + 4.0, "start", &row.name);
+            fitting(&mut out, [4.0, y + 4.0], "start", &row.name, NAMES - 8.0);
             text(&mut out, NAMES + REMARKS / 2.0 - 4.0, y + 4.0, "middle", &row.remark);
             text(&mut out, left + AXIS + 10.0, y + 4.0, "start", &row.text);
             if let Some(limit) = row.limit {
@@ -183,16 +184,26 @@ fn power(x: f64, order: bool) -> String {
 }
 
 fn text(out: &mut String, x: f64, y: f64, anchor: &str, text: &str) {
-    // the tables have the full text
-    let short: String = if text.chars().count() > 44 {
-        text.chars().take(43).chain(['\u{2026}']).collect()
-    } else {
-        text.into()
+    fitting(out, [x, y], anchor, text, 44.0 * LETTER);
+}
+
+/// Mean width of a letter, in pixels.
+const LETTER: f64 = 7.0;
+
+/// Text that is cut to a width in pixels; the full text is its title.
+fn fitting(out: &mut String, [x, y]: [f64; 2], anchor: &str, text: &str, room: f64) {
+    let most = (room / LETTER) as usize;
+    let (shown, title) = match text.chars().count() > most {
+        true => {
+            let short: String = text.chars().take(most.saturating_sub(1)).chain(['\u{2026}']).collect();
+            (short, format!("<title>{}</title>", escaped(text)))
+        }
+        false => (text.to_string(), String::new()),
     };
-    let short = visible(&short).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let shown = escaped(&shown);
     let _ = write!(
         out,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{BLACK}\">{short}</text>"
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{BLACK}\">{title}{shown}</text>"
     );
 }
 

@@ -45,6 +45,18 @@ pub(crate) fn whose_margin(r: &Requirements) -> &'static str {
     if r.leaves_out() { " of the others" } else { "" }
 }
 
+/// `every requirement is met, 15 of 15`, `requirements are NOT met, 2 of 15 missed: psi_x, psi_y`.
+pub(crate) fn verdict(r: &Requirements) -> String {
+    let bench = if r.with_bench { "with the bench " } else { "" };
+    match (r.stated, r.all_met()) {
+        (0, _) => "no requirement is stated, so none is judged".into(),
+        (n, true) => format!("{bench}every requirement is met, {} of {n}", r.met),
+        (n, false) => {
+            format!("{bench}requirements are NOT met, {} of {n} missed: {}", r.missed.len(), missed(r))
+        }
+    }
+}
+
 /// `every requirement is met, 15 of 15; smallest margin 1.245 (D_OZ)`.
 pub(crate) fn requirements(r: &Requirements) -> String {
     if r.stated == 0 {
@@ -209,7 +221,7 @@ pub(crate) fn predicted_of<'a>(all: impl IntoIterator<Item = &'a MeasurementRepo
 
 /// Values of conditions that are not stated, by their keys: `latitude 28.2 deg, noise of Z 1e-5 g`; `None` if
 /// all are stated.
-fn chosen(m: &MeasurementReport) -> Option<String> {
+pub(crate) fn chosen(m: &MeasurementReport) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", m.latitude_deg),
         "accelerometer_noise_g" => format!("noise of Z {:e} g", m.accelerometer_noise_g),
@@ -229,6 +241,11 @@ pub(crate) fn by_default(m: &MeasurementReport) -> Option<String> {
 
 /// Sentence on conditions of a run that are not stated; `None` if all are stated.
 pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> Option<String> {
+    chosen_in_run(c, unknowns, &[]).map(|listed| format!("not stated, chosen by the program: {listed}"))
+}
+
+/// Conditions of a run that are not stated, without those of the keys `said`; `None` without any.
+pub(crate) fn chosen_in_run(c: &ConditionsReport, unknowns: &[Estimate], said: &[String]) -> Option<String> {
     // the paper lacks the other unknowns, whose values and priors the program chooses
     let of_paper = |name: &str| {
         name.starts_with("psi")
@@ -261,8 +278,8 @@ pub(crate) fn by_default_in_run(c: &ConditionsReport, unknowns: &[Estimate]) -> 
         "azimuth_noise_deg" => "noise of the azimuth 0.001 deg".into(),
         other => other.to_string(),
     };
-    let listed: Vec<String> = c.by_default.iter().map(value).collect();
-    (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
+    let listed: Vec<String> = c.by_default.iter().filter(|key| !said.contains(key)).map(value).collect();
+    (!listed.is_empty()).then(|| listed.join(", "))
 }
 
 /// True if the drifts of a run are not stated, so that they are those of the paper.

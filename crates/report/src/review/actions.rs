@@ -53,14 +53,14 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
     if !s.simulation.validity.holds {
         let of = match stated::drifts_by_default(&s.simulation.conditions) {
             true => {
-                "State the drifts of your gyros ([simulation.values]): at those of the paper, which stand in \
-                     their place, the small-angle model does not hold. Then compensate"
+                "State the drifts of your gyros (true values of the simulation): at those of the paper, which \
+                 stand in their place, the small-angle model does not hold. Then compensate"
             }
             false => "At these drifts the small-angle model does not hold: compensate",
         };
         out.push(format!(
-            "{of} known drifts before the run, or use a filter with full attitudes (`obsdeg simulate --truth \
-             exact` shows its sigmas)."
+            "{of} known drifts before the run, or use a filter with full attitudes (a simulation with the exact \
+             truth shows its sigmas)."
         ));
     }
     if gimbals::lead(s.analysis.gimbals.as_ref()).is_some() {
@@ -155,7 +155,7 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let unseen = named(&|q| q.status == Exact::NotSeen);
     if !unseen.is_empty() {
         out.push(format!(
-            "Look at orders above {} (`obsdeg analyze --order`) for {}: no end is proven.",
+            "Look at orders above {} (option --order of analyze) for {}: no end is proven.",
             a.last_order,
             words::names(unseen)
         ));
@@ -213,7 +213,7 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     let open = without(|u| u.left_open);
     if !open.is_empty() {
         out.push(format!(
-            "State priors of the drifts as small as is true (`priors` under [simulation]), or add positions, \
+            "State priors of the drifts as small as is true, or add positions, \
              for {}: the record leaves them open at these drifts.",
             words::names(open)
         ));
@@ -238,8 +238,8 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     }
     if !missed.is_empty() {
         out.push(format!(
-            "Record longer, or one more position, for {}: by this record their requirements are NOT met (`obsdeg \
-             design --next 1 --after` names the position).",
+            "Record longer, or one more position, for {}: by this record their requirements are NOT met (design --next 1 \
+             --after names the position).",
             words::names(missed)
         ));
     }
@@ -307,10 +307,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         }
         .into(),
         Finding::Cells { column, kind_of_cells: CellKind::Code, .. } => format!(
-            "Look at column `{column}` of the record: state codes of missing values as `missing` under [record]."
+            "Look at column {column} of the record: state its codes of missing values in the scheme file."
         ),
         Finding::Cells { column, kind_of_cells: CellKind::Stuck, lines, .. } => format!(
-            "Look at column `{column}` of the record between lines {} and {}: empty the cells of a stuck output.",
+            "Look at column {column} of the record between lines {} and {}: empty the cells of a stuck output.",
             lines.0, lines.1
         ),
         Finding::Succession { position, .. } => format!(
@@ -323,10 +323,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         ),
         Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
         Finding::Turns { .. } => {
-            "State the rate of the turns of this run (`slew_rate_deg_s`), and calibrate again.".into()
+            "State the rate of the turns of this run, and calibrate again.".into()
         }
         Finding::Force { .. } => {
-            "Add scales and zeros of the accelerometers to the unknowns (K1, K0 in `terms`), or state the \
+            "Add scales and zeros of the accelerometers to the unknowns (K1, K0), or state the \
              gravity of the place (--gravity, for forces in m/s^2)."
                 .into()
         }

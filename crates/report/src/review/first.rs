@@ -8,14 +8,14 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
-use super::{joined, seconds};
+use super::{answers, duration, joined};
 use crate::compare::{deciding, unknowns};
 use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
 use crate::rows::{Chart, Row};
-use crate::{compare, words};
+use crate::{Origin, compare, stated, words};
 
 /// Largest number of rows of a chart, so that it fits a page.
-const ROWS: usize = 48;
+const ROWS: usize = 24;
 
 /// Outcome of one requirement, in words.
 fn margin(q: &Quantity) -> (String, Grade) {
@@ -130,8 +130,8 @@ fn like_with_like(r: &DesignReview) -> StatusRow {
     let totals = || r.comparison.schemes.iter().map(|s| s.total_s);
     let (least, most) = totals().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
     let time = match least == most {
-        true => format!("all take {} s", seconds(least)),
-        false => format!("they take {} to {} s", seconds(least), seconds(most)),
+        true => format!("all take {}", duration(least)),
+        false => format!("they take {} to {}", duration(least), duration(most)),
     };
     let (grade, text) = match r.comparison.differ.is_empty() {
         true => (Grade::Good, format!("same conditions, unknowns and requirements; {time}")),
@@ -148,18 +148,77 @@ fn recommended(r: &DesignReview) -> StatusRow {
     StatusRow { what: "Recommended", grade, text }
 }
 
+/// Sentence on the unknowns of each scheme that others lack.
+fn estimated_besides(schemes: &[ComparedScheme]) -> String {
+    let has = |s: &ComparedScheme, name: &str| s.quantities.iter().any(|q| q.name == name);
+    let besides = |s: &ComparedScheme| {
+        let own = s.quantities.iter().map(|q| q.name.as_str());
+        // every position has a psi of its own under reset carry
+        let own: Vec<&str> = own
+            .filter(|name| !name.starts_with("psi") && schemes.iter().any(|other| !has(other, name)))
+            .collect();
+        (!own.is_empty()).then(|| format!("{} estimates {}", s.name, words::names(own)))
+    };
+    let listed: Vec<String> = schemes.iter().filter_map(besides).collect();
+    if listed.is_empty() { listed.concat() } else { format!("; not in all: {}", listed.join("; ")) }
+}
+
+/// The most accurate and the shortest scheme, between which no stated requirement decides.
+fn without_requirements(schemes: &[ComparedScheme]) -> String {
+    let sigma = |s: &ComparedScheme| s.worst.as_ref().map_or(f64::INFINITY, |w| w.sigma_dph);
+    let accurate = schemes.iter().min_by(|a, b| sigma(a).total_cmp(&sigma(b)));
+    let accurate = accurate.and_then(|s| Some((s, s.worst.as_ref()?)));
+    let accurate = accurate.map_or_else(
+        || "no scheme determines every coefficient".into(),
+        |(s, w)| {
+            format!(
+                "most accurate {} ({} {})",
+                s.name,
+                stated::worst(&s.requirements),
+                stated::worst_sigma(w)
+            )
+        },
+    );
+    let all = schemes.iter().any(|s| s.worst.is_some());
+    let shortest =
+        (schemes.iter().filter(|s| s.worst.is_some() == all)).min_by(|a, b| a.total_s.total_cmp(&b.total_s));
+    let shortest = shortest.map_or_else(String::new, |s| {
+        let determined = if all { " that determines every coefficient" } else { "" };
+        format!("; shortest{determined} {} ({})", s.name, duration(s.total_s))
+    });
+    format!(
+        "none: no requirement says what is good enough. State requirements of every scheme; until then \
+         accuracy and time decide: {accurate}{shortest}"
+    )
+}
+
+/// The recommended scheme of several with the same conditions. Schemes that differ in nothing but their
+/// unknowns are judged by the requirements of each.
 fn choice(r: &DesignReview) -> (Grade, String) {
     let schemes = &r.comparison.schemes;
-    if !r.comparison.differ.is_empty() {
+    let unlike: Vec<&str> =
+        r.comparison.differ.iter().map(String::as_str).filter(|of| *of != "unknowns").collect();
+    if !unlike.is_empty() {
         let differ = r.comparison.differ.join(", ");
         return (
             Grade::Open,
-            format!("none: schemes that differ in {differ} are answers to different questions"),
+            format!(
+                "none: schemes that differ in {differ} are answers to different questions. Give them the \
+                 same {}{}",
+                unlike.join(", "),
+                estimated_besides(schemes)
+            ),
         );
     }
     if schemes.iter().any(|s| s.requirements.stated == 0) {
-        return (Grade::Open, "none: no requirement says what is good enough".into());
+        return (Grade::Open, without_requirements(schemes));
     }
+    let (grade, text) = by_requirements(r);
+    (grade, format!("{text}{}", estimated_besides(schemes)))
+}
+
+fn by_requirements(r: &DesignReview) -> (Grade, String) {
+    let schemes = &r.comparison.schemes;
     let worst = |s: &ComparedScheme| s.requirements.worst.as_ref().map_or(0.0, |w| w.margin);
     let meeting: Vec<usize> = (0..schemes.len()).filter(|&i| schemes[i].requirements.all_met()).collect();
     let best = meeting.iter().copied().min_by(|&i, &k| {
@@ -172,8 +231,8 @@ fn choice(r: &DesignReview) -> (Grade, String) {
         let why = match (meeting.len(), as_short) {
             (1, _) => "the only one that meets every requirement by prediction".to_string(),
             (n, 1) => format!(
-                "the shortest of {n} that meet every requirement by prediction, {} s",
-                seconds(s.total_s)
+                "the shortest of {n} that meet every requirement by prediction, {}",
+                duration(s.total_s)
             ),
             (n, k) => format!(
                 "of {n} that meet every requirement by prediction, {k} of them equally short, the one with \
@@ -210,13 +269,14 @@ fn doubts(s: &SchemeReview) -> String {
 }
 
 /// Comparison on one page: recommendation, schemes as columns, sigmas as a picture.
-pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview) {
+pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview, origin: &Origin) {
     let title = format!("Comparison of {} schemes", r.schemes.len());
     blocks.push(Block::Status(vec![Status {
         title,
         rows: vec![recommended(r), like_with_like(r)],
         actions: vec![],
     }]));
+    blocks.push(answers::table(r, origin));
     blocks.push(matrix(&r.comparison.schemes));
     blocks.push(sigmas(&r.comparison.schemes));
 }
@@ -230,7 +290,7 @@ fn kept(r: &Requirements) -> String {
     }
 }
 
-/// Schemes as columns: carry, positions, total time, rank, requirements, and the margin of every unknown.
+/// Schemes as columns: positions, rank, requirements, and the margin of every unknown.
 fn matrix(schemes: &[ComparedScheme]) -> Block {
     let mut columns = vec![left("")];
     columns.extend(schemes.iter().map(|s| left(s.name.clone())));
@@ -238,9 +298,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
         std::iter::once(name.into()).chain(schemes.iter().map(cell)).collect()
     };
     let mut rows = vec![
-        line("carry", &|s| s.carry.to_string().into()),
         line("positions", &|s| s.positions.len().to_string().into()),
-        line("total time", &|s| format!("{} s", seconds(s.total_s)).into()),
         line("rank with dwell", &|s| {
             let grade = if s.rank[0] == s.rank[1] { Grade::Good } else { Grade::Limited };
             Cell::graded(compare::rank(s.rank, s.has_accuracy_orders), grade)

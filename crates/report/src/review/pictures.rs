@@ -150,9 +150,27 @@ fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Line> {
     columns.iter().enumerate().map(curve).filter(|l| l.points.len() > 1).collect()
 }
 
-/// Names of the drift coefficients of a sweep.
+/// Largest number of curves of a sweep.
+const WORST: usize = 6;
+
+/// Names of the drift coefficients of a sweep with the largest last values, in the order of the sweep.
 fn drifts(s: &Sweep) -> Vec<String> {
-    s.names.iter().filter(|n| n.starts_with("D_")).cloned().collect()
+    let last = |c: usize| s.sigmas.iter().rev().find_map(|row| row[c]).unwrap_or(0.0);
+    let mut order: Vec<usize> = (0..s.names.len()).filter(|&c| s.names[c].starts_with("D_")).collect();
+    order.sort_by(|&a, &b| last(b).total_cmp(&last(a)));
+    order.truncate(WORST);
+    order.sort_unstable();
+    order.into_iter().map(|c| s.names[c].clone()).collect()
+}
+
+/// Note on coefficients without a curve; empty if each has one.
+fn not_shown(s: &Sweep) -> String {
+    let all = s.names.iter().filter(|n| n.starts_with("D_")).count();
+    if all > WORST {
+        format!(" ({WORST} of {all} coefficients, those with the largest)")
+    } else {
+        String::new()
+    }
 }
 
 /// Name of the quantity of the sweeps.
@@ -175,7 +193,8 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
     };
     let caption = format!(
         "Predicted {what} of the coefficients against the latitude; a curve ends where its coefficient is \
-         not observable"
+         not observable{}",
+        not_shown(&s.latitudes)
     );
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
@@ -196,14 +215,17 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
     }
     let figure = Figure {
         title: format!("Predicted {what} against time"),
-        x_label: "total time, all dwells scaled alike [s]".into(),
+        x_label: "total time, dwells alike scaled [s]".into(),
         y_label: "1 sigma [deg/h, deg/h/g]".into(),
         lines,
         log: true,
         ..Figure::default()
     };
     let required = if required.is_empty() { "" } else { ", with the required sigma" };
-    let caption = format!("What longer dwells buy: predicted {what} against the total time{required}");
+    let caption = format!(
+        "What longer dwells buy: predicted {what} against the total time{required}{}",
+        not_shown(&s.dwells)
+    );
     Some(curves(name, caption, figure))
 }
 
@@ -231,12 +253,12 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
         }
         let points: Vec<(f64, f64)> = s.alternatives.front.iter().map(|f| (f.total_s, f.value)).collect();
         if points.len() > 1 {
-            let label = format!("best of 24, {} positions ({})", s.alternatives.front_positions, s.name);
+            let label = format!("best {} of 24 ({})", s.alternatives.front_positions, s.name);
             lines.push(line(&label, found, Stroke::Dotted, points));
         }
         let bound = s.alternatives.certificate.as_ref().map_or(&[][..], |c| &c.front);
         if bound.len() > 1 {
-            let label = format!("none of {} of 24 is below ({})", s.alternatives.front_positions, s.name);
+            let label = format!("bound, {} of 24 ({})", s.alternatives.front_positions, s.name);
             lines.push(line(&label, least, Stroke::DashDot, bound_steps(bound)));
         }
     }

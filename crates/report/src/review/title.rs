@@ -6,25 +6,38 @@ use obsdeg_design::review::DesignReview;
 use crate::Origin;
 use crate::document::{Block, Column, left};
 
-/// Table of the title blocks, a row for each file that states one, with room for signatures; a sentence where
-/// no file does.
-pub(super) fn block(r: &DesignReview) -> Block {
+/// Table of the title blocks, a row for each file, with room for signatures; a sentence where a single file
+/// states none.
+pub(super) fn block(r: &DesignReview, origin: &Origin) -> Block {
     let schemes = r.schemes.iter().map(|s| (s.name.as_str(), &s.document));
     let generic = r.generic.iter().map(|g| (g.name.as_str(), &g.document));
     let models = r.models.iter().map(|m| (m.analysis.name.as_str(), &m.document));
-    of(schemes.chain(generic).chain(models).collect())
+    let all: Vec<(&str, &TitleBlock)> = schemes.chain(generic).chain(models).collect();
+    // of schemes alone, files and schemes have the same order
+    let files = origin.inputs.iter().map(|line| file(line)).collect::<Vec<_>>();
+    let by_file = r.schemes.len() == all.len() && files.len() == all.len() && all.len() > 1;
+    let name = |(i, (name, of)): (usize, &(&str, _))| match by_file {
+        true => (format!("{name} ({})", files[i]), *of),
+        false => (name.to_string(), *of),
+    };
+    self::of(all.iter().enumerate().map(name).collect())
+}
+
+/// File of a line on its digest.
+fn file(line: &str) -> &str {
+    line.rsplit_once(": ").map_or(line, |(file, _)| file.strip_prefix("sha256 of ").unwrap_or(file))
 }
 
 /// Title block of one document; a sentence where the file states none.
 pub(crate) fn of_one(own: &TitleBlock, name: &str) -> Block {
-    of(vec![(name, own)])
+    of(vec![(name.to_string(), own)])
 }
 
-fn of(all: Vec<(&str, &TitleBlock)>) -> Block {
-    let all: Vec<(&str, &TitleBlock)> =
-        all.into_iter().filter(|(_, of)| **of != TitleBlock::default()).collect();
+fn of(all: Vec<(String, &TitleBlock)>) -> Block {
+    let is_stated = |of: &TitleBlock| *of != TitleBlock::default();
     let entry = |of: &TitleBlock, name: &str| {
-        of.entries().into_iter().find(|e| e.0 == name).map_or("-", |e| e.1).to_string()
+        let none = if name == "reference" && !is_stated(of) { "no document stated" } else { "-" };
+        of.entries().into_iter().find(|e| e.0 == name).map_or(none, |e| e.1).to_string()
     };
     let names = ["reference", "revision", "date", "author"];
     let mut roles: Vec<&String> = all.iter().flat_map(|(_, of)| &of.signatures).collect();
@@ -35,17 +48,17 @@ fn of(all: Vec<(&str, &TitleBlock)>) -> Block {
         .chain(names.map(left))
         .chain(roles.iter().map(|role| left(format!("{role}: name, date, signature"))))
         .collect();
-    let row = |(name, of): &(&str, &TitleBlock)| -> Vec<String> {
+    let row = |(name, of): &(String, &TitleBlock)| -> Vec<String> {
         let line =
             |role: &&String| if of.signatures.contains(role) { "\u{a0}".repeat(44) } else { "-".into() };
-        std::iter::once(name.to_string())
+        std::iter::once(name.clone())
             .chain(names.map(|name| entry(of, name)))
             .chain(roles.iter().map(line))
             .collect()
     };
-    match all.is_empty() {
-        false => Block::table("", columns, all.iter().map(row)),
-        true => Block::Text(
+    match all.iter().any(|(_, of)| is_stated(of)) || all.len() > 1 {
+        true => Block::table("", columns, all.iter().map(row)),
+        false => Block::Text(
             "Reference, revision, date, author and signatures are not stated (table [document] of the file)."
                 .into(),
         ),

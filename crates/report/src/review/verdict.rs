@@ -5,7 +5,7 @@ use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
-use super::{derivatives, joined, seconds};
+use super::{derivatives, duration, joined};
 use crate::document::{Grade, Status, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
@@ -47,7 +47,7 @@ fn lost_with_dwell(s: &SchemeReview) -> Vec<&str> {
 }
 
 /// Answer to the question whether the checks of a filter agree.
-fn evidence(s: &SchemeReview) -> (Grade, String) {
+pub(super) fn evidence(s: &SchemeReview) -> (Grade, String) {
     match &s.evidence {
         Ok(e) if e.passed => {
             let open = match e.counts.not_resolvable {
@@ -70,7 +70,7 @@ fn evidence(s: &SchemeReview) -> (Grade, String) {
 }
 
 /// Limits of the verdict, the gravest first.
-fn limits(s: &SchemeReview) -> Vec<String> {
+pub(super) fn limits(s: &SchemeReview) -> Vec<String> {
     // drifts that are not stated limit no scheme
     let states_drifts = !stated::drifts_by_default(&s.simulation.conditions);
     let mut out: Vec<String> = small_angles(s).filter(|_| states_drifts).into_iter().collect();
@@ -115,6 +115,9 @@ fn dwell_or_slews(s: &SchemeReview) -> &'static str {
 fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
     let predicted = stated::requirements(&review.requirements);
     let run = stated::run(&s.simulation.run, &s.simulation.conditions);
+    // a run with the outcome of the prediction needs no sentence of its own
+    let same = stated::capital(&run).strip_prefix(&format!("In this run {predicted}; ")).map(String::from);
+    let run = same.map_or(run, |rest| format!("in the run too; {rest}"));
     match (review.requirements.stated, review.requirements.all_met()) {
         (0, _) => (Grade::Open, predicted),
         (_, true) => (Grade::Good, format!("{predicted}; {run}")),
@@ -169,12 +172,12 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         || "None of them has a finite predicted sigma".to_string(),
         |(q, sigma)| {
             format!(
-                "The largest predicted sigma of {} is {} {} ({}) after {} s",
+                "The largest predicted sigma of {} is {} {} ({}) after {}",
                 if rates.len() == with_dwell.len() { "those" } else { "the drift coefficients" },
                 number(sigma),
                 q.unit,
                 q.name,
-                seconds(review.total_s)
+                duration(review.total_s)
             )
         },
     );
@@ -192,12 +195,22 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
         _ => "",
     };
     let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
-    let (grade, requirements) = requirements(s, review);
-    let (missed, others) = match grade {
-        Grade::Missed => (format!("{}. ", stated::capital(&requirements)), String::new()),
-        _ => (String::new(), format!("; {requirements}")),
+    // margins and the run are in the status
+    let missed = match requirements(s, review).0 {
+        Grade::Missed => format!("{}. ", stated::capital(&stated::verdict(&review.requirements))),
+        _ => String::new(),
     };
-    format!("{missed}{lead}{first}. {accuracy}{total}{others}{filter}.")
+    format!("{missed}{lead}{first}. {accuracy}{total}{filter}.")
+}
+
+/// Sentences on errors outside the model that requirements rest on: of those without a stated size the sizes
+/// that use up a margin.
+fn outside(review: &ComparedScheme) -> String {
+    let (of, r) = (&review.omitted, &review.requirements);
+    let while_small = omitted::met_while(of, r.with_bench, false).filter(|_| r.all_met());
+    let not_counted = omitted::not_counted(of, r.with_bench, r.all_met())
+        .filter(|_| r.with_bench || !r.all_met() || while_small.is_some());
+    not_counted.into_iter().chain(while_small).fold(String::from("."), |out, line| format!("{out} {line}"))
 }
 
 /// Status of a scheme.
@@ -230,10 +243,10 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
     let prior = by_prior(s);
     let (checks, agreement) = evidence(s);
     let (required, requirements) = requirements(s, review);
-    // condition of the outcome: sizes of errors that no bench states
-    let open = omitted::lead(&review.omitted, review.requirements.with_bench, review.requirements.all_met());
-    let open = open.filter(|_| review.requirements.stated > 0);
-    let requirements = open.map_or(requirements.clone(), |open| format!("{requirements}. {open}"));
+    let requirements = match review.requirements.stated {
+        0 => requirements,
+        _ => format!("{requirements}{}", outside(review)),
+    };
     let row = |what, grade, text| StatusRow { what, grade, text };
     let beyond = gimbals::lead(s.analysis.gimbals.as_ref()).map(|text| row("Gimbals", Grade::Missed, text));
     let first = [
