@@ -293,8 +293,8 @@ fn by_normal_equations(left_out: usize) -> Vec<f64> {
 }
 
 /// Samples at the start of positions that the record leaves out count in no command: `simulate`, `compare`,
-/// `procedure`, `design` and the engine of the page give the same uncertainty of every coefficient. Its sigma is
-/// larger than with all samples; a total with a bench need not be.
+/// `procedure`, `design` and the engine of the page give the same uncertainty of every coefficient. Its sigma
+/// is larger than with all samples; a total with a bench need not be.
 #[test]
 fn samples_that_the_record_leaves_out_count_nowhere() {
     let positions = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
@@ -303,7 +303,7 @@ fn samples_that_the_record_leaves_out_count_nowhere() {
         ("inertial", slews, ""),
         ("inertial", "", "[bench]\nK0 = 20\nlatitude = 10\n"),
         ("platform", "drift_noise = '0.001 deg/sqrt(h)'\n", ""),
-        ("reset", "accelerometer_bias_instability_ug = 2\n", ""),
+        ("platform", "accelerometer_bias_instability_ug = 2\n", ""),
     ];
     for (carry, conditions, bench) in cases {
         let with = |settle: &str| {

@@ -307,7 +307,7 @@ fn pages_of_the_bench() {
         return;
     };
     for (page, most) in pages.iter().zip([4, 7]) {
-        let printed = printed_pages(&mut browser, page);
+        let printed = printed_pages(&mut browser, page).0;
         assert!((1..=most).contains(&printed), "{}: {printed} pages", page.display());
         browser.open(page, 400, 900);
         browser.settle();
@@ -384,15 +384,24 @@ fn changes_between_calibrations() {
     refused(&["report", "-o", &path("d.html")], &["<FILE>"]);
 }
 
-/// Number of A4 pages that a browser prints.
-fn printed_pages(browser: &mut Browser, file: &Path) -> usize {
+/// Number of A4 pages that a browser prints, and the words of the first two; without words where there is no
+/// pdftotext.
+fn printed_pages(browser: &mut Browser, file: &Path) -> (usize, Option<String>) {
     use base64::Engine;
     browser.open(file, 1280, 900);
     let answer =
         browser.call("Page.printToPDF", json!({ "preferCSSPageSize": true, "printBackground": false }));
     let pdf = base64::engine::general_purpose::STANDARD.decode(answer["data"].as_str().expect("data"));
-    let pdf = String::from_utf8_lossy(&pdf.expect("base64")).into_owned();
-    pdf.matches("/Type /Page").count() - pdf.matches("/Type /Pages").count()
+    let pdf = pdf.expect("base64");
+    let printed = file.with_extension("pdf");
+    std::fs::write(&printed, &pdf).expect("written");
+    let mut pdftotext = std::process::Command::new("pdftotext");
+    let text = pdftotext.args(["-l", "2"]).arg(&printed).arg("-").output().ok().map(|out| {
+        let text = String::from_utf8_lossy(&out.stdout).into_owned();
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    });
+    let pdf = String::from_utf8_lossy(&pdf).into_owned();
+    (pdf.matches("/Type /Page").count() - pdf.matches("/Type /Pages").count(), text)
 }
 
 /// Questions of a board, as the table of answers names them.
@@ -478,8 +487,14 @@ fn a_review_fits_its_pages() {
         return;
     };
     for (file, least, most) in files {
-        let pages = printed_pages(&mut browser, &file);
+        let (pages, first) = printed_pages(&mut browser, &file);
         assert!((least..=most).contains(&pages), "{}: {pages} pages", file.display());
+        let parts = ["Made by obsdeg", "State the drifts of your gyros"];
+        let missing = |first: &String| {
+            QUESTIONS.iter().chain(&parts).find(|part| !first.contains(**part)).map(ToString::to_string)
+        };
+        let missing = first.as_ref().and_then(missing);
+        assert_eq!(missing, None, "{}: not on page one or two", file.display());
         let smallest = smallest_text(&mut browser, &file);
         assert!(smallest > 7.9, "{}: {smallest} px", file.display());
     }

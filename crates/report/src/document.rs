@@ -134,8 +134,9 @@ impl<T: Into<String>> From<T> for Cell {
     }
 }
 
-/// First column of the tables whose rows a narrow page shows one below the other: the steps of a procedure.
-const CARDS: &str = "step";
+/// First columns of the tables whose rows a narrow page shows one below the other, if they have more than two
+/// columns: the steps of a procedure, the answers of several schemes.
+const CARDS: [&str; 2] = ["step", "question"];
 
 /// A table for the templates of pages.
 pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>]) -> Value {
@@ -144,7 +145,7 @@ pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>
     json!({
         "kind": "table",
         "heading": heading,
-        "cards": columns.first().is_some_and(|c| c.name == CARDS),
+        "cards": columns.len() > 2 && columns.first().is_some_and(|c| CARDS.contains(&&*c.name)),
         "header": columns.iter().map(|c| &c.name).collect::<Vec<_>>(),
         "numbers": columns.iter().map(|c| c.number).collect::<Vec<_>>(),
         "rows": rows.iter().map(texts).collect::<Vec<_>>(),

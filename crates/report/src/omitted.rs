@@ -226,7 +226,7 @@ fn advice(of: &OmittedEffects) -> Vec<String> {
 /// Line on one change that was tried.
 pub(crate) fn advised(a: &Advice) -> String {
     let what = match a.kind {
-        AdviceKind::Estimate => format!("Estimate {} too (add to `terms` of the scheme)", a.what),
+        AdviceKind::Estimate => format!("Estimate {} too (add to the terms of the scheme)", a.what),
         AdviceKind::Relevel => "Level the platform again before each position (carry reset)".into(),
         AdviceKind::AddPosition => format!("Add a position {}, as long as the last one", a.what),
     };
@@ -511,7 +511,7 @@ pub(crate) fn estimated_by(errors: &[String]) -> String {
         }
     }
     terms.dedup();
-    let add = (!terms.is_empty()).then(|| format!("add {} to `terms` of the scheme", terms.join(",")));
+    let add = (!terms.is_empty()).then(|| format!("add {} to the terms of the scheme", terms.join(",")));
     let measure = (!others.is_empty())
         .then(|| format!("{} cannot be a term: measure it, and correct the scheme", others.join(", ")));
     add.into_iter().chain(measure).collect::<Vec<_>>().join("; ")

@@ -42,7 +42,8 @@ pub fn steps(dwell_s: f64, step_s: f64) -> Result<usize, SimulationError> {
     counted("steps", (dwell_s / step_s - 1e-9).ceil().max(1.0), MAX_STEPS)
 }
 
-/// Number of the first samples of a position at rest, `dt` s apart, that lie within `settle_s` s of its start.
+/// Number of the first samples of a position at rest, `dt` s apart, that lie within `settle_s` s of its
+/// start.
 pub fn left_out(settle_s: f64, dt: f64) -> usize {
     (settle_s / dt + 1e-9).floor().max(0.0) as usize
 }

@@ -357,7 +357,7 @@ fn sigmas(schemes: &[ComparedScheme]) -> Block {
     };
     let what = if bench { "Predicted sigma, of schemes with a bench the total," } else { "Predicted sigma" };
     let caption = format!(
-        "{what} of every unknown in each scheme; a stroke: what is required; no mark: not determined"
+        "{what} of every unknown in each scheme; a stroke: what all of them require; no mark: not determined"
     );
     chart("comparison_sigmas", caption, picture, all.len())
 }

@@ -15,8 +15,9 @@ const FINEST: usize = 256;
 
 /// Dwells of the positions of `path` with a smaller criterion than equal ones; candidates of
 /// `evaluator` are its positions in order. Dwells are multiples of the time between samples with the same
-/// sum, each with at least one sample that counts. Moving the smallest time from one position to another makes none of them
-/// better. `allowed` is true if dwells keep the constraints. `None` if equal dwells are as good.
+/// sum, each with at least one sample that counts. Moving the smallest time from one position to another
+/// makes none of them better. `allowed` is true if dwells keep the constraints. `None` if equal dwells are
+/// as good.
 ///
 /// # Errors
 /// [`DesignError::Filter`].
