@@ -125,9 +125,9 @@ def wrong(value: Any, hint: Any, path: str, seen: dict[type, set[str]]) -> Itera
 
 #: Keys that the answers above omit, by class.
 RARE = {
-    "ConditionsReport.accelerometer_bias", "Design.gimbals", "ConditionsReport.settle_s", "Geometry.accelerometers", "MeasurementReport.accelerometer_bias", "MeasurementReport.gyro_noise",
-    "MeasurementReport.settle_s", "NextPositions.unused_ageing",
-    "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor", "SearchReport.ranked",
+    "ConditionsReport.accelerometer_bias", "ConditionsReport.settle_s", "Design.gimbals", "Geometry.accelerometers",
+    "MeasurementReport.accelerometer_bias", "MeasurementReport.gyro_noise", "MeasurementReport.settle_s",
+    "NextPositions.unused_ageing", "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor", "SearchReport.ranked",
 }
 
 

@@ -252,6 +252,37 @@ fn what_is_not_alike_is_said() {
     assert_eq!(json["schemes"][0]["sensitivity"][9]["condition"], "platform carry, no slews");
 }
 
+/// Every condition of the predicted sigmas that two schemes do not share is named.
+#[test]
+fn conditions_that_differ_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str, conditions: &str, record: &str| {
+        let path = folder.path().join(name);
+        let text = format!(
+            "latitude_deg = 40\n[simulation]\ndwell_s = 300\n{conditions}{record}\
+             [[position]]\nattitude = 'NUE'\n[[position]]\nattitude = 'UEN'\n"
+        );
+        std::fs::write(&path, text).expect("written");
+        path.display().to_string()
+    };
+    let plain = file("plain.toml", "", "");
+    let random = "random drift or bias instability";
+    for (conditions, record, named) in [
+        ("", "", None),
+        ("drift_noise = '0.001 deg/sqrt(h)'\n", "", Some(random)),
+        ("bias_instability_dph = 0.01\n", "", Some(random)),
+        ("accelerometer_bias_instability_ug = 2\n", "", Some(random)),
+        ("priors = { D_F = 1 }\n", "", Some("prior")),
+        ("step_s = 5\n", "", Some("step")),
+        ("", "[record]\nsettle = 20\n", Some("settle")),
+    ] {
+        let other = file("other.toml", conditions, record);
+        let json: serde_json::Value =
+            serde_json::from_str(&printed(&[&plain, &other, "--format", "json"])).expect("JSON");
+        assert_eq!(json["differ"], serde_json::json!(Vec::from_iter(named)), "{conditions}{record}");
+    }
+}
+
 /// The answer and the table state the conditions of the sigmas. An unknown that the dwell makes undetermined
 /// has no sigma.
 #[test]

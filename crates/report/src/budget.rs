@@ -8,8 +8,7 @@ use crate::ReportError;
 use crate::csv_text::write;
 use crate::document::number;
 use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
-use crate::panels::escaped;
-use crate::visible;
+use crate::visible::escaped;
 
 /// Colours of the families; samples are grey.
 const COLORS: [&str; 6] = [ORANGE, BLUE, GREEN, AMBER, PURPLE, SKY];
@@ -134,7 +133,7 @@ fn rectangle(out: &mut String, [x, y, width, height]: [f64; 4], color: &str) {
 }
 
 fn text(out: &mut String, x: f64, y: f64, text: &str) {
-    let text = escaped(&visible(text));
+    let text = escaped(text);
     let _ = write!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" fill=\"{BLACK}\">{text}</text>");
 }
 

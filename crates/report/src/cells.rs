@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::figure::{BLACK, FONT, GREY, ink, shade};
-use crate::panels::escaped;
+use crate::visible::escaped;
 
 /// Width and height of a cell, and the least width of a picture, in pixels.
 const CELL: [f64; 2] = [34.0, 20.0];

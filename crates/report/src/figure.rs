@@ -12,6 +12,7 @@ use kuva::render::figure::Figure as Grid;
 use resvg::{tiny_skia, usvg};
 
 use crate::visible;
+use crate::visible::escaped;
 
 /// Colours that colour-blind readers can distinguish (Okabe and Ito).
 pub(crate) const BLACK: &str = "#000000";
@@ -272,7 +273,7 @@ impl Figure {
                 l.color,
                 x + 30.0,
                 y + 4.5,
-                shown(&l.label).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+                escaped(&l.label)
             );
         }
         (out, ENTRY * named.len().div_ceil(columns) as f64 + 4.0)

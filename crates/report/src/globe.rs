@@ -15,7 +15,7 @@ use obsdeg_core::model::Matrix3;
 
 use crate::cells::text;
 use crate::figure::{AMBER, BLACK, FONT, GREY, ink};
-use crate::panels::escaped;
+use crate::visible::escaped;
 
 /// Width of the picture, and radius of the globe, in pixels.
 const WIDTH: f64 = 900.0;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::figure::FONT;
-use crate::visible;
+use crate::visible::escaped;
 
 /// Width of a panel, and of the space between two panels, in pixels.
 pub(crate) const WIDTH: f64 = 220.0;
@@ -62,8 +62,4 @@ impl Panels {
         out.push_str("</svg>\n");
         out
     }
-}
-
-pub(crate) fn escaped(text: &str) -> String {
-    visible(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -13,7 +13,8 @@ use obsdeg_evidence::simulation::latitude_of;
 
 use crate::figure::{BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE};
 use crate::figures::File;
-use crate::panels::{Panel, Panels, WIDTH, escaped};
+use crate::panels::{Panel, Panels, WIDTH};
+use crate::visible::escaped;
 use crate::{visible, words};
 
 /// Azimuth and elevation of the view, in deg.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::document::Grade;
 use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
-use crate::panels::escaped;
+use crate::visible::escaped;
 
 /// Row of a chart.
 pub(crate) struct Row {

@@ -57,45 +57,51 @@ pub(crate) fn verdict(r: &Requirements) -> String {
     }
 }
 
-/// `every requirement is met, 15 of 15; smallest margin 1.245 (D_OZ)`.
-pub(crate) fn requirements(r: &Requirements) -> String {
-    if r.stated == 0 {
-        return "no requirement is stated, so none is judged".into();
-    }
-    let basis = match r.basis {
-        Basis::Predicted | Basis::PredictedWithPrior => "",
-        Basis::Run => "in this run ",
-        Basis::Record => "by this record ",
-    };
+/// [`verdict`] with the smallest margin and what rests on a prior.
+fn outcome(r: &Requirements) -> String {
     let margin =
         worst_margin(r).map_or_else(String::new, |w| format!("; smallest margin{} {w}", whose_margin(r)));
     let prior = match r.on_prior.is_empty() {
         true => String::new(),
         false => format!("; by the stated prior alone: {}", names(r.on_prior.iter().map(String::as_str))),
     };
-    let basis = if r.with_bench { format!("{basis}with the bench ") } else { basis.into() };
-    if r.all_met() {
-        return format!("{basis}every requirement is met, {} of {}{margin}{prior}", r.met, r.stated);
-    }
-    format!(
-        "{basis}requirements are NOT met, {} of {} missed: {}{margin}{prior}",
-        r.missed.len(),
-        r.stated,
-        missed(r)
-    )
+    format!("{}{margin}{prior}", verdict(r))
+}
+
+/// `every requirement is met, 15 of 15; smallest margin 1.245 (D_OZ)`.
+pub(crate) fn requirements(r: &Requirements) -> String {
+    let basis = match r.basis {
+        _ if r.stated == 0 => return verdict(r),
+        Basis::Predicted | Basis::PredictedWithPrior => "",
+        Basis::Run => "in this run ",
+        Basis::Record => "by this record ",
+    };
+    format!("{basis}{}", outcome(r))
 }
 
 /// Outcome of the requirements in a run, and the reasons for differences from the predicted sigmas.
 pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
-    let verdict = match r.requirements.stated {
-        0 => "in this run".into(),
-        _ => format!("{};", requirements(&r.requirements)),
-    };
+    match r.requirements.stated {
+        0 => format!("in this run {}", sigmas_of_run(r, c)),
+        _ => format!("{}; {}", requirements(&r.requirements), sigmas_of_run(r, c)),
+    }
+}
+
+/// [`run`] behind the prediction, whose outcome is not said again.
+pub(crate) fn run_beside(predicted: &Requirements, r: &RunRequirements, c: &ConditionsReport) -> String {
+    match r.requirements.stated > 0 && outcome(predicted) == outcome(&r.requirements) {
+        true => format!("in the run too; {}", sigmas_of_run(r, c)),
+        false => run(r, c),
+    }
+}
+
+/// Sigmas of a run beside the predicted ones, and the reasons for differences.
+fn sigmas_of_run(r: &RunRequirements, c: &ConditionsReport) -> String {
     let (Some(low), Some(high)) = (&r.smallest_ratio, &r.largest_ratio) else {
-        return format!("{verdict} no sigma is predicted");
+        return "no sigma is predicted".into();
     };
     if low.ratio > 1.0 - EQUAL && high.ratio < 1.0 + EQUAL {
-        return format!("{verdict} its sigmas are the predicted ones within 1 %");
+        return "its sigmas are the predicted ones within 1 %".into();
     }
     let of = |r: &SigmaRatio| format!("{} ({})", ratio(r.ratio), r.name);
     let reasons: Vec<String> = r.differs.iter().map(|why| reason(*why, c)).collect();
@@ -103,7 +109,7 @@ pub(crate) fn run(r: &RunRequirements, c: &ConditionsReport) -> String {
         true => String::new(),
         false => format!(", since the run has {}", listed(&reasons)),
     };
-    format!("{verdict} its sigmas are {} to {} times the predicted ones{why}", of(low), of(high))
+    format!("its sigmas are {} to {} times the predicted ones{why}", of(low), of(high))
 }
 
 /// `a`, `a and b`, `a, b and c`.

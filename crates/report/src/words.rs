@@ -193,9 +193,9 @@ pub(crate) fn gyros(geometry: &Geometry) -> String {
     format!("gyros {}", parts.join(", "))
 }
 
-/// Assumptions, one sentence each.
-pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
-    let carry = match a.carry {
+/// Carry with its meaning.
+pub(crate) fn carry(of: Carry) -> &'static str {
+    match of {
         Carry::Platform => {
             "platform: psi in platform axes goes on from position to position (the paper's simulation)"
         }
@@ -203,7 +203,11 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
             "inertial: psi in geographic axes goes on from position to position (real torqued slews)"
         }
         Carry::Reset => "reset: psi is a new unknown at each position",
-    };
+    }
+}
+
+/// Assumptions, one sentence each.
+pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let latitude = a.latitude_deg.map_or_else(
         || "generic: wN and wU independent, not zero".to_string(),
         |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
@@ -232,7 +236,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         }
     };
     let mut out = vec![
-        format!("carry {carry}"),
+        format!("carry {}", carry(a.carry)),
         format!("latitude {latitude}"),
         format!(
             "{}; {} {}",

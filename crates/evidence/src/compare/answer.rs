@@ -24,7 +24,7 @@ pub struct Comparison {
     /// Schemes of the comparison, in the order given.
     pub schemes: Vec<ComparedScheme>,
     /// Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns,
-    /// requirements, noise, step.
+    /// requirements, noise, random drift or bias instability, prior, bench, step, settle.
     pub differ: Vec<String>,
     /// Seed of all random choices.
     pub seed: u64,

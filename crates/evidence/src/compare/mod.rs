@@ -76,14 +76,21 @@ fn differ(schemes: &[ComparedScheme]) -> Vec<String> {
     let here = required(first);
     let other = |differs: &dyn Fn(&ComparedScheme) -> bool| others.iter().any(differs);
     let noise = |r: &ComparedScheme| (r.conditions.accelerometer_noise_g, r.conditions.azimuth_noise_deg);
+    let random = |r: &ComparedScheme| {
+        let c = &r.conditions;
+        (c.drift_noise.clone(), c.gyro_noise, c.accelerometer_bias)
+    };
     let found = [
         ("carry", other(&|r| r.carry != first.carry)),
         ("latitude", other(&|r| r.conditions.latitude_deg != first.conditions.latitude_deg)),
         ("unknowns", other(&|r| !required(r).keys().eq(here.keys()))),
         ("requirements", other(&|r| required(r).iter().any(|(n, x)| here.get(n).is_some_and(|y| x != y)))),
         ("noise", other(&|r| noise(r) != noise(first))),
+        ("random drift or bias instability", other(&|r| random(r) != random(first))),
+        ("prior", other(&|r| r.conditions.prior != first.conditions.prior)),
         ("bench", other(&|r| r.conditions.bench != first.conditions.bench)),
         ("step", other(&|r| r.conditions.step_s != first.conditions.step_s)),
+        ("settle", other(&|r| r.conditions.settle_s != first.conditions.settle_s)),
     ];
     found.into_iter().filter(|f| f.1).map(|f| f.0.into()).collect()
 }

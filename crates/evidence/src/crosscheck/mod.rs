@@ -161,8 +161,8 @@ pub fn crosscheck_against(
     against(prediction, &truth, scheme, conditions, options, progress)
 }
 
-/// Conditions with the samples at the start of positions that a record leaves out: slopes are those of dwells
-/// that begin with a sample, as the verdicts do.
+/// Conditions without a time at the start of positions whose samples are left out: exact verdicts are those
+/// of whole dwells, and so are the slopes that check them.
 fn every_sample(conditions: &Conditions) -> Conditions {
     Conditions { settle_s: 0.0, ..conditions.clone() }
 }

@@ -238,8 +238,8 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     }
     if !missed.is_empty() {
         out.push(format!(
-            "Record longer, or one more position, for {}: by this record their requirements are NOT met (design --next 1 \
-             --after names the position).",
+            "Record longer, or one more position, for {}: by this record their requirements are NOT met (design \
+             --next 1 --after names the position).",
             words::names(missed)
         ));
     }

@@ -23,7 +23,7 @@ pub(super) fn table(r: &DesignReview, origin: &Origin) -> Block {
         std::iter::once(name.into()).chain(all.iter().map(|(s, review)| cell(s, review))).collect()
     };
     let mut rows = vec![
-        line("Carry", &|s, _| carry(s).into()),
+        line("Carry", &|s, _| words::carry(s.analysis.carry).into()),
         line("Assumed", &|s, review| assumed(s, review).into()),
         line("Chosen by the program", &|s, review| chosen(s, review).into()),
         line("What limits it", &|s, review| limits(s, review)),
@@ -43,13 +43,6 @@ pub(super) fn table(r: &DesignReview, origin: &Origin) -> Block {
     Block::table(HEADING, columns, rows)
 }
 
-/// Carry with its meaning.
-fn carry(s: &SchemeReview) -> String {
-    let line =
-        words::assumptions(&s.analysis).into_iter().find_map(|l| Some(l.strip_prefix("carry ")?.into()));
-    line.unwrap_or_default()
-}
-
 /// Conditions of the predicted sigmas in one line.
 fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
     let m = &review.conditions;
@@ -67,6 +60,7 @@ fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
         dwell,
         format!("latitude {} deg", m.latitude_deg),
     ];
+    out.extend(m.settle_s.map(words::settle));
     out.extend(m.slew_rate_deg_s.map(|r| format!("turns at {r} deg/s, without samples")));
     out.extend(m.accelerometer_bias.as_ref().map(words::accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));

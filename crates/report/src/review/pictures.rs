@@ -215,7 +215,7 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
     }
     let figure = Figure {
         title: format!("Predicted {what} against time"),
-        x_label: "total time, dwells alike scaled [s]".into(),
+        x_label: "total time, dwells scaled alike [s]".into(),
         y_label: "1 sigma [deg/h, deg/h/g]".into(),
         lines,
         log: true,

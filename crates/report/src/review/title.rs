@@ -14,7 +14,7 @@ pub(super) fn block(r: &DesignReview, origin: &Origin) -> Block {
     let models = r.models.iter().map(|m| (m.analysis.name.as_str(), &m.document));
     let all: Vec<(&str, &TitleBlock)> = schemes.chain(generic).chain(models).collect();
     // of schemes alone, files and schemes have the same order
-    let files = origin.inputs.iter().map(|line| file(line)).collect::<Vec<_>>();
+    let files = origin.inputs.iter().map(|line| file_and_digest(line).0).collect::<Vec<_>>();
     let by_file = r.schemes.len() == all.len() && files.len() == all.len() && all.len() > 1;
     let name = |(i, (name, of)): (usize, &(&str, _))| match by_file {
         true => (format!("{name} ({})", files[i]), *of),
@@ -23,9 +23,10 @@ pub(super) fn block(r: &DesignReview, origin: &Origin) -> Block {
     self::of(all.iter().enumerate().map(name).collect())
 }
 
-/// File of a line on its digest.
-fn file(line: &str) -> &str {
-    line.rsplit_once(": ").map_or(line, |(file, _)| file.strip_prefix("sha256 of ").unwrap_or(file))
+/// File and digest of a line `sha256 of FILE: DIGEST`; a line without digest is a file.
+fn file_and_digest(line: &str) -> (&str, Option<&str>) {
+    let (file, digest) = line.rsplit_once(": ").map_or((line, None), |(file, digest)| (file, Some(digest)));
+    (file.strip_prefix("sha256 of ").unwrap_or(file), digest)
 }
 
 /// Title block of one document; a sentence where the file states none.
@@ -75,12 +76,11 @@ pub(super) fn made_from(r: &DesignReview, origin: &Origin) -> String {
 
 /// Sentence on the version of the program and on the files, with the beginning of their digests.
 pub(crate) fn made(version: &str, origin: &Origin) -> String {
-    let short = |line: &String| match line.rsplit_once(": ") {
-        Some((file, digest)) => {
-            let file = file.strip_prefix("sha256 of ").unwrap_or(file);
+    let short = |line: &String| match file_and_digest(line) {
+        (file, Some(digest)) => {
             format!("{file} (sha256 {}...)", digest.chars().take(DIGITS).collect::<String>())
         }
-        None => line.clone(),
+        (_, None) => line.clone(),
     };
     let from = origin.inputs.iter().map(short).collect::<Vec<_>>().join(", ");
     let from = if from.is_empty() { from } else { format!(" from {from}") };

@@ -114,10 +114,7 @@ fn dwell_or_slews(s: &SchemeReview) -> &'static str {
 /// Requirements by prediction, which decides the grade, and in the run.
 fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
     let predicted = stated::requirements(&review.requirements);
-    let run = stated::run(&s.simulation.run, &s.simulation.conditions);
-    // a run with the outcome of the prediction needs no sentence of its own
-    let same = stated::capital(&run).strip_prefix(&format!("In this run {predicted}; ")).map(String::from);
-    let run = same.map_or(run, |rest| format!("in the run too; {rest}"));
+    let run = stated::run_beside(&review.requirements, &s.simulation.run, &s.simulation.conditions);
     match (review.requirements.stated, review.requirements.all_met()) {
         (0, _) => (Grade::Open, predicted),
         (_, true) => (Grade::Good, format!("{predicted}; {run}")),

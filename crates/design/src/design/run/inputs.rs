@@ -216,6 +216,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         ("bench", bench),
         ("stated conditions", stated),
     ];
+    // parts of searches of before know no such time
     let settle = (*settle_s > 0.0).then_some(("settle", settle_s as &dyn std::fmt::Debug));
     of.into_iter().chain(settle).map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
 }
