@@ -1546,7 +1546,9 @@ class Comparison(Shape):
     schemes: list[Review]
     """Schemes of the comparison, in the order given."""
     differ: list[str]
-    """Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, step."""
+    """Differences between the schemes besides positions, dwells and slews: carry, latitude, unknowns, requirements, noise, random drift
+    or bias instability, prior, bench, step, settle.
+    """
     seed: int
     """Seed of all random choices."""
 
