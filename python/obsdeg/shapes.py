@@ -2811,6 +2811,10 @@ class SystemRun(Shape):
     """Time between two samples, in the unit of `t` in the model."""
     noise: list[tuple[str, float]]
     """Standard deviation of the noise of a sample, by output, in its unit."""
+    priors_by_default: list[str]
+    """Names of the unknowns whose prior the file does not state, so that the program chose it: the size of the true value, and 1 where
+    that is zero.
+    """
     error_bound: float | None
     """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None

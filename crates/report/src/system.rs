@@ -29,7 +29,7 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
 
 /// Certainty of verdicts in a sentence. Real numbers give no probability: a number that differs from zero is
 /// proven to do so, one whose ball contains zero is assumed to be zero.
-fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
+pub(crate) fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
         (Some(bound), _) => {
             format!("a verdict is wrong with probability below {}; seed {seed}", words::at_most(bound))
@@ -355,6 +355,17 @@ fn begins_at(time: f64) -> String {
     )
 }
 
+/// Priors of a run that the file does not state; `None` if all are stated.
+pub(crate) fn priors_chosen(run: &SystemRun) -> Option<String> {
+    let all = &run.priors_by_default;
+    (!all.is_empty()).then(|| {
+        format!(
+            "prior sigma of {}: the size of the true value (1 where that is zero)",
+            words::names(all.iter().map(String::as_str))
+        )
+    })
+}
+
 /// One run of the filter.
 impl Answer for SystemRun {
     fn layout(&self) -> Option<&str> {
@@ -406,6 +417,7 @@ impl Answer for SystemRun {
             "the initial estimate is the truth plus an error drawn from the prior".into(),
             certainty(self.error_bound, self.digits, self.seed),
         ];
+        assumed.extend(priors_chosen(self).map(|text| format!("not stated, chosen by the program: {text}")));
         assumed.extend(self.time.map(begins_at));
         Document {
             title: format!("Simulation: {}", self.name),

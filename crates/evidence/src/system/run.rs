@@ -61,6 +61,9 @@ pub struct SystemRun {
     pub step: f64,
     /// Standard deviation of the noise of a sample, by output, in its unit.
     pub noise: Vec<(String, f64)>,
+    /// Names of the unknowns whose prior the file does not state, so that the program chose it: the size of
+    /// the true value, and 1 where that is zero.
+    pub priors_by_default: Vec<String>,
     /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
     /// Margin of the rank decisions in real numbers; null for a model judged in prime fields.
@@ -131,17 +134,31 @@ fn missing(what: &str, message: &str) -> ModelError {
     ModelError { what: what.into(), message: message.into(), span: None }
 }
 
+/// Start of a state of the filter.
+fn start<'a>(model: &'a SystemModel, state: &FilterState) -> &'a StateStart {
+    match *state {
+        FilterState::State { i, .. } => &model.states[i].start,
+        _ => &StateStart::Unknown,
+    }
+}
+
+/// Names of the unknowns whose prior the file does not state.
+fn priors_by_default(model: &SystemModel, numeric: &Numeric<'_>) -> Vec<String> {
+    let nominal = &model.simulation;
+    let all = numeric.states.iter().zip(&numeric.names);
+    let chosen = all.filter(|(state, name)| {
+        matches!(start(model, state), StateStart::Unknown) && nominal.named(&nominal.priors, name).is_none()
+    });
+    chosen.map(|(_, name)| name.clone()).collect()
+}
+
 /// Values and priors by filter state.
 fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, Vec<f64>), ModelError> {
     let nominal = &model.simulation;
     let n = numeric.states.len();
     let (mut truth, mut sigmas) = (DVector::zeros(n), vec![1.0; n]);
-    let start = |state: &FilterState| match *state {
-        FilterState::State { i, .. } => &model.states[i].start,
-        _ => &StateStart::Unknown,
-    };
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
-        if !matches!(start(state), StateStart::Value(_)) {
+        if !matches!(start(model, state), StateStart::Value(_)) {
             truth[c] = nominal.named(&nominal.values, name).ok_or_else(|| {
                 missing(&format!("`{name}`"), "no true value; expected one under [simulation.values]")
             })?;
@@ -168,7 +185,7 @@ fn starts(model: &SystemModel, numeric: &Numeric<'_>) -> Result<(DVector<f64>, V
     }
     for (c, (state, name)) in numeric.states.iter().zip(&numeric.names).enumerate() {
         let size = if truth[c] == 0.0 { 1.0 } else { truth[c].abs() };
-        sigmas[c] = match start(state) {
+        sigmas[c] = match start(model, state) {
             StateStart::Unknown => nominal.named(&nominal.priors, name).unwrap_or(size),
             StateStart::Known | StateStart::Value(_) => KNOWN * size,
         };
@@ -384,7 +401,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             record(before + t + dt, part, &truth, &filter);
         }
     }
-    let estimates = estimates(model, &judged, &numeric, &traces);
+    let estimates = estimates(model, &judged, &numeric, &traces, &prior);
     traces.determined = estimates.iter().map(SystemEstimate::is_determined).collect();
     let consistency = Consistency::of(Outcomes {
         whitened: &whitened,
@@ -406,6 +423,7 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             duration,
             step: dt,
             noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
+            priors_by_default: priors_by_default(model, &numeric),
             error_bound: judged.error_bound(),
             digits: judged.digits(),
             seed,
@@ -428,6 +446,7 @@ fn estimates(
     judged: &Judgement,
     numeric: &Numeric<'_>,
     traces: &Traces,
+    stated: &[f64],
 ) -> Vec<SystemEstimate> {
     let of = |(c, name): (usize, &String)| {
         let series = &traces.series[c];
@@ -456,8 +475,9 @@ fn estimates(
                 determined,
                 FilterKind::Linear,
                 error_over_sigma,
-                // a known start, or a constrained one, is no prior of the end
-                [if prior_sigma <= 100.0 * KNOWN * size { f64::INFINITY } else { prior_sigma }, sigma],
+                // a known start is no prior of the end; constraints make the prior of the start smaller, by
+                // what no file states
+                [if stated[c] <= 100.0 * KNOWN * size { f64::INFINITY } else { stated[c] }, sigma],
                 None,
             ),
         }
