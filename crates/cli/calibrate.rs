@@ -102,7 +102,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     }
     let accepted = acceptance.is_none_or(AcceptanceReport::all_accepted);
     let file = if a.asked.dry_run { "records.json" } else { "calibration.json" };
-    a.output.write_folder(&found, file, || found.files())?;
+    a.output.write_folder(&found, file, || found.files(true))?;
     match found.passed() {
         _ if found.interrupted() => Err(Failure::unfinished("interrupted".into())),
         true => a.met.decide_with(found.requirements(), accepted),

@@ -142,7 +142,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             }
             let first = || found.found.found.first().map(|f| &f.requirements);
             a.met.check(first())?;
-            a.output.write_folder(&*found, "design.json", || found.files())?;
+            a.output.write_folder(&*found, "design.json", || found.files(true))?;
             a.met.decide(first())
         }
         Designed::Walks(found) => {

@@ -47,6 +47,6 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let input = a.asked.input.read_one(a.files.read()?)?;
     let (run, traces) = simulate(&a.asked, &input)?;
     a.met.check(run.requirements())?;
-    a.output.write_folder(&run, "summary.json", || simulation_files(&run, &traces))?;
+    a.output.write_folder(&run, "summary.json", || simulation_files(&run, &traces, true))?;
     a.met.decide(run.requirements())
 }

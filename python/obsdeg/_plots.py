@@ -201,7 +201,7 @@ def system_calibration(of: _results.SystemCalibration, canvas: Canvas) -> list[A
 
     answer = of.to_dict()
     panels = _panels(canvas, 2, height_ratios=[1, max(1.0, _ROW * len(answer["quantities"]) / 2.2)])
-    residuals = pandas.read_csv(io.BytesIO(of.files()["residuals.csv"]))
+    residuals = pandas.read_csv(io.BytesIO(of.files(pictures=False)["residuals.csv"]))
     for i, (name, rows) in enumerate(residuals.groupby("output", sort=False)):
         panels[0].plot(rows["t"], rows["residual"] / rows["sigma"], ".", color=f"C{i}", label=str(name))
     _residuals(panels[0], "time")

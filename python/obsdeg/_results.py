@@ -153,10 +153,28 @@ class Answer:
         text = self.csv(table)
         return pandas.read_csv(io.StringIO(text)) if text.strip() else pandas.DataFrame()
 
-    def files(self) -> dict[str, bytes]:
-        """Files that ``-o`` writes into a folder beside the JSON: figures (SVG, PNG), series, found schemes.
+    def files(self, *, pictures: bool = True) -> dict[str, bytes]:
+        """Files that ``-o`` writes into a folder beside the JSON, by name.
+
+        Parameters
+        ----------
+        pictures : bool
+            True to draw the figures (SVG and PNG) and the page of a calibration too, which takes longer than
+            most answers.
+
+        Returns
+        -------
+        dict of str to bytes
+            Series, found schemes and figures.
+
+        Examples
+        --------
+        >>> import obsdeg
+        >>> run = obsdeg.simulate([(0, 0, 0), (180, 0, 0)], carry="inertial")
+        >>> sorted(run.files(pictures=False))
+        ['series.csv', 'series.parquet']
         """
-        return self._answer().files()
+        return self._answer().files(pictures)
 
     if not TYPE_CHECKING:
 
@@ -267,12 +285,11 @@ class Run(Drawn):
         def names(self) -> list[str]: ...
 
     def series(self) -> pandas.DataFrame:
-        """Truth, estimate and sigma over time, one column each, with units. The first call takes seconds,
-        since the engine draws the figures of the run too."""
+        """Truth, estimate and sigma over time, one column each, with units."""
         if "_series" not in self.__dict__:
             import pandas
 
-            self._series = pandas.read_csv(io.BytesIO(self.files()["series.csv"]))
+            self._series = pandas.read_csv(io.BytesIO(self.files(pictures=False)["series.csv"]))
         found: pandas.DataFrame = self._series
         return found.copy()
 
@@ -512,7 +529,7 @@ class Walks(Answer, shapes.Walks):
 def _winner(of: Answer) -> Scheme:
     from ._scheme import Scheme
 
-    files = of.files()
+    files = of.files(pictures=False)
     if "winner.toml" not in files:
         raise LookupError("no scheme was found")
     return Scheme.from_text(files["winner.toml"].decode("utf-8"), name="winner.toml")
@@ -597,7 +614,7 @@ class Procedure(Answer, shapes.Procedure):
 
     def controller(self) -> str:
         """Table for a controller, as the command line writes it to ``controller.csv`` or ``controller.txt``."""
-        files = self.files()
+        files = self.files(pictures=False)
         return next(text.decode() for name, text in files.items() if name.startswith("controller."))
 
 

@@ -43,7 +43,7 @@ def test_a_run_has_its_sigmas_and_histories(monkeypatch: pytest.MonkeyPatch) -> 
     assert names(axes) == [f"{q['name']} [{q['unit']}]" for q in rows]
     series = run.series()
     # the series is made once
-    monkeypatch.setattr(type(run), "files", lambda self: pytest.fail("drawn again"))
+    monkeypatch.setattr(type(run), "files", lambda self, **_: pytest.fail("drawn again"))
     panels = run.plot("D_FX", "psi_x")
     assert [p.get_ylabel() for p in panels] == ["D_FX [deg/h]", "psi_x [deg]"]
     found = points(panels[0])
@@ -135,3 +135,21 @@ def test_importing_loads_none_of_what_is_optional() -> None:
     script = "import obsdeg, sys; obsdeg.analyze([(0, 0, 0)]); print([m for m in ('matplotlib', 'numpy', 'pandas', 'pyarrow', 'sympy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_series_needs_no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = obsdeg.simulate(PAIR, carry="inertial", step=100)
+    plain, whole = run.files(pictures=False), run.files()
+    assert sorted(plain) == ["series.csv", "series.parquet"]
+    assert all(whole[name] == text for name, text in plain.items())
+    assert any(name.endswith(".svg") for name in whole) and any(name.endswith(".png") for name in whole)
+    asked: list[bool] = []
+    files = type(run).files
+
+    def counted(self: Any, *, pictures: bool = True) -> dict[str, bytes]:
+        asked.append(pictures)
+        return files(self, pictures=pictures)
+
+    monkeypatch.setattr(type(run), "files", counted)
+    run.series()
+    assert asked == [False]

@@ -236,11 +236,12 @@ impl Calibrated {
         }
     }
 
-    /// Files beside the JSON: coefficients, their covariance, residuals, figures.
+    /// Files beside the JSON: coefficients, their covariance, residuals, and with `pictures` the page and the
+    /// figures.
     ///
     /// # Errors
     /// [`ReportError`] of a figure that cannot be drawn.
-    pub fn files(&self) -> Result<Vec<File>, ReportError> {
+    pub fn files(&self, pictures: bool) -> Result<Vec<File>, ReportError> {
         let coefficients = obsdeg_report::written(self, Format::Csv, Layout::default())?;
         let (covariance, residuals) = match self {
             Self::Platform(c) => (&c.covariance, residuals_csv(c)?),
@@ -252,6 +253,9 @@ impl Calibrated {
             File { name: "covariance.csv".into(), bytes: covariance_csv(covariance)?.into_bytes() },
             File { name: "residuals.csv".into(), bytes: residuals.into_bytes() },
         ];
+        if !pictures {
+            return Ok(files);
+        }
         if let Self::Platform(c) = self {
             let named = [(String::new(), c.as_ref().clone())];
             let page = calibration_report(&named, &Origin::default(), ReviewFormat::Html, "")?;

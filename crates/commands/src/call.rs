@@ -61,11 +61,11 @@ pub trait Rendered: Send + Sync {
     /// [`Problem`] of an answer that cannot be written.
     fn fragment(&self) -> Result<String, Problem>;
 
-    /// Files of the folder, besides the JSON: figures, series, found schemes.
+    /// Files of the folder, besides the JSON: series, found schemes, and with `pictures` the figures.
     ///
     /// # Errors
     /// [`Problem`] of a figure that cannot be drawn.
-    fn files(&self) -> Result<Vec<File>, Problem>;
+    fn files(&self, pictures: bool) -> Result<Vec<File>, Problem>;
 }
 
 /// Answer to a request in JSON.
@@ -96,7 +96,7 @@ struct AnswerWithFiles<A, F> {
 impl<A, F> Rendered for AnswerWithFiles<A, F>
 where
     A: Answer + Send + Sync,
-    F: Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync,
+    F: Fn(&A, bool) -> Result<Vec<File>, Problem> + Send + Sync,
 {
     fn layout(&self) -> Option<&str> {
         self.answer.layout()
@@ -114,8 +114,10 @@ where
         Ok(fragment(&self.answer)?)
     }
 
-    fn files(&self) -> Result<Vec<File>, Problem> {
-        (self.files)(&self.answer)
+    fn files(&self, pictures: bool) -> Result<Vec<File>, Problem> {
+        let mut files = (self.files)(&self.answer, pictures)?;
+        files.retain(|f| pictures || !is_picture(&f.name));
+        Ok(files)
     }
 }
 
@@ -139,13 +141,18 @@ impl Rendered for PlainText {
         Ok(self.0.clone())
     }
 
-    fn files(&self) -> Result<Vec<File>, Problem> {
+    fn files(&self, _: bool) -> Result<Vec<File>, Problem> {
         Ok(Vec::new())
     }
 }
 
+/// True for the file names of pictures.
+fn is_picture(name: &str) -> bool {
+    [".svg", ".png"].iter().any(|end| name.ends_with(end))
+}
+
 /// No files, for answers without any.
-fn none<A>(_: &A) -> Result<Vec<File>, Problem> {
+fn none<A>(_: &A, _: bool) -> Result<Vec<File>, Problem> {
     Ok(Vec::new())
 }
 
@@ -156,7 +163,7 @@ trait OutputForm {
     fn whole<A: Answer + Send + Sync + 'static>(
         answer: A,
         passed: bool,
-        files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+        files: impl Fn(&A, bool) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Self::Out, Problem>;
 
     fn text(text: String, passed: bool) -> Result<Self::Out, Problem>;
@@ -171,7 +178,7 @@ impl OutputForm for AllFormats {
     fn whole<A: Answer + Send + Sync + 'static>(
         answer: A,
         passed: bool,
-        files: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+        files: impl Fn(&A, bool) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Answered, Problem> {
         Ok(Answered { answer: Box::new(AnswerWithFiles { answer, files }), passed })
     }
@@ -202,7 +209,7 @@ impl OutputForm for JsonOnly {
     fn whole<A: Answer + Send + Sync + 'static>(
         answer: A,
         passed: bool,
-        _: impl Fn(&A) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
+        _: impl Fn(&A, bool) -> Result<Vec<File>, Problem> + Send + Sync + 'static,
     ) -> Result<Self::Out, Problem> {
         let (sentences, explanations) = (answer.sentences(), answer.explanations());
         Ok(InJson { text: obsdeg_report::json(&answer)?, sentences, explanations, passed })
@@ -246,7 +253,7 @@ fn answered<W: OutputForm>(
             let wanted = asked.options.certificate;
             let certificate = wanted.then(|| certificate(&asked.options, &read)).transpose()?;
             let reduced = asked.options.reduced.then(|| reduced_model(&asked.options, &read)).transpose()?;
-            W::whole(judged, true, move |_| {
+            W::whole(judged, true, move |_, _| {
                 let own = certificate.clone().into_iter().chain(reduced.clone());
                 Ok(position_figures(&read).into_iter().chain(own).collect())
             })
@@ -256,7 +263,7 @@ fn answered<W: OutputForm>(
             asked.options.input.given = asked.given;
             let input = asked.options.input.read_one(asked.files.sources)?;
             let (run, traces) = simulate(&asked.options, &input)?;
-            W::whole(run, true, move |run| Ok(simulation_files(run, &traces)?))
+            W::whole(run, true, move |run, pictures| Ok(simulation_files(run, &traces, pictures)?))
         }
         "crosscheck" => {
             let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
@@ -264,7 +271,7 @@ fn answered<W: OutputForm>(
             let input = asked.options.input.read_one(asked.files.sources)?;
             let evidence = crosscheck(&asked.options, &input, host)?;
             let passed = evidence.passed();
-            W::whole(evidence, passed, |e| Ok(crosscheck_files(e)?))
+            W::whole(evidence, passed, |e, _| Ok(crosscheck_files(e)?))
         }
         "procedure" => {
             let mut asked: Request<Procedure, Planning> = Request::read(request)?;
@@ -272,7 +279,7 @@ fn answered<W: OutputForm>(
             let Planning { sources, rotations } = asked.files;
             let planned = procedure(&asked.options, sources, rotations.as_ref())?;
             let passed = planned.sheet.executable;
-            W::whole(planned.sheet.clone(), passed, move |_| planned.files())
+            W::whole(planned.sheet.clone(), passed, move |_, _| planned.files())
         }
         "calibrate" => {
             let mut asked: Request<Calibrate, Records> = Request::read(request)?;
@@ -294,10 +301,10 @@ fn answered<W: OutputForm>(
         "design" => {
             let asked: Request<Search, SearchFiles> = Request::read(request)?;
             match design(&asked.options, &asked.files, host)? {
-                Designed::Schemes(found) => W::whole(*found, true, |f| f.files()),
-                Designed::Walks(found) => W::whole(*found, true, |f| Ok(f.files())),
-                Designed::Outputs(found) => W::whole(*found, true, |s| Ok(sensor_figures(s)?)),
-                Designed::Next(found) => W::whole(*found, true, |n| Ok(next_figures(n)?)),
+                Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
+                Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
+                Designed::Outputs(found) => W::whole(*found, true, |s, _| Ok(sensor_figures(s)?)),
+                Designed::Next(found) => W::whole(*found, true, |n, _| Ok(next_figures(n)?)),
                 Designed::Part(part) => {
                     let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
                     W::text(json + "\n", part.complete)
@@ -489,7 +496,7 @@ fn noise_of<W: OutputForm>(
         .map_err(|_| Problem::input(format!("found {found} records; expected one of sensors at rest")))?;
     let found = allan(options, record, host)?;
     let passed = found.columns.iter().all(|c| c.explained);
-    W::whole(found, passed, |found| Ok(allan_files(found)?))
+    W::whole(found, passed, |found, _| Ok(allan_files(found)?))
 }
 
 fn calibrated<W: OutputForm>(
@@ -501,7 +508,7 @@ fn calibrated<W: OutputForm>(
 ) -> Result<W::Out, Problem> {
     let found = calibrate(options, source.read()?, records, before, host)?;
     let passed = found.passed();
-    W::whole(found, passed, |found| Ok(found.files()?))
+    W::whole(found, passed, |found, pictures| Ok(found.files(pictures)?))
 }
 
 fn one(sources: Vec<Source>) -> Result<Source, Problem> {

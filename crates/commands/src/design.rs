@@ -828,19 +828,23 @@ impl Searched {
         self.certificate.take()
     }
 
-    /// Files beside the JSON: the best scheme, its positions, the front.
+    /// Files beside the JSON: the best scheme, and with `pictures` its positions and the front.
     ///
     /// # Errors
     /// [`Problem`] of a figure that cannot be drawn.
-    pub fn files(&self) -> Result<Vec<File>, Problem> {
+    pub fn files(&self, pictures: bool) -> Result<Vec<File>, Problem> {
         let Self { found, base, conditions, certificate } = self;
         let mut files: Vec<File> = certificate.iter().cloned().collect();
         if let Some(best) = found.found.first() {
             let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
             files.push(File { name: "winner.toml".into(), bytes });
-            files.push(position_figure(&scheme_found(best, base, conditions)?));
+            if pictures {
+                files.push(position_figure(&scheme_found(best, base, conditions)?));
+            }
         }
-        files.extend(design_figures(found)?);
+        if pictures {
+            files.extend(design_figures(found)?);
+        }
         Ok(files)
     }
 }

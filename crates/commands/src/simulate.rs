@@ -108,11 +108,11 @@ pub fn simulate(options: &Simulate, input: &Input) -> Result<(Run, Traces), Prob
     }
 }
 
-/// Files beside the summary: the series and the figures.
+/// Files beside the summary: the series, and with `pictures` the figures, which take most of the time.
 ///
 /// # Errors
 /// [`ReportError`] of a figure that cannot be drawn.
-pub fn files(run: &Run, traces: &Traces) -> Result<Vec<File>, ReportError> {
+pub fn files(run: &Run, traces: &Traces, pictures: bool) -> Result<Vec<File>, ReportError> {
     let mut files = vec![
         File { name: "series.csv".into(), bytes: series_csv(traces)?.into_bytes() },
         File { name: "series.parquet".into(), bytes: series_parquet(traces, run)? },
@@ -123,6 +123,8 @@ pub fn files(run: &Run, traces: &Traces) -> Result<Vec<File>, ReportError> {
         let bytes = budget_csv(&run.omitted.budgets)?.into_bytes();
         files.push(File { name: "budget.csv".into(), bytes });
     }
-    files.extend(simulation_figures(traces)?);
+    if pictures {
+        files.extend(simulation_figures(traces)?);
+    }
     Ok(files)
 }

@@ -63,9 +63,10 @@ impl Answer {
         py.detach(|| self.0.answer.fragment()).map_err(raised)
     }
 
-    /// Figures, series and found schemes, by file name.
-    fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let files = py.detach(|| self.0.answer.files()).map_err(raised)?;
+    /// Series, found schemes and, unless `pictures` is false, figures, by file name.
+    #[pyo3(signature = (pictures=true))]
+    fn files<'py>(&self, py: Python<'py>, pictures: bool) -> PyResult<Bound<'py, PyDict>> {
+        let files = py.detach(|| self.0.answer.files(pictures)).map_err(raised)?;
         let out = PyDict::new(py);
         for file in files {
             out.set_item(file.name, PyBytes::new(py, &file.bytes))?;

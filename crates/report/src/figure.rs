@@ -432,19 +432,33 @@ pub(crate) fn tree(svg: &str) -> Result<usvg::Tree, FigureError> {
     usvg::Tree::from_str(svg, &options).map_err(|e| FigureError(e.to_string()))
 }
 
-/// The PNG of an SVG at twice its size.
+/// Width in pixels from which a picture is wide enough for a screen as it is.
+const WIDE: f32 = 1000.0;
+
+/// The PNG of an SVG, at twice its size unless it is wide.
 ///
 /// # Errors
 /// [`FigureError`] when the SVG cannot be read or the picture is too large.
 pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
-    const SCALE: f32 = 2.0;
     let tree = tree(svg)?;
-    let (width, height) = (tree.size().width() * SCALE, tree.size().height() * SCALE);
+    let scale = if tree.size().width() < WIDE { 2.0 } else { 1.0 };
+    let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
     let mut pixels = tiny_skia::Pixmap::new(width.ceil() as u32, height.ceil() as u32)
         .ok_or_else(|| FigureError(format!("{width} x {height} pixels")))?;
     pixels.fill(tiny_skia::Color::WHITE);
-    resvg::render(&tree, tiny_skia::Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|e| FigureError(e.to_string()))
+    resvg::render(&tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
+    encoded(&pixels).map_err(|e| FigureError(e.to_string()))
+}
+
+/// PNG of opaque pixels, compressed fast: the default of the library takes longer than drawing.
+fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
+    let colors: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.write_header()?.write_image_data(&colors)?;
+    Ok(out)
 }
 
 #[cfg(test)]

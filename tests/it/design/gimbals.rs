@@ -134,7 +134,7 @@ fn within(tasks: usize, seed: u64) -> usize {
                 assert!(gimbals.hold(&angles) || of_all.contains(&&shown), "{what}: {shown} in {text}");
             }
         }
-        let files = searched.files().expect("files");
+        let files = searched.files(true).expect("files");
         let file = |name: &str| {
             String::from_utf8(files.iter().find(|f| f.name == name).expect("a file").bytes.clone())
                 .expect("text")
