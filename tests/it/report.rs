@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::browser::Browser;
 use crate::program::{run, stderr};
+use crate::report_page::{assert_on_two_pages, assert_questions};
 use scraper::{Html, Selector};
 
 /// Markup of every format, in names and descriptions.
@@ -124,25 +126,49 @@ fn every_example_has_a_report() {
     have_reports(1);
 }
 
-/// Reads the reports of the examples, each `step`th of them in the order of their names.
-fn have_reports(step: usize) {
+/// Every example answers the questions of a board on its first two pages.
+#[test]
+#[ignore = "full length: .ci/run release"]
+#[expect(clippy::print_stderr, reason = "a skipped test says so")]
+fn every_example_has_a_report_of_two_pages() {
     let folder = tempfile::tempdir().expect("a folder");
+    let Some(mut browser) = Browser::start() else {
+        eprintln!("skipped: no Chromium on this machine");
+        return;
+    };
+    for (i, input) in examples().iter().enumerate() {
+        let (file, _) = report(folder.path(), &format!("{i}.html"), &[&input.display().to_string()]);
+        assert_on_two_pages(&mut browser, &file);
+    }
+}
+
+/// Schemes and models of the examples that have reports, in the order of their names.
+fn examples() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let mut inputs: Vec<PathBuf> = (std::fs::read_dir(root).expect("a folder"))
         .map(|e| e.expect("an entry").path())
-        // schemes without numbers or without noise are not simulated
-        .filter(|p| !["generic-angles", "influenza", "theophylline"].iter().any(|name| p.ends_with(name)))
         .filter(|p| !p.display().to_string().contains("wrong-"))
         .flat_map(|p| ["scheme.toml", "model.toml"].map(|name| p.join(name)))
         .filter(|p| p.is_file())
         .collect();
     inputs.sort();
     assert!(inputs.len() > 15);
+    inputs
+}
+
+/// Reads the reports of the examples, each `step`th of them in the order of their names.
+fn have_reports(step: usize) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut inputs = examples();
+    // schemes without numbers or without noise are not simulated
+    let bare = ["generic-angles", "influenza", "theophylline"];
+    inputs.retain(|p| !bare.iter().any(|name| p.parent().is_some_and(|folder| folder.ends_with(name))));
     for (i, input) in inputs.iter().enumerate().step_by(step) {
         let (_, text) = report(folder.path(), &format!("{i}.html"), &[&input.display().to_string()]);
         let page = Html::parse_document(&text);
         assert!(page.errors.is_empty(), "{}: {:?}", input.display(), page.errors);
         assert_unique_ids(&page);
+        assert_questions(&page, 1, &input.display().to_string());
         assert!(text.len() < 2_000_000 && !text.contains("NaN"), "{}", input.display());
         let verdict = texts(&page, "main > p")
             .into_iter()

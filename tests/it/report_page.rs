@@ -419,7 +419,7 @@ const QUESTIONS: [&str; 9] = [
 
 /// Beginnings or parts of answers that every scheme of the examples below has.
 const ANSWERS: [(&str, &str); 6] = [
-    ("Assumed", "noise of Z 1e-5 g per sample"),
+    ("Assumed", " g per sample and axis; a sample at least every"),
     ("Accelerometers off by 20 ug", "K0 of 20 ug (1 sigma each) change D_"),
     ("Duration", " positions; "),
     ("Proven by", "a verdict is wrong with probability below"),
@@ -427,17 +427,44 @@ const ANSWERS: [(&str, &str); 6] = [
     ("Verified by", "with its truth"),
 ];
 
+/// Questions as a report names them: a model has outputs in place of positions.
+pub(crate) fn questions(text: &str) -> [&'static str; 9] {
+    QUESTIONS.map(|q| match q {
+        "Position to drop" if !text.contains(q) => "Output to drop",
+        q => q,
+    })
+}
+
+/// Rows of the answers of `columns` subjects: what is the same for all of them has one cell.
+fn answers_of(page: &Html, columns: usize) -> Vec<Vec<String>> {
+    let mut rows = table(page, "Answers in brief");
+    assert!(rows.iter().all(|row| row.len() == columns + 1), "{rows:?}");
+    if columns > 1 && texts(page, "caption").iter().any(|c| c.starts_with("Answers in brief, the same")) {
+        rows.extend(table(page, "Answers in brief, the same"));
+        // nothing that all say is said by each
+        assert!(rows.iter().all(|row| row.len() == 2 || row[1..].iter().any(|cell| *cell != row[1])));
+    }
+    rows
+}
+
+/// Asserts that the answers of a report have every question, each with an answer.
+pub(crate) fn assert_questions(page: &Html, columns: usize, name: &str) {
+    let answers = answers_of(page, columns);
+    for question in questions(&texts(page, "body").remove(0)) {
+        let row = answers.iter().find(|r| r[0] == question);
+        let row = row.unwrap_or_else(|| panic!("{name}: {question}: {answers:?}"));
+        assert!(row.iter().all(|cell| cell.len() > 1), "{name}: {row:?}");
+    }
+}
+
 /// Asserts that the table of answers has every question, with an answer for each of `schemes` schemes.
 fn assert_answers(page: &Html, schemes: usize, name: &str) {
-    let answers = table(page, "Answers in brief");
+    assert_questions(page, schemes, name);
+    let answers = answers_of(page, schemes);
     let of = |question: &str| {
         let row = answers.iter().find(|r| r[0] == question);
         row.unwrap_or_else(|| panic!("{name}: {question}: {answers:?}"))
     };
-    for question in QUESTIONS {
-        let row = of(question);
-        assert!(row.len() == schemes + 1 && row.iter().all(|cell| cell.len() > 1), "{name}: {row:?}");
-    }
     for (question, answer) in ANSWERS {
         assert!(of(question)[1..].iter().all(|cell| cell.contains(answer)), "{name}: {:?}", of(question));
     }
@@ -448,6 +475,21 @@ fn assert_answers(page: &Html, schemes: usize, name: &str) {
     for part in ["Made by obsdeg", "Recommended action", "OPEN: not stated", "Margin: what is required"] {
         assert!(body.contains(part), "{name}: {part}");
     }
+}
+
+/// Asserts that the first two printed pages of a report have every question of a board, its origin and its
+/// actions. Number of its pages.
+pub(crate) fn assert_on_two_pages(browser: &mut Browser, file: &Path) -> usize {
+    let (pages, first) = printed_pages(browser, file);
+    let text = std::fs::read_to_string(file).expect("written");
+    let drifts = "State the drifts of your gyros";
+    let parts = ["Made by obsdeg", if text.contains(drifts) { drifts } else { "Recommended action" }];
+    let missing = |first: &String| {
+        questions(&text).iter().chain(&parts).find(|part| !first.contains(**part)).map(ToString::to_string)
+    };
+    let missing = first.as_ref().and_then(missing);
+    assert_eq!(missing, None, "{}: not on page one or two", file.display());
+    pages
 }
 
 /// Smallest text of the pictures outside folded details, in CSS pixels, at the width of a printed page.
@@ -473,11 +515,24 @@ fn a_review_fits_its_pages() {
     let folder = tempfile::tempdir().expect("a folder");
     let example = |name: &str| format!("examples/{name}/scheme.toml");
     let mut files = Vec::new();
-    for name in ["six-positions", "bench-errors", "paper-p1-p2", "rate-table"] {
+    for name in ["six-positions", "bench-errors", "bench-datasheet", "rate-table"] {
         let (file, text) = report(folder.path(), &format!("{name}.html"), &[&example(name)]);
         assert_answers(&Html::parse_document(&text), 1, name);
         files.push((file, 3, 8));
     }
+    for name in ["hudson-bay/model.toml", "lotka-volterra/model.toml", "generic-angles/scheme.toml"] {
+        let (file, text) = report(
+            folder.path(),
+            &format!("{}.html", name.replace('/', "-")),
+            &[&format!("examples/{name}")],
+        );
+        assert_questions(&Html::parse_document(&text), 1, name);
+        files.push((file, 2, 5));
+    }
+    let [_, calibration] = bench_pages(folder.path());
+    let text = std::fs::read_to_string(&calibration).expect("written");
+    assert_questions(&Html::parse_document(&text), 1, "calibration");
+    files.push((calibration, 4, 6));
     let three = ["five-positions", "six-positions", "paper-p1-p2"].map(example);
     let (file, text) = report(folder.path(), "three.html", &three.each_ref().map(String::as_str));
     assert_answers(&Html::parse_document(&text), 3, "three");
@@ -487,17 +542,118 @@ fn a_review_fits_its_pages() {
         return;
     };
     for (file, least, most) in files {
-        let (pages, first) = printed_pages(&mut browser, &file);
+        let pages = assert_on_two_pages(&mut browser, &file);
         assert!((least..=most).contains(&pages), "{}: {pages} pages", file.display());
-        let parts = ["Made by obsdeg", "State the drifts of your gyros"];
-        let missing = |first: &String| {
-            QUESTIONS.iter().chain(&parts).find(|part| !first.contains(**part)).map(ToString::to_string)
-        };
-        let missing = first.as_ref().and_then(missing);
-        assert_eq!(missing, None, "{}: not on page one or two", file.display());
         let smallest = smallest_text(&mut browser, &file);
         assert!(smallest > 7.9, "{}: {smallest} px", file.display());
     }
+}
+
+/// Outputs of a model that can be dropped are those without which `analyze` finds the same unknowns and the
+/// same rank.
+#[test]
+fn an_output_to_drop_changes_no_verdict() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // names with their degrees, and the rank
+    let judged = |file: &str| -> (Vec<(String, Option<u64>)>, u64) {
+        let out = run(&["analyze", "--model", file, "--format", "json"]);
+        let answer: serde_json::Value = serde_json::from_slice(&out.stdout).expect("JSON");
+        let quantities = answer["quantities"].as_array().expect("quantities").clone();
+        let degree =
+            |q: &serde_json::Value| (q["name"].as_str().expect("a name").to_string(), q["degree"].as_u64());
+        (quantities.iter().map(degree).collect(), answer["rank"].as_u64().expect("a rank"))
+    };
+    let own = |name: &str, body: &str| {
+        let file = folder.path().join(format!("{name}.toml"));
+        std::fs::write(&file, format!("name = '{name}'\n{body}")).expect("written");
+        file.display().to_string()
+    };
+    // one of two outputs is the derivative of the other; two equal outputs
+    let rate = own("rate", "[states]\nx = 'v'\nv = 'a'\n[parameters]\na = {}\n[outputs]\ny = 'x'\nz = 'v'\n");
+    let equal = own("equal", "[states]\nx = '-k*x'\n[parameters]\nk = {}\n[outputs]\ny = 'x'\nz = '2*x'\n");
+    let (mut dropped, mut kept) = (0, 0);
+    // without a bearing combinations are lost, and no unknown, since none is observable
+    let models = ["examples/hudson-bay/model.toml", "examples/bearing-slam/model.toml", &rate, &equal];
+    for (i, model) in models.into_iter().enumerate() {
+        let (_, page) = report(folder.path(), &format!("{i}.html"), &[model]);
+        let answers = table(&Html::parse_document(&page), "Answers in brief");
+        let said = &answers.iter().find(|r| r[0] == "Output to drop").expect("a row")[1];
+        let text = std::fs::read_to_string(model).expect("a model");
+        let outputs =
+            text.split("[outputs]\n").nth(1).expect("outputs").split("\n[").next().expect("outputs");
+        let (all, rank) = judged(model);
+        let names = said.strip_prefix("You can drop ").and_then(|rest| rest.split(':').next());
+        let names: Vec<&str> =
+            names.map_or(Vec::new(), |n| n.trim_start_matches("one of ").split(", ").collect());
+        for line in outputs.lines().filter(|l| l.contains('=')) {
+            let name = line.split(" =").next().expect("a name");
+            // numbers of a run belong to all outputs
+            let rest =
+                text.split("\n[simulation").next().expect("a model").replacen(&format!("{line}\n"), "", 1);
+            let file = folder.path().join(format!("{i}-{name}.toml"));
+            std::fs::write(&file, rest).expect("written");
+            let (without, fewer) = judged(&file.display().to_string());
+            let pairs: Vec<_> =
+                all.iter().zip(&without).filter(|((_, degree), _)| degree.is_some()).collect();
+            let lost: Vec<&str> =
+                pairs.iter().filter(|(_, b)| b.1.is_none()).map(|(a, _)| a.0.as_str()).collect();
+            let higher = pairs.iter().any(|(a, b)| b.1 > a.1);
+            if names.contains(&name) {
+                dropped += 1;
+                let told = said.contains("higher order");
+                assert!(lost.is_empty() && fewer == rank && higher == told, "{said}: {without:?}");
+            } else if said.starts_with("Keep all outputs") {
+                kept += 1;
+                let part =
+                    said.split(&format!("without {name} ")).nth(1).expect("the output").split(';').next();
+                let expected = match lost.is_empty() {
+                    true => format!("{} of {rank} independent combinations", rank - fewer),
+                    false => lost.join(", "),
+                };
+                assert!(part == Some(&expected) && fewer < rank, "{said}: {expected}");
+            }
+        }
+    }
+    assert!(dropped == 3 && kept == 4, "{dropped} {kept}");
+}
+
+/// Answers hold for what was computed: a run that is not stated in full, equal schemes, a record that
+/// determines nothing.
+#[test]
+fn answers_say_no_more_than_was_computed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let answers = |page: &str, heading: &str| table(&Html::parse_document(page), heading);
+    let of = |rows: &[Vec<String>], question: &str| {
+        rows.iter().find(|r| r[0] == question).unwrap_or_else(|| panic!("{question}: {rows:?}"))[1].clone()
+    };
+    // the file states duration, step and values, and no noise
+    let (_, page) = report(folder.path(), "influenza.html", &["examples/influenza/model.toml"]);
+    let rows = answers(&page, "Answers in brief");
+    assert!(
+        of(&rows, "Duration").starts_with("No run: ") && of(&rows, "Duration").contains("noise"),
+        "{rows:?}"
+    );
+    assert!(of(&rows, "Chosen by the program").contains("there is no run"), "{rows:?}");
+    let scheme = "examples/rate-table/scheme.toml";
+    let (_, page) = report(folder.path(), "equal.html", &[scheme, scheme]);
+    let captions = texts(&Html::parse_document(&page), "caption");
+    let brief: Vec<_> = captions.iter().filter(|c| c.starts_with("Answers in brief")).collect();
+    assert_eq!(brief, ["Answers in brief, the same for all 2"]);
+    // two of six positions, at drifts that bend the run: nothing is determined
+    let text = std::fs::read_to_string("examples/bench-day/scheme.toml").expect("an example");
+    let two = text.split("[[position]]\nname = \"p3\"").next().expect("two positions");
+    std::fs::write(path("s.toml"), two).expect("written");
+    let record = std::fs::read_to_string("examples/bench-day/record.csv").expect("an example");
+    let early = record.lines().take_while(|line| !line.contains("p3")).collect::<Vec<_>>().join("\n");
+    std::fs::write(path("r.csv"), early).expect("written");
+    run(&["calibrate", &path("s.toml"), &path("r.csv"), "-o", &path("c"), "--quiet"]);
+    let page = std::fs::read_to_string(path("c/calibration.html")).expect("written");
+    let coefficients = answers(&page, "Coefficients");
+    assert!(coefficients.iter().all(|r| r[2] == "-"), "{coefficients:?}");
+    let rows = answers(&page, "Answers in brief");
+    assert_eq!(of(&rows, "Verified by"), "Nothing to compare: no unknown is determined");
+    assert_eq!(of(&rows, "Position to drop"), "None: no unknown is determined");
 }
 
 /// The effect of accelerometers that are off by 20 ug is that of 20 ug where the bench states another size:
@@ -641,7 +797,8 @@ fn a_calibration_says_what_to_do() {
     };
     let (none, json) = of("examples/bench-day/scheme.toml", "right");
     assert!(json.contains("\"findings\": []"));
-    assert!(none.len() == 1 && none[0].starts_with("No action: every unknown is determined"), "{none:?}");
+    assert!(none.len() == 1 && none[0].starts_with("State the bench: without it"), "{none:?}");
+    assert!(none[0].contains("K0 < 7.16 ug, M < 1.51 arcsec"), "{none:?}");
     // requirements by the record decide, whatever the prediction says
     let strict = folder.path().join("strict.toml").display().to_string();
     let text = std::fs::read_to_string("examples/bench-day/scheme.toml").expect("a scheme");

@@ -61,7 +61,7 @@ fn verdicts(a: &Analysis) -> [Block; 2] {
         let how = solved(&q.solution, words::explanation(q));
         row(vec![expression(&q.name), q.unit.as_str().into()], q.status, q.degree, q.accuracy_order, how)
     });
-    let combinations = a.combinations.iter().map(|c| {
+    let combinations = words::combinations(a).map(|c| {
         let asked = if c.requested { " (asked for)" } else { "" };
         let name = expression(&c.expression);
         let name = Cell { text: format!("{}{asked}", c.expression), ..name };

@@ -483,7 +483,8 @@ fn records(c: &Calibration) -> Vec<String> {
     c.records.iter().map(of).collect()
 }
 
-fn assumed(c: &Calibration) -> Vec<String> {
+/// Assumptions of a calibration, one sentence each.
+pub(crate) fn assumed(c: &Calibration) -> Vec<String> {
     let a = &c.assumed;
     let mut out = vec![
         format!(
@@ -679,8 +680,8 @@ fn fit(c: &Calibration) -> Vec<String> {
     out
 }
 
-/// Conditions that are not stated but affect sigmas and requirements; `None` if all are stated.
-fn by_default(a: &Assumed) -> Option<String> {
+/// Values of the conditions that are not stated but affect sigmas and requirements; `None` if all are stated.
+pub(crate) fn values_by_default(a: &Assumed) -> Option<String> {
     let value = |key: &String| match key.as_str() {
         "latitude_deg" => format!("latitude {} deg", a.latitude_deg),
         "accelerometer_noise_g" => format!("noise of a sample {:e} g", a.accelerometer_noise_g),
@@ -688,7 +689,7 @@ fn by_default(a: &Assumed) -> Option<String> {
         other => other.into(),
     };
     let listed: Vec<String> = a.by_default.iter().map(value).collect();
-    (!listed.is_empty()).then(|| format!("not stated, chosen by the program: {}", listed.join(", ")))
+    (!listed.is_empty()).then(|| listed.join(", "))
 }
 
 impl Answer for Calibration {
@@ -716,7 +717,8 @@ impl Answer for Calibration {
         lead.extend(accepted.map(|text| format!("{}.", stated::capital(&text))));
         lead.extend(omitted::of_requirements(self));
         lead.extend(left_open(self));
-        lead.extend(by_default(&self.assumed));
+        let chosen = values_by_default(&self.assumed);
+        lead.extend(chosen.map(|listed| format!("not stated, chosen by the program: {listed}")));
         lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
         let totals = self.quantities.iter().any(|e| e.total.is_some());
         let mut columns = vec![

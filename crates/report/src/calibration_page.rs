@@ -1,11 +1,12 @@
 //! Report of a calibration: decision and coefficients, fit, budget of the uncertainty, and changes since
 //! earlier calibrations.
 
-use obsdeg_calibration::{Calibration, CalibrationChange, compared};
+use obsdeg_calibration::{Basis, Calibration, CalibrationChange, compared};
 
+use crate::calibration_figures::file_name;
 use crate::document::{Block, Cell, Document, Grade, estimate, left, number, optional, right};
-use crate::review::calibrated::{Pictures, pictures, status};
-use crate::review::title;
+use crate::review::calibrated::{Pictures, answers, pictures, status};
+use crate::review::{answers, title};
 use crate::words::{self, names};
 use crate::{Answer, Origin, acceptance, stated};
 
@@ -20,9 +21,10 @@ pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) 
         return Document { title: String::new(), lead: Vec::new(), blocks: Vec::new() };
     };
     let scheme = c.name.as_str();
-    let mut blocks = vec![title::of_one(&c.document, scheme), Block::Text(title::made(&c.version, origin))];
+    let mut blocks = vec![title::of_one(&c.document, scheme), Block::Text(made(c, origin))];
     let named = if name.is_empty() { "Calibration".into() } else { format!("Calibration {name}") };
     blocks.push(Block::Status(vec![status(c, named)]));
+    blocks.extend(answers::tables(&[answers(name, c)]));
     blocks.push(coefficients(c, before.first().map(|b| &b.1)));
     if let Some(a) = &c.acceptance {
         blocks.push(acceptance::table("Acceptance", a));
@@ -54,6 +56,19 @@ pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) 
         (false, false) => format!("{scheme} ({name})"),
     };
     Document { title: format!("Calibration: {of}"), lead: Vec::new(), blocks }
+}
+
+/// Sentence on the program and on what the calibration was made from: files with digests, else the records.
+fn made(c: &Calibration, origin: &Origin) -> String {
+    if !origin.inputs.is_empty() || c.rests_on.is_empty() {
+        return title::made(&c.version, origin);
+    }
+    let of = |b: &Basis| {
+        let digest: String = b.digest.chars().take(title::DIGITS).collect();
+        format!("{} (digest of its numbers {digest}...)", file_name(&b.record))
+    };
+    let records: Vec<String> = c.rests_on.iter().map(of).collect();
+    format!("Made by obsdeg {} from {}.", c.version, records.join(", "))
 }
 
 /// Meaning of the predicted sigmas.

@@ -231,6 +231,8 @@ pub(crate) struct Picture {
 pub(crate) enum Drawing {
     /// Curves, which a page may make interactive.
     Curves(Box<Figure>),
+    /// Bars, which no page makes interactive.
+    Bars(Box<Figure>),
     /// SVG.
     Still(String),
     /// SVG on white, whose colours a dark page inverts.
@@ -247,7 +249,7 @@ impl Picture {
 
     pub(crate) fn svg(&self) -> String {
         match &self.drawing {
-            Drawing::Curves(figure) => figure.svg(),
+            Drawing::Curves(figure) | Drawing::Bars(figure) => figure.svg(),
             Drawing::Still(svg) | Drawing::Map(svg) => svg.clone(),
             Drawing::Panels(panels) => panels.svg(),
         }

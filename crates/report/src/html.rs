@@ -138,15 +138,16 @@ fn picture(p: &Picture) -> Json {
     let plot = match &p.drawing {
         // `</script>` must not occur in a script
         Drawing::Curves(figure) => Json::from(curves(figure).to_string().replace('<', "\\u003c")),
-        Drawing::Still(_) | Drawing::Map(_) | Drawing::Panels(_) => Json::Null,
+        Drawing::Bars(_) | Drawing::Still(_) | Drawing::Map(_) | Drawing::Panels(_) => Json::Null,
     };
     let panels: Option<Vec<String>> = match &p.drawing {
         Drawing::Panels(panels) => Some(panels.each().map(|svg| in_page_colors(&svg)).collect()),
-        Drawing::Still(_) | Drawing::Map(_) | Drawing::Curves(_) => None,
+        Drawing::Bars(_) | Drawing::Still(_) | Drawing::Map(_) | Drawing::Curves(_) => None,
     };
     let svg = if panels.is_some() { String::new() } else { inlined(p) };
     let class = match &p.drawing {
         Drawing::Curves(_) => "curves",
+        Drawing::Bars(_) => "bars",
         Drawing::Still(_) => "drawing",
         Drawing::Map(_) => "map",
         Drawing::Panels(_) => "panels",
@@ -206,7 +207,7 @@ fn terms(latex: &str, long: usize) -> Vec<String> {
 /// The SVG with ids of its own, in the colours of the page.
 fn inlined(p: &Picture) -> String {
     let svg = match &p.drawing {
-        Drawing::Curves(figure) => figure.small_svg(),
+        Drawing::Curves(figure) | Drawing::Bars(figure) => figure.small_svg(),
         _ => p.svg(),
     };
     let attribute = |name: &str| {

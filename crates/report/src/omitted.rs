@@ -165,6 +165,42 @@ pub(crate) fn accelerometers_off(review: &ComparedScheme) -> String {
     )
 }
 
+/// Sentence on the effect of accelerometers that are off by 20 ug on a calibration.
+pub(crate) fn accelerometers_off_in_record(c: &Calibration) -> String {
+    let is_zero = |name: &str| name.starts_with("K0");
+    if c.quantities.iter().any(|q| is_zero(&q.name)) {
+        return format!(
+            "Nothing changes: the scheme estimates K0, so that {OFF_UG} ug do not enter other estimates"
+        );
+    }
+    if let Some(l) = c.omitted.limits.iter().find(|l| l.family == "K0") {
+        let met = if OFF_UG < l.size { "every requirement stays met" } else { "requirements are NOT met" };
+        return format!(
+            "Errors K0 of {OFF_UG} ug (1 sigma each): {met}; all are met up to {} {}, from where that on {} is \
+             missed first",
+            below(l.size),
+            l.unit,
+            l.unknown
+        );
+    }
+    let silent = c.omitted.silent.iter().filter(|s| is_zero(&s.name));
+    let change = silent.flat_map(|s| s.sensitivities.iter().map(move |k| (s, k)));
+    match change.max_by(|x, y| x.1.per_unit.abs().total_cmp(&y.1.per_unit.abs())) {
+        Some((s, k)) => format!(
+            "{} of {OFF_UG} {} changes {} by {} {}, and no record of this scheme shows it",
+            s.name,
+            s.unit,
+            k.unknown,
+            number(OFF_UG * k.per_unit.abs()),
+            k.unit
+        ),
+        None if c.requirements.as_ref().is_some_and(|r| r.with_bench && r.all_met()) => {
+            "The bench states K0: every uncertainty and margin here counts its size".into()
+        }
+        None => "Not computed for this record: the report of its scheme has the changes".into(),
+    }
+}
+
 /// Largest change of a coefficient by a family of errors, all of one size, against its requirement, and the
 /// change by the size that the bench states; `None` for a family that is estimated.
 fn by_size(review: &ComparedScheme, family: &str, size: f64) -> Option<String> {
@@ -515,6 +551,14 @@ pub(crate) fn estimated_by(errors: &[String]) -> String {
     let measure = (!others.is_empty())
         .then(|| format!("{} cannot be a term: measure it, and correct the scheme", others.join(", ")));
     add.into_iter().chain(measure).collect::<Vec<_>>().join("; ")
+}
+
+/// Sizes of biases and misalignments of the accelerometers up to which the requirements of a calibration are
+/// met; empty where none are computed.
+pub(crate) fn main_limits(c: &Calibration) -> String {
+    let all = c.omitted.limits.iter().filter(|l| ["K0", "M"].contains(&l.family.as_str()));
+    let listed: Vec<String> = all.map(|l| format!("{} < {} {}", l.family, below(l.size), l.unit)).collect();
+    listed.join(", ")
 }
 
 /// Conditions of the requirements of a calibration: suspected errors, and sizes of errors that the bench does

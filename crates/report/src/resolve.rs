@@ -13,6 +13,8 @@ use crate::words::names;
 
 /// Largest factor of a sigma that counts as no growth.
 const SAME: f64 = 1.001;
+/// Factor up to which a larger figure is worth a position less, where no requirement decides.
+const LITTLE: f64 = 1.25;
 
 /// First line of `compare` for one scheme: the position to drop, or that none can be dropped.
 pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
@@ -21,9 +23,10 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
     }
     let met = r.requirements.stated > 0 && r.requirements.all_met();
     // without a position, psi of single positions is numbered anew
-    let missed_here = |name: &str| name.contains('@') || r.requirements.missed.iter().any(|m| m.name == name);
-    let keeps =
-        |d: &&DropOne| d.lost.is_empty() && d.requirements.missed.iter().all(|m| missed_here(&m.name));
+    let count = |r: &obsdeg_evidence::requirements::Requirements| {
+        r.missed.iter().filter(|m| !m.name.contains('@')).count()
+    };
+    let keeps = |d: &&DropOne| d.lost.is_empty() && count(&d.requirements) <= count(&r.requirements);
     let sigma = |d: &DropOne| d.worst.as_ref().map_or(f64::INFINITY, |w| w.sigma_dph);
     let best = r.drop_one.iter().filter(keeps).min_by(|x, y| sigma(x).total_cmp(&sigma(y)));
     let Some(d) = best else {
@@ -35,7 +38,9 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
     };
     let kept = match met {
         true => "every unknown stays observable and every requirement met",
-        false if r.requirements.stated > 0 => "nothing observable is lost and no further requirement missed",
+        false if r.requirements.stated > 0 => {
+            "nothing observable is lost and no more requirements are missed"
+        }
         false => "nothing observable is lost",
     };
     let what = if r.conditions.bench.is_some() { "total uncertainty" } else { "predicted sigma" };
@@ -47,7 +52,7 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
         (Some(now), Some(then)) if then.sigma_dph <= now.sigma_dph * SAME => {
             format!("Drop {}: {kept}, and the largest {what} of a coefficient does not grow", d.position)
         }
-        (Some(now), Some(then)) if met => {
+        (Some(now), Some(then)) if met || then.sigma_dph <= now.sigma_dph * LITTLE => {
             format!("You can drop {}: {kept}; {}", d.position, grows(now, then))
         }
         (Some(now), Some(then)) => {

@@ -1,7 +1,7 @@
 //! Design review: its sections in the order of a review.
 
 mod actions;
-mod answers;
+pub(crate) mod answers;
 pub(crate) mod calibrated;
 mod first;
 mod generic;
@@ -35,7 +35,8 @@ const CALIBRATED: &str = "The run that is simulated of its scheme, and the check
 
 /// Meaning of the grades of a status, and of a margin.
 const GRADES: &str = "OK: a requirement is met or a check passes. LIMITED: limits the validity of other \
-                      answers. NOT MET: a requirement or a check fails. OPEN: not stated or not computed, so \
+                      answers, as a check that fails does. NOT MET: a requirement is missed, or a record is \
+                      not consistent. OPEN: not stated or not computed, so \
                       nothing is judged. Margin: what is required over the predicted sigma (with a bench over \
                       the total uncertainty); 1 or more is met.";
 
@@ -48,9 +49,17 @@ pub(crate) fn document(
 ) -> Document {
     let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
     let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
+    let certified = !origin.certificates.is_empty();
+    let answers: Vec<answers::Answers> = (reviewed()
+        .map(|(s, review)| answers::of_scheme(s, review, certified)))
+    .chain(r.generic.iter().map(generic::answers))
+    .chain(r.models.iter().map(model::answers))
+    .collect();
+    let answers = answers::tables(&answers);
+    let (compared, own) = if r.schemes.len() > 1 { (answers, Vec::new()) } else { (Vec::new(), answers) };
     let mut blocks = vec![title::block(r, origin), Block::Text(title::made_from(r, origin))];
     if r.schemes.len() > 1 {
-        first::comparison(&mut blocks, r, origin);
+        first::comparison(&mut blocks, r, compared);
     }
     blocks.push(Block::Text(GRADES.into()));
     let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
@@ -59,8 +68,8 @@ pub(crate) fn document(
         .chain(r.models.iter().map(model::status))
         .chain(run);
     blocks.push(Block::Status(all.collect()));
+    blocks.extend(own);
     if alone {
-        blocks.extend((!r.schemes.is_empty()).then(|| answers::table(r, origin)));
         blocks.extend(reviewed().map(|(s, review)| first::margins(s, review, "s1")));
         blocks.extend(r.generic.iter().map(|g| first::generic_degrees(g, "g1")));
         blocks.extend(r.models.iter().map(|m| first::model_degrees(&m.analysis, "m1")));
@@ -417,7 +426,7 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
         }
     };
-    blocks.extend(Block::formulas("Observable combinations", a.combinations.iter().map(combination)));
+    blocks.extend(Block::formulas("Observable combinations", words::combinations(a).map(combination)));
 }
 
 /// A time in s, to a tenth.
@@ -506,7 +515,7 @@ fn solved(a: &Analysis) -> Vec<Block> {
         let solution = q.solution.as_ref()?;
         Some(formula(latex::symbol(&q.name), &q.name, solution))
     });
-    let combinations = a.combinations.iter().filter_map(|c| {
+    let combinations = words::combinations(a).filter_map(|c| {
         let solution = c.solution.as_ref()?;
         Some(formula(latex::expression(&c.expression), &c.expression, solution))
     });

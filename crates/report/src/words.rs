@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use obsdeg_core::analysis::{
-    Analysis, CarryReport, Component, PositionReport, Quantity, Solution, term_notes,
+    Analysis, CarryReport, CombinationReport, Component, PositionReport, Quantity, Solution, term_notes,
 };
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Geometry, Scheme, Source, Term, Unknowns, parse_attitude};
+use obsdeg_core::model::{Carry, Geometry, Scheme, Source, Term, Unknowns, omitted_unit, parse_attitude};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::simulation::{
     AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, NoiseFloor, Outcome, Reached,
@@ -183,7 +183,12 @@ pub(crate) fn carries(a: &Analysis) -> Vec<String> {
 
 /// The bench of some conditions: sizes in the units of their errors.
 pub(crate) fn bench(sizes: &str) -> String {
-    format!("bench {sizes} (1 sigma; ug, ppm, arcsec, ... as stated)")
+    let with_unit = |size: &str| {
+        let unit = size.split(' ').next().and_then(omitted_unit);
+        unit.map_or_else(|| size.to_string(), |unit| format!("{size} {unit}"))
+    };
+    let listed: Vec<String> = sizes.split(", ").map(with_unit).collect();
+    format!("bench {} (1 sigma)", listed.join(", "))
 }
 
 /// `gyros X: I=+x O=-z S=+y, Y: ...`.
@@ -191,6 +196,14 @@ pub(crate) fn gyros(geometry: &Geometry) -> String {
     let gyros = ["X", "Y", "Z"].iter().zip(geometry.gyros());
     let parts: Vec<String> = gyros.map(|(g, x)| format!("{g}: I={} O={} S={}", x.I, x.O, x.S)).collect();
     format!("gyros {}", parts.join(", "))
+}
+
+/// Combinations of an analysis; one that was found and asked for is listed once, as asked for.
+pub(crate) fn combinations(a: &Analysis) -> impl Iterator<Item = &CombinationReport> {
+    let asked = |c: &CombinationReport| {
+        a.combinations.iter().any(|other| other.requested && other.expression == c.expression)
+    };
+    a.combinations.iter().filter(move |c| c.requested || !asked(c))
 }
 
 /// Carry with its meaning.

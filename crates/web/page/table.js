@@ -50,7 +50,9 @@ function drawVerdicts() {
   }
   const order = new Map(answer.unknowns.map((n, i) => [n, i]));
   const rows = [...answer.quantities].sort((a, b) => order.get(a.name) - order.get(b.name));
-  const combinations = answer.combinations ?? [];
+  // one that was found and asked for is listed once
+  const asked = new Set((answer.combinations ?? []).filter((c) => c.requested).map((c) => c.expression));
+  const combinations = (answer.combinations ?? []).filter((c) => c.requested || !asked.has(c.expression));
   const all = [...rows, ...combinations.map((q) => ({ ...q, combined: true }))];
   const body = table.tBodies[0], old = byName(verdicts.before?.answer);
   while (body.rows.length > all.length) body.lastChild.remove();
@@ -76,17 +78,17 @@ function drawVerdicts() {
   });
   drawLinks(rows);
   // sigmas of another scheme are faint until those of this scheme arrive
-  const asked = JSON.stringify(state.scheme);
-  table.classList.toggle('old-sigmas', verdicts.sigmasOf !== asked);
-  if (verdicts.sigmasOf !== asked) drawOmitted(null);
-  table.classList.toggle('old-solutions', verdicts.solutionsOf !== asked);
+  const scheme = JSON.stringify(state.scheme);
+  table.classList.toggle('old-sigmas', verdicts.sigmasOf !== scheme);
+  if (verdicts.sigmasOf !== scheme) drawOmitted(null);
+  table.classList.toggle('old-solutions', verdicts.solutionsOf !== scheme);
   const open = rows.filter((q) => q.degree === null).map((q) => q.name);
   const worst = Math.max(0, ...rows.map((q) => q.degree ?? 0));
   const alone = rows.length - open.length, more = answer.rank - alone;
   const together = more > 0 ? ` and ${more} combination${more > 1 ? 's' : ''} of the others` : '';
-  const judged = verdicts.sigmasOf === asked && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
+  const judged = verdicts.sigmasOf === scheme && verdicts.sigmas && verdicts.requirements?.stated ? verdicts.requirements : null;
   const met = judged ? `; requirements ${judged.missed.length ? 'NOT met' : 'met'}, ${judged.met} of ${judged.stated}${!judged.missed.length && verdicts.limited ? ', while no error uses up a margin (Errors that are not estimated)' : ''}` : '';
-  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}${verdicts.sigmasOf === asked && verdicts.without ? `; no sigmas: ${verdicts.without}` : ''}`);
+  put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}${verdicts.sigmasOf === scheme && verdicts.without ? `; no sigmas: ${verdicts.without}` : ''}`);
   drawSentences($('sentences'), verdicts.now.sentences);
   drawRemedies(answer.to_resolve);
   offerStrip(rows);

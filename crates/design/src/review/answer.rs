@@ -182,4 +182,22 @@ pub struct ModelReview {
     pub evidence: Option<SystemEvidence>,
     /// Reason why there is no run, or no evidence; `None` if there are both.
     pub refused: Option<RunError>,
+    /// Verdicts without each of its outputs, in their order; empty for a single output, `None` for a model of
+    /// many outputs or unknowns, where they are not computed.
+    pub outputs: Option<Vec<WithoutOutput>>,
+}
+
+/// Change of the verdicts of a model without one of its outputs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WithoutOutput {
+    /// Name of the output; that of a vector stands for all of its entries.
+    pub name: String,
+    /// Unknowns that are observable with the output and not without it.
+    pub lost: Vec<String>,
+    /// Unknowns that are observable without it too, by derivatives of a higher order.
+    pub higher: Vec<String>,
+    /// Number of independent combinations that are observable without it.
+    pub rank: usize,
+    /// Largest degree of an unknown that is observable with and without it; 0 if there is none.
+    pub largest: usize,
 }

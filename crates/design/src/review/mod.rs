@@ -7,7 +7,7 @@ pub use answer::*;
 use obsdeg_core::analysis::{Analysis, AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Dwell, Latitude, Pose, Scheme};
-use obsdeg_core::system::{ModelError, SystemModel, SystemOptions, analyze_system};
+use obsdeg_core::system::{ModelError, SystemAnalysis, SystemModel, SystemOptions, analyze_system, judge};
 use obsdeg_evidence::compare::{Entry, comparable, compare, predicted};
 use obsdeg_evidence::crosscheck::{CrossCheckOptions, crosscheck};
 use obsdeg_evidence::simulation::{Conditions, Plan, SegmentKind, SimulationError, latitude_of, simulate};
@@ -27,6 +27,10 @@ const FRONT_POSITIONS: usize = 5;
 const FRONT_OF_SETS: usize = 12;
 /// Largest number of positions of a scheme whose smallest sufficient subset is searched.
 const SUBSETS: usize = 24;
+/// Largest number of outputs of a model that is judged without each of them.
+const OUTPUTS: usize = 12;
+/// Largest number of unknowns of such a model.
+const UNKNOWNS: usize = 60;
 
 /// Options of a review.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -366,6 +370,44 @@ fn states_run(model: &SystemModel) -> bool {
     stated.duration.is_some() && model.outputs.iter().all(|o| stated.noise.contains_key(&o.0.name))
 }
 
+/// Name of an output; entries `y[1]`, `y[2]` of a vector have the same.
+fn output_name(name: &str) -> &str {
+    name.split('[').next().unwrap_or(name)
+}
+
+/// Verdicts of a model without each of its outputs; `None` if there are many outputs or unknowns, or if a
+/// model with fewer outputs cannot be judged.
+fn without_outputs(model: &SystemModel, analysis: &SystemAnalysis, seed: u64) -> Option<Vec<WithoutOutput>> {
+    let mut names: Vec<&str> = model.outputs.iter().map(|o| output_name(&o.0.name)).collect();
+    names.dedup();
+    if names.len() < 2 {
+        return Some(Vec::new());
+    }
+    if names.len() > OUTPUTS || analysis.unknowns > UNKNOWNS {
+        return None;
+    }
+    let without = |i: usize| {
+        let name = names[i];
+        let mut fewer = SystemModel { combinations: Vec::new(), candidates: Vec::new(), ..model.clone() };
+        fewer.outputs.retain(|o| output_name(&o.0.name) != name);
+        let judged = judge(&fewer, seed, None)?;
+        let rank = judged.findings.degrees.rank();
+        let mut out =
+            WithoutOutput { name: name.into(), lost: Vec::new(), higher: Vec::new(), rank, largest: 0 };
+        for q in analysis.quantities.iter().filter(|q| q.degree.is_some()) {
+            let degree = judged.verdict(&fewer, &q.name).and_then(|v| v.degree);
+            out.largest = out.largest.max(degree.unwrap_or(0));
+            if degree.is_none() {
+                out.lost.push(q.name.clone());
+            } else if degree > q.degree {
+                out.higher.push(q.name.clone());
+            }
+        }
+        Ok::<_, ModelError>(out)
+    };
+    parallel::try_map(names.len(), without).ok()
+}
+
 /// Review of a model, with run and evidence if it has numbers for them.
 fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
     let analysis = analyze_system(model, SystemOptions { seed, ..SystemOptions::default() })?;
@@ -388,5 +430,6 @@ fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
         Some(Err(e)) => unless_wrong(e).map(|()| None)?,
         None => None,
     };
-    Ok(ModelReview { document: model.document.clone(), analysis, run, evidence, refused })
+    let outputs = without_outputs(model, &analysis, seed);
+    Ok(ModelReview { document: model.document.clone(), analysis, run, evidence, refused, outputs })
 }

@@ -34,6 +34,19 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         ));
         out.extend(resolve::to_resolve_in_scheme(&s.analysis));
     }
+    let stated = review.requirements.stated;
+    let open: Vec<&str> = (review.quantities.iter())
+        .filter(|q| stated == 0 && q.status != Exact::Observable && q.sigma.is_none())
+        .filter(|q| !q.name.starts_with("psi"))
+        .map(|q| q.name.as_str())
+        .collect();
+    if !open.is_empty() {
+        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
+        out.push(format!(
+            "If you need {}, add or change positions: these do not determine them{fewest}.",
+            words::names(open)
+        ));
+    }
     let large = missed(Miss::TooLarge);
     if !large.is_empty() {
         let advised =
@@ -76,14 +89,16 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         _ => {}
     }
     let met = review.requirements.all_met();
+    if stated == 0 {
+        out.push("State requirements: nothing says yet what is good enough.".into());
+    }
     if out.is_empty() {
-        out.push(match (review.requirements.stated, met, &s.evidence) {
-            (0, ..) => "State requirements: nothing says yet what is good enough.".into(),
-            (_, false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
-            (_, _, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no \
+        out.push(match (met, &s.evidence) {
+            (false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
+            (_, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no \
                               check fails."
                 .into(),
-            (_, _, Err(_)) => {
+            (_, Err(_)) => {
                 "No action from what was computed: every requirement is met, by prediction and in the run. \
                  Evidence by a filter was not taken."
                     .into()
@@ -141,8 +156,9 @@ fn longer(s: &SchemeReview, review: &ComparedScheme, large: &[&str]) -> String {
     }
 }
 
-/// Actions for a model, the gravest first.
-pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
+/// Actions for a model, the gravest first; `by_prior` has the unknowns whose estimate in the run equals the
+/// prior.
+pub(super) fn of_model(m: &ModelReview, by_prior: &[&str]) -> Vec<String> {
     let a = &m.analysis;
     let named = |of: &dyn Fn(&&SystemQuantity) -> bool| -> Vec<&str> {
         a.quantities.iter().filter(of).map(|q| q.name.as_str()).collect()
@@ -155,7 +171,7 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
     let unseen = named(&|q| q.status == Exact::NotSeen);
     if !unseen.is_empty() {
         out.push(format!(
-            "Look at orders above {} (option --order of analyze) for {}: no end is proven.",
+            "Look at derivatives of orders above {} for {}: no end is proven.",
             a.last_order,
             words::names(unseen)
         ));
@@ -169,11 +185,26 @@ pub(super) fn of_model(m: &ModelReview) -> Vec<String> {
         ));
     }
     match &m.run {
-        None => out.push(
-            "State numbers for a run ([simulation] of the model file): without them no accuracy is predicted.".into(),
-        ),
+        None => out
+            .push("State numbers for a run in the model file: without them no accuracy is predicted.".into()),
         Some((run, _)) if !run.consistency.consistent => out.push(INCONSISTENT.into()),
         Some(_) => {}
+    }
+    // what is not observable has an action above
+    let prior: Vec<&str> = (by_prior.iter().copied())
+        .filter(|name| a.quantities.iter().any(|q| q.name == *name && q.status == Exact::Observable))
+        .collect();
+    // a state whose sigma grew is no matter of the length of the run
+    let grown = |name: &&str| {
+        let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
+        estimates.filter(|e| e.name == **name).any(|e| e.sigma > e.prior_sigma)
+    };
+    let prior: Vec<&str> = prior.into_iter().filter(|name| !grown(name)).collect();
+    if !prior.is_empty() {
+        out.push(format!(
+            "Make the run longer or the noise smaller for {}: the estimate relies on the prior.",
+            words::names(prior)
+        ));
     }
     if out.is_empty() {
         out.push(match &m.evidence {
@@ -238,9 +269,17 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     }
     if !missed.is_empty() {
         out.push(format!(
-            "Record longer, or one more position, for {}: by this record their requirements are NOT met (design \
-             --next 1 --after names the position).",
+            "Record longer, or one more position, for {}: by this record their requirements are NOT met \
+             (a design of the next position after this calibration names it).",
             words::names(missed)
+        ));
+    }
+    let met = c.requirements.as_ref().is_some_and(|r| !r.with_bench && r.all_met());
+    let limits = if met && c.consistent { omitted::main_limits(c) } else { String::new() };
+    if !limits.is_empty() {
+        out.push(format!(
+            "State the bench: without it errors outside the model count as zero, and the requirements are met \
+             only while these are small ({limits}, each by itself)."
         ));
     }
     if out.is_empty() {
@@ -282,7 +321,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         Finding::Interrupted => "Run the same command again, to its end.".into(),
         Finding::NotSettled => {
             "Look at units, labels and times of the record, and state first estimates near the truth \
-             ([simulation.estimates])."
+             in the scheme file."
                 .into()
         }
         Finding::Clock { by_changes: Some(_), .. } => "Compare the times of the record and of its positions \
@@ -327,24 +366,24 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         }
         Finding::Force { .. } => {
             "Add scales and zeros of the accelerometers to the unknowns (K1, K0), or state the \
-             gravity of the place (--gravity, for forces in m/s^2)."
+             gravity of the place, for forces in m/s^2."
                 .into()
         }
         Finding::Position { .. } => at_positions(c),
         Finding::Noise { .. } | Finding::Channel { .. } => {
-            "Estimate the noise (--estimate-noise), or use the rescaled sigmas instead of those of the \
+            "Estimate the noise from the record, or use the rescaled sigmas instead of those of the \
              assumed noise."
                 .into()
         }
         Finding::Correlated { .. } => {
-            "State noise with memory (--drift-noise, --bias-instability), or add an unknown for what drifts: \
+            "State noise with memory (random walk, bias instability), or add an unknown for what drifts: \
              sigmas of white noise are too small."
                 .into()
         }
         Finding::Temperature { .. } => {
             "Repeat the run at a steady temperature: the residuals follow it.".into()
         }
-        Finding::Outliers { .. } => "Check the noise of the record (--noise): too many of its samples are \
+        Finding::Outliers { .. } => "Check the noise of the record: too many of its samples are \
                                      far off."
             .into(),
         Finding::Repeatability { .. } => {
@@ -360,7 +399,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
             omitted::estimated_by(errors)
         ),
         Finding::Known { .. } => {
-            "Calibrate without --prior: the earlier knowledge does not agree with these records.".into()
+            "Calibrate without the earlier calibration: it does not agree with these records.".into()
         }
     }
 }

@@ -1,46 +1,84 @@
-//! Answers to the questions of a board on schemes: one table for the first two printed pages, schemes as
-//! columns.
+//! Answers to the questions of a board: one table for the first two printed pages, with a column for each
+//! scheme, model or calibration.
 
-use obsdeg_core::degree::Status as Exact;
-use obsdeg_design::review::{DesignReview, SchemeReview};
+use obsdeg_core::analysis::Analysis;
+use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::ComparedScheme;
 
 use super::{actions, verdict};
-use crate::document::{Block, Cell, Grade, left};
-use crate::{Origin, omitted, resolve, stated, words};
+use crate::document::{Block, Cell, Grade, left, number};
+use crate::{omitted, resolve, stated, words};
 
 /// Heading of the table of answers.
 const HEADING: &str = "Answers in brief";
+/// Question of a table of several subjects on what to do.
+const NEXT: &str = "Next step";
 
-/// Answers on every scheme of a review. Of a single scheme the box above has the next steps.
-pub(super) fn table(r: &DesignReview, origin: &Origin) -> Block {
-    let alone = r.schemes.len() == 1;
-    let all: Vec<_> = r.schemes.iter().zip(&r.comparison.schemes).collect();
-    let mut columns = vec![left("question")];
-    columns.extend(all.iter().map(|(s, _)| left(if alone { "answer".into() } else { s.name.clone() })));
-    let certified = !origin.certificates.is_empty();
-    let line = |name: &str, cell: &dyn Fn(&SchemeReview, &ComparedScheme) -> Cell| -> Vec<Cell> {
-        std::iter::once(name.into()).chain(all.iter().map(|(s, review)| cell(s, review))).collect()
-    };
-    let mut rows = vec![
-        line("Carry", &|s, _| words::carry(s.analysis.carry).into()),
-        line("Assumed", &|s, review| assumed(s, review).into()),
-        line("Chosen by the program", &|s, review| chosen(s, review).into()),
-        line("What limits it", &|s, review| limits(s, review)),
-        line("Accelerometers off by 20 ug", &|_, review| omitted::accelerometers_off(review).into()),
-        line("Duration", &|s, review| duration(s, review).into()),
-        line("Position to drop", &|_, review| {
-            resolve::position_to_drop(review)
-                .unwrap_or_else(|| "Not computed: the scheme has one position, rotates, or is long".into())
-                .into()
-        }),
-        line("Proven by", &|s, _| proven(s, certified).into()),
-        line("Verified by", &|s, _| verified(s)),
-    ];
-    if !alone {
-        rows.push(line("Next step", &|s, review| next(s, review).into()));
+/// Answers on one scheme, model or calibration.
+pub(crate) struct Answers {
+    /// Name of the scheme, model or calibration.
+    pub(crate) name: String,
+    /// Questions with their answers, in the order of the table.
+    pub(crate) rows: Vec<(&'static str, Cell)>,
+    /// First action, and the number of further ones. Of a single subject the box above has the actions.
+    pub(crate) next: String,
+}
+
+/// Tables of the answers on all subjects of a report: of several first what is the same for all of them.
+pub(crate) fn tables(all: &[Answers]) -> Vec<Block> {
+    let [first, others @ ..] = all else { return Vec::new() };
+    if others.is_empty() {
+        let rows = first.rows.iter().map(|(question, cell)| vec![Cell::from(*question), cell.clone()]);
+        return vec![Block::table(HEADING, [left("question"), left("answer")], rows)];
     }
-    Block::table(HEADING, columns, rows)
+    let mut questions: Vec<&str> = Vec::new();
+    for (question, _) in all.iter().flat_map(|a| &a.rows) {
+        if !questions.contains(question) {
+            questions.push(question);
+        }
+    }
+    questions.push(NEXT);
+    let of = |a: &Answers, question: &str| match question {
+        NEXT => a.next.clone().into(),
+        _ => a.rows.iter().find(|r| r.0 == question).map_or_else(|| "-".into(), |r| r.1.clone()),
+    };
+    let (mut alike, mut rows) = (Vec::new(), Vec::new());
+    for question in questions {
+        let mut cells: Vec<Cell> = all.iter().map(|a| of(a, question)).collect();
+        match cells.iter().all(|c| c.text == cells[0].text && c.grade == cells[0].grade) {
+            true => alike.push(vec![question.into(), cells.remove(0)]),
+            false => rows.push([vec![question.into()], cells].concat()),
+        }
+    }
+    let mut columns = vec![left("question")];
+    columns.extend(all.iter().map(|a| left(a.name.clone())));
+    let same = format!("{HEADING}, the same for all {}", all.len());
+    let both = [(HEADING.into(), columns, rows), (same, vec![left("question"), left("answer")], alike)];
+    let written = both.into_iter().filter(|(.., rows)| !rows.is_empty());
+    written.map(|(heading, columns, rows)| Block::table(heading, columns, rows)).collect()
+}
+
+/// Answers on a scheme; `certified`: the report names digests of certificates.
+pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme, certified: bool) -> Answers {
+    let drop = resolve::position_to_drop(review).unwrap_or_else(|| match s.positions.len() {
+        1 => "None: the scheme has one position".into(),
+        _ => "Not computed: the scheme rotates or has many positions".into(),
+    });
+    Answers {
+        name: s.name.clone(),
+        rows: vec![
+            ("Carry", words::carry(s.analysis.carry).into()),
+            ("Assumed", assumed(s, review).into()),
+            ("Chosen by the program", chosen(s, review).into()),
+            ("What limits it", limits(s, review)),
+            ("Accelerometers off by 20 ug", omitted::accelerometers_off(review).into()),
+            ("Duration", duration(s, review).into()),
+            ("Position to drop", drop.into()),
+            ("Proven by", proven(&s.analysis, certified).into()),
+            ("Verified by", verified(s)),
+        ],
+        next: next(actions::of_scheme(s, review)),
+    }
 }
 
 /// Conditions of the predicted sigmas in one line.
@@ -92,23 +130,55 @@ fn chosen(s: &SchemeReview, review: &ComparedScheme) -> String {
 /// Limits of the verdict, the unknowns without an answer and the least accurate coefficient.
 fn limits(s: &SchemeReview, review: &ComparedScheme) -> Cell {
     let mut out = verdict::limits(s);
-    let lost: Vec<&str> = (review.quantities.iter())
-        .filter(|q| q.status != Exact::Observable && q.sigma.is_none())
-        .map(|q| q.name.as_str())
-        .collect();
-    if !lost.is_empty() {
+    let lost: Vec<&str> =
+        (review.quantities.iter()).filter(|q| q.sigma.is_none()).map(|q| q.name.as_str()).collect();
+    if !lost.is_empty() && lost != verdict::by_prior(s) {
         out.push(format!("not determined: {}", words::names(lost)));
     }
-    let found = !out.is_empty() || !review.requirements.missed.is_empty();
+    let r = &review.requirements;
+    let grade = match (r.stated, r.missed.is_empty(), out.is_empty()) {
+        (_, false, _) => Grade::Missed,
+        (_, _, false) => Grade::Limited,
+        (0, ..) => Grade::Open,
+        (_, true, true) => Grade::Good,
+    };
+    if !r.missed.is_empty() {
+        out.insert(0, format!("{} of {} requirements NOT met", r.missed.len(), r.stated));
+    }
     if let Some(margin) = stated::worst_margin(&review.requirements) {
-        out.push(format!("smallest margin{} {margin}", stated::whose_margin(&review.requirements)));
+        out.push(format!(
+            "smallest margin{} {margin}{}",
+            stated::whose_margin(&review.requirements),
+            largest_shares(review)
+        ));
     } else if let Some(worst) = &review.worst {
-        out.push(format!("{} {}", stated::worst(&review.requirements), stated::worst_sigma(worst)));
+        out.push(format!(
+            "{} {}, by the noise of Z and the dwells",
+            stated::worst(&review.requirements),
+            stated::worst_sigma(worst)
+        ));
     }
     if out.is_empty() {
         out.push("nothing found".into());
     }
-    Cell::graded(stated::capital(&out.join("; ")), if found { Grade::Limited } else { Grade::Good })
+    Cell::graded(stated::capital(&out.join("; ")), grade)
+}
+
+/// The two largest sources in the budget of the smallest margin; empty without a bench.
+fn largest_shares(review: &ComparedScheme) -> String {
+    let worst = review.requirements.worst.as_ref();
+    let budget = worst.and_then(|w| review.omitted.budgets.iter().find(|b| b.unknown == w.name));
+    let listed = budget.iter().flat_map(|b| &b.lines).take(2).map(|l| {
+        format!(
+            "{} of {} {} ({:.0} % of its squared total)",
+            l.source,
+            number(l.value),
+            l.value_unit,
+            l.percent
+        )
+    });
+    let listed: Vec<String> = listed.collect();
+    if listed.is_empty() { String::new() } else { format!(", by {}", listed.join(" and ")) }
 }
 
 /// Total time with its parts.
@@ -124,8 +194,8 @@ fn duration(s: &SchemeReview, review: &ComparedScheme) -> String {
 }
 
 /// Certainty of the exact verdicts, and the figures that no proof covers.
-fn proven(s: &SchemeReview, certified: bool) -> String {
-    let c = &s.analysis.certainty;
+pub(super) fn proven(a: &Analysis, certified: bool) -> String {
+    let c = &a.certainty;
     let certificate = if certified { "; certificate: see How to check this without obsdeg" } else { "" };
     format!(
         "Status and degree: {}, a verdict is wrong with probability below {}{certificate}. Sigmas are \
@@ -140,16 +210,20 @@ fn verified(s: &SchemeReview) -> Cell {
     let (grade, evidence) = verdict::evidence(s);
     let consistent = s.simulation.consistency.consistent;
     let run = if consistent { "is consistent" } else { "is NOT consistent" };
-    let text =
-        format!("Kalman filter and exact verdicts: {evidence}. One simulated run {run} with its truth");
+    let small = match s.simulation.validity.holds {
+        true => "",
+        false => ". Both are of the small-angle model, which does not hold at these drifts",
+    };
+    let text = format!(
+        "Kalman filter and exact verdicts: {evidence}. One simulated run {run} with its truth{small}"
+    );
     Cell::graded(text, if consistent { grade } else { Grade::Limited })
 }
 
 /// First action, and the number of further ones.
-fn next(s: &SchemeReview, review: &ComparedScheme) -> String {
-    let all = actions::of_scheme(s, review);
-    let first = all.first().cloned().unwrap_or_default();
-    match all.len().saturating_sub(1) {
+pub(super) fn next(actions: Vec<String>) -> String {
+    let first = actions.first().cloned().unwrap_or_default();
+    match actions.len().saturating_sub(1) {
         0 => first,
         more => format!("{first} ({more} more below)"),
     }

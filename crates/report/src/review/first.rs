@@ -8,11 +8,11 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
-use super::{answers, duration, joined};
+use super::{duration, joined};
 use crate::compare::{deciding, unknowns};
 use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
 use crate::rows::{Chart, Row};
-use crate::{Origin, compare, stated, words};
+use crate::{compare, stated, words};
 
 /// Largest number of rows of a chart, so that it fits a page.
 const ROWS: usize = 24;
@@ -269,14 +269,14 @@ fn doubts(s: &SchemeReview) -> String {
 }
 
 /// Comparison on one page: recommendation, schemes as columns, sigmas as a picture.
-pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview, origin: &Origin) {
+pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview, answers: Vec<Block>) {
     let title = format!("Comparison of {} schemes", r.schemes.len());
     blocks.push(Block::Status(vec![Status {
         title,
         rows: vec![recommended(r), like_with_like(r)],
         actions: vec![],
     }]));
-    blocks.push(answers::table(r, origin));
+    blocks.extend(answers);
     blocks.push(matrix(&r.comparison.schemes));
     blocks.push(sigmas(&r.comparison.schemes));
 }

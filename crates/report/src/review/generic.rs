@@ -3,8 +3,9 @@
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_design::review::GenericReview;
 
+use super::answers::Answers;
 use super::{derivatives, pictures, section};
-use crate::document::{Block, Grade, Status, StatusRow};
+use crate::document::{Block, Cell, Grade, Status, StatusRow};
 use crate::{Answer, words};
 
 /// `any alpha and gamma`.
@@ -43,10 +44,42 @@ pub(super) fn status(g: &GenericReview) -> Status {
             row("Requirements", Grade::Open, "nothing is predicted: generic angles have no numbers".into()),
             row("Filter and exact verdicts", Grade::Open, "not taken: generic angles have no numbers".into()),
         ],
-        actions: vec![format!(
-            "State numbers for {}: then accuracy, requirements and evidence are reviewed as well.",
-            g.angles.join(" and ")
-        )],
+        actions: vec![action(g)],
+    }
+}
+
+fn action(g: &GenericReview) -> String {
+    format!(
+        "State numbers for {}: then accuracy, requirements and evidence are reviewed as well.",
+        g.angles.join(" and ")
+    )
+}
+
+/// Answers to the questions of a board.
+pub(super) fn answers(g: &GenericReview) -> Answers {
+    let a = &g.analysis;
+    let lost: Vec<&str> =
+        a.quantities.iter().filter(|q| q.status != Exact::Observable).map(|q| q.name.as_str()).collect();
+    let latitude = a.latitude_deg.map_or_else(|| "generic latitude".into(), |l| format!("latitude {l} deg"));
+    let open = || format!("Not computed: no number is stated for {}", g.angles.join(" and "));
+    let limits = match lost.is_empty() {
+        true => Cell::graded("Angles on which verdicts change: those that were found are below", Grade::Good),
+        false => Cell::graded(format!("Not determined: {}", words::names(lost)), Grade::Limited),
+    };
+    Answers {
+        name: g.name.clone(),
+        rows: vec![
+            ("Carry", words::carry(a.carry).into()),
+            ("Assumed", format!("Almost {} at {} positions; {latitude}", any(g), a.positions.len()).into()),
+            ("Chosen by the program", "Nothing".into()),
+            ("What limits it", limits),
+            ("Accelerometers off by 20 ug", open().into()),
+            ("Duration", open().into()),
+            ("Position to drop", open().into()),
+            ("Proven by", super::answers::proven(a, false).into()),
+            ("Verified by", Cell::graded("No filter: it needs numbers for the angles", Grade::Open)),
+        ],
+        next: action(g),
     }
 }
 

@@ -2,13 +2,14 @@
 
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
-use obsdeg_design::review::ModelReview;
+use obsdeg_design::review::{ModelReview, WithoutOutput};
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
+use super::answers::{self, Answers};
 use super::{ERRORS, derivatives, is_list, pictures, section};
-use crate::document::{Block, Grade, Status, StatusRow};
-use crate::{Answer, words};
+use crate::document::{Block, Cell, Grade, Status, StatusRow, number};
+use crate::{Answer, stated, system, words};
 
 /// Verdict on a model: its limits, and the determined unknowns.
 fn verdict(m: &ModelReview) -> String {
@@ -66,10 +67,16 @@ fn solutions(a: &SystemAnalysis) -> String {
 /// Answer to the question whether the information of a run agrees with the verdicts.
 fn evidence(m: &ModelReview) -> (Grade, String) {
     match &m.evidence {
-        Some(e) if e.passed && e.not_resolvable > 0 => {
-            (Grade::Good, format!("agree in all {} checks, {} not resolvable", e.checks, e.not_resolvable))
+        Some(e) if e.passed => {
+            let mut text = format!("agree in all {} checks", e.checks);
+            if e.not_resolvable > 0 {
+                text += &format!(", {} not resolvable", e.not_resolvable);
+            }
+            if e.orders.measured < e.orders.of {
+                text += &format!(", {} of {} degrees measured", e.orders.measured, e.orders.of);
+            }
+            (Grade::Good, text)
         }
-        Some(e) if e.passed => (Grade::Good, format!("agree in all {} checks", e.checks)),
         Some(e) => (Grade::Limited, format!("DISAGREE in {} of {} checks", e.failures, e.checks)),
         None => (Grade::Open, "not taken".into()),
     }
@@ -110,7 +117,7 @@ fn limits(m: &ModelReview) -> Vec<String> {
     }
     let prior = by_prior(m);
     if !prior.is_empty() {
-        out.push(format!("the prior alone speaks for {}", words::names(prior)));
+        out.push(format!("the estimate relies on its prior for {}", words::names(prior)));
     }
     if m.analysis.rests_on_bound {
         out.push(format!("what is not observable rests on orders up to {}", m.analysis.bound));
@@ -131,9 +138,147 @@ pub(super) fn status(m: &ModelReview) -> Status {
     ];
     let prior = by_prior(m);
     if !prior.is_empty() {
-        rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior))));
+        rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior.iter().copied()))));
     }
-    Status { title: a.name.clone(), rows, actions: super::actions::of_model(m) }
+    Status { title: a.name.clone(), rows, actions: super::actions::of_model(m, &prior) }
+}
+
+/// Answers to the questions of a board.
+pub(super) fn answers(m: &ModelReview) -> Answers {
+    let a = &m.analysis;
+    let carry = "None: a model has no positions. States go on by the equations of the file";
+    let off =
+        "Not computed: a model has no bench. Add an error as an unknown constant to see what it changes";
+    let duration = m.run.as_ref().map_or_else(
+        || match &m.refused {
+            Some(reason) => format!("No run: {reason}"),
+            None => "No run".into(),
+        },
+        |(run, _)| {
+            format!(
+                "A run of {} with a sample every {}, in the unit of t",
+                number(run.duration),
+                number(run.step)
+            )
+        },
+    );
+    let (evidence_grade, evidence) = evidence(m);
+    let (run_grade, run) = credible(m);
+    let verified = format!("Samples and exact verdicts: {evidence}. Filter, one run: {run}");
+    let grade = if run_grade == Grade::Limited { run_grade } else { evidence_grade };
+    Answers {
+        name: a.name.clone(),
+        rows: vec![
+            ("Carry", carry.into()),
+            ("Assumed", assumed(m).into()),
+            ("Chosen by the program", chosen(m).into()),
+            ("What limits it", limits_in_brief(m)),
+            ("Accelerometers off by 20 ug", off.into()),
+            ("Duration", duration.into()),
+            ("Output to drop", output_to_drop(m).into()),
+            ("Proven by", proven(m).into()),
+            ("Verified by", Cell::graded(verified, grade)),
+        ],
+        next: answers::next(super::actions::of_model(m, &by_prior(m))),
+    }
+}
+
+/// Conditions of the verdicts and of the run in one line.
+fn assumed(m: &ModelReview) -> String {
+    let a = &m.analysis;
+    let mut out = vec![match a.constraints.is_empty() {
+        true => "a generic point: starts, parameters and inputs are not special".into(),
+        false => format!("at the start {}", a.constraints.join(", ")),
+    }];
+    out.extend((!a.known.is_empty()).then(|| format!("known starts {}", a.known.join(", "))));
+    if let Some((run, _)) = &m.run {
+        let noise: Vec<String> = run.noise.iter().map(|(name, sigma)| format!("{name} {sigma}")).collect();
+        out.push(format!("the run: noise of a sample {}; true values of the file", noise.join(", ")));
+    }
+    stated::capital(&out.join("; "))
+}
+
+/// Conditions that the file does not state.
+fn chosen(m: &ModelReview) -> String {
+    let a = &m.analysis;
+    let mut out = Vec::new();
+    out.extend(a.rests_on_bound.then(|| format!("orders of derivatives up to {}", a.bound)));
+    out.extend(m.run.as_ref().and_then(|(run, _)| system::priors_chosen(run)));
+    match (out.is_empty(), &m.run) {
+        (true, Some(_)) => "Nothing: the file states every condition".into(),
+        (true, None) => "Nothing for the verdicts; there is no run".into(),
+        (false, _) => stated::capital(&out.join("; ")),
+    }
+}
+
+/// Limits of the verdict, and the unknowns without an answer.
+fn limits_in_brief(m: &ModelReview) -> Cell {
+    let mut out = limits(m);
+    let all = &m.analysis.quantities;
+    let lost: Vec<&str> =
+        all.iter().filter(|q| q.status != Exact::Observable).map(|q| q.name.as_str()).collect();
+    if !lost.is_empty() && lost != by_prior(m) {
+        out.push(format!("not determined: {}", words::names(lost)));
+    }
+    let several =
+        |q: &&SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(k)) if k > 1);
+    let several: Vec<&str> = all.iter().filter(several).map(|q| q.name.as_str()).collect();
+    if !several.is_empty() {
+        out.push(format!("several solutions for {}", words::names(several)));
+    }
+    match out.is_empty() {
+        true => Cell::graded("Nothing found", Grade::Good),
+        false => Cell::graded(stated::capital(&out.join("; ")), Grade::Limited),
+    }
+}
+
+/// Output without which the verdicts change least, or that none can be dropped.
+fn output_to_drop(m: &ModelReview) -> String {
+    let Some(all) = &m.outputs else {
+        return "Not computed: the model has many outputs or unknowns".into();
+    };
+    if all.is_empty() {
+        return "None: the model has one output".into();
+    }
+    let of = |names: &[String]| words::names(names.iter().map(String::as_str));
+    let a = &m.analysis;
+    let keeps = |o: &&WithoutOutput| o.lost.is_empty() && o.rank == a.rank;
+    let least = all.iter().filter(keeps).map(|o| (o.largest, o.higher.len())).min();
+    if let Some(least) = least {
+        let best: Vec<&WithoutOutput> =
+            all.iter().filter(keeps).filter(|o| (o.largest, o.higher.len()) == least).collect();
+        let names: Vec<&str> = best.iter().map(|o| o.name.as_str()).collect();
+        let one = if names.len() > 1 { "one of " } else { "" };
+        let degrees = match (&best[..], least.1) {
+            (_, 0) => "with the same degrees".into(),
+            ([o], _) => {
+                format!("but {} by derivatives of a higher order, up to {}", of(&o.higher), o.largest)
+            }
+            (_, n) => format!(
+                "but {n} unknown{} by derivatives of a higher order, up to {}",
+                if n == 1 { "" } else { "s" },
+                least.0
+            ),
+        };
+        return format!(
+            "You can drop {one}{}: what is observable stays so locally, {degrees}; sigmas grow",
+            words::names(names)
+        );
+    }
+    let each = all.iter().map(|o| match o.lost.is_empty() {
+        true => format!("without {} {} of {} independent combinations", o.name, a.rank - o.rank, a.rank),
+        false => format!("without {} {}", o.name, of(&o.lost)),
+    });
+    format!("Keep all outputs. These are not observable any more: {}", each.collect::<Vec<_>>().join("; "))
+}
+
+/// Certainty of the exact verdicts, and the figures that no proof covers.
+fn proven(m: &ModelReview) -> String {
+    let a = &m.analysis;
+    format!(
+        "Status and degree: {}. Estimates and sigmas of the run are computed, not proven",
+        system::certainty(a.error_bound, a.digits, a.seed)
+    )
 }
 
 /// Part with verdict, unknowns, equations and evidence.

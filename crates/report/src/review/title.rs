@@ -67,7 +67,7 @@ fn of(all: Vec<(String, &TitleBlock)>) -> Block {
 }
 
 /// Number of digits of a digest on the first page.
-const DIGITS: usize = 12;
+pub(crate) const DIGITS: usize = 12;
 
 /// Sentence on the program and the files that the review was made from, with the beginning of their digests.
 pub(super) fn made_from(r: &DesignReview, origin: &Origin) -> String {

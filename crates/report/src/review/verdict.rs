@@ -34,7 +34,7 @@ fn small_angles(s: &SchemeReview) -> Option<String> {
 }
 
 /// Unknowns whose estimate in the run equals the prior.
-fn by_prior(s: &SchemeReview) -> Vec<&str> {
+pub(super) fn by_prior(s: &SchemeReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
     s.simulation.quantities.iter().filter(|q| rests(q.outcome)).map(|q| q.name.as_str()).collect()
 }
