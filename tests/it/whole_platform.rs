@@ -177,6 +177,19 @@ fn both_paths_agree(scheme: &Scheme) {
 /// 90, 120 and other angles.
 #[test]
 fn a_second_path() {
+    second_paths(12);
+}
+
+/// Random terms and attitudes, rotations and rotations by samples, more of each.
+#[test]
+#[ignore = "full length: .ci/run release"]
+fn second_paths_at_length() {
+    second_paths(60);
+    rotations_by_the_second_path(36);
+    rotations_by_samples(40);
+}
+
+fn second_paths(cases: usize) {
     for terms in ["F,I,O,S,K0,K1", "F,I,O,S,K0,K1,M3,K2"] {
         for carry in Carry::ALL {
             both_paths_agree(&Scheme { carry, unknowns: unknowns(terms), ..cardinals() });
@@ -188,7 +201,7 @@ fn a_second_path() {
     let all =
         ["F", "I", "O", "S", "II", "OO", "SS", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
     let mut rng = SplitMix64::new(11);
-    for case in 0..30 {
+    for case in 0..cases {
         let mut chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(2) == 0).collect();
         for (whole, triangle) in [("GM", "GM3"), ("M6", "M3")] {
             if chosen.contains(&whole) {
@@ -335,9 +348,13 @@ fn wrong_use_has_a_reason() {
 /// derivatives of Z changes no verdict.
 #[test]
 fn rotating_segments_by_the_second_path() {
+    rotations_by_the_second_path(9);
+}
+
+fn rotations_by_the_second_path(cases: usize) {
     let all = ["F", "I", "O", "S", "II", "OO", "SS"];
     let mut rng = SplitMix64::new(17);
-    for case in 0..18 {
+    for case in 0..cases {
         let chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(2) == 0).collect();
         if chosen.is_empty() {
             continue;
@@ -362,10 +379,14 @@ fn rotating_segments_by_the_second_path() {
 /// confirm the exact verdict. No degree is below that with the drifts alone.
 #[test]
 fn courses_by_samples() {
+    rotations_by_samples(10);
+}
+
+fn rotations_by_samples(cases: usize) {
     let all = ["F", "I", "O", "S", "II", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
     let mut rng = SplitMix64::new(41);
     let mut compared = 0;
-    for case in 0..20 {
+    for case in 0..cases {
         let mut chosen: Vec<&str> = all.into_iter().filter(|_| rng.below(4) == 0).collect();
         for (whole, triangle) in [("GM", "GM3"), ("M6", "M3")] {
             if chosen.contains(&whole) {
@@ -407,7 +428,7 @@ fn courses_by_samples() {
             }
         }
     }
-    assert!(compared > 10, "{compared}");
+    assert!(compared > cases / 3, "{compared}");
 }
 
 /// By hand: during a rotation about the vertical the gyro along it has one constant drift, D_F + GS (w + wU),

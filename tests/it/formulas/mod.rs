@@ -524,6 +524,18 @@ fn without_the_engine(times: usize) {
 #[cfg(feature = "symbolica")]
 #[test]
 fn formulas_of_the_engine_give_the_truth() {
+    with_the_engine(1);
+}
+
+#[cfg(feature = "symbolica")]
+#[test]
+#[ignore = "full length, for `.ci/run release`"]
+fn formulas_of_the_engine_give_the_truth_at_length() {
+    with_the_engine(4);
+}
+
+#[cfg(feature = "symbolica")]
+fn with_the_engine(times: usize) {
     let mut worker = Worker::new(obsdeg_symbolic::WorkerConfig {
         program: env!("CARGO_BIN_EXE_obsdeg").into(),
         arguments: vec!["symbolic-worker".into()],
@@ -533,12 +545,12 @@ fn formulas_of_the_engine_give_the_truth() {
     });
     let mut seen = CheckCounts::default();
     for (kind, most, n, turning) in [
-        (Angles::Cardinal, 3, 4, &[] as &[i32]),
-        (Angles::Roots, 3, 4, &[]),
-        (Angles::Constants, 2, 8, &[]),
-        (Angles::Names, 2, 10, &[]),
-        (Angles::TwoNames, 1, 2, &[]),
-        (Angles::Cardinal, 2, 6, &[360, -360]),
+        (Angles::Cardinal, 3, 2 * times, &[] as &[i32]),
+        (Angles::Roots, 3, 2 * times, &[]),
+        (Angles::Constants, 2, 4 * times, &[]),
+        (Angles::Names, 2, 5 * times, &[]),
+        (Angles::TwoNames, 1, times, &[]),
+        (Angles::Cardinal, 2, 3 * times, &[360, -360]),
     ] {
         for (i, draw) in cases(kind, most, n, turning).iter().enumerate() {
             check(draw, [Frame::N, Frame::Platform][i % 2], Some(&mut worker), &mut seen);
@@ -551,11 +563,11 @@ fn formulas_of_the_engine_give_the_truth() {
     asked(Some(&mut worker));
     degenerate_angles(&mut worker);
     assert!(
-        seen.exact > 100
-            && seen.symbolic > 50
-            && seen.turning > 10
-            && seen.null_vectors > 30
-            && seen.formulas > 300,
+        seen.exact > 50 * times
+            && seen.symbolic > 25 * times
+            && seen.turning > 5 * times
+            && seen.null_vectors > 15 * times
+            && seen.formulas > 150 * times,
         "{seen:?}"
     );
 }

@@ -121,14 +121,17 @@ fn steps_of_the_biases_against_integration() {
     }
 }
 
-/// ANEES and NIS of 200 runs.
-fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme) -> Vec<Statistic> {
+/// Number of Monte Carlo runs, daily and at full length.
+const RUNS: [usize; 2] = [60, 200];
+
+/// ANEES and NIS of `runs` runs.
+fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme, runs: usize) -> Vec<Statistic> {
     let plan = |c: &Conditions| Plan::new(scheme, c).expect("a plan");
     let (filter_plan, truth_plan) = (plan(filter), plan(truth));
     let experiment =
         Experiment { filter: &filter_plan, truth: &truth_plan, conditions: truth, null_space: None, seed: 5 };
     let prepared = Prepared::new(experiment).expect("prepared");
-    prepared.statistics(&prepared.run(200, &|_| true))
+    prepared.statistics(&prepared.run(runs, &|_| true))
 }
 
 /// With the noise states in filter and truth, ANEES and NIS lie in their 99.9 % bands; with the noise in the
@@ -136,6 +139,17 @@ fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme) -> Vec<S
 /// filter), slews and a rotating segment.
 #[test]
 fn monte_carlo_with_the_states_in_filter_and_truth() {
+    states_in_filter_and_truth(RUNS[0]);
+}
+
+#[test]
+#[ignore = "full length: .ci/run release"]
+fn monte_carlo_at_length() {
+    states_in_filter_and_truth(RUNS[1]);
+    biases_of_the_accelerometers(RUNS[1]);
+}
+
+fn states_in_filter_and_truth(runs: usize) {
     let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
     let mut turning = scheme(&["10,25,40", "130,-50,70"], Carry::Inertial);
     turning.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
@@ -153,13 +167,13 @@ fn monte_carlo_with_the_states_in_filter_and_truth() {
         ("linear, slews", &turning, slews(&both)),
         ("exact, slews", &turning, slews(&exact)),
     ] {
-        let right = statistics(&conditions, &conditions, scheme);
+        let right = statistics(&conditions, &conditions, scheme, runs);
         assert_eq!(
             right.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
             ["ANEES, 15 unknowns and 4 biases", "NIS"]
         );
         assert!(right.iter().all(|s| s.pass), "{name}: {right:?}");
-        let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
+        let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme, runs);
         assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
     }
 }
@@ -167,6 +181,10 @@ fn monte_carlo_with_the_states_in_filter_and_truth() {
 /// Monte Carlo runs with biases of the accelerometers that are large against their white noise.
 #[test]
 fn monte_carlo_with_biases_of_the_accelerometers() {
+    biases_of_the_accelerometers(RUNS[0]);
+}
+
+fn biases_of_the_accelerometers(runs: usize) {
     let two = scheme(&["0,0,0", "180,0,0"], Carry::Platform);
     let mut turning = scheme(&["10,25,40", "130,-50,70"], Carry::Inertial);
     turning.positions[1].rotation = Some(Rotation::new("Y_p", "140").expect("a rotation"));
@@ -189,13 +207,13 @@ fn monte_carlo_with_biases_of_the_accelerometers() {
         ("linear, slews", &turning, slews(&both)),
         ("exact, slews", &turning, slews(&exact)),
     ] {
-        let right = statistics(&conditions, &conditions, scheme);
+        let right = statistics(&conditions, &conditions, scheme, runs);
         assert_eq!(
             right.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
             ["ANEES, 15 unknowns and 3 biases", "NIS"]
         );
         assert!(right.iter().all(|s| s.pass), "{name}: {right:?}");
-        let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme);
+        let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme, runs);
         assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
     }
     // a filter with full attitudes has the same sigmas for small psi and drifts, and consistent innovations

@@ -305,11 +305,11 @@ fn right(only: impl Fn(&Case) -> bool, seeds: std::ops::Range<u64>) {
     assert!(records < 2000 || 100 * flagged <= records, "{flagged} of {records} flagged");
 }
 
-/// Three records of cases that take a second.
+/// A record of each case that takes a second.
 #[test]
 fn records_of_random_platforms() {
     let quick = |c: &Case| c.scheme == Scheme::Six && c.carry == Carry::Inertial;
-    right(quick, 0..3);
+    right(quick, 0..1);
     // once wrong by a hundred sigmas and called consistent
     right(|c| c.scheme == Scheme::Two && c.carry == Carry::Inertial && c.scale == 3.0 && c.priors, 0..3);
 }
