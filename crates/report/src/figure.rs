@@ -450,14 +450,14 @@ pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     encoded(&pixels).map_err(|e| FigureError(e.to_string()))
 }
 
-/// PNG of opaque pixels, compressed fast: the default of the library takes longer than drawing.
+/// PNG of opaque pixels, compressed fast: the default of the library takes longer than drawing. Colours are
+/// multiplied by their opacity, which is one, so they are written as they are.
 fn encoded(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, png::EncodingError> {
-    let colors: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(png::ColorType::Rgba);
     encoder.set_compression(png::Compression::Fast);
-    encoder.write_header()?.write_image_data(&colors)?;
+    encoder.write_header()?.write_image_data(pixels.data())?;
     Ok(out)
 }
 
