@@ -635,6 +635,16 @@ fn answers_say_no_more_than_was_computed() {
         "{rows:?}"
     );
     assert!(of(&rows, "Chosen by the program").contains("there is no run"), "{rows:?}");
+    // with a bench and no requirement the largest figure is a total, by the sources of its budget
+    let bench = "carry = 'inertial'\nlatitude_deg = 40\n[bench]\nK0 = 20\n";
+    let positions = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
+    std::fs::write(path("bench.toml"), format!("{bench}{}", positions.concat())).expect("written");
+    let (_, page) = report(folder.path(), "bench.html", &[&path("bench.toml")]);
+    let limits = of(&answers(&page, "Answers in brief"), "What limits it");
+    assert!(
+        limits.contains("orst total") && limits.contains("by K0_") && !limits.contains("noise"),
+        "{limits}"
+    );
     let scheme = "examples/rate-table/scheme.toml";
     let (_, page) = report(folder.path(), "equal.html", &[scheme, scheme]);
     let captions = texts(&Html::parse_document(&page), "caption");

@@ -151,6 +151,14 @@ fn is_picture(name: &str) -> bool {
     [".svg", ".png"].iter().any(|end| name.ends_with(end))
 }
 
+/// Files of an answer that are all pictures.
+fn drawn<A, E>(draw: impl Fn(&A) -> Result<Vec<File>, E>) -> impl Fn(&A, bool) -> Result<Vec<File>, Problem>
+where
+    Problem: From<E>,
+{
+    move |answer, pictures| if pictures { Ok(draw(answer)?) } else { Ok(Vec::new()) }
+}
+
 /// No files, for answers without any.
 fn none<A>(_: &A, _: bool) -> Result<Vec<File>, Problem> {
     Ok(Vec::new())
@@ -271,7 +279,7 @@ fn answered<W: OutputForm>(
             let input = asked.options.input.read_one(asked.files.sources)?;
             let evidence = crosscheck(&asked.options, &input, host)?;
             let passed = evidence.passed();
-            W::whole(evidence, passed, |e, _| Ok(crosscheck_files(e)?))
+            W::whole(evidence, passed, drawn(crosscheck_files))
         }
         "procedure" => {
             let mut asked: Request<Procedure, Planning> = Request::read(request)?;
@@ -303,8 +311,8 @@ fn answered<W: OutputForm>(
             match design(&asked.options, &asked.files, host)? {
                 Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
                 Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
-                Designed::Outputs(found) => W::whole(*found, true, |s, _| Ok(sensor_figures(s)?)),
-                Designed::Next(found) => W::whole(*found, true, |n, _| Ok(next_figures(n)?)),
+                Designed::Outputs(found) => W::whole(*found, true, drawn(sensor_figures)),
+                Designed::Next(found) => W::whole(*found, true, drawn(next_figures)),
                 Designed::Part(part) => {
                     let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
                     W::text(json + "\n", part.complete)

@@ -194,12 +194,6 @@ pub(super) fn of_model(m: &ModelReview, by_prior: &[&str]) -> Vec<String> {
     let prior: Vec<&str> = (by_prior.iter().copied())
         .filter(|name| a.quantities.iter().any(|q| q.name == *name && q.status == Exact::Observable))
         .collect();
-    // a state whose sigma grew is no matter of the length of the run
-    let grown = |name: &&str| {
-        let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
-        estimates.filter(|e| e.name == **name).any(|e| e.sigma > e.prior_sigma)
-    };
-    let prior: Vec<&str> = prior.into_iter().filter(|name| !grown(name)).collect();
     if !prior.is_empty() {
         out.push(format!(
             "Make the run longer or the noise smaller for {}: the estimate relies on the prior.",

@@ -149,14 +149,14 @@ fn limits(s: &SchemeReview, review: &ComparedScheme) -> Cell {
         out.push(format!(
             "smallest margin{} {margin}{}",
             stated::whose_margin(&review.requirements),
-            largest_shares(review)
+            review.requirements.worst.as_ref().map_or_else(String::new, |w| largest_shares(review, &w.name))
         ));
     } else if let Some(worst) = &review.worst {
-        out.push(format!(
-            "{} {}, by the noise of Z and the dwells",
-            stated::worst(&review.requirements),
-            stated::worst_sigma(worst)
-        ));
+        let by = match review.conditions.bench {
+            Some(_) => largest_shares(review, &worst.name),
+            None => ", by the noise and the dwells".into(),
+        };
+        out.push(format!("{} {}{by}", stated::worst(&review.requirements), stated::worst_sigma(worst)));
     }
     if out.is_empty() {
         out.push("nothing found".into());
@@ -164,10 +164,9 @@ fn limits(s: &SchemeReview, review: &ComparedScheme) -> Cell {
     Cell::graded(stated::capital(&out.join("; ")), grade)
 }
 
-/// The two largest sources in the budget of the smallest margin; empty without a bench.
-fn largest_shares(review: &ComparedScheme) -> String {
-    let worst = review.requirements.worst.as_ref();
-    let budget = worst.and_then(|w| review.omitted.budgets.iter().find(|b| b.unknown == w.name));
+/// The two largest sources in the budget of an unknown; empty without a bench.
+fn largest_shares(review: &ComparedScheme, unknown: &str) -> String {
+    let budget = review.omitted.budgets.iter().find(|b| b.unknown == unknown);
     let listed = budget.iter().flat_map(|b| &b.lines).take(2).map(|l| {
         format!(
             "{} of {} {} ({:.0} % of its squared total)",
