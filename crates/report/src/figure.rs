@@ -435,13 +435,13 @@ pub(crate) fn tree(svg: &str) -> Result<usvg::Tree, FigureError> {
 /// Width in pixels from which a picture is wide enough for a screen as it is.
 const WIDE: f32 = 1000.0;
 
-/// The PNG of an SVG, at twice its size unless it is wide.
+/// The PNG of an SVG, at one and a half times its size unless it is wide.
 ///
 /// # Errors
 /// [`FigureError`] when the SVG cannot be read or the picture is too large.
 pub fn png(svg: &str) -> Result<Vec<u8>, FigureError> {
     let tree = tree(svg)?;
-    let scale = if tree.size().width() < WIDE { 2.0 } else { 1.0 };
+    let scale = if tree.size().width() < WIDE { 1.5 } else { 1.0 };
     let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
     let mut pixels = tiny_skia::Pixmap::new(width.ceil() as u32, height.ceil() as u32)
         .ok_or_else(|| FigureError(format!("{width} x {height} pixels")))?;

@@ -255,6 +255,8 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
             planned.push((format!("figures-2-to-10{end}"), Planned::Grid(some, title)));
         }
     }
+    // the largest first, so that no thread is left with one at the end
+    planned.sort_by_key(|(_, what)| matches!(what, Planned::One(_)));
     drawn(&planned)
 }
 
