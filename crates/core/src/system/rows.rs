@@ -12,6 +12,7 @@ use super::work::{Cost, Step, Sweeps, Work, product};
 use crate::degree::rows::DerivativeRows;
 
 mod by_output;
+mod generic;
 
 pub use by_output::{OwnRows, PointRows};
 
@@ -216,6 +217,24 @@ impl<S: Values> Point<S> {
     }
 }
 
+/// Values at a point that all experiments share.
+struct SharedValues<S: Values> {
+    parameters: Vec<S::Element>,
+    constants: Vec<S::Element>,
+    /// Time at the start of each experiment.
+    time: S::Element,
+}
+
+/// Start of a segment.
+struct SegmentStart<S: Values> {
+    point: Point<S>,
+    /// Differentials of the constraints at the start of the experiment.
+    known: Rows<S>,
+    /// True if the point is generic among those where the constraints hold.
+    generic: bool,
+    time: S::Element,
+}
+
 /// Builder of points: model, graph, unknowns, field and work.
 pub(super) struct PointBuilder<'a, 'b, S: Values> {
     pub(super) model: &'b SystemModel,
@@ -400,87 +419,93 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
     }
 
-    /// Upper bounds on the ranks of a run's rows, of all outputs together or (`apart`) of each. They are the
-    /// ranks at a generic point, where every state is an unknown, the time is arbitrary, and the first order
-    /// that adds nothing is the last, multiplied by the derivatives of the run's states by the unknowns. A
-    /// minor that is not zero at the run's own point is not zero there either.
-    fn generic_ranks(
+    /// Random values of an experiment that satisfy the constraints. The parameters and constants of the first
+    /// experiment become those of all.
+    fn start(
         &self,
-        point: &Point<S>,
-        known: &[Vec<S::Element>],
+        experiment: usize,
+        shared: &mut SharedValues<S>,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Result<SegmentStart<S>, Singular> {
+        let compiled = self.compiled;
+        let (parameters, constants) = (&shared.parameters, &shared.constants);
+        let mut point = self.draw(experiment, (parameters, constants), shared.time, rng, attempt)?;
+        self.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
+        self.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
+        for (slot, role) in compiled.roles.iter().enumerate() {
+            let Signal::Constant { value, .. } = &point.signals[slot] else { continue };
+            match *role {
+                Role::Parameter(i) => shared.parameters[i] = *value,
+                Role::Constant(i) => shared.constants[i] = *value,
+                _ => {}
+            }
+        }
+        self.set_states(&mut point, &given(&compiled.starts))?;
+        let (known, kept) = self.constraints(&point)?;
+        let generic = kept && self.model.states.iter().all(|s| s.start == StateStart::Unknown);
+        Ok(SegmentStart { point, known, generic, time: shared.time })
+    }
+
+    /// Changes the start of the segment before into that of this one.
+    fn enter(
+        &self,
+        start: &mut SegmentStart<S>,
+        (number, segment): (usize, &CompiledSegment),
+        rng: &mut SplitMix64,
+    ) -> Result<(), Singular> {
+        let f = &self.field;
+        if number > 0
+            && let Some(slot) = self.slot_of(Role::Time)
+        {
+            // the start time of a later segment is not given, but it is later
+            let lasts = f.random(rng, 0);
+            let lasts = if f.is_positive(&lasts) == Some(false) { f.neg(&lasts) } else { lasts };
+            start.time = f.add(&start.time, &lasts);
+            start.point.signals[slot] = Signal::Time { value: start.time };
+        }
+        self.set_constants(&mut start.point, &segment.constants, true)?;
+        self.set_states(&mut start.point, &segment.carry)?;
+        start.generic &= segment.carry.is_empty();
+        Ok(())
+    }
+
+    /// Run of a segment, whose outputs are followed `apart` or together. Reduces `gap` to the margin of its
+    /// end condition.
+    fn run(
+        &self,
+        start: &SegmentStart<S>,
+        number: usize,
         apart: bool,
         rng: &mut SplitMix64,
-    ) -> Option<(Vec<usize>, Gap)> {
-        let f = &self.field;
-        let unknowns = self.layout.unknowns.len();
-        let outputs = self.compiled.outputs(point.experiment);
-        let groups = if apart { outputs.len() } else { 1 };
-        let states: Vec<usize> =
-            (0..self.model.states.len()).filter_map(|i| self.slot_of(Role::State(i))).collect();
-        let lanes = unknowns + states.len();
-        for attempt in 0..S::ATTEMPTS {
-            let mut generic = Point {
-                signals: point.signals.clone(),
-                initial: point.initial.clone(),
-                seed: rng.next_u64(),
-                experiment: point.experiment,
-            };
-            for (k, &slot) in states.iter().enumerate() {
-                generic.initial[slot] = Some((f.random(rng, attempt), vec![(unknowns + k, f.one())]));
+        gap: &mut Gap,
+    ) -> Result<RunRows<'a, S>, Singular> {
+        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
+        let point = &start.point;
+        let taylor = self.series(point, lanes)?;
+        let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
+        let combinations = compiled.combinations.iter().map(gradient).collect();
+        let arbitrary = self.model.unknown_inputs.iter().any(|u| u.1.is_none());
+        let any_time = self.model.time == StartTime::Generic;
+        let end = match () {
+            () if arbitrary => EndCondition::Open,
+            () if start.generic && (number > 0 || any_time || !taylor.depends_on_time()) => {
+                EndCondition::Stagnation
             }
-            for signal in &mut generic.signals {
-                match signal {
-                    Signal::Time { value } | Signal::Known { value, .. } | Signal::Unknown { value, .. } => {
-                        *value = f.random(rng, attempt);
-                    }
-                    Signal::Constant { value, lane: Some(_) } => *value = f.random(rng, attempt),
-                    _ => {}
+            () if taylor.is_at_rest() => EndCondition::Order(lanes + self.model.states.len()),
+            () => match self.generic_ranks(point, &start.known, apart, rng) {
+                None => EndCondition::Open,
+                Some((ranks, clear)) => {
+                    *gap = gap.and(clear);
+                    EndCondition::Rank(ranks)
                 }
-            }
-            let mut taylor = match self.series(&generic, lanes) {
-                Ok(taylor) => taylor,
-                Err(Singular::Refused) => return None,
-                Err(_) => continue,
-            };
-            let mut adjoint = self.adjoint(&generic, lanes);
-            let mut whole = vec![S::Space::new(f.clone(), lanes); groups];
-            let mut seen = vec![S::Space::new(f.clone(), unknowns); groups];
-            for row in known {
-                seen.iter_mut().for_each(|space| _ = space.insert(row));
-            }
-            let refined = |spaces: &[S::Space]| spaces.iter().map(RowSpace::refined).sum::<u64>();
-            for order in 0..=lanes {
-                let sweeps = adjoint.as_ref().map(|a| a.sweeps(order));
-                if !self.work.spend(order, &cost_of(&taylor, sweeps, outputs.len())) {
-                    return None;
-                }
-                let mut grew = false;
-                let before = refined(&whole) + refined(&seen);
-                for (i, row) in rows_of(&mut taylor, adjoint.as_mut(), outputs, order).into_iter().enumerate()
-                {
-                    let group = i.min(groups - 1);
-                    grew |= whole[group].insert(&row);
-                    // derivatives by the unknowns themselves, and through the states
-                    let mut through = row[..unknowns].to_vec();
-                    for (x, &slot) in row[unknowns..].iter().zip(&states) {
-                        for (lane, d) in point.initial[slot].iter().flat_map(|s| &s.1) {
-                            through[*lane] = f.add(&through[*lane], &f.mul(x, d));
-                        }
-                    }
-                    seen[group].insert(&through);
-                }
-                let again = refined(&whole) + refined(&seen) - before;
-                self.work
-                    .take(Step::Derivatives(order), again.saturating_mul(product::<S::Element>()), 0)
-                    .ok()?;
-                if !grew {
-                    break;
-                }
-            }
-            let gap = whole.iter().chain(&seen).fold(Gap::OPEN, |gap, space| gap.and(space.gap()));
-            return Some((seen.iter().map(RowSpace::rank).collect(), gap));
-        }
-        None
+            },
+        };
+        let own = S::Space::new(f.clone(), lanes);
+        let outputs = compiled.outputs(point.experiment);
+        let adjoint = self.adjoint(point, lanes);
+        let known = start.known.clone();
+        Ok(RunRows { taylor, adjoint, outputs, own, end, done: false, known, combinations })
     }
 }
 
@@ -605,75 +630,24 @@ impl<'a, S: Values> SystemRows<'a, S> {
     ) -> Result<Self, Singular> {
         let (model, compiled, f) = (builder.model, builder.compiled, &builder.field);
         let lanes = builder.layout.unknowns.len();
-        let mut parameters: Vec<S::Element> =
-            model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
-        let mut constants: Vec<S::Element> = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
-        let whole = [CompiledSegment::default()];
-        let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
-        let arbitrary = model.unknown_inputs.iter().any(|u| u.1.is_none());
-        let (mut runs, mut gap) = (Vec::new(), Gap::OPEN);
-        let any_time = model.time == StartTime::Generic;
+        let parameters = model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
+        let constants = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
         let time = match model.time {
             StartTime::Zero => f.zero(),
             StartTime::At { mantissa, decimals } => f.number(mantissa, decimals),
             StartTime::Generic => f.random(rng, attempt),
         };
+        let mut shared = SharedValues::<S> { parameters, constants, time };
+        let whole = [CompiledSegment::default()];
+        let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
+        let (mut runs, mut gap): (Vec<RunRows<'a, S>>, Gap) = (Vec::new(), Gap::OPEN);
         for experiment in 0..model.experiments.max(1) {
-            let mut point = builder.draw(experiment, (&parameters, &constants), time, rng, attempt)?;
-            builder.set_constants(&mut point, &given(compiled.constants(experiment)), false)?;
-            builder.hold_constraints(&mut point, experiment == 0, rng, attempt)?;
-            let value = |slot: usize| match &point.signals[slot] {
-                Signal::Constant { value, .. } => Some(*value),
-                _ => None,
-            };
-            for (slot, role) in compiled.roles.iter().enumerate() {
-                match (*role, value(slot)) {
-                    (Role::Parameter(i), Some(value)) => parameters[i] = value,
-                    (Role::Constant(i), Some(value)) => constants[i] = value,
-                    _ => {}
-                }
-            }
-            builder.set_states(&mut point, &given(&compiled.starts))?;
-            let (known, kept) = builder.constraints(&point)?;
-            let mut generic = kept && model.states.iter().all(|s| s.start == StateStart::Unknown);
-            let mut begins = time;
+            let mut start = builder.start(experiment, &mut shared, rng, attempt)?;
             for (number, segment) in segments.iter().enumerate() {
-                if number > 0
-                    && let Some(slot) = builder.slot_of(Role::Time)
-                {
-                    // the start time of a later segment is not given, but it is later
-                    let lasts = f.random(rng, 0);
-                    let lasts = if f.is_positive(&lasts) == Some(false) { f.neg(&lasts) } else { lasts };
-                    begins = f.add(&begins, &lasts);
-                    point.signals[slot] = Signal::Time { value: begins };
-                }
-                builder.set_constants(&mut point, &segment.constants, true)?;
-                builder.set_states(&mut point, &segment.carry)?;
-                generic &= segment.carry.is_empty();
-                let taylor = builder.series(&point, lanes)?;
-                let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
-                let combinations = compiled.combinations.iter().map(gradient).collect();
-                let end = match () {
-                    () if arbitrary => EndCondition::Open,
-                    () if generic && (number > 0 || any_time || !taylor.depends_on_time()) => {
-                        EndCondition::Stagnation
-                    }
-                    () if taylor.is_at_rest() => EndCondition::Order(lanes + model.states.len()),
-                    () => match builder.generic_ranks(&point, &known, followed.apart, rng) {
-                        None => EndCondition::Open,
-                        Some((ranks, clear)) => {
-                            gap = gap.and(clear);
-                            EndCondition::Rank(ranks)
-                        }
-                    },
-                };
-                let own = S::Space::new(f.clone(), lanes);
-                let outputs = compiled.outputs(experiment);
-                let adjoint = builder.adjoint(&point, lanes);
-                let known = known.clone();
-                runs.push(RunRows { taylor, adjoint, outputs, own, end, done: false, known, combinations });
+                builder.enter(&mut start, (number, segment), rng)?;
+                runs.push(builder.run(&start, number, followed.apart, rng, &mut gap)?);
                 for number in 0..followed.others {
-                    let other = point.with_constant_inputs(|| match number {
+                    let other = start.point.with_constant_inputs(|| match number {
                         0 => f.zero(),
                         _ => f.random(rng, attempt),
                     });

@@ -319,42 +319,11 @@ impl<'a, S: Values> Taylor<'a, S> {
         }
         let words = self.lanes.div_ceil(64);
         let (operations, bytes) = (2 * n as u64 * words as u64, 8 * n as u64 * words as u64);
-        let mut sets = vec![0u64; n * words];
-        let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
-        for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
-            let Op::Slot(s) = *op else { continue };
-            match &self.signals[s] {
-                Signal::State { .. } => {
-                    initial[s].iter().flat_map(|x| &x.1).for_each(|(lane, _)| own(i, *lane));
-                }
-                Signal::Constant { lane: Some(lane), .. } => own(i, *lane),
-                Signal::Unknown { lane, count, .. } => (*lane..lane + count).for_each(|lane| own(i, lane)),
-                _ => {}
-            }
-        }
+        let mut sets = self.lanes_of_slots(initial, words);
         // add lanes of operands until nothing is added
         loop {
             work.take(Step::Gradients, operations, bytes)?;
-            let mut grew = false;
-            for i in (0..n).filter(|&i| self.needed[i]) {
-                let parts = match self.dag.ops[i] {
-                    Op::Number { .. } | Op::Pi => continue,
-                    Op::Slot(s) => match self.signals[s] {
-                        Signal::State { rate } if moving => [rate, rate],
-                        _ => continue,
-                    },
-                    Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => [a, b],
-                    Op::Primitive { of, .. } => [of, of],
-                };
-                for part in parts {
-                    for w in 0..words {
-                        let new = sets[part * words + w] & !sets[i * words + w];
-                        sets[i * words + w] |= new;
-                        grew |= new != 0;
-                    }
-                }
-            }
-            if !grew {
+            if !self.add_lanes_of_operands(&mut sets, words, moving) {
                 break;
             }
         }
@@ -371,6 +340,49 @@ impl<'a, S: Values> Taylor<'a, S> {
             .collect();
         self.support.resize(n, Arc::from([]));
         Ok(())
+    }
+
+    /// Lanes of the content of each slot, as a set of `words` words of 64 bits per node; empty for other
+    /// nodes.
+    fn lanes_of_slots(&self, initial: &[Option<Initial<S::Element>>], words: usize) -> Vec<u64> {
+        let mut sets = vec![0u64; self.dag.ops.len() * words];
+        let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
+        for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
+            let Op::Slot(s) = *op else { continue };
+            match &self.signals[s] {
+                Signal::State { .. } => {
+                    initial[s].iter().flat_map(|x| &x.1).for_each(|(lane, _)| own(i, *lane));
+                }
+                Signal::Constant { lane: Some(lane), .. } => own(i, *lane),
+                Signal::Unknown { lane, count, .. } => (*lane..lane + count).for_each(|lane| own(i, lane)),
+                _ => {}
+            }
+        }
+        sets
+    }
+
+    /// Adds to the set of each node those of its operands, node by node. True if any set grew.
+    fn add_lanes_of_operands(&self, sets: &mut [u64], words: usize, moving: bool) -> bool {
+        let mut grew = false;
+        for i in (0..self.dag.ops.len()).filter(|&i| self.needed[i]) {
+            let parts = match self.dag.ops[i] {
+                Op::Number { .. } | Op::Pi => continue,
+                Op::Slot(s) => match self.signals[s] {
+                    Signal::State { rate } if moving => [rate, rate],
+                    _ => continue,
+                },
+                Op::Add(a, b) | Op::Subtract(a, b) | Op::Multiply(a, b) | Op::Divide(a, b) => [a, b],
+                Op::Primitive { of, .. } => [of, of],
+            };
+            for part in parts {
+                for w in 0..words {
+                    let new = sets[part * words + w] & !sets[i * words + w];
+                    sets[i * words + w] |= new;
+                    grew |= new != 0;
+                }
+            }
+        }
+        grew
     }
 
     fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
