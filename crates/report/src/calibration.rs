@@ -2,307 +2,15 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{
-    Assumed, CellKind, Clock, ClockRate, CovarianceTable, Curvature, Estimated, Finding, ForceCause,
-    ForceError, Gap, NextRun, PositionFit, PositionsBy, RecordReport,
+    Assumed, CovarianceTable, Curvature, Estimated, Gap, NextRun, PositionFit, PositionsBy, RecordReport,
 };
 
+use crate::calibration_findings::{clock, finding};
 use crate::document::{Block, Document, estimate, left, number, optional, right};
 use crate::{Answer, ReportError, Table, acceptance, omitted, stated, words};
 
 /// Largest number of listed outliers.
 const LISTED: usize = 20;
-
-/// Sentence part on sigmas that are wrong by a factor.
-fn sigmas(factor: f64) -> String {
-    if factor >= 1.0 {
-        format!("sigmas are {factor:.2} times too small")
-    } else {
-        format!("sigmas are {:.2} times too large", 1.0 / factor)
-    }
-}
-
-/// ` of FILE` if there are several records, else empty.
-fn of(record: &str, records: &[RecordReport]) -> String {
-    if records.len() > 1 { format!(" of {record}") } else { String::new() }
-}
-
-/// Error of one axis that explains the lengths of the specific force.
-fn cause(c: &ForceCause) -> String {
-    let besides = c.besides.map_or_else(String::new, |b| {
-        format!(", beside {} too long at all positions alike (scale or gravity)", number(b))
-    });
-    let sigma = number(c.sigma);
-    match c.error {
-        ForceError::Scale if c.by < 0.0 => {
-            format!("{} is {} too short (scale, sigma {sigma}; K1){besides}", c.axis, number(-c.by))
-        }
-        ForceError::Scale => {
-            format!("{} is {} too long (scale, sigma {sigma}; K1){besides}", c.axis, number(c.by))
-        }
-        ForceError::Zero => {
-            let by = format!("{}{}", if c.by < 0.0 { "" } else { "+" }, number(c.by));
-            format!("{} has a zero of {by} g (sigma {sigma} g; K0){besides}", c.axis)
-        }
-    }
-}
-
-/// Relative rate error of a clock in percent, with `fast` or `slow`.
-fn part(fast: f64) -> String {
-    let digits = if fast.abs() < 1e-3 { 4 } else { 2 };
-    format!("{:.digits$} % {}", 100.0 * fast.abs(), if fast < 0.0 { "slow" } else { "fast" })
-}
-
-/// Relative rate error from which a clock error is large.
-const CLOCK: f64 = 0.1;
-
-/// True if durations and rates show the same clock. Drifts that follow the clock take up a quarter of its
-/// error, so the two may differ by that.
-pub(crate) fn is_clock(by_durations: Option<&ClockRate>, by_earth: Option<&ClockRate>) -> bool {
-    let both = by_durations.zip(by_earth);
-    both.is_some_and(|(d, e)| (e.fast - d.fast).abs() <= 3.0 * e.sigma.hypot(d.sigma) + d.fast.abs() / 4.0)
-}
-
-/// Rate of a clock by the durations of positions. Answers of before have no sigma: it is 0 then.
-pub(crate) fn durations(fast: Option<f64>, sigma: Option<f64>) -> Option<ClockRate> {
-    fast.map(|fast| ClockRate { fast, sigma: sigma.unwrap_or(0.0) })
-}
-
-/// Sigma in parentheses, with a unit or without; empty for 0.
-fn sigma(value: f64, unit: &str) -> String {
-    if value > 0.0 { format!(" (sigma {}{unit})", number(value)) } else { String::new() }
-}
-
-/// Sentence on the offset and the rate of a record's clock.
-fn clock(c: &Clock) -> String {
-    let begins = match (c.offset_s, c.offset_sigma_s) {
-        (Some(at), Some(sigma)) => format!(
-            "; the scheme begins at {at:.3} s of its clock (estimated, sigma {} s; labels leave it open)",
-            number(sigma)
-        ),
-        (Some(at), None) if at.abs() >= 5e-4 => format!("; the scheme begins at {at:.3} s of its clock"),
-        _ => String::new(),
-    };
-    format!("{begins}{}", rates(c))
-}
-
-/// Sentence on the rate of a record's clock.
-fn rates(c: &Clock) -> String {
-    let held = durations(c.by_durations, c.by_durations_sigma).map_or_else(String::new, |held| {
-        let times = 1.0 + held.fast;
-        format!("; positions last {times:.4} times as long as in the scheme{}", sigma(held.sigma, ""))
-    });
-    let sharper = |e: &&ClockRate| c.by_earth.as_ref().is_none_or(|by| e.sigma < by.sigma);
-    if let Some(e) = c.by_changes.as_ref().filter(sharper).filter(|e| 3.0 * e.sigma < CLOCK) {
-        return format!(
-            "; by its changes of position its clock is {} (sigma {} %)",
-            part(e.fast),
-            number(100.0 * e.sigma)
-        );
-    }
-    match &c.by_earth {
-        Some(e) if 3.0 * e.sigma < CLOCK && e.fast.abs() > CLOCK => {
-            format!(
-                "; no rate of its clock makes the rates of the earth and of turns those of the scheme{held}"
-            )
-        }
-        Some(e) if 3.0 * e.sigma < CLOCK => format!(
-            "; by the rates of the earth and of turns its clock is {} (sigma {} %){held}",
-            part(e.fast),
-            number(100.0 * e.sigma)
-        ),
-        Some(e) => format!(
-            "; a clock that is wrong by less than {:.0} % does not show in it, and would make drifts wrong \
-             by as much or more{held}",
-            300.0 * e.sigma
-        ),
-        None => format!(
-            "; a wrong clock does not show in it, and would make drifts wrong by as much or more{held}"
-        ),
-    }
-}
-
-pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
-    match f {
-        Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => {
-            "the iteration did NOT settle: the estimates are where it was given up. Check the times and \
-             attitudes of the scheme against the run (--dry-run shows how the record is read); state priors \
-             of the drifts under [simulation]; add positions"
-                .into()
-        }
-        Finding::Force { record, length_g, alike, least, most, causes } => {
-            let of = of(record, records);
-            if *alike {
-                let or =
-                    causes.iter().map(|c| format!(" (or of {} alone: these positions do not tell)", c.axis));
-                return format!(
-                    "the specific force{of} is {length_g:.6} g long at all positions alike: a scale error of \
-                     {}{}, or another gravity, which no unknown of the scheme explains (K1 would)",
-                    number(length_g - 1.0),
-                    or.collect::<String>()
-                );
-            }
-            let lengths = format!(
-                "the specific force{of} is {:.6} g long at {} and {:.6} g at {}",
-                least.length_g, least.position, most.length_g, most.position
-            );
-            if causes.is_empty() {
-                return format!(
-                    "{lengths}: no scale or zero of one axis makes such lengths (they are among the \
-                     positions), and no unknown of the scheme explains them (K0 and K1 would)"
-                );
-            }
-            let each: Vec<String> = causes.iter().map(cause).collect();
-            let told = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
-            format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
-        }
-        Finding::Cells { record, column, kind_of_cells, value, count, lines } => {
-            let (cells, hold, repeat, them, were) = if *count == 1 {
-                ("cell", "holds", "repeats", "it", "was")
-            } else {
-                ("cells", "hold", "repeat", "them", "were")
-            };
-            let lines = match lines {
-                (first, last) if first == last => format!("line {first}"),
-                (first, last) => format!("lines {first} to {last}"),
-            };
-            let place = format!("column `{column}`{}, {lines}", of(record, records));
-            match kind_of_cells {
-                CellKind::Code => format!(
-                    "{place}: {count} {cells} {hold} exactly {value}, far from the rows beside {them}, and \
-                     {were} left out; if that is a code of missing values, state `missing = [{value}]` under \
-                     [record]"
-                ),
-                CellKind::Stuck => format!(
-                    "{place}: {count} {cells} {repeat} the value {value} of the row before to the last \
-                     digit, and {were} left out; check whether the output is stuck"
-                ),
-            }
-        }
-        Finding::Succession { record, position, channel, count, lines, span_s, sigmas } => format!(
-            "{count} measurements of {channel}{} in succession (position {position}, {} to {} s, lines {} to \
-             {}) lie {:+.1} to {:+.1} sigma off, and were left out: no outliers, but a step of an output at \
-             either end of them, or a platform that moved; a step also changes what comes before or after",
-            of(record, records),
-            number(span_s.0),
-            number(span_s.1),
-            lines.0,
-            lines.1,
-            sigmas.0,
-            sigmas.1
-        ),
-        Finding::Clock { record, by_durations, by_durations_sigma, by_changes, by_earth } => {
-            let of = of(record, records);
-            let by_durations = durations(*by_durations, *by_durations_sigma);
-            let rate = |e: &ClockRate| format!("{}{}", part(e.fast), sigma(100.0 * e.sigma, " %"));
-            let held = by_durations
-                .as_ref()
-                .map(|d| format!("positions begin and end as by a clock that is {}", rate(d)));
-            let rates = by_earth.as_ref().map(rate);
-            let by_changes = by_changes.as_ref().map(|e| {
-                format!(
-                    "the clock{of} is {} by its changes of position, and drifts are off by that part; \
-                     positions held so much longer or shorter than in the scheme look the same",
-                    rate(e)
-                )
-            });
-            let by_rates = || match (held, rates) {
-                (Some(held), Some(rates)) if is_clock(by_durations.as_ref(), by_earth.as_ref()) => format!(
-                    "the clock{of}: {held}, by the rates of the earth and of turns it is {rates}; drifts are \
-                     off by that part, those that the earth rate tells by more"
-                ),
-                (held, Some(rates)) => format!(
-                    "the rates of the earth and of turns{of} are not those of the scheme: they fit best as \
-                     by a clock that is {rates}{}; another latitude or rate of turns, or an error that no \
-                     unknown explains, look the same, and are likelier where positions last as in the \
-                     scheme",
-                    held.map_or_else(String::new, |held| format!(", while {held}"))
-                ),
-                (held, None) => format!(
-                    "the clock{of}: {}; the rates of the earth and of turns do not tell a clock from \
-                     positions that were held so much longer or shorter: by a clock drifts are off by that \
-                     part or more, else the scheme has other times than its run",
-                    held.unwrap_or_default()
-                ),
-            };
-            by_changes.unwrap_or_else(by_rates)
-        }
-        Finding::ClockJump { record, line, place, from_s, by_s, chi_square, explains } => format!(
-            "the clock{} was set forward by {by_s:.1} s behind {from_s:.3} s ({place}, before line {line}): with \
-             the times from there on less by that, {} (chi-square {} per degree of freedom)",
-            of(record, records),
-            match explains {
-                true => "the model explains the records",
-                false => "the records fit far better, but something else is wrong besides",
-            },
-            number(*chi_square)
-        ),
-        Finding::Copy { record, other, correlation } => format!(
-            "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a copy, \
-             and counts twice"
-        ),
-        Finding::Turns { record, factor, slew_rate_deg_s } => format!(
-            "the turns{} last {factor:.3} times as long as in the scheme, while positions do not{}",
-            of(record, records),
-            slew_rate_deg_s.map_or_else(String::new, |rate| {
-                format!(": they were made at about {rate:.2} deg/s (`slew_rate_deg_s`)")
-            })
-        ),
-        Finding::Position { record, position, chi_square, factor } => format!(
-            "the model does not explain position {position}{} (chi-square {} per degree of freedom): {} there",
-            of(record, records),
-            number(*chi_square),
-            sigmas(*factor)
-        ),
-        Finding::Noise { chi_square, factor } => format!(
-            "chi-square is {} per degree of freedom over all positions together: {}",
-            number(*chi_square),
-            sigmas(*factor)
-        ),
-        Finding::Channel { channel, chi_square, factor } => {
-            format!(
-                "{channel} has a chi-square of {} per degree of freedom: its {}",
-                number(*chi_square),
-                sigmas(*factor)
-            )
-        }
-        Finding::Correlated { record, channel, probability } => format!(
-            "the residuals of {channel}{} are not independent of each other (probability {}): sigmas are too \
-             small by what that hides",
-            of(record, records),
-            number(*probability)
-        ),
-        Finding::Temperature { record, channel, correlation, probability } => format!(
-            "the residuals of {channel}{} go with the temperature (correlation {correlation:+.2}, \
-             probability {}), which no unknown of the scheme explains",
-            of(record, records),
-            number(*probability)
-        ),
-        Finding::Outliers { count, of } => {
-            format!(
-                "{count} of {of} measurements are far off, too many to be outliers: none of them was left out"
-            )
-        }
-        Finding::Repeatability { chi_square } => format!(
-            "the records do not agree on the coefficients (chi-square {} per degree of freedom): they \
-             changed between the runs, or sigmas are too small",
-            number(*chi_square)
-        ),
-        Finding::SecondPath { difference } => format!(
-            "filter and least squares differ by {} sigma: these numbers are not resolved in double precision",
-            number(*difference)
-        ),
-        Finding::Suspect { errors, chi_square_fall } => format!(
-            "with {} among the unknowns chi-square would fall by {}, more than by chance: see Not estimated",
-            errors.join(" and "),
-            number(*chi_square_fall)
-        ),
-        Finding::Known { chi_square } => format!(
-            "the calibration before does not agree with these records (chi-square {} per degree of freedom)",
-            number(*chi_square)
-        ),
-    }
-}
 
 /// Sentence that the record leaves all unknowns open at its drifts, so that no estimate is given; `None` if
 /// estimates are given. Nothing else is wrong with such a record.
@@ -692,61 +400,148 @@ pub(crate) fn values_by_default(a: &Assumed) -> Option<String> {
     (!listed.is_empty()).then(|| listed.join(", "))
 }
 
+/// First lines: consistency, requirements, conditions that are not stated, findings.
+fn lead(c: &Calibration) -> Vec<String> {
+    let mut lead = vec![match c.consistent {
+        true => format!(
+            "consistent: the model and its sigmas explain the record, as far as it can tell{}",
+            omitted::silent(&c.omitted)
+        ),
+        false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
+    }];
+    lead.extend(c.requirements.as_ref().map(|r| {
+        let psi = "; those on psi are not judged, since psi here is that of the start of a record";
+        let said = stated::requirements(r);
+        match said.strip_prefix("by this record ").filter(|_| !c.consistent) {
+            Some(rest) => format!("By these sigmas, which a finding contradicts, {rest}{psi}."),
+            None => format!("{}{psi}.", stated::capital(&said)),
+        }
+    }));
+    let accepted = c.acceptance.as_ref().and_then(acceptance::sentence);
+    lead.extend(accepted.map(|text| format!("{}.", stated::capital(&text))));
+    lead.extend(omitted::of_requirements(c));
+    lead.extend(left_open(c));
+    let chosen = values_by_default(&c.assumed);
+    lead.extend(chosen.map(|listed| format!("not stated, chosen by the program: {listed}")));
+    lead.extend(c.findings.iter().map(|f| finding(f, &c.records)));
+    lead
+}
+
+/// Tables of the estimates of unknowns and of combinations.
+fn estimates(c: &Calibration) -> Vec<Block> {
+    let totals = c.quantities.iter().any(|e| e.total.is_some());
+    let mut columns = vec![
+        left("unknown"),
+        left("unit"),
+        right("degree"),
+        right("estimate"),
+        right("sigma"),
+        right("rescaled"),
+    ];
+    columns.extend(totals.then(|| right("total")));
+    columns.extend([right("predicted"), right("prior"), left("status")]);
+    let total = if totals { "total: with the bench and what a suspected error changes; " } else { "" };
+    let heading = format!(
+        "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and \
+         with the noise of the record; prior: what that of the program would do, in sigma and to sigma, \
+         where none is stated)"
+    );
+    let mut blocks =
+        vec![Block::table(heading, columns.clone(), c.quantities.iter().map(|e| row(e, totals)))];
+    if !c.combinations.is_empty() {
+        let rows = c.combinations.iter().map(|e| row(e, totals));
+        blocks.push(Block::table(
+            "Combinations of what is not told apart, and those asked for",
+            columns,
+            rows,
+        ));
+    }
+    blocks
+}
+
+/// Table of the positions of all records.
+fn positions(c: &Calibration) -> Block {
+    let each = c.positions.len() / c.records.len().max(1);
+    let force = c.positions.iter().any(|p| p.force_g.is_some());
+    let mut columns = vec![
+        left("position"),
+        right("from [s]"),
+        right("to [s]"),
+        right("measured"),
+        right("force [g]"),
+        right("chi-square"),
+        left("without it moves most"),
+        left("without it not determined"),
+    ];
+    if !force {
+        columns.remove(FORCE);
+    }
+    Block::table(
+        "Positions (times of the record; chi-square per degree of freedom)",
+        columns,
+        c.positions
+            .iter()
+            .enumerate()
+            .map(|(i, p)| position(p, (c.records.len() > 1).then(|| i / each), force)),
+    )
+}
+
+/// Table of the components of Z.
+fn channels(c: &Calibration) -> Block {
+    let columns = [
+        left("component"),
+        left("unit"),
+        right("sigma"),
+        right("scatter"),
+        right("chi-square"),
+        right("whiteness"),
+        right("temperature"),
+    ];
+    let rows = c.channels.iter().map(|c| {
+        vec![
+            c.channel.clone(),
+            c.unit.clone(),
+            number(c.sigma),
+            optional(c.scatter),
+            number(c.chi_square),
+            optional(c.whiteness_probability),
+            c.temperature
+                .map_or_else(|| "-".into(), |w| format!("{:+.2} ({})", w.correlation, number(w.probability))),
+        ]
+    });
+    Block::table(
+        "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: \
+         probability of correlations like these; temperature: correlation with it, and the probability \
+         of that)",
+        columns,
+        rows,
+    )
+}
+
+/// Table of the first outliers; `None` without any.
+fn outliers(c: &Calibration) -> Option<Block> {
+    if c.outliers.is_empty() {
+        return None;
+    }
+    let columns = [left("record"), left("lines"), right("t [s]"), left("component"), right("off by [sigma]")];
+    let lines = |(from, to): (u64, u64)| if from == to { from.to_string() } else { format!("{from}-{to}") };
+    let rows = c.outliers.iter().take(LISTED).map(|o| {
+        vec![o.record.clone(), lines(o.lines), number(o.t_s), o.channel.clone(), format!("{:+.1}", o.sigmas)]
+    });
+    let heading = match c.outlier_count {
+        n if n > LISTED => format!("Left out as outliers: {n}, of which the first {LISTED}"),
+        n => format!("Left out as outliers: {n}"),
+    };
+    Some(Block::table(heading, columns, rows))
+}
+
 impl Answer for Calibration {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
     }
 
     fn document(&self) -> Document {
-        let mut lead = vec![match self.consistent {
-            true => format!(
-                "consistent: the model and its sigmas explain the record, as far as it can tell{}",
-                omitted::silent(&self.omitted)
-            ),
-            false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
-        }];
-        lead.extend(self.requirements.as_ref().map(|r| {
-            let psi = "; those on psi are not judged, since psi here is that of the start of a record";
-            let said = stated::requirements(r);
-            match said.strip_prefix("by this record ").filter(|_| !self.consistent) {
-                Some(rest) => format!("By these sigmas, which a finding contradicts, {rest}{psi}."),
-                None => format!("{}{psi}.", stated::capital(&said)),
-            }
-        }));
-        let accepted = self.acceptance.as_ref().and_then(acceptance::sentence);
-        lead.extend(accepted.map(|text| format!("{}.", stated::capital(&text))));
-        lead.extend(omitted::of_requirements(self));
-        lead.extend(left_open(self));
-        let chosen = values_by_default(&self.assumed);
-        lead.extend(chosen.map(|listed| format!("not stated, chosen by the program: {listed}")));
-        lead.extend(self.findings.iter().map(|f| finding(f, &self.records)));
-        let totals = self.quantities.iter().any(|e| e.total.is_some());
-        let mut columns = vec![
-            left("unknown"),
-            left("unit"),
-            right("degree"),
-            right("estimate"),
-            right("sigma"),
-            right("rescaled"),
-        ];
-        columns.extend(totals.then(|| right("total")));
-        columns.extend([right("predicted"), right("prior"), left("status")]);
-        let total = if totals { "total: with the bench and what a suspected error changes; " } else { "" };
-        let heading = format!(
-            "Estimates (degree: exact verdict; {total}predicted: sigma by the linear model, at the times and \
-             with the noise of the record; prior: what that of the program would do, in sigma and to sigma, \
-             where none is stated)"
-        );
-        let mut blocks =
-            vec![Block::table(heading, columns.clone(), self.quantities.iter().map(|e| row(e, totals)))];
-        if !self.combinations.is_empty() {
-            let rows = self.combinations.iter().map(|e| row(e, totals));
-            blocks.push(Block::table(
-                "Combinations of what is not told apart, and those asked for",
-                columns,
-                rows,
-            ));
-        }
+        let mut blocks = estimates(self);
         if let Some(a) = &self.acceptance {
             blocks.push(acceptance::table("Acceptance", a));
             blocks.push(Block::list("Decision rule", acceptance::rule(a)));
@@ -755,85 +550,15 @@ impl Answer for Calibration {
         blocks.push(Block::list("Fit", fit(self)));
         blocks.extend(Block::list_if_any("Next runs", next_runs(&self.next_runs)));
         blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
-        let each = self.positions.len() / self.records.len().max(1);
-        let force = self.positions.iter().any(|p| p.force_g.is_some());
-        let mut columns = vec![
-            left("position"),
-            right("from [s]"),
-            right("to [s]"),
-            right("measured"),
-            right("force [g]"),
-            right("chi-square"),
-            left("without it moves most"),
-            left("without it not determined"),
-        ];
-        if !force {
-            columns.remove(FORCE);
-        }
-        blocks.push(Block::table(
-            "Positions (times of the record; chi-square per degree of freedom)",
-            columns,
-            self.positions
-                .iter()
-                .enumerate()
-                .map(|(i, p)| position(p, (self.records.len() > 1).then(|| i / each), force)),
-        ));
-        let columns = [
-            left("component"),
-            left("unit"),
-            right("sigma"),
-            right("scatter"),
-            right("chi-square"),
-            right("whiteness"),
-            right("temperature"),
-        ];
-        let rows = self.channels.iter().map(|c| {
-            vec![
-                c.channel.clone(),
-                c.unit.clone(),
-                number(c.sigma),
-                optional(c.scatter),
-                number(c.chi_square),
-                optional(c.whiteness_probability),
-                c.temperature.map_or_else(
-                    || "-".into(),
-                    |w| format!("{:+.2} ({})", w.correlation, number(w.probability)),
-                ),
-            ]
-        });
-        blocks.push(Block::table(
-            "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: \
-             probability of correlations like these; temperature: correlation with it, and the probability \
-             of that)",
-            columns,
-            rows,
-        ));
-        if !self.outliers.is_empty() {
-            let columns =
-                [left("record"), left("lines"), right("t [s]"), left("component"), right("off by [sigma]")];
-            let lines =
-                |(from, to): (u64, u64)| if from == to { from.to_string() } else { format!("{from}-{to}") };
-            let rows = self.outliers.iter().take(LISTED).map(|o| {
-                vec![
-                    o.record.clone(),
-                    lines(o.lines),
-                    number(o.t_s),
-                    o.channel.clone(),
-                    format!("{:+.1}", o.sigmas),
-                ]
-            });
-            let heading = match self.outlier_count {
-                n if n > LISTED => format!("Left out as outliers: {n}, of which the first {LISTED}"),
-                n => format!("Left out as outliers: {n}"),
-            };
-            blocks.push(Block::table(heading, columns, rows));
-        }
+        blocks.push(positions(self));
+        blocks.push(channels(self));
+        blocks.extend(outliers(self));
         blocks.push(Block::list("Read", records(self)));
         blocks.push(Block::list("Assumed", assumed(self)));
         let count = self.records.len();
         Document {
             title: format!("Calibration from {count} record{}", if count == 1 { "" } else { "s" }),
-            lead,
+            lead: lead(self),
             blocks,
         }
     }

@@ -18,6 +18,7 @@ mod audit;
 mod budget;
 mod calibration;
 mod calibration_figures;
+mod calibration_findings;
 mod calibration_page;
 mod cells;
 mod compare;

@@ -9,7 +9,7 @@ use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
 
 use super::fewest_of_all;
-use crate::calibration::{durations, is_clock};
+use crate::calibration_findings::{durations, is_clock};
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
 use crate::{gimbals, omitted, resolve, stated, words};

@@ -6,10 +6,11 @@ use obsdeg_evidence::acceptance::Decision;
 
 use super::answers::{self, Answers};
 use crate::Answer;
-use crate::calibration::{assumed, finding, values_by_default};
+use crate::calibration::{assumed, values_by_default};
 use crate::calibration_figures::{
     allan_figure, estimate_figures, file_name, residual_figure, whiteness_figure,
 };
+use crate::calibration_findings::finding;
 use crate::document::{Block, Cell, Document, Drawing, Grade, Picture, Status, StatusRow, number};
 use crate::figure::Figure;
 use crate::{acceptance, omitted, stated, words};
