@@ -2,7 +2,8 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{
-    DigitsReport, NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination, SystemQuantity,
+    ConstraintFactor, DigitsReport, NumberOfSolutions, POLYNOMIAL_DEGREE, SystemAnalysis, SystemCombination,
+    SystemQuantity,
 };
 use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::simulation::Outcome;
@@ -142,6 +143,202 @@ fn branch(a: &SystemAnalysis) -> String {
     format!("{functions}: the verdicts are those of one branch, {chosen}; others may have other verdicts")
 }
 
+/// Table of the verdicts on unknowns, in the order given.
+fn verdicts(a: &SystemAnalysis, order: &[&SystemQuantity]) -> Block {
+    let units = a.quantities.iter().any(|q| !q.unit.is_empty());
+    let rows = order.iter().map(|q| verdict_row(a, q, units));
+    let mut columns = vec![left("unknown"), left("kind")];
+    columns.extend(units.then(|| left("unit")));
+    columns.extend([left("status"), right("degree"), left("explanation")]);
+    Block::table("Verdicts", columns, rows)
+}
+
+/// Verdict on an unknown; with its unit if any unknown has one.
+fn verdict_row(a: &SystemAnalysis, q: &SystemQuantity, units: bool) -> Vec<String> {
+    let mut row = vec![q.name.clone(), q.kind.clone()];
+    if units {
+        row.push(q.unit.clone());
+    }
+    let verdict = match q.status {
+        Status::NotSeen => format!("not seen up to order {}", a.last_order),
+        status => status.to_string(),
+    };
+    row.extend([verdict, words::degree(q.degree), explanation(q, !a.constraints.is_empty())]);
+    if !q.description.is_empty() {
+        let last = row.len() - 1;
+        row[last] = format!("{} ({})", row[last], q.description);
+    }
+    row
+}
+
+/// Expression that solves an unknown; `None` without one.
+fn solved_by(q: &SystemQuantity) -> Option<Typeset> {
+    let solution = q.solution.as_ref()?;
+    let (text, latex) = match solution.len() {
+        0..=READABLE => (solution.clone(), latex::expression(solution)),
+        long => {
+            let text = format!("a fraction of {long} characters (--format json holds it)");
+            (text.clone(), format!("\\text{{{text}}}"))
+        }
+    };
+    let latex = format!("{} = {latex}", latex::expression(&q.name));
+    Some(Typeset { text: format!("{} = {text}", q.name), latex })
+}
+
+/// Changes of unknowns that no output shows; `None` without any.
+fn directions(a: &SystemAnalysis) -> Option<Block> {
+    let mut lines: Vec<String> = a.symmetries.iter().map(|s| s.words.clone()).collect();
+    let silent = a.quantities.iter().filter(|q| q.status == Status::NotExcited);
+    lines.extend(silent.map(|q| format!("change {} alone", q.name)));
+    lines.extend(a.other_directions.iter().map(|moved| {
+        format!(
+            "move {} together in a way for which no polynomial of degree up to {POLYNOMIAL_DEGREE} was found",
+            moved.join(", ")
+        )
+    }));
+    // derivatives of higher order than the bound may change
+    let heading = match a.rests_on_bound {
+        true => {
+            format!("No derivative up to order {} changes at the start when you", a.last_order)
+        }
+        false => "No output changes when you".into(),
+    };
+    Block::list_if_any(&heading, lines)
+}
+
+/// Conditions of the verdicts, one sentence each.
+fn assumed(a: &SystemAnalysis) -> Vec<String> {
+    let mut assumed = Vec::new();
+    if a.missing_functions > 0 {
+        assumed.push(format!(
+            "identifiable combinations are not all listed: {} independent one{} more of unobservable \
+             unknowns exist, and no short sum of products of powers was found",
+            a.missing_functions,
+            if a.missing_functions == 1 { "" } else { "s" }
+        ));
+    }
+    if !a.known.is_empty() {
+        assumed.push(format!("known starts: {}", a.known.join(", ")));
+    }
+    assumed.extend(a.time.as_deref().map(|time| judged_at(a, time)));
+    if !a.constraints.is_empty() {
+        assumed.push(kept_constraints(a));
+        assumed.extend(a.constraint_factors.iter().map(chosen_factor));
+    }
+    assumed.push(last_order(a));
+    assumed.push(
+        "observable and degree are meant locally: around a generic point no other value gives the same \
+         outputs up to that order; how many values there are in all is said where it was decided, and \
+         the expression of an only one may use derivatives of higher orders"
+            .into(),
+    );
+    if !a.branches.is_empty() {
+        assumed.push(branch(a));
+    }
+    if !a.combinations.is_empty() {
+        assumed.push("the number of solutions of a combination that is asked for is not counted".into());
+    }
+    assumed.extend(counting(a));
+    assumed.extend(a.note.clone());
+    if let Some(count @ 1..) = a.independent_functions {
+        assumed.push(format!(
+            "the values of {count} functions, derivatives counted, are algebraically independent at a \
+             generic point (by Ax's theorem, from the rank of the gradients of their arguments), so that \
+             random values stand for them"
+        ));
+    }
+    assumed.push(match (&a.primes, a.error_bound) {
+        (Some([p, q]), Some(bound)) => format!(
+            "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {}; seed {}",
+            words::at_most(bound),
+            a.seed
+        ),
+        _ => certainty(a.error_bound, a.digits, a.seed),
+    });
+    assumed
+}
+
+/// Sentence on the time at which a model that depends on it was judged: `generic` or a number.
+fn judged_at(a: &SystemAnalysis, time: &str) -> String {
+    let at = match time {
+        "generic" => format!("a generic time (verdicts of almost every time{})", side_in_time(a)),
+        time => format!("t = {time}, where the run begins"),
+    };
+    format!(
+        "the equations or known inputs depend on the time: judged at {at}; segments after the first, \
+         if there are any, at a generic time{}; `time` in the file sets another, or \"generic\"",
+        if time == "generic" { String::new() } else { side_in_time(a) }
+    )
+}
+
+/// Sentence on the constraints, which hold at the start.
+fn kept_constraints(a: &SystemAnalysis) -> String {
+    // a linear constraint holds in one way, a product by the factor that was chosen
+    let left = |c: &String| {
+        let factor = a.constraint_factors.iter().find(|w| w.constraint == *c);
+        factor.map_or(c.clone(), |w| w.factor.clone())
+    };
+    // a name may stand for a product
+    let defined = |c: &String| {
+        a.equations.iter().any(|e| {
+            let (name, _) = e.split_once(" = ").unwrap_or_default();
+            !name.is_empty() && c.split(|x: char| !x.is_alphanumeric() && x != '_').any(|word| word == name)
+        })
+    };
+    let several = a.constraints.iter().map(left).any(|c| c.contains(['*', '^', '/']) || defined(&c));
+    format!(
+        "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
+        a.constraints.join(", "),
+        match several {
+            true =>
+                "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are \
+                     those of one: state that one to choose",
+            false => "",
+        }
+    )
+}
+
+/// Sentence on the factor of a product that was chosen to be zero.
+fn chosen_factor(w: &ConstraintFactor) -> String {
+    let others: Vec<String> = w.others.iter().map(|o| format!("{o} = 0")).collect();
+    format!(
+        "{} holds where {} = 0 or where {}: all that is said is of {} = 0, {}; state another one \
+         in its place to choose it",
+        w.constraint,
+        w.factor,
+        others.join(" or where "),
+        w.factor,
+        match w.given {
+            true => "which the values under [simulation.values] hold",
+            false => "the first with a real point of its own, unknowns alone last",
+        }
+    )
+}
+
+/// Sentence on the last order of derivatives that was looked at.
+fn last_order(a: &SystemAnalysis) -> String {
+    if a.closed {
+        format!(
+            "generic point and inputs: the first order that adds nothing is the last; {} was looked at",
+            a.last_order
+        )
+    } else if a.rests_on_bound {
+        format!(
+            "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what \
+             is not observable rests on it (--order sets another)",
+            a.bound
+        )
+    } else if a.rank == a.unknowns {
+        format!("everything is observable with derivatives up to order {}", a.last_order)
+    } else {
+        format!(
+            "starts, inputs, jumps or the time are special, yet no order above {} can add anything: the rank \
+             is that of a generic point, or nothing moves",
+            a.last_order
+        )
+    }
+}
+
 impl Answer for SystemAnalysis {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -152,44 +349,12 @@ impl Answer for SystemAnalysis {
     }
 
     fn document(&self) -> Document {
-        let units = self.quantities.iter().any(|q| !q.unit.is_empty());
         let mut order: Vec<_> = self.quantities.iter().collect();
         // best first, unknowns without a degree last
         order.sort_by_key(|q| (q.status, q.degree));
-        let rows = order.iter().map(|q| {
-            let mut row = vec![q.name.clone(), q.kind.clone()];
-            if units {
-                row.push(q.unit.clone());
-            }
-            let verdict = match q.status {
-                Status::NotSeen => format!("not seen up to order {}", self.last_order),
-                status => status.to_string(),
-            };
-            row.extend([verdict, words::degree(q.degree), explanation(q, !self.constraints.is_empty())]);
-            if !q.description.is_empty() {
-                let last = row.len() - 1;
-                row[last] = format!("{} ({})", row[last], q.description);
-            }
-            row
-        });
-        let mut columns = vec![left("unknown"), left("kind")];
-        columns.extend(units.then(|| left("unit")));
-        columns.extend([left("status"), right("degree"), left("explanation")]);
         let mut blocks = why::blocks(&self.why);
-        blocks.push(Block::table("Verdicts", columns, rows));
-        let solved = order.iter().filter_map(|q| {
-            let solution = q.solution.as_ref()?;
-            let (text, latex) = match solution.len() {
-                0..=READABLE => (solution.clone(), latex::expression(solution)),
-                long => {
-                    let text = format!("a fraction of {long} characters (--format json holds it)");
-                    (text.clone(), format!("\\text{{{text}}}"))
-                }
-            };
-            let latex = format!("{} = {latex}", latex::expression(&q.name));
-            Some(Typeset { text: format!("{} = {text}", q.name), latex })
-        });
-        blocks.extend(Block::formulas("Solved by", solved));
+        blocks.push(verdicts(self, &order));
+        blocks.extend(Block::formulas("Solved by", order.iter().filter_map(|q| solved_by(q))));
         let unproven = self.rests_on_bound.then_some(self.last_order);
         if !self.combinations.is_empty() {
             blocks.push(combinations("Combinations asked for", &self.combinations, unproven));
@@ -198,143 +363,14 @@ impl Answer for SystemAnalysis {
             blocks.push(combinations("Identifiable combinations", &self.invariants, unproven));
         }
         if self.unobservable_directions > 0 {
-            let mut lines: Vec<String> = self.symmetries.iter().map(|s| s.words.clone()).collect();
-            let silent = self.quantities.iter().filter(|q| q.status == Status::NotExcited);
-            lines.extend(silent.map(|q| format!("change {} alone", q.name)));
-            lines.extend(self.other_directions.iter().map(|moved| {
-            format!(
-                "move {} together in a way for which no polynomial of degree up to {POLYNOMIAL_DEGREE} was found",
-                moved.join(", ")
-            )
-        }));
-            // derivatives of higher order than the bound may change
-            let heading = match self.rests_on_bound {
-                true => {
-                    format!("No derivative up to order {} changes at the start when you", self.last_order)
-                }
-                false => "No output changes when you".into(),
-            };
-            blocks.extend(Block::list_if_any(&heading, lines));
+            blocks.extend(directions(self));
         }
         blocks.extend(Block::list_if_any(
             "Every solution has another one with the same outputs, which appears when you",
             self.solution_maps.clone(),
         ));
         blocks.push(Block::list("The system", self.equations.clone()));
-        let mut assumed = Vec::new();
-        if self.missing_functions > 0 {
-            assumed.push(format!(
-                "identifiable combinations are not all listed: {} independent one{} more of unobservable \
-                 unknowns exist, and no short sum of products of powers was found",
-                self.missing_functions,
-                if self.missing_functions == 1 { "" } else { "s" }
-            ));
-        }
-        if !self.known.is_empty() {
-            assumed.push(format!("known starts: {}", self.known.join(", ")));
-        }
-        assumed.extend(self.time.as_ref().map(|time| {
-            let at = match time.as_str() {
-                "generic" => format!("a generic time (verdicts of almost every time{})", side_in_time(self)),
-                time => format!("t = {time}, where the run begins"),
-            };
-            format!(
-                "the equations or known inputs depend on the time: judged at {at}; segments after the first, \
-                 if there are any, at a generic time{}; `time` in the file sets another, or \"generic\"",
-                if time == "generic" { String::new() } else { side_in_time(self) }
-            )
-        }));
-        if !self.constraints.is_empty() {
-            // a linear constraint holds in one way, a product by the factor that was chosen
-            let left = |c: &String| {
-                let factor = self.constraint_factors.iter().find(|w| w.constraint == *c);
-                factor.map_or(c.clone(), |w| w.factor.clone())
-            };
-            // a name may stand for a product
-            let defined = |c: &String| {
-                self.equations.iter().any(|e| {
-                    let (name, _) = e.split_once(" = ").unwrap_or_default();
-                    !name.is_empty()
-                        && c.split(|x: char| !x.is_alphanumeric() && x != '_').any(|word| word == name)
-                })
-            };
-            let several =
-                self.constraints.iter().map(left).any(|c| c.contains(['*', '^', '/']) || defined(&c));
-            assumed.push(format!(
-                "at the start {}: the verdicts are about changes that keep this, as if it were an output of degree 0{}",
-                self.constraints.join(", "),
-                match several {
-                    true => "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are \
-                             those of one: state that one to choose",
-                    false => "",
-                }
-            ));
-            assumed.extend(self.constraint_factors.iter().map(|w| {
-                let others: Vec<String> = w.others.iter().map(|o| format!("{o} = 0")).collect();
-                format!(
-                    "{} holds where {} = 0 or where {}: all that is said is of {} = 0, {}; state another one \
-                     in its place to choose it",
-                    w.constraint,
-                    w.factor,
-                    others.join(" or where "),
-                    w.factor,
-                    match w.given {
-                        true => "which the values under [simulation.values] hold",
-                        false => "the first with a real point of its own, unknowns alone last",
-                    }
-                )
-            }));
-        }
-        assumed.push(if self.closed {
-        format!(
-            "generic point and inputs: the first order that adds nothing is the last; {} was looked at",
-            self.last_order
-        )
-    } else if self.rests_on_bound {
-        format!(
-            "starts, inputs or segments are not generic: orders up to the bound {} were looked at, and what \
-             is not observable rests on it (--order sets another)",
-            self.bound
-        )
-    } else if self.rank == self.unknowns {
-        format!("everything is observable with derivatives up to order {}", self.last_order)
-    } else {
-        format!(
-            "starts, inputs, jumps or the time are special, yet no order above {} can add anything: the rank \
-             is that of a generic point, or nothing moves",
-            self.last_order
-        )
-    });
-        assumed.push(
-            "observable and degree are meant locally: around a generic point no other value gives the same \
-             outputs up to that order; how many values there are in all is said where it was decided, and \
-             the expression of an only one may use derivatives of higher orders"
-                .into(),
-        );
-        if !self.branches.is_empty() {
-            assumed.push(branch(self));
-        }
-        if !self.combinations.is_empty() {
-            assumed.push("the number of solutions of a combination that is asked for is not counted".into());
-        }
-        assumed.extend(counting(self));
-        assumed.extend(self.note.clone());
-        if let Some(count @ 1..) = self.independent_functions {
-            assumed.push(format!(
-                "the values of {count} functions, derivatives counted, are algebraically independent at a \
-                 generic point (by Ax's theorem, from the rank of the gradients of their arguments), so that \
-                 random values stand for them"
-            ));
-        }
-        assumed.push(match (&self.primes, self.error_bound) {
-            (Some([p, q]), Some(bound)) => format!(
-                "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {}; seed {}",
-                words::at_most(bound),
-                self.seed
-            ),
-            _ => certainty(self.error_bound, self.digits, self.seed),
-        });
-        blocks.push(Block::list("Assumed", assumed));
+        blocks.push(Block::list("Assumed", assumed(self)));
         let profile = words::list(&self.rank_profile);
         let mut lead = self.sentences();
         lead.extend((!self.description.is_empty()).then(|| self.description.clone()));
@@ -427,6 +463,134 @@ impl Answer for SystemRun {
     }
 }
 
+/// Outcome of a comparison in words.
+fn said(outcome: Agreement) -> &'static str {
+    match outcome {
+        Agreement::Disagrees => "DISAGREES",
+        Agreement::NotResolvable => "not resolvable",
+        Agreement::Agrees => "agrees",
+        Agreement::NotTested => "not measured",
+    }
+}
+
+/// Finding on an unknown: its slope and its inflation together.
+fn agreement(q: &SystemQuantityEvidence) -> &'static str {
+    match (
+        q.slope.fails() || q.inflation.fails(),
+        q.inflation.outcome,
+        q.degree.is_some() && q.slope.measured.is_none(),
+    ) {
+        (true, _, _) => "DISAGREES",
+        (false, Agreement::NotResolvable, _) => "not resolvable",
+        (false, Agreement::NotTested, _) => "not measured",
+        (false, _, true) => "agrees, degree not measured",
+        (false, _, false) => "agrees",
+    }
+}
+
+/// Table of slopes and inflations, unknown by unknown.
+fn information(e: &SystemEvidence) -> Block {
+    let row = |q: &SystemQuantityEvidence| {
+        vec![
+            q.name.clone(),
+            q.status.to_string(),
+            words::degree(q.degree),
+            if q.degree.is_some() { format!("{:.1}", q.slope.predicted) } else { "-".into() },
+            q.slope.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}")),
+            format!("{:.2}", q.inflation.predicted),
+            q.inflation.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}")),
+            agreement(q).into(),
+        ]
+    };
+    Block::table(
+        "Information of the samples, linearised along the true run",
+        [
+            left("unknown"),
+            left("status"),
+            right("degree"),
+            right("slope"),
+            right("slope measured"),
+            right("prior x10"),
+            right("x10 measured"),
+            left("finding"),
+        ],
+        e.quantities.iter().map(row),
+    )
+}
+
+/// Directions that no output sees, against the singular values of the information.
+fn unseen_directions(e: &SystemEvidence) -> Block {
+    let mut null: Vec<String> = e
+        .symmetries
+        .iter()
+        .map(|s| {
+            let seen = s.seen.measured.map_or_else(|| "-".into(), |x| format!("{x:.0e}"));
+            format!("{}: seen with {seen} of the best direction, {}", s.words, said(s.seen.outcome))
+        })
+        .collect();
+    let (heading, by) = match e.seen_up_to {
+        Some(order) => (
+            format!("Directions that no derivative up to order {order} sees"),
+            format!("up to order {order}"),
+        ),
+        None => ("Directions that no output sees".into(), "exact".into()),
+    };
+    null.push(format!(
+        "unobservable directions: {} {by}, {} singular values vanish, {}",
+        e.defect.predicted,
+        e.defect.measured,
+        said(e.defect.outcome)
+    ));
+    Block::list(heading, null)
+}
+
+/// Meaning of the figures, and their certainty.
+fn how(e: &SystemEvidence) -> Vec<String> {
+    let mut how = vec![
+        format!(
+            "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling \
+             rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to \
+             {} long)",
+            number(e.duration)
+        ),
+        "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is \
+         observable, 10 for what is not"
+            .into(),
+        "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is \
+         observable and leaves more than a hundredth of its diffuse prior, and directions seen with less \
+         than 1e-9 of the best and more than 1e-12"
+            .into(),
+        certainty(e.error_bound, e.digits, e.seed),
+    ];
+    how.extend(e.seen_up_to.map(|order| {
+        format!(
+            "not seen: by no derivative up to order {order}; samples that see it by higher ones speak \
+             neither for nor against the verdict"
+        )
+    }));
+    how.extend(e.time.map(begins_at));
+    how
+}
+
+/// First line: agreement of samples and verdicts, and the number of checks.
+fn outcome(e: &SystemEvidence) -> String {
+    let open = e.orders.measured < e.orders.of || e.not_resolvable > 0;
+    let verdict = match (e.passed, open) {
+        (false, _) => "the information of samples DISAGREES with the exact verdicts",
+        (true, true) => "the information of samples agrees with the exact verdicts as far as measured",
+        (true, false) => "the information of samples agrees with the exact verdicts",
+    };
+    let open = match e.not_resolvable {
+        0 => String::new(),
+        k => format!(", {k} not resolvable"),
+    };
+    let passed = format!("{} of {} checks passed{open}", e.checks - e.failures, e.checks);
+    format!(
+        "{verdict} (no filter is run): {passed}, {} of {} degrees measured",
+        e.orders.measured, e.orders.of
+    )
+}
+
 /// The exact verdicts against the information of the samples.
 impl Answer for SystemEvidence {
     fn layout(&self) -> Option<&str> {
@@ -434,113 +598,7 @@ impl Answer for SystemEvidence {
     }
 
     fn document(&self) -> Document {
-        let said = |outcome: Agreement| match outcome {
-            Agreement::Disagrees => "DISAGREES",
-            Agreement::NotResolvable => "not resolvable",
-            Agreement::Agrees => "agrees",
-            Agreement::NotTested => "not measured",
-        };
-        let row = |q: &SystemQuantityEvidence| {
-            vec![
-                q.name.clone(),
-                q.status.to_string(),
-                words::degree(q.degree),
-                if q.degree.is_some() { format!("{:.1}", q.slope.predicted) } else { "-".into() },
-                q.slope.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}")),
-                format!("{:.2}", q.inflation.predicted),
-                q.inflation.measured.map_or_else(|| "-".into(), |x| format!("{x:.3}")),
-                match (
-                    q.slope.fails() || q.inflation.fails(),
-                    q.inflation.outcome,
-                    q.degree.is_some() && q.slope.measured.is_none(),
-                ) {
-                    (true, _, _) => "DISAGREES",
-                    (false, Agreement::NotResolvable, _) => "not resolvable",
-                    (false, Agreement::NotTested, _) => "not measured",
-                    (false, _, true) => "agrees, degree not measured",
-                    (false, _, false) => "agrees",
-                }
-                .into(),
-            ]
-        };
-        let mut blocks = vec![Block::table(
-            "Information of the samples, linearised along the true run",
-            [
-                left("unknown"),
-                left("status"),
-                right("degree"),
-                right("slope"),
-                right("slope measured"),
-                right("prior x10"),
-                right("x10 measured"),
-                left("finding"),
-            ],
-            self.quantities.iter().map(row),
-        )];
-        let mut null: Vec<String> = self
-            .symmetries
-            .iter()
-            .map(|s| {
-                let seen = s.seen.measured.map_or_else(|| "-".into(), |x| format!("{x:.0e}"));
-                format!("{}: seen with {seen} of the best direction, {}", s.words, said(s.seen.outcome))
-            })
-            .collect();
-        let (heading, by) = match self.seen_up_to {
-            Some(order) => (
-                format!("Directions that no derivative up to order {order} sees"),
-                format!("up to order {order}"),
-            ),
-            None => ("Directions that no output sees".into(), "exact".into()),
-        };
-        null.push(format!(
-            "unobservable directions: {} {by}, {} singular values vanish, {}",
-            self.defect.predicted,
-            self.defect.measured,
-            said(self.defect.outcome)
-        ));
-        blocks.push(Block::list(heading, null));
-        let mut how = vec![
-            format!(
-                "slope: of log sigma against the log of a short horizon, -(degree + 1/2) at a fixed sampling \
-                 rate; - where jumps or rounding hide it, or where it still changes with the horizon (up to \
-                 {} long)",
-                number(self.duration)
-            ),
-            "prior x10: the factor on sigma when a diffuse prior is ten times as loose; 1 for what is \
-             observable, 10 for what is not"
-                .into(),
-            "not resolvable: what moves no output by more than rounding (1e-13 of the outputs), what is \
-             observable and leaves more than a hundredth of its diffuse prior, and directions seen with less \
-             than 1e-9 of the best and more than 1e-12"
-                .into(),
-            certainty(self.error_bound, self.digits, self.seed),
-        ];
-        how.extend(self.seen_up_to.map(|order| {
-            format!(
-                "not seen: by no derivative up to order {order}; samples that see it by higher ones speak \
-                 neither for nor against the verdict"
-            )
-        }));
-        how.extend(self.time.map(begins_at));
-        blocks.push(Block::list("How", how));
-        let open = self.orders.measured < self.orders.of || self.not_resolvable > 0;
-        let verdict = match (self.passed, open) {
-            (false, _) => "the information of samples DISAGREES with the exact verdicts",
-            (true, true) => "the information of samples agrees with the exact verdicts as far as measured",
-            (true, false) => "the information of samples agrees with the exact verdicts",
-        };
-        let open = match self.not_resolvable {
-            0 => String::new(),
-            k => format!(", {k} not resolvable"),
-        };
-        let passed = format!("{} of {} checks passed{open}", self.checks - self.failures, self.checks);
-        Document {
-            title: format!("Cross-check: {}", self.name),
-            lead: vec![format!(
-                "{verdict} (no filter is run): {passed}, {} of {} degrees measured",
-                self.orders.measured, self.orders.of
-            )],
-            blocks,
-        }
+        let blocks = vec![information(self), unseen_directions(self), Block::list("How", how(self))];
+        Document { title: format!("Cross-check: {}", self.name), lead: vec![outcome(self)], blocks }
     }
 }

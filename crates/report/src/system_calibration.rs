@@ -1,7 +1,8 @@
 //! A calibration of any system.
 
 use obsdeg_calibration::system::{
-    OtherStarts, StatesStart, SystemCalibration, SystemEstimated, SystemFinding,
+    OtherSolution, OtherStarts, OutputFit, Profile, StatesStart, SystemCalibration, SystemEstimated,
+    SystemFinding,
 };
 
 use crate::calibration::{COEFFICIENTS, with_coefficients};
@@ -82,155 +83,186 @@ fn other_starts(of: &OtherStarts) -> Option<String> {
     (!out.is_empty()).then(|| format!("of the other starts, {}", out.join("; ")))
 }
 
+/// First lines: consistency and the first findings.
+fn lead(c: &SystemCalibration) -> Vec<String> {
+    let mut lead = vec![match (c.consistent, c.findings.is_empty()) {
+        (Some(true), _) => "consistent: the model and its noise explain the data".to_string(),
+        (Some(false), _) => "NOT consistent: sigmas are not to be relied upon as they are".into(),
+        (None, _) => {
+            "no noise was given: it is estimated from what is left, so chi-square says nothing of the model"
+                .into()
+        }
+    }];
+    lead.extend(c.findings.iter().take(LISTED).map(finding));
+    if c.findings.len() > LISTED {
+        lead.push(format!("and {} findings more", c.findings.len() - LISTED));
+    }
+    lead
+}
+
+/// Tables of the estimates of unknowns and of combinations.
+fn estimates(c: &SystemCalibration) -> Vec<Block> {
+    let columns = [
+        left("unknown"),
+        left("unit"),
+        right("degree"),
+        right("estimate"),
+        right("sigma"),
+        right("rescaled"),
+        left("status"),
+    ];
+    let mut blocks = vec![Block::table(
+        "Estimates (degree: exact verdict; states: at the start)",
+        columns.clone(),
+        c.quantities.iter().map(row),
+    )];
+    if !c.combinations.is_empty() {
+        blocks.push(Block::table(
+            "Combinations of what is not told apart, and those asked for",
+            columns,
+            c.combinations.iter().map(row),
+        ));
+    }
+    blocks
+}
+
+/// Sentences on chi-square and on the starts of the iteration.
+fn fit(c: &SystemCalibration) -> Vec<String> {
+    let per = c.factor * c.factor;
+    let mut out = vec![format!(
+        "chi-square {} on {} degrees of freedom: {} each (band of 99.9 % {:.4} to {:.4})",
+        number(c.chi_square),
+        c.degrees_of_freedom,
+        number(per),
+        c.band.0,
+        c.band.1
+    )];
+    if c.starts.0 < c.starts_at_most {
+        out.push(format!(
+            "{} of {} starts were made: no other solution was to be expected by then (Boender and \
+             Rinnooy Kan 1987)",
+            c.starts.0, c.starts_at_most
+        ));
+    }
+    out.push(match c.starts {
+        (of, led) if c.others.is_empty() => {
+            format!("{led} of {of} starts led to this solution; no other that fits nearly as well was found")
+        }
+        (of, led) => {
+            format!("{led} of {of} starts led to this solution; OTHERS fit nearly as well, see below")
+        }
+    });
+    out.extend(other_starts(&c.other_starts));
+    out
+}
+
+/// Table of the outputs: noise, residuals and outliers.
+fn outputs(c: &SystemCalibration) -> Block {
+    let columns = [
+        left("output"),
+        right("measured"),
+        right("sigma"),
+        left("from"),
+        right("chi-square"),
+        right("rms left"),
+        right("expected"),
+        right("whiteness"),
+        right("outlier beyond"),
+    ];
+    let rows = c.outputs.iter().map(|o| {
+        vec![
+            o.output.clone(),
+            o.measurements.to_string(),
+            o.sigma.map_or_else(|| "by row".into(), number),
+            if o.estimated { "what is left" } else { "given" }.into(),
+            number(o.chi_square),
+            number(o.rms),
+            number(o.expected_rms),
+            optional(o.whiteness_probability),
+            o.outlier_gate.map_or_else(|| "too few to tell".into(), number),
+        ]
+    });
+    Block::table(
+        "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as \
+         all others have it)",
+        columns,
+        rows,
+    )
+}
+
+/// Other solutions that fit nearly as well; `None` without any.
+fn other_solutions(c: &SystemCalibration) -> Option<Block> {
+    let names: Vec<&str> = c.quantities.iter().map(|u| u.name.as_str()).collect();
+    let of = |o: &OtherSolution| {
+        let values: Vec<String> =
+            names.iter().zip(&o.values).map(|(n, v)| format!("{n} = {}", number(*v))).collect();
+        format!("chi-square {} from {} starts: {}", number(o.chi_square), o.starts, values.join(", "))
+    };
+    Block::list_if_any("Other solutions", c.others.iter().map(of).collect())
+}
+
+/// Table of chi-square along one unknown.
+fn profile(p: &Profile) -> Block {
+    let flat = if p.flat { ": FLAT, the data say nothing of it" } else { "" };
+    Block::table(
+        format!("Profile of {}{flat}", p.name),
+        [right("value"), right("chi-square more")],
+        p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
+    )
+}
+
+/// Sentences on what was read from the record.
+fn read(c: &SystemCalibration) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    out.extend(c.intervals.map(|n| {
+        format!(
+            "{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of \
+             its samples",
+            c.samples
+        )
+    }));
+    let t = c.begins.unwrap_or(0.0);
+    let starts = match (c.states_start, c.before_first_row) {
+        (StatesStart::FarRows, _) => {
+            format!("with the first row of a run (at t = {t}), since the record begins long after 0")
+        }
+        (StatesStart::Rows, _) => format!("with the first row of a run (at t = {t}), as `time` asks for"),
+        (StatesStart::Model, None) => format!("at t = {t}"),
+        (StatesStart::Model, Some(before)) => {
+            format!("at t = {t}, {before} before the first row (`time` in the file sets where a run begins)")
+        }
+    };
+    out.push(format!(
+        "{} rows; inputs that are columns are held from a row to the next; states start {starts}; {} \
+         times the usual steps of integration; seed {}",
+        c.rows, c.substeps, c.seed
+    ));
+    if !c.ignored.is_empty() {
+        out.push(format!("nothing was made of the columns {}", c.ignored.join(", ")));
+    }
+    if c.shared {
+        out.push(
+            "the calibration before rests on the same record, by another model: what both models take of \
+             it counts twice"
+                .into(),
+        );
+    }
+    out
+}
+
 impl Answer for SystemCalibration {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
     }
 
     fn document(&self) -> Document {
-        let mut lead = vec![match (self.consistent, self.findings.is_empty()) {
-            (Some(true), _) => "consistent: the model and its noise explain the data".to_string(),
-            (Some(false), _) => "NOT consistent: sigmas are not to be relied upon as they are".into(),
-            (None, _) => {
-                "no noise was given: it is estimated from what is left, so chi-square says nothing of the model".into()
-            }
-        }];
-        lead.extend(self.findings.iter().take(LISTED).map(finding));
-        if self.findings.len() > LISTED {
-            lead.push(format!("and {} findings more", self.findings.len() - LISTED));
-        }
-        let columns = [
-            left("unknown"),
-            left("unit"),
-            right("degree"),
-            right("estimate"),
-            right("sigma"),
-            right("rescaled"),
-            left("status"),
-        ];
-        let mut blocks = vec![Block::table(
-            "Estimates (degree: exact verdict; states: at the start)",
-            columns.clone(),
-            self.quantities.iter().map(row),
-        )];
-        if !self.combinations.is_empty() {
-            blocks.push(Block::table(
-                "Combinations of what is not told apart, and those asked for",
-                columns,
-                self.combinations.iter().map(row),
-            ));
-        }
-        let per = self.factor * self.factor;
-        let mut fit = vec![format!(
-            "chi-square {} on {} degrees of freedom: {} each (band of 99.9 % {:.4} to {:.4})",
-            number(self.chi_square),
-            self.degrees_of_freedom,
-            number(per),
-            self.band.0,
-            self.band.1
-        )];
-        if self.starts.0 < self.starts_at_most {
-            fit.push(format!(
-                "{} of {} starts were made: no other solution was to be expected by then (Boender and \
-                 Rinnooy Kan 1987)",
-                self.starts.0, self.starts_at_most
-            ));
-        }
-        fit.push(match self.starts {
-            (of, led) if self.others.is_empty() => {
-                format!(
-                    "{led} of {of} starts led to this solution; no other that fits nearly as well was found"
-                )
-            }
-            (of, led) => {
-                format!("{led} of {of} starts led to this solution; OTHERS fit nearly as well, see below")
-            }
-        });
-        fit.extend(other_starts(&self.other_starts));
-        blocks.push(Block::list("Fit", fit));
-        let columns = [
-            left("output"),
-            right("measured"),
-            right("sigma"),
-            left("from"),
-            right("chi-square"),
-            right("rms left"),
-            right("expected"),
-            right("whiteness"),
-            right("outlier beyond"),
-        ];
-        let rows = self.outputs.iter().map(|o| {
-            vec![
-                o.output.clone(),
-                o.measurements.to_string(),
-                o.sigma.map_or_else(|| "by row".into(), number),
-                if o.estimated { "what is left" } else { "given" }.into(),
-                number(o.chi_square),
-                number(o.rms),
-                number(o.expected_rms),
-                optional(o.whiteness_probability),
-                o.outlier_gate.map_or_else(|| "too few to tell".into(), number),
-            ]
-        });
-        blocks.push(Block::table(
-            "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as \
-             all others have it)",
-            columns,
-            rows,
-        ));
-        if !self.others.is_empty() {
-            let names: Vec<&str> = self.quantities.iter().map(|u| u.name.as_str()).collect();
-            let of = |o: &obsdeg_calibration::system::OtherSolution| {
-                let values: Vec<String> =
-                    names.iter().zip(&o.values).map(|(n, v)| format!("{n} = {}", number(*v))).collect();
-                format!("chi-square {} from {} starts: {}", number(o.chi_square), o.starts, values.join(", "))
-            };
-            blocks.push(Block::list("Other solutions", self.others.iter().map(of).collect()));
-        }
-        for p in &self.profiles {
-            let flat = if p.flat { ": FLAT, the data say nothing of it" } else { "" };
-            blocks.push(Block::table(
-                format!("Profile of {}{flat}", p.name),
-                [right("value"), right("chi-square more")],
-                p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
-            ));
-        }
-        let mut read: Vec<String> = Vec::new();
-        read.extend(self.intervals.map(|n| {
-            format!(
-                "{} samples; {n} intervals at rest were found, a mean of each is measured, with the noise of \
-                 its samples",
-                self.samples
-            )
-        }));
-        let t = self.begins.unwrap_or(0.0);
-        let starts = match (self.states_start, self.before_first_row) {
-            (StatesStart::FarRows, _) => {
-                format!("with the first row of a run (at t = {t}), since the record begins long after 0")
-            }
-            (StatesStart::Rows, _) => format!("with the first row of a run (at t = {t}), as `time` asks for"),
-            (StatesStart::Model, None) => format!("at t = {t}"),
-            (StatesStart::Model, Some(before)) => format!(
-                "at t = {t}, {before} before the first row (`time` in the file sets where a run begins)"
-            ),
-        };
-        read.push(format!(
-            "{} rows; inputs that are columns are held from a row to the next; states start {starts}; {} \
-             times the usual steps of integration; seed {}",
-            self.rows, self.substeps, self.seed
-        ));
-        if !self.ignored.is_empty() {
-            read.push(format!("nothing was made of the columns {}", self.ignored.join(", ")));
-        }
-        if self.shared {
-            read.push(
-                "the calibration before rests on the same record, by another model: what both models take of \
-                 it counts twice"
-                    .into(),
-            );
-        }
-        blocks.push(Block::list("Read", read));
-        Document { title: format!("Calibration: {}", self.name), lead, blocks }
+        let mut blocks = estimates(self);
+        blocks.push(Block::list("Fit", fit(self)));
+        blocks.push(outputs(self));
+        blocks.extend(other_solutions(self));
+        blocks.extend(self.profiles.iter().map(profile));
+        blocks.push(Block::list("Read", read(self)));
+        Document { title: format!("Calibration: {}", self.name), lead: lead(self), blocks }
     }
 
     /// Lists of the JSON, then coefficients and covariance of all estimates.
@@ -263,7 +295,7 @@ pub fn system_residuals_csv(c: &SystemCalibration) -> Result<String, ReportError
 /// # Errors
 /// [`FigureError`].
 pub fn system_calibration_figures(c: &SystemCalibration) -> Result<Vec<File>, FigureError> {
-    let figure = |(k, o): (usize, &obsdeg_calibration::system::OutputFit)| {
+    let figure = |(k, o): (usize, &OutputFit)| {
         let mut some: Vec<_> = c.residuals.iter().filter(|r| r.output == k).collect();
         some.sort_by(|a, b| a.t.total_cmp(&b.t));
         let points: Vec<(f64, f64)> = some.iter().map(|r| (r.t, r.residual)).collect();
