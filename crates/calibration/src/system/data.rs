@@ -52,20 +52,23 @@ pub(super) struct Read {
 
 /// Source of the value of a known input.
 #[derive(Debug, Clone, Copy)]
-enum From {
+enum InputSource {
     /// Index of the requested number, and that of its standard deviation.
     Column(usize, Option<usize>),
     /// Mean of another input in the interval before.
     Before(usize),
 }
 
+/// Source of an output: the indices of the number and of its standard deviation, or a known value.
+type OutputSource = Result<(usize, Option<usize>), f64>;
+
 /// Meaning of the requested numbers of a row.
 struct Columns {
     wanted: Vec<Wanted>,
     /// Known inputs with values in every row, and their sources.
-    inputs: Vec<(usize, From)>,
-    /// Outputs: the indices of the number and of its standard deviation, or a known value.
-    outputs: Vec<Result<(usize, Option<usize>), f64>>,
+    inputs: Vec<(usize, InputSource)>,
+    /// Sources of the outputs.
+    outputs: Vec<OutputSource>,
     label: Option<usize>,
     /// Index of the requested number of the segment.
     segment: Option<usize>,
@@ -76,67 +79,10 @@ impl Columns {
     fn of(record: &Record, model: &SystemModel) -> Result<Self, SystemCalibrationError> {
         let time = record.find("t").ok_or_else(|| record.missing("`t` (the time of the model)"))?;
         let mut wanted = vec![units::time(record, time, model)?];
-        let mut want = |column: usize, unit: &str| -> Result<usize, RecordError> {
-            wanted.push(units::wanted(record, column, unit)?);
-            Ok(wanted.len() - 1)
-        };
-        let mut inputs = Vec::new();
-        let before = |name: &str| {
-            let of = name.strip_suffix("_before").filter(|_| model.recording.still.is_some())?;
-            model.known_inputs.iter().position(|i| i.0.name == of).filter(|_| record.find(of).is_some())
-        };
-        for (k, (named, kind)) in model.known_inputs.iter().enumerate() {
-            match (record.find(&named.name), kind) {
-                (None, KnownInput::Function(_)) => {}
-                (None, _) if model.simulation.inputs.contains_key(&named.name) => {}
-                (None, _) if before(&named.name).is_some() => {
-                    inputs.extend(before(&named.name).map(|of| (k, From::Before(of))));
-                }
-                (None, _) => return Err(record.missing(&format!("`{}` (a known input)", named.name)).into()),
-                (Some(_), KnownInput::Function(_)) => {
-                    let what = format!("the known input {}", named.name);
-                    let message =
-                        "a function of time in the model and a column of the record; expected one of them";
-                    return Err(ModelError { what, message: message.into(), span: None }.into());
-                }
-                (Some(column), _) => {
-                    let sigma = record.find(&format!("sigma_{}", named.name));
-                    let own = want(column, &named.unit)?;
-                    let sigma = sigma.map(|column| want(column, &named.unit)).transpose()?;
-                    inputs.push((k, From::Column(own, sigma)));
-                }
-            }
-        }
-        let mut outputs = Vec::new();
-        for (named, _) in &model.outputs {
-            let column = record.find(&named.name);
-            if let (None, Some(value)) = (column, model.recording.value(&named.name)) {
-                outputs.push(Err(value));
-                continue;
-            }
-            let column = column.ok_or_else(|| record.missing(&format!("`{}` (an output)", named.name)))?;
-            let own = want(column, &named.unit)?;
-            let sigma = record.find(&format!("sigma_{}", named.name));
-            outputs.push(Ok((own, sigma.map(|column| want(column, &named.unit)).transpose()?)));
-        }
-        let label = record.find("experiment");
-        if label.is_none() && model.experiments > 1 {
-            return Err(record.missing("`experiment` (1, 2, ...)").into());
-        }
-        if label.is_some() && model.recording.still.is_some() {
-            let what = "intervals at rest that are sought and a column `experiment`";
-            return Err(SystemCalibrationError::NotYet { what });
-        }
-        let named = record.find("segment").filter(|column| wanted.iter().all(|w| w.column != *column));
-        if model.segments.len() > 1 {
-            if named.is_none() {
-                return Err(record.missing("`segment` (1, 2, ...: it begins with its first row)").into());
-            }
-            if model.recording.still.is_some() {
-                let what = "intervals at rest that are sought in several segments";
-                return Err(SystemCalibrationError::NotYet { what });
-            }
-        }
+        let inputs = input_sources(record, model, &mut wanted)?;
+        let outputs = output_sources(record, model, &mut wanted)?;
+        let label = experiment_column(record, model)?;
+        let named = segment_column(record, model, &wanted)?;
         wanted.extend(named.map(|column| Wanted { column, scale: 1.0 }));
         let segment = named.map(|_| wanted.len() - 1);
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
@@ -149,6 +95,222 @@ impl Columns {
     }
 }
 
+/// Index of a further requested number: that of `column`, in `unit`.
+fn want(record: &Record, wanted: &mut Vec<Wanted>, column: usize, unit: &str) -> Result<usize, RecordError> {
+    wanted.push(units::wanted(record, column, unit)?);
+    Ok(wanted.len() - 1)
+}
+
+/// Known inputs with values in every row, and their sources; their numbers are added to `wanted`.
+fn input_sources(
+    record: &Record,
+    model: &SystemModel,
+    wanted: &mut Vec<Wanted>,
+) -> Result<Vec<(usize, InputSource)>, SystemCalibrationError> {
+    let mut out = Vec::new();
+    let before = |name: &str| {
+        let of = name.strip_suffix("_before").filter(|_| model.recording.still.is_some())?;
+        model.known_inputs.iter().position(|i| i.0.name == of).filter(|_| record.find(of).is_some())
+    };
+    for (k, (named, kind)) in model.known_inputs.iter().enumerate() {
+        match (record.find(&named.name), kind) {
+            (None, KnownInput::Function(_)) => {}
+            (None, _) if model.simulation.inputs.contains_key(&named.name) => {}
+            (None, _) if before(&named.name).is_some() => {
+                out.extend(before(&named.name).map(|of| (k, InputSource::Before(of))));
+            }
+            (None, _) => return Err(record.missing(&format!("`{}` (a known input)", named.name)).into()),
+            (Some(_), KnownInput::Function(_)) => {
+                let what = format!("the known input {}", named.name);
+                let message =
+                    "a function of time in the model and a column of the record; expected one of them";
+                return Err(ModelError { what, message: message.into(), span: None }.into());
+            }
+            (Some(column), _) => {
+                let sigma = record.find(&format!("sigma_{}", named.name));
+                let own = want(record, wanted, column, &named.unit)?;
+                let sigma = sigma.map(|column| want(record, wanted, column, &named.unit)).transpose()?;
+                out.push((k, InputSource::Column(own, sigma)));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Sources of the outputs, in their order; their numbers are added to `wanted`.
+fn output_sources(
+    record: &Record,
+    model: &SystemModel,
+    wanted: &mut Vec<Wanted>,
+) -> Result<Vec<OutputSource>, RecordError> {
+    let mut out = Vec::new();
+    for (named, _) in &model.outputs {
+        let column = record.find(&named.name);
+        if let (None, Some(value)) = (column, model.recording.value(&named.name)) {
+            out.push(Err(value));
+            continue;
+        }
+        let column = column.ok_or_else(|| record.missing(&format!("`{}` (an output)", named.name)))?;
+        let own = want(record, wanted, column, &named.unit)?;
+        let sigma = record.find(&format!("sigma_{}", named.name));
+        out.push(Ok((own, sigma.map(|column| want(record, wanted, column, &named.unit)).transpose()?)));
+    }
+    Ok(out)
+}
+
+/// Column of the experiments; `None` for a single one.
+fn experiment_column(record: &Record, model: &SystemModel) -> Result<Option<usize>, SystemCalibrationError> {
+    let label = record.find("experiment");
+    if label.is_none() && model.experiments > 1 {
+        return Err(record.missing("`experiment` (1, 2, ...)").into());
+    }
+    if label.is_some() && model.recording.still.is_some() {
+        let what = "intervals at rest that are sought and a column `experiment`";
+        return Err(SystemCalibrationError::NotYet { what });
+    }
+    Ok(label)
+}
+
+/// Column of the segments, unless it is one of the `wanted`; `None` for a single one.
+fn segment_column(
+    record: &Record,
+    model: &SystemModel,
+    wanted: &[Wanted],
+) -> Result<Option<usize>, SystemCalibrationError> {
+    let named = record.find("segment").filter(|column| wanted.iter().all(|w| w.column != *column));
+    if model.segments.len() > 1 {
+        if named.is_none() {
+            return Err(record.missing("`segment` (1, 2, ...: it begins with its first row)").into());
+        }
+        if model.recording.still.is_some() {
+            let what = "intervals at rest that are sought in several segments";
+            return Err(SystemCalibrationError::NotYet { what });
+        }
+    }
+    Ok(named)
+}
+
+/// Reader of the rows of a record, one after the other.
+struct RowReader<'a> {
+    /// Name of the record, and the texts of the requested columns.
+    record: &'a str,
+    texts: Vec<String>,
+    columns: &'a Columns,
+    /// Numbers of experiments and of segments.
+    experiments: usize,
+    segments: usize,
+    /// Earliest time of a row; -infinity if any time is allowed.
+    least: f64,
+    /// Segment and time of the last row of every experiment.
+    reached: Vec<(usize, f64)>,
+    rows: Vec<Data>,
+}
+
+impl RowReader<'_> {
+    /// Error of the value `found` in a column.
+    fn refuse(&self, line: u64, column: &str, found: String, expected: &str) -> SystemCalibrationError {
+        SystemCalibrationError::Value {
+            record: self.record.into(),
+            line,
+            column: column.into(),
+            found,
+            expected: expected.into(),
+        }
+    }
+
+    /// Adds a row.
+    fn take(&mut self, row: &Row<'_>) -> Result<(), SystemCalibrationError> {
+        let experiment = self.experiment(row)?;
+        let t = row.numbers[0].unwrap_or(f64::NAN);
+        let (_, time) = self.reached[experiment];
+        let segment = self.segment(row, experiment)?;
+        if t <= time {
+            let expected = format!("a time after {time}, which experiment {} has reached", experiment + 1);
+            return Err(self.refuse(row.line, &self.texts[0], t.to_string(), &expected));
+        }
+        self.reached[experiment] = (segment, t);
+        if t < self.least {
+            let expected = format!("a time from {}, where the run of the model begins, on", self.least);
+            return Err(self.refuse(row.line, &self.texts[0], t.to_string(), &expected));
+        }
+        let inputs = self.inputs(row)?;
+        let outputs = self.columns.outputs.iter();
+        let outputs = outputs.map(|o| o.map_or_else(Some, |(i, _)| row.numbers[i])).collect();
+        let sigmas = self.columns.outputs.iter().map(|o| o.map_or(Ok(None), |(_, s)| self.sigma(row, s)));
+        let sigmas = sigmas.collect::<Result<_, _>>()?;
+        let (line, run) = (row.line, experiment);
+        self.rows.push(Data { line, experiment, run, segment, t, inputs, outputs, sigmas });
+        Ok(())
+    }
+
+    /// Index of the experiment of a row.
+    fn experiment(&self, row: &Row<'_>) -> Result<usize, SystemCalibrationError> {
+        if self.columns.label.is_none() {
+            return Ok(0);
+        }
+        let experiments = self.experiments;
+        let number = row.label.parse::<usize>().ok().filter(|e| (1..=experiments).contains(e));
+        let expected = format!("a number from 1 to {experiments}");
+        let refuse = || self.refuse(row.line, "experiment", format!("`{}`", row.label), &expected);
+        Ok(number.ok_or_else(refuse)? - 1)
+    }
+
+    /// Index of the segment of a row. An experiment may continue behind rows of another.
+    fn segment(&self, row: &Row<'_>, experiment: usize) -> Result<usize, SystemCalibrationError> {
+        let (last, time) = self.reached[experiment];
+        let Some(i) = self.columns.segment else { return Ok(last) };
+        let first = time == f64::NEG_INFINITY;
+        let most = if first { 1 } else { (last + 2).min(self.segments) };
+        let found = row.numbers[i].filter(|n| (last + 1..=most).any(|k| *n == k as f64));
+        let expected = match most == last + 1 {
+            true if first && self.segments > 1 => "1: every segment has a row at least".into(),
+            true => format!("{most}: the model has no more segments"),
+            false => format!("{} or {most} (every segment has a row at least)", last + 1),
+        };
+        let text = row.numbers[i].map_or_else(|| "nothing".into(), |n| n.to_string());
+        Ok(found.ok_or_else(|| self.refuse(row.line, "segment", text, &expected))? as usize - 1)
+    }
+
+    /// Standard deviation in a requested number of a row; `None` where there is none.
+    fn sigma(&self, row: &Row<'_>, i: Option<usize>) -> Result<Option<f64>, SystemCalibrationError> {
+        match i.and_then(|i| Some((i, row.numbers[i]?))) {
+            Some((i, s)) if s <= 0.0 => {
+                Err(self.refuse(row.line, &self.texts[i], s.to_string(), "a standard deviation above zero"))
+            }
+            found => Ok(found.map(|(_, s)| s)),
+        }
+    }
+
+    /// Values of the inputs in a row, with their standard deviations.
+    fn inputs(&self, row: &Row<'_>) -> Result<Vec<(f64, f64)>, SystemCalibrationError> {
+        let mut out = Vec::new();
+        for &(_, from) in &self.columns.inputs {
+            let InputSource::Column(i, s) = from else {
+                out.push((f64::NAN, 0.0));
+                continue;
+            };
+            let nothing =
+                || self.refuse(row.line, &self.texts[i], "nothing".into(), "the value of a known input");
+            let x = row.numbers[i].ok_or_else(nothing)?;
+            out.push((x, self.sigma(row, s)?.unwrap_or(0.0)));
+        }
+        Ok(out)
+    }
+}
+
+/// Earliest time of a row; -infinity if the model begins at any time.
+fn earliest(model: &SystemModel) -> f64 {
+    match model.time {
+        StartTime::Zero => 0.0,
+        StartTime::Generic => f64::NEG_INFINITY,
+        at @ StartTime::At { .. } => at.number(),
+    }
+}
+
+/// Reads the rows of a record for a model.
+///
+/// # Errors
+/// [`SystemCalibrationError`].
 pub(super) fn read(
     record: Record,
     model: &SystemModel,
@@ -159,113 +321,35 @@ pub(super) fn read(
     let columns = Columns::of(&record, model)?;
     let still = model.recording.still.as_ref();
     let (name, experiments) = (record.name().to_string(), model.experiments.max(1));
-    let texts: Vec<String> = columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect();
-    let mut rows: Vec<Data> = Vec::new();
-    let segments = model.segments.len().max(1);
-    let least = match model.time {
-        StartTime::Zero => 0.0,
-        StartTime::Generic => f64::NEG_INFINITY,
-        at @ StartTime::At { .. } => at.number(),
+    let least = earliest(model);
+    let mut reader = RowReader {
+        record: &name,
+        texts: columns.wanted.iter().map(|w| record.columns()[w.column].text.clone()).collect(),
+        columns: &columns,
+        experiments,
+        segments: model.segments.len().max(1),
+        least: if still.is_none() { least } else { f64::NEG_INFINITY },
+        reached: vec![(0, f64::NEG_INFINITY); experiments],
+        rows: Vec::new(),
     };
-    // segment and time of the last row of every experiment
-    let mut reached = vec![(0, f64::NEG_INFINITY); experiments];
-    let take = |row: Row<'_>| -> Result<(), SystemCalibrationError> {
-        let samples = rows.len() + 1;
+    let digest = record.read(&columns.wanted, columns.label, true, |row| {
+        let samples = reader.rows.len() + 1;
         if samples.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples }) {
             return Err(SystemCalibrationError::Interrupted);
         }
-        let refuse = |column: &str, found: String, expected: &str| SystemCalibrationError::Value {
-            record: name.clone(),
-            line: row.line,
-            column: column.into(),
-            found,
-            expected: expected.into(),
-        };
-        let experiment = match columns.label {
-            None => 0,
-            Some(_) => {
-                let number = row.label.parse::<usize>().ok().filter(|e| (1..=experiments).contains(e));
-                let expected = format!("a number from 1 to {experiments}");
-                number.ok_or_else(|| refuse("experiment", format!("`{}`", row.label), &expected))? - 1
-            }
-        };
-        let t = row.numbers[0].unwrap_or(f64::NAN);
-        // an experiment may continue behind rows of another
-        let (last, time) = reached[experiment];
-        let mut segment = last;
-        if let Some(i) = columns.segment {
-            let first = time == f64::NEG_INFINITY;
-            let most = if first { 1 } else { (last + 2).min(segments) };
-            let found = row.numbers[i].filter(|n| (last + 1..=most).any(|k| *n == k as f64));
-            let expected = match most == last + 1 {
-                true if first && segments > 1 => "1: every segment has a row at least".into(),
-                true => format!("{most}: the model has no more segments"),
-                false => format!("{} or {most} (every segment has a row at least)", last + 1),
-            };
-            let text = row.numbers[i].map_or_else(|| "nothing".into(), |n| n.to_string());
-            segment = found.ok_or_else(|| refuse("segment", text, &expected))? as usize - 1;
-        }
-        if t <= time {
-            let expected = format!("a time after {time}, which experiment {} has reached", experiment + 1);
-            return Err(refuse(&texts[0], t.to_string(), &expected));
-        }
-        reached[experiment] = (segment, t);
-        if t < least && still.is_none() {
-            let expected = format!("a time from {least}, where the run of the model begins, on");
-            return Err(refuse(&texts[0], t.to_string(), &expected));
-        }
-        let value = |i: usize| row.numbers[i];
-        let sigma = |i: Option<usize>| -> Result<Option<f64>, SystemCalibrationError> {
-            match i.and_then(|i| Some((i, value(i)?))) {
-                Some((i, s)) if s <= 0.0 => {
-                    Err(refuse(&texts[i], s.to_string(), "a standard deviation above zero"))
-                }
-                found => Ok(found.map(|(_, s)| s)),
-            }
-        };
-        let mut of_inputs = Vec::new();
-        for &(_, from) in &columns.inputs {
-            let From::Column(i, s) = from else {
-                of_inputs.push((f64::NAN, 0.0));
-                continue;
-            };
-            let x =
-                value(i).ok_or_else(|| refuse(&texts[i], "nothing".into(), "the value of a known input"))?;
-            of_inputs.push((x, sigma(s)?.unwrap_or(0.0)));
-        }
-        let outputs = columns.outputs.iter().map(|o| o.map_or_else(Some, |(i, _)| value(i))).collect();
-        let sigmas = columns.outputs.iter().map(|o| o.map_or(Ok(None), |(_, s)| sigma(s)));
-        let sigmas = sigmas.collect::<Result<_, _>>()?;
-        rows.push(Data {
-            line: row.line,
-            experiment,
-            run: experiment,
-            segment,
-            t,
-            inputs: of_inputs,
-            outputs,
-            sigmas,
-        });
-        Ok(())
-    };
-    let digest = record.read(&columns.wanted, columns.label, true, take)?;
+        reader.take(&row)
+    })?;
+    let mut rows = reader.rows;
     let (samples, mut intervals) = (rows.len(), None);
     let begins = if least.is_finite() { least } else { 0.0 };
     let (mut rule, mut origins) = (StatesStart::Model, vec![begins; experiments]);
     if let Some(still) = still {
-        let place =
-            |name: &String| columns.inputs.iter().position(|(k, _)| model.known_inputs[*k].0.name == *name);
-        let by: Vec<usize> = still.by.iter().filter_map(place).collect();
-        let found = at_rest(&rows, &by, still);
-        if found.len() < 2 {
-            return Err(SystemCalibrationError::NoRest { record: name.clone(), found: found.len() });
+        let (found, of_rest) = rows_at_rest(&rows, &columns.inputs, model, still);
+        if found < 2 {
+            return Err(SystemCalibrationError::NoRest { record: name.clone(), found });
         }
-        intervals = Some(found.len());
-        rows = if model.states.is_empty() {
-            found.iter().map(|r| mean(&rows[r.clone()], &columns.inputs, None)).collect()
-        } else {
-            ways(&rows, &found, &columns.inputs)
-        };
+        intervals = Some(found);
+        rows = of_rest;
     } else {
         // rows of each experiment together
         rows.sort_by_key(|r| r.experiment);
@@ -275,10 +359,9 @@ pub(super) fn read(
         rule = states_start(&rows, model, uses_time);
         origins = from_origins(&mut rows, rule, begins, experiments);
     }
-    let inputs = columns.inputs.iter().map(|(k, _)| *k).collect();
     Ok(Read {
         rows,
-        inputs,
+        inputs: columns.inputs.iter().map(|(k, _)| *k).collect(),
         name,
         digest,
         ignored: columns.ignored,
@@ -287,6 +370,25 @@ pub(super) fn read(
         states_start: rule,
         intervals,
     })
+}
+
+/// Number of intervals at rest, and the rows that a model with them has: means of the intervals, or motions
+/// from one to the next if it has states. With fewer than two intervals there are none.
+fn rows_at_rest(
+    rows: &[Data],
+    inputs: &[(usize, InputSource)],
+    model: &SystemModel,
+    still: &Still,
+) -> (usize, Vec<Data>) {
+    let place = |name: &String| inputs.iter().position(|(k, _)| model.known_inputs[*k].0.name == *name);
+    let by: Vec<usize> = still.by.iter().filter_map(place).collect();
+    let found = at_rest(rows, &by, still);
+    let of_rest = match found.len() {
+        0 | 1 => Vec::new(),
+        _ if model.states.is_empty() => found.iter().map(|r| mean(&rows[r.clone()], inputs, None)).collect(),
+        _ => ways(rows, &found, inputs),
+    };
+    (found.len(), of_rest)
 }
 
 /// Rule of the start of the states for `rows`, sorted by experiment. A stated `time` holds. Without it,
@@ -354,7 +456,7 @@ fn at_rest(rows: &[Data], by: &[usize], still: &Still) -> Vec<Range<usize>> {
 
 /// Mean of some rows, with the standard deviations of the means of independent samples. Inputs of the
 /// interval before come from `before`.
-fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data {
+fn mean(rows: &[Data], inputs: &[(usize, InputSource)], before: Option<&Data>) -> Data {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();
         let n = values.len() as f64;
@@ -362,8 +464,8 @@ fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data 
         let scatter = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
         (!values.is_empty()).then(|| (mean, (scatter / n).sqrt()))
     };
-    let input = |(i, (_, from)): (usize, &(usize, From))| match (from, before) {
-        (From::Before(k), Some(before)) => {
+    let input = |(i, (_, from)): (usize, &(usize, InputSource))| match (from, before) {
+        (InputSource::Before(k), Some(before)) => {
             let at = inputs.iter().position(|(of, _)| of == k).unwrap_or(i);
             before.inputs[at]
         }
@@ -387,7 +489,7 @@ fn mean(rows: &[Data], inputs: &[(usize, From)], before: Option<&Data>) -> Data 
 
 /// Motions from each interval to the next, one run each: the samples between them, then the means of the next
 /// interval with the measured outputs.
-fn ways(rows: &[Data], intervals: &[Range<usize>], inputs: &[(usize, From)]) -> Vec<Data> {
+fn ways(rows: &[Data], intervals: &[Range<usize>], inputs: &[(usize, InputSource)]) -> Vec<Data> {
     let mut out = Vec::new();
     for (run, pair) in intervals.windows(2).enumerate() {
         let (from, to) = (pair[0].end - 1, pair[1].start);

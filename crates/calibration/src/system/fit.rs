@@ -56,6 +56,28 @@ pub(super) struct At {
     pub(super) ways: DMatrix<f64>,
 }
 
+/// Filter states along a run of the data.
+#[derive(Debug, Clone)]
+struct Trajectory {
+    /// Number of the run; `None` at the start, before the first.
+    run: Option<usize>,
+    /// Time from the start of the states.
+    t: f64,
+    /// All filter states.
+    x: DVector<f64>,
+    /// Derivatives of the states by the free unknowns.
+    by_free: DMatrix<f64>,
+    /// Index of the segment.
+    segment: usize,
+}
+
+impl Trajectory {
+    /// Trajectory at its start.
+    fn from_start(x: DVector<f64>, by_free: DMatrix<f64>) -> Self {
+        Self { run: None, t: 0.0, x, by_free, segment: 0 }
+    }
+}
+
 impl At {
     /// Sum of squares in sigma.
     pub(super) fn cost(&self) -> f64 {
@@ -99,9 +121,7 @@ impl Problem<'_> {
     pub(super) fn at(&mut self, base: &DVector<f64>, x: &DVector<f64>, finer: usize) -> Result<At, EkfError> {
         self.passes += 1;
         self.stopped |= !(self.going)(Going::Passes(self.passes));
-        let start = self.all(base, x);
-        let to_start = self.of_free(base, x);
-        let segments = self.numeric.segments();
+        let start = Trajectory::from_start(self.all(base, x), self.of_free(base, x));
         let mut out = At {
             rows: DMatrix::zeros(0, 0),
             left: DVector::zeros(0),
@@ -113,48 +133,32 @@ impl Problem<'_> {
         let (mut rows, mut left): (Vec<RowDVector<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
         let data = self.data;
         let ones = vec![1.0; self.noise.len()];
-        let mut now = (usize::MAX, 0.0, start.clone(), to_start.clone());
-        let mut segment = 0;
+        let mut now = start.clone();
         for (k, row) in data.rows.iter().enumerate() {
-            if now.0 != row.run {
-                let (x, by) = self.numeric.carry(row.experiment * segments, 0.0, &start);
-                now = (row.run, 0.0, x, by * &to_start);
-                segment = 0;
+            if now.run != Some(row.run) {
+                now = self.begin(&start, row);
             }
             let asked = self.long && k.is_multiple_of(OFTEN);
             if asked && !(self.going)(Going::Passes(self.passes)) {
                 self.stopped = true;
                 return Err(EkfError::Interrupted);
             }
-            let part = row.experiment * segments + segment;
-            // the values held until here, then those held from here on
-            if row.t > now.1 {
-                let process = self.numeric.process(part);
-                let steps = ((row.t - now.1) / self.longest).ceil().max(1.0) as usize * finer;
-                let next = runge_kutta(&process, now.1, &now.2, row.t - now.1, steps)?;
-                now = (row.run, row.t, next.x, next.phi * now.3);
-            }
-            // a segment begins with its first row
-            while segment < row.segment {
-                segment += 1;
-                let (x, by) = self.numeric.carry(row.experiment * segments + segment, row.t, &now.2);
-                now = (now.0, now.1, x, by * now.3);
-            }
-            let part = row.experiment * segments + segment;
+            self.carry_to(&mut now, row, finer)?;
+            let part = self.part(row, now.segment);
             for (&input, (value, _)) in data.inputs.iter().zip(&row.inputs) {
                 self.numeric.hold(input, *value);
             }
             if row.outputs.iter().all(Option::is_none) {
                 continue;
             }
-            let h = self.numeric.measurement(part, &ones).h(row.t, &now.2);
-            let jacobian = Measurement::jacobian(&self.numeric.measurement(part, &ones), row.t, &now.2);
-            let by_inputs = self.by_inputs(part, row, &now.2, &ones);
+            let h = self.numeric.measurement(part, &ones).h(row.t, &now.x);
+            let jacobian = Measurement::jacobian(&self.numeric.measurement(part, &ones), row.t, &now.x);
+            let by_inputs = self.by_inputs(part, row, &now.x, &ones);
             for (j, measured) in row.outputs.iter().enumerate() {
                 let Some(measured) = measured else { continue };
                 let own = row.sigmas[j].unwrap_or(self.noise[j]);
                 out.sigmas.push((own * own + by_inputs[j]).sqrt());
-                rows.push(jacobian.row(j) * &now.3);
+                rows.push(jacobian.row(j) * &now.by_free);
                 left.push(measured - h[j]);
                 out.keys.push((k, j));
             }
@@ -167,6 +171,37 @@ impl Problem<'_> {
             Some(&value) => Err(EkfError::NotFinite { what: "the outputs", value, row: 0, column: 0 }),
             None => Ok(out),
         }
+    }
+
+    /// Index of the process and the measurement of a segment, in the experiment of a row.
+    fn part(&self, row: &Data, segment: usize) -> usize {
+        row.experiment * self.numeric.segments() + segment
+    }
+
+    /// Trajectory at the start of the run of a row.
+    fn begin(&self, start: &Trajectory, row: &Data) -> Trajectory {
+        let (x, by) = self.numeric.carry(self.part(row, 0), 0.0, &start.x);
+        Trajectory { run: Some(row.run), t: 0.0, x, by_free: by * &start.by_free, segment: 0 }
+    }
+
+    /// Carries a trajectory to the time and the segment of a row. Inputs hold until there the values of the
+    /// row before. A segment begins with its first row.
+    fn carry_to(&self, now: &mut Trajectory, row: &Data, finer: usize) -> Result<(), EkfError> {
+        if row.t > now.t {
+            let process = self.numeric.process(self.part(row, now.segment));
+            let steps = ((row.t - now.t) / self.longest).ceil().max(1.0) as usize * finer;
+            let next = runge_kutta(&process, now.t, &now.x, row.t - now.t, steps)?;
+            now.t = row.t;
+            now.x = next.x;
+            now.by_free = next.phi * &now.by_free;
+        }
+        while now.segment < row.segment {
+            now.segment += 1;
+            let (x, by) = self.numeric.carry(self.part(row, now.segment), row.t, &now.x);
+            now.x = x;
+            now.by_free = by * &now.by_free;
+        }
+        Ok(())
     }
 
     /// Variance of every output by the errors of a row's inputs.

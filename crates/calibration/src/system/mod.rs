@@ -13,7 +13,7 @@ mod units;
 use std::cell::Cell;
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::degree::Status;
+use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::system::{
     Compiled, Judgement, ModelError, StartTime, StateStart, SystemModel, invariant_reports, judge_compiled,
     symmetries,
@@ -101,6 +101,75 @@ fn digest(model: &SystemModel) -> String {
 /// Combination: its text, degree, value, and derivatives by unknowns.
 type OfInvariant = (String, Option<usize>, f64, Vec<(usize, f64)>);
 
+/// Free unknowns of a model: their names, and their verdicts where the model has them.
+struct FreeUnknowns {
+    names: Vec<String>,
+    verdicts: Vec<Option<Verdict>>,
+}
+
+impl FreeUnknowns {
+    /// True if the unknown `j` is observable.
+    fn observable(&self, j: usize) -> bool {
+        self.verdicts[j].is_some_and(|v| v.status == Status::Observable)
+    }
+}
+
+/// Fit at the solution.
+struct FinalFit {
+    best: Settled,
+    /// Rows at the solution.
+    at: At,
+    solution: Solution,
+    /// Solution with a pull ten times as weak.
+    weaker: Solution,
+    /// True for each free unknown that model and record determine.
+    determined: Vec<bool>,
+    degrees_of_freedom: usize,
+    /// Chi-square per degree of freedom.
+    mean: f64,
+}
+
+impl FinalFit {
+    /// True if the record determines a functional of the free unknowns.
+    fn determines(&self, terms: &[(usize, f64)]) -> bool {
+        self.weaker.sigma(terms) <= DETERMINED * self.solution.sigma(terms)
+    }
+
+    /// Covariance of two functionals with the noise that the fit has, if that is larger.
+    fn between(&self, a: &[(usize, f64)], b: &[(usize, f64)]) -> f64 {
+        self.solution.covariance_with(a, b, self.mean.sqrt().max(1.0), &self.at.known.0)
+    }
+
+    /// Band of chi-square per degree of freedom.
+    fn band(&self) -> (f64, f64) {
+        let free = self.degrees_of_freedom as f64;
+        let band = chi_square_band(free, 1.0, 1.0 - levels::NOISE);
+        (band.0 / free, band.1 / free)
+    }
+
+    /// Estimate of a functional by its name and unit.
+    fn estimated(
+        &self,
+        (name, unit): (&str, String),
+        verdict: Option<Verdict>,
+        determined: bool,
+        value: f64,
+        terms: &[(usize, f64)],
+    ) -> SystemEstimated {
+        let there = |x: f64| determined.then_some(x);
+        SystemEstimated {
+            name: name.into(),
+            unit,
+            status: verdict.map(|v| v.status),
+            degree: verdict.and_then(|v| v.degree),
+            determined,
+            estimate: there(value),
+            sigma: there(self.solution.sigma(terms)),
+            sigma_rescaled: there(self.between(terms, terms).max(0.0).sqrt()),
+        }
+    }
+}
+
 /// State of a calibration.
 struct Calibrating<'a> {
     model: &'a SystemModel,
@@ -123,55 +192,14 @@ impl<'a> Calibrating<'a> {
         options: &'a SystemOptions,
         going: &'a dyn Fn(Going<'_>) -> bool,
     ) -> Result<Self, SystemCalibrationError> {
-        let nominal = &model.simulation;
         let known = |state: &FilterState| match *state {
             FilterState::State { i, .. } => model.states[i].start != StateStart::Unknown,
             FilterState::Parameter(_) | FilterState::Input { .. } => false,
         };
         let free: Vec<usize> = (0..numeric.states.len()).filter(|&i| !known(&numeric.states[i])).collect();
-        let value = |(i, name): (usize, &String)| {
-            let found = nominal.named(&nominal.values, name);
-            let start = match numeric.states[i] {
-                FilterState::State { i, .. } => &model.states[i].start,
-                _ => &StateStart::Unknown,
-            };
-            match (found, start) {
-                (Some(v), _) => Ok(v),
-                (None, StateStart::Known) => Err(ModelError {
-                    what: format!("`{name}`"),
-                    message: "a known start without a value; expected one under [simulation.values]".into(),
-                    span: None,
-                }),
-                (None, _) => Ok(1.0),
-            }
-        };
-        let base = numeric.names.iter().enumerate().map(value).collect::<Result<Vec<_>, _>>()?;
-        let mut base = DVector::from_vec(base);
-        numeric.set_known_starts(&mut base);
-        // a row without a sigma of its own needs one
-        let bare = |j: usize| data.rows.iter().any(|r| r.outputs[j].is_some() && r.sigmas[j].is_none());
-        let by_inputs = data.rows.iter().any(|r| r.inputs.iter().any(|(_, s)| *s > 0.0));
-        let (mut noise, mut estimated) = (Vec::new(), Vec::new());
-        for (j, (named, _)) in model.outputs.iter().enumerate() {
-            let given = nominal.noise.get(&named.name).copied();
-            let unknown = given.is_none() && bare(j) && !by_inputs;
-            estimated.push(unknown);
-            let spread = spread(data.rows.iter().filter_map(|r| r.outputs[j]));
-            noise.push(given.unwrap_or(if unknown { spread } else { 0.0 }));
-        }
-        let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
-        let longest = nominal.step.unwrap_or(f64::INFINITY).min(if last > 0.0 { last / 50.0 } else { 1.0 });
-        // checked before the work begins
-        let mut found = 0.0;
-        for run in data.rows.chunk_by(|a, b| (a.experiment, a.run) == (b.experiment, b.run)) {
-            let steps = |from: f64, to: f64| ((to - from) / longest).ceil().max(1.0);
-            found += steps(0.0, run[0].t) + run.windows(2).map(|w| steps(w[0].t, w[1].t)).sum::<f64>();
-        }
-        let most = STEPS + STEPS_A_ROW * data.rows.len() as f64;
-        if !model.states.is_empty() && found > most {
-            let record = data.name.clone();
-            return Err(SystemCalibrationError::TooLong { record, last, found, longest, most });
-        }
+        let base = first_start(model, &numeric)?;
+        let (noise, estimated) = first_noise(model, data);
+        let (longest, found) = integration_steps(model, data)?;
         let known = (DMatrix::zeros(0, free.len()), DVector::zeros(0));
         let long = found + data.rows.len() as f64 > LONG;
         let mut problem =
@@ -192,169 +220,35 @@ impl<'a> Calibrating<'a> {
 
     fn run(mut self) -> Result<SystemCalibration, SystemCalibrationError> {
         let judged = self.judged()?;
-        let measured = self.data.rows.iter().flat_map(|r| &r.outputs).flatten().count();
         let starts = self.starts();
-        let names: Vec<String> =
-            self.problem.free.iter().map(|&i| self.problem.numeric.names[i].clone()).collect();
-        let verdict = |j: usize| {
-            judged.verdict(self.model, &names[j]).or_else(|| judged.verdict(self.model, plain(&names[j])))
-        };
-        let verdicts: Vec<_> = (0..names.len()).map(verdict).collect();
-        let observable = |j: usize| verdicts[j].is_some_and(|v| v.status == Status::Observable);
-        let (ends, tried, first_error) = self.search(&starts, &observable);
-        let model = self.model;
-        let constraint = |i: usize| model.constraints[i % model.constraints.len()].text.clone();
-        let stuck = |e| match e {
-            Stuck::Numbers(reason) => SystemCalibrationError::Nowhere { starts: tried, reason },
-            Stuck::Held(i) => SystemCalibrationError::Unheld { starts: tried, constraint: constraint(i) },
-        };
-        let Some(best) = ends.first().cloned() else {
-            return Err(stuck(first_error.unwrap_or(Stuck::Numbers(EkfError::Singular { column: 0 }))));
-        };
-        let nowhere = |reason| SystemCalibrationError::Nowhere { starts: tried, reason };
-        if let Some(i) = self.problem.flat(&self.base, &best.x) {
-            return Err(SystemCalibrationError::Flat { constraint: constraint(i) });
-        }
-        // more integration steps until the solution does not change visibly
-        let mut finer = 1;
-        let mut best = best;
-        for _ in 0..DOUBLINGS {
-            if self.problem.stopped {
-                break;
-            }
-            let coarse = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
-            let fine = self.problem.at(&self.base, &best.x, 2 * finer).map_err(nowhere)?;
-            let scale = (coarse.cost() / coarse.sigmas.len() as f64).max(1.0).sqrt();
-            let off = coarse
-                .left
-                .iter()
-                .zip(fine.left.iter())
-                .zip(&coarse.sigmas)
-                .map(|((a, b), s)| ((a - b) / s).abs());
-            if off.fold(0.0, f64::max) <= 1e-3 * scale {
-                break;
-            }
-            finer *= 2;
-            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(stuck)?;
-        }
-        // noise that is not stated
-        for _ in 0..ROUNDS {
-            let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
-            let factors = self.factors(&at, &best.x).map_err(nowhere)?;
-            if factors.iter().all(|f| (f - 1.0).abs() < 1e-4) {
-                break;
-            }
-            self.problem.noise.iter_mut().zip(&factors).for_each(|(s, f)| *s *= f);
-            best = settle(&mut self.problem, &self.base, best.x, finer, None).map_err(stuck)?;
-        }
-        let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere)?;
-        let solution = step(&at, &best.x, 1.0 / WEAK).map_err(nowhere)?;
-        let weaker = step(&at, &best.x, 0.1 / WEAK).map_err(nowhere)?;
-        let determined: Vec<bool> = (0..names.len())
-            .map(|j| observable(j) && weaker.sigma(&[(j, 1.0)]) <= DETERMINED * solution.sigma(&[(j, 1.0)]))
-            .collect();
-        let rank = rank(&solution);
-        let measured = measured + at.known.1.len();
-        if measured <= rank {
-            return Err(SystemCalibrationError::TooFew { found: measured, unknowns: rank });
-        }
-        let degrees_of_freedom = measured - rank;
-        let mean = at.cost() / degrees_of_freedom as f64;
-        let rescale = mean.sqrt().max(1.0);
-        let known = &at.known.0;
-        let between = |a: &[(usize, f64)], b: &[(usize, f64)]| solution.covariance_with(a, b, rescale, known);
-        let estimate =
-            |name: &str, unit: &str, status, degree, determined: bool, value: f64, terms: &[(usize, f64)]| {
-                let sigma = solution.sigma(terms);
-                let there = |x: f64| determined.then_some(x);
-                SystemEstimated {
-                    name: name.into(),
-                    unit: unit.into(),
-                    status,
-                    degree,
-                    determined,
-                    estimate: there(value),
-                    sigma: there(sigma),
-                    sigma_rescaled: there(between(terms, terms).max(0.0).sqrt()),
-                }
-            };
-        let unknowns: Vec<SystemEstimated> = (0..names.len())
-            .map(|j| {
-                let v = verdicts[j];
-                let unit = self.unit(self.problem.free[j]);
-                let (status, degree) = (v.map(|v| v.status), v.and_then(|v| v.degree));
-                estimate(&names[j], &unit, status, degree, determined[j], best.x[j], &[(j, 1.0)])
-            })
-            .collect();
-        let all = self.problem.all(&self.base, &best.x);
-        let (values, by_all) = self.problem.numeric.combinations(&all);
-        let by_free = by_all * self.problem.of_free(&self.base, &best.x);
-        let combinations =
-            self.model.combinations.iter().zip(judged.asked()).enumerate().map(|(i, (c, v))| {
-                let terms: Vec<(usize, f64)> = by_free.row(i).iter().copied().enumerate().collect();
-                let (sigma, wide) = (solution.sigma(&terms), weaker.sigma(&terms));
-                let determined = v.status == Status::Observable && wide <= DETERMINED * sigma;
-                estimate(&c.text, "", Some(v.status), v.degree, determined, values[i], &terms)
-            });
-        let mut combinations: Vec<SystemEstimated> = combinations.collect();
-        // identifiable combinations of unknowns that are not determined alone, by the symmetries of the model
-        for (text, degree, value, terms) in self.invariants(&judged, &names, &best.x)? {
-            if combinations.iter().any(|c| c.name == text) {
-                continue;
-            }
-            let determined = weaker.sigma(&terms) <= DETERMINED * solution.sigma(&terms);
-            let status = Some(Status::Observable);
-            combinations.push(estimate(&text, "", status, degree, determined, value, &terms));
-        }
-        let own: Vec<usize> = (0..names.len()).filter(|&j| determined[j]).collect();
-        let p = solution.covariance();
-        let covariance = CovarianceTable {
-            names: own.iter().map(|&j| names[j].clone()).collect(),
-            units: own.iter().map(|&j| self.unit(self.problem.free[j])).collect(),
-            estimates: own.iter().map(|&j| best.x[j]).collect(),
-            covariance: own.iter().map(|&i| own.iter().map(|&j| p[(i, j)]).collect()).collect(),
-            rescaled: own
-                .iter()
-                .map(|&i| own.iter().map(|&j| between(&[(i, 1.0)], &[(j, 1.0)])).collect())
-                .collect(),
-        };
-        let residuals = self.residuals(&at, &solution);
-        let outputs = self.with_gates(self.outputs(&residuals, &at, &solution));
-        let all_estimated = self.estimated.iter().all(|e| *e);
-        let band = chi_square_band(degrees_of_freedom as f64, 1.0, 1.0 - levels::NOISE);
-        let band = (band.0 / degrees_of_freedom as f64, band.1 / degrees_of_freedom as f64);
-        let mut findings = Vec::new();
-        if self.problem.stopped {
-            findings.push(SystemFinding::Interrupted);
-        } else if !best.converged {
-            findings.push(SystemFinding::NotSettled);
-        }
-        if !all_estimated && !(band.0..=band.1).contains(&mean) {
-            findings.push(SystemFinding::Noise { chi_square: mean, factor: mean.sqrt() });
-        }
-        for o in &outputs {
-            if let Some(probability) =
-                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < levels::CORRELATED)
-            {
-                findings.push(SystemFinding::Correlated { output: o.output.clone(), probability });
-            }
-        }
-        findings.extend(self.outliers(&residuals, &outputs));
-        let (others, led, other_starts) = self.others(&ends, &best, &determined, &solution, mean, finer);
-        let profiles = self.profiles(&names, &best, &solution, finer)?;
+        let unknowns = self.free_unknowns(&judged);
+        let (ends, tried, first_error) = self.search(&starts, &|j| unknowns.observable(j));
+        let best = self.best_end(&ends, tried, first_error)?;
+        let (best, finer) = self.with_finer_steps(best, tried)?;
+        let best = self.with_estimated_noise(best, finer, tried)?;
+        let fit = self.final_fit(best, finer, &unknowns, tried)?;
+        let quantities = self.quantities(&unknowns, &fit);
+        let combinations = self.combinations(&judged, &unknowns.names, &fit)?;
+        let covariance = self.covariance(&unknowns.names, &fit);
+        let residuals = self.residuals(&fit.at, &fit.solution);
+        let outputs = self.with_gates(self.outputs(&residuals, &fit.at, &fit.solution));
+        let findings = self.findings(&fit, &residuals, &outputs);
+        let FinalFit { best, solution, determined, mean, .. } = &fit;
+        let (others, led, other_starts) = self.others(&ends, best, determined, solution, *mean, finer);
+        let profiles = self.profiles(&unknowns.names, best, solution, finer)?;
         Ok(SystemCalibration {
             schema: SCHEMA.into(),
             version: env!("CARGO_PKG_VERSION").into(),
             name: self.model.name.clone(),
-            consistent: (!all_estimated || !findings.is_empty()).then_some(findings.is_empty()),
+            consistent: (!self.all_estimated() || !findings.is_empty()).then_some(findings.is_empty()),
             findings,
-            quantities: unknowns,
+            quantities,
             combinations,
             covariance,
-            chi_square: at.cost(),
-            degrees_of_freedom,
-            band,
-            factor: mean.sqrt(),
+            chi_square: fit.at.cost(),
+            degrees_of_freedom: fit.degrees_of_freedom,
+            band: fit.band(),
+            factor: fit.mean.sqrt(),
             outputs,
             others,
             starts: (tried, led),
@@ -375,6 +269,219 @@ impl<'a> Calibrating<'a> {
             seed: self.options.seed,
             residuals,
         })
+    }
+
+    /// Free unknowns with their verdicts; that of an unknown of one experiment may have its plain name.
+    fn free_unknowns(&self, judged: &Judgement) -> FreeUnknowns {
+        let names: Vec<String> =
+            self.problem.free.iter().map(|&i| self.problem.numeric.names[i].clone()).collect();
+        let verdict = |name: &String| {
+            judged.verdict(self.model, name).or_else(|| judged.verdict(self.model, plain(name)))
+        };
+        let verdicts = names.iter().map(verdict).collect();
+        FreeUnknowns { names, verdicts }
+    }
+
+    /// Text of the constraint of this index.
+    fn constraint(&self, i: usize) -> String {
+        self.model.constraints[i % self.model.constraints.len()].text.clone()
+    }
+
+    /// Error of `tried` starts that lead to no solution.
+    fn stuck(&self, e: Stuck, tried: usize) -> SystemCalibrationError {
+        match e {
+            Stuck::Numbers(reason) => nowhere(tried)(reason),
+            Stuck::Held(i) => {
+                SystemCalibrationError::Unheld { starts: tried, constraint: self.constraint(i) }
+            }
+        }
+    }
+
+    /// End of the search with the lowest sum of squares.
+    fn best_end(
+        &self,
+        ends: &[Settled],
+        tried: usize,
+        first_error: Option<Stuck>,
+    ) -> Result<Settled, SystemCalibrationError> {
+        let Some(best) = ends.first().cloned() else {
+            let e = first_error.unwrap_or(Stuck::Numbers(EkfError::Singular { column: 0 }));
+            return Err(self.stuck(e, tried));
+        };
+        match self.problem.flat(&self.base, &best.x) {
+            Some(i) => Err(SystemCalibrationError::Flat { constraint: self.constraint(i) }),
+            None => Ok(best),
+        }
+    }
+
+    /// Solution with more integration steps, until it does not change visibly, and the factor of their number.
+    fn with_finer_steps(
+        &mut self,
+        mut best: Settled,
+        tried: usize,
+    ) -> Result<(Settled, usize), SystemCalibrationError> {
+        let mut finer = 1;
+        for _ in 0..DOUBLINGS {
+            if self.problem.stopped {
+                break;
+            }
+            let coarse = self.problem.at(&self.base, &best.x, finer).map_err(nowhere(tried))?;
+            let fine = self.problem.at(&self.base, &best.x, 2 * finer).map_err(nowhere(tried))?;
+            let scale = (coarse.cost() / coarse.sigmas.len() as f64).max(1.0).sqrt();
+            let off = coarse
+                .left
+                .iter()
+                .zip(fine.left.iter())
+                .zip(&coarse.sigmas)
+                .map(|((a, b), s)| ((a - b) / s).abs());
+            if off.fold(0.0, f64::max) <= 1e-3 * scale {
+                break;
+            }
+            finer *= 2;
+            best = self.settled(best.x, finer, tried)?;
+        }
+        Ok((best, finer))
+    }
+
+    /// Solution with the noise that is not stated, as the residuals have it.
+    fn with_estimated_noise(
+        &mut self,
+        mut best: Settled,
+        finer: usize,
+        tried: usize,
+    ) -> Result<Settled, SystemCalibrationError> {
+        for _ in 0..ROUNDS {
+            let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere(tried))?;
+            let factors = self.factors(&at, &best.x).map_err(nowhere(tried))?;
+            if factors.iter().all(|f| (f - 1.0).abs() < 1e-4) {
+                break;
+            }
+            self.problem.noise.iter_mut().zip(&factors).for_each(|(s, f)| *s *= f);
+            best = self.settled(best.x, finer, tried)?;
+        }
+        Ok(best)
+    }
+
+    /// End of the iteration from `x`.
+    fn settled(
+        &mut self,
+        x: DVector<f64>,
+        finer: usize,
+        tried: usize,
+    ) -> Result<Settled, SystemCalibrationError> {
+        let end = settle(&mut self.problem, &self.base, x, finer, None);
+        end.map_err(|e| self.stuck(e, tried))
+    }
+
+    /// Fit at the solution `best`.
+    fn final_fit(
+        &mut self,
+        best: Settled,
+        finer: usize,
+        unknowns: &FreeUnknowns,
+        tried: usize,
+    ) -> Result<FinalFit, SystemCalibrationError> {
+        let at = self.problem.at(&self.base, &best.x, finer).map_err(nowhere(tried))?;
+        let solution = step(&at, &best.x, 1.0 / WEAK).map_err(nowhere(tried))?;
+        let weaker = step(&at, &best.x, 0.1 / WEAK).map_err(nowhere(tried))?;
+        let rank = rank(&solution);
+        let measured = self.data.rows.iter().flat_map(|r| &r.outputs).flatten().count() + at.known.1.len();
+        if measured <= rank {
+            return Err(SystemCalibrationError::TooFew { found: measured, unknowns: rank });
+        }
+        let degrees_of_freedom = measured - rank;
+        let mean = at.cost() / degrees_of_freedom as f64;
+        let mut out =
+            FinalFit { best, at, solution, weaker, determined: Vec::new(), degrees_of_freedom, mean };
+        let determined = |j: usize| unknowns.observable(j) && out.determines(&[(j, 1.0)]);
+        out.determined = (0..unknowns.names.len()).map(determined).collect();
+        Ok(out)
+    }
+
+    /// Estimates of the unknowns.
+    fn quantities(&self, unknowns: &FreeUnknowns, fit: &FinalFit) -> Vec<SystemEstimated> {
+        let of = |(j, name): (usize, &String)| {
+            let named = (name.as_str(), self.unit(self.problem.free[j]));
+            fit.estimated(named, unknowns.verdicts[j], fit.determined[j], fit.best.x[j], &[(j, 1.0)])
+        };
+        unknowns.names.iter().enumerate().map(of).collect()
+    }
+
+    /// Estimates of the requested combinations, then of identifiable combinations of unknowns that are not
+    /// determined alone, by the symmetries of the model.
+    fn combinations(
+        &self,
+        judged: &Judgement,
+        names: &[String],
+        fit: &FinalFit,
+    ) -> Result<Vec<SystemEstimated>, ModelError> {
+        let all = self.problem.all(&self.base, &fit.best.x);
+        let (values, by_all) = self.problem.numeric.combinations(&all);
+        let by_free = by_all * self.problem.of_free(&self.base, &fit.best.x);
+        let requested = self.model.combinations.iter().zip(judged.asked()).enumerate().map(|(i, (c, v))| {
+            let terms: Vec<(usize, f64)> = by_free.row(i).iter().copied().enumerate().collect();
+            let determined = v.status == Status::Observable && fit.determines(&terms);
+            fit.estimated((c.text.as_str(), String::new()), Some(v), determined, values[i], &terms)
+        });
+        let mut out: Vec<SystemEstimated> = requested.collect();
+        for (text, degree, value, terms) in self.invariants(judged, names, &fit.best.x)? {
+            if out.iter().any(|c| c.name == text) {
+                continue;
+            }
+            let verdict = Verdict { status: Status::Observable, degree };
+            let named = (text.as_str(), String::new());
+            out.push(fit.estimated(named, Some(verdict), fit.determines(&terms), value, &terms));
+        }
+        Ok(out)
+    }
+
+    /// Covariance of the determined unknowns.
+    fn covariance(&self, names: &[String], fit: &FinalFit) -> CovarianceTable {
+        let own: Vec<usize> = (0..names.len()).filter(|&j| fit.determined[j]).collect();
+        let p = fit.solution.covariance();
+        CovarianceTable {
+            names: own.iter().map(|&j| names[j].clone()).collect(),
+            units: own.iter().map(|&j| self.unit(self.problem.free[j])).collect(),
+            estimates: own.iter().map(|&j| fit.best.x[j]).collect(),
+            covariance: own.iter().map(|&i| own.iter().map(|&j| p[(i, j)]).collect()).collect(),
+            rescaled: own
+                .iter()
+                .map(|&i| own.iter().map(|&j| fit.between(&[(i, 1.0)], &[(j, 1.0)])).collect())
+                .collect(),
+        }
+    }
+
+    /// True if the noise of every output is estimated: chi-square then says nothing.
+    fn all_estimated(&self) -> bool {
+        self.estimated.iter().all(|e| *e)
+    }
+
+    /// Evidence against the model or its sigmas.
+    fn findings(
+        &self,
+        fit: &FinalFit,
+        residuals: &[SystemResidual],
+        outputs: &[OutputFit],
+    ) -> Vec<SystemFinding> {
+        let (band, mean) = (fit.band(), fit.mean);
+        let mut out = Vec::new();
+        if self.problem.stopped {
+            out.push(SystemFinding::Interrupted);
+        } else if !fit.best.converged {
+            out.push(SystemFinding::NotSettled);
+        }
+        if !self.all_estimated() && !(band.0..=band.1).contains(&mean) {
+            out.push(SystemFinding::Noise { chi_square: mean, factor: mean.sqrt() });
+        }
+        for o in outputs {
+            if let Some(probability) =
+                o.whiteness_probability.filter(|p| p * (outputs.len() as f64) < levels::CORRELATED)
+            {
+                out.push(SystemFinding::Correlated { output: o.output.clone(), probability });
+            }
+        }
+        out.extend(self.outliers(residuals, outputs));
+        out
     }
 
     /// Identifiable products and sums of unknowns that are not determined alone: their text, degree, value at
@@ -476,6 +583,73 @@ impl<'a> Calibrating<'a> {
         }
         Ok(out)
     }
+}
+
+/// All filter states at the first start: values of the file, and 1 where it states none.
+fn first_start(model: &SystemModel, numeric: &Numeric<'_>) -> Result<DVector<f64>, ModelError> {
+    let nominal = &model.simulation;
+    let value = |(i, name): (usize, &String)| {
+        let found = nominal.named(&nominal.values, name);
+        let start = match numeric.states[i] {
+            FilterState::State { i, .. } => &model.states[i].start,
+            _ => &StateStart::Unknown,
+        };
+        match (found, start) {
+            (Some(v), _) => Ok(v),
+            (None, StateStart::Known) => Err(ModelError {
+                what: format!("`{name}`"),
+                message: "a known start without a value; expected one under [simulation.values]".into(),
+                span: None,
+            }),
+            (None, _) => Ok(1.0),
+        }
+    };
+    let base = numeric.names.iter().enumerate().map(value).collect::<Result<Vec<_>, _>>()?;
+    let mut base = DVector::from_vec(base);
+    numeric.set_known_starts(&mut base);
+    Ok(base)
+}
+
+/// Noise by output at the first start, and true for each output whose noise is estimated.
+fn first_noise(model: &SystemModel, data: &Read) -> (Vec<f64>, Vec<bool>) {
+    // a row without a sigma of its own needs one
+    let bare = |j: usize| data.rows.iter().any(|r| r.outputs[j].is_some() && r.sigmas[j].is_none());
+    let by_inputs = data.rows.iter().any(|r| r.inputs.iter().any(|(_, s)| *s > 0.0));
+    let (mut noise, mut estimated) = (Vec::new(), Vec::new());
+    for (j, (named, _)) in model.outputs.iter().enumerate() {
+        let given = model.simulation.noise.get(&named.name).copied();
+        let unknown = given.is_none() && bare(j) && !by_inputs;
+        estimated.push(unknown);
+        let spread = spread(data.rows.iter().filter_map(|r| r.outputs[j]));
+        noise.push(given.unwrap_or(if unknown { spread } else { 0.0 }));
+    }
+    (noise, estimated)
+}
+
+/// Longest step of integration, and the number of steps over all rows.
+///
+/// # Errors
+/// [`SystemCalibrationError::TooLong`], before the work begins.
+fn integration_steps(model: &SystemModel, data: &Read) -> Result<(f64, f64), SystemCalibrationError> {
+    let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
+    let usual = if last > 0.0 { last / 50.0 } else { 1.0 };
+    let longest = model.simulation.step.unwrap_or(f64::INFINITY).min(usual);
+    let mut found = 0.0;
+    for run in data.rows.chunk_by(|a, b| (a.experiment, a.run) == (b.experiment, b.run)) {
+        let steps = |from: f64, to: f64| ((to - from) / longest).ceil().max(1.0);
+        found += steps(0.0, run[0].t) + run.windows(2).map(|w| steps(w[0].t, w[1].t)).sum::<f64>();
+    }
+    let most = STEPS + STEPS_A_ROW * data.rows.len() as f64;
+    if !model.states.is_empty() && found > most {
+        let record = data.name.clone();
+        return Err(SystemCalibrationError::TooLong { record, last, found, longest, most });
+    }
+    Ok((longest, found))
+}
+
+/// Error of `starts` from which the model gives no numbers.
+fn nowhere(starts: usize) -> impl Fn(EkfError) -> SystemCalibrationError {
+    move |reason| SystemCalibrationError::Nowhere { starts, reason }
 }
 
 /// Name of an unknown without its experiment.
