@@ -11,6 +11,7 @@ mod answer;
 mod branches;
 mod candidates;
 mod canonical;
+mod compile;
 pub(crate) mod constraints;
 mod counts;
 pub(crate) mod dag;

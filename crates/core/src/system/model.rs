@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 
-use super::constraints::{ConstraintFactor, below, slots_of};
-use super::dag::{Dag, DagError, Op};
+use super::constraints::ConstraintFactor;
+use super::dag::{Dag, Op};
 use super::error::ModelError;
 use super::work::WorkLimit;
-use crate::language::{Expression, Function, MAX_NAME, among, nearest};
+use crate::language::{Expression, Function, MAX_NAME};
 use crate::model::recording::Recording;
 use crate::title_block::TitleBlock;
 
@@ -373,9 +373,9 @@ impl Compiled {
 /// Experiment as nodes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct CompiledExperiment {
-    rates: Vec<usize>,
-    outputs: Vec<usize>,
-    constants: Vec<Option<usize>>,
+    pub(super) rates: Vec<usize>,
+    pub(super) outputs: Vec<usize>,
+    pub(super) constants: Vec<Option<usize>>,
 }
 
 /// Segment as nodes.
@@ -479,7 +479,7 @@ impl SystemModel {
     }
 
     /// All names with their roles, in slot order.
-    fn roles(&self) -> Vec<(String, Role)> {
+    pub(super) fn roles(&self) -> Vec<(String, Role)> {
         let mut out: Vec<(String, Role)> = Vec::new();
         out.extend(self.states.iter().enumerate().map(|(i, s)| (s.named.name.clone(), Role::State(i))));
         out.extend(self.parameters.iter().enumerate().map(|(i, p)| (p.name.clone(), Role::Parameter(i))));
@@ -508,7 +508,7 @@ impl SystemModel {
             let message = format!("{found} states and parameters; expected at most {MAX_UNKNOWNS} unknowns");
             return Err(ModelError { what: "the model".into(), message, span: None });
         }
-        self.compile_into(Dag::default())
+        self.graph()
     }
 
     /// Checks conditions that need no graph: at least one state or parameter, one output, and distinct
@@ -574,213 +574,5 @@ impl SystemModel {
             check_length("description", &of.name, &of.description, MAX_DESCRIPTION)?;
         }
         Ok(())
-    }
-
-    fn compile_into(&self, mut dag: Dag) -> Result<Compiled, ModelError> {
-        let roles = self.roles();
-        let mut names: HashMap<String, usize> = HashMap::new();
-        for (slot, (name, _)) in roles.iter().enumerate() {
-            names.insert(name.clone(), dag.slot(slot));
-        }
-        let role_of: HashMap<String, Role> = roles.iter().cloned().collect();
-        let mut places: HashMap<usize, (Place, Range<usize>)> = HashMap::new();
-        let mut node = |dag: &mut Dag, formula: &PlacedExpression, names: &HashMap<String, usize>| {
-            let before = dag.ops.len();
-            let made = dag.translate(&formula.expression, &|name| names.get(name).copied());
-            let span = |i: usize| formula.expression.spans.get(i).cloned().unwrap_or(0..0);
-            let node = made.map_err(|(error, i)| {
-                let is_output = |name: &String| self.outputs.iter().any(|o| o.0.name == *name);
-                let hint = match &error {
-                    DagError::UnknownName(name) if is_output(name) => {
-                        Some(": an output, to which nothing can refer".into())
-                    }
-                    DagError::UnknownName(name) => {
-                        let mut known: Vec<String> = names.keys().cloned().collect();
-                        known.sort();
-                        let declared = match nearest(name, &known) {
-                            Some(_) => "",
-                            None => "; new names are declared as parameters, constants or known_inputs",
-                        };
-                        Some(format!("; {}{declared}", among(name, &known)))
-                    }
-                    _ => None,
-                };
-                formula.place.error(format!("{error}{}", hint.unwrap_or_default()), span(i))
-            })?;
-            for made in before..dag.ops.len() {
-                places.insert(made, (formula.place.clone(), formula.expression.span()));
-            }
-            if dag.ops.len() > MAX_NODES {
-                return Err(formula
-                    .place
-                    .error(format!("more than {MAX_NODES} operations in the model"), span(0)));
-            }
-            Ok(node)
-        };
-        // names in the value of a constant: other constants that come before
-        let constant_names: HashMap<String, usize> =
-            self.constants.iter().map(|(n, _)| (n.name.clone(), names[&n.name])).collect();
-        let shared = names.clone();
-        let mut experiments: Vec<CompiledExperiment> = Vec::new();
-        let changed: HashSet<&str> =
-            self.segments.iter().flat_map(|s| &s.constants).map(|(name, _)| name.as_str()).collect();
-        let slot_of: HashMap<String, usize> =
-            roles.iter().enumerate().map(|(i, r)| (r.0.clone(), i)).collect();
-        // names in starts, jumps and combinations: values that are the same in all experiments
-        let mut always: Option<HashMap<usize, (i64, i64)>> = None;
-        for experiment in 0..self.own.len().max(1) {
-            let mut own = CompiledExperiment::default();
-            dag.definite.clear();
-            let mut before: HashMap<String, usize> = HashMap::new();
-            for (i, (named, _)) in self.constants.iter().enumerate() {
-                let formula = self.constant_formula(experiment, i);
-                own.constants.push(formula.map(|f| node(&mut dag, f, &before)).transpose()?);
-                before.insert(named.name.clone(), names[&named.name]);
-                // a segment may change the value
-                let own_value = own.constants[i].filter(|_| !changed.contains(named.name.as_str()));
-                if let Some(value) = own_value.and_then(|node| dag.rational(node)) {
-                    dag.definite.insert(slot_of[&named.name], value);
-                }
-            }
-            let mut inside = shared.clone();
-            for (i, (named, _)) in self.known_inputs.iter().enumerate() {
-                if let KnownInput::Function(formula) = self.known_input(experiment, i) {
-                    let mut allowed = constant_names.clone();
-                    if let Some(&t) = shared.get("t").filter(|_| role_of.get("t") == Some(&Role::Time)) {
-                        allowed.insert("t".into(), t);
-                    }
-                    let value = node(&mut dag, formula, &allowed)?;
-                    inside.insert(named.name.clone(), value);
-                }
-            }
-            for (name, formula) in &self.definitions {
-                let value = node(&mut dag, formula, &inside)?;
-                inside.insert(name.clone(), value);
-            }
-            for s in &self.states {
-                own.rates.push(node(&mut dag, &s.equation, &inside)?);
-            }
-            for (_, formula) in &self.outputs {
-                own.outputs.push(node(&mut dag, formula, &inside)?);
-            }
-            if experiment == 0 {
-                names = inside;
-            }
-            experiments.push(own);
-            let here = &dag.definite;
-            always = Some(match always {
-                None => here.clone(),
-                Some(all) => all.into_iter().filter(|(slot, value)| here.get(slot) == Some(value)).collect(),
-            });
-        }
-        dag.definite = always.unwrap_or_default();
-        // a known start may depend on constants, and on states whose start is not given by a formula
-        let mut start_names = constant_names.clone();
-        for p in &self.parameters {
-            start_names.insert(p.name.clone(), names[&p.name]);
-        }
-        for s in self.states.iter().filter(|s| !matches!(s.start, StateStart::Value(_))) {
-            start_names.insert(s.named.name.clone(), names[&s.named.name]);
-        }
-        let mut starts = Vec::new();
-        for s in &self.states {
-            starts.push(match &s.start {
-                StateStart::Value(formula) => Some(node(&mut dag, formula, &start_names)?),
-                _ => None,
-            });
-        }
-        for (name, formula) in self.own.iter().flat_map(|e| &e.constants) {
-            if !matches!(role_of.get(name), Some(Role::Constant(_))) {
-                let message = format!("`{name}` is no known constant; expected one of the constants");
-                return Err(formula.place.error(message, 0..0));
-            }
-        }
-        let mut segments = Vec::new();
-        for segment in &self.segments {
-            let mut compiled = CompiledSegment::default();
-            for (name, formula) in &segment.constants {
-                let Some(Role::Constant(c)) = role_of.get(name) else {
-                    let message = format!("`{name}` is no known constant; expected one of the constants");
-                    return Err(formula.place.error(message, 0..0));
-                };
-                compiled.constants.push((*c, node(&mut dag, formula, &constant_names)?));
-            }
-            let mut carried = start_names.clone();
-            for s in &self.states {
-                carried.insert(s.named.name.clone(), names[&s.named.name]);
-            }
-            for (name, formula) in &segment.carry {
-                let Some(Role::State(s)) = role_of.get(name) else {
-                    let message = format!("`{name}` is no state; expected one of the states");
-                    return Err(formula.place.error(message, 0..0));
-                };
-                compiled.carry.push((*s, node(&mut dag, formula, &carried)?));
-            }
-            segments.push(compiled);
-        }
-        let mut constraints = Vec::new();
-        for formula in &self.constraints {
-            let made = node(&mut dag, formula, &names)?;
-            self.check_constraint(&dag, &roles, made, formula)?;
-            constraints.push(made);
-        }
-        let mut not_negative = Vec::new();
-        for formula in &self.not_negative {
-            not_negative.push(node(&mut dag, formula, &names)?);
-        }
-        let mut combinations = Vec::new();
-        for formula in &self.combinations {
-            combinations.push(node(&mut dag, formula, &names)?);
-        }
-        Ok(Compiled {
-            dag,
-            roles: roles.into_iter().map(|r| r.1).collect(),
-            experiments,
-            starts,
-            segments,
-            constraints,
-            not_negative,
-            combinations,
-            places,
-        })
-    }
-
-    /// Checks that a constraint is rational in states whose start is not given, parameters and constants,
-    /// and that its value can change.
-    fn check_constraint(
-        &self,
-        dag: &Dag,
-        roles: &[(String, Role)],
-        node: usize,
-        formula: &PlacedExpression,
-    ) -> Result<(), ModelError> {
-        let refuse = |message: String| Err(formula.place.error(message, 0..formula.text.len()));
-        if below(dag, node).into_iter().any(|i| matches!(dag.ops[i], Op::Primitive { .. } | Op::Pi)) {
-            return refuse(
-                "a function; expected + - * / and whole powers, or norm(v) = c, which is taken squared"
-                    .into(),
-            );
-        }
-        let mut moves = false;
-        for slot in slots_of(dag, node) {
-            let (name, role) = &roles[slot];
-            let kind = match role {
-                Role::State(i) if matches!(self.states[*i].start, StateStart::Value(_)) => {
-                    "a state whose start is given"
-                }
-                Role::State(_) | Role::Parameter(_) => {
-                    moves = true;
-                    continue;
-                }
-                Role::Constant(_) => continue,
-                Role::KnownInput(_) | Role::UnknownInput(_) => "an input",
-                Role::Time => "the time",
-            };
-            return refuse(format!("`{name}` is {kind}; expected states, parameters and constants"));
-        }
-        match moves {
-            true => Ok(()),
-            false => refuse("nothing unknown; expected states or parameters in it".into()),
-        }
     }
 }
