@@ -140,8 +140,8 @@ pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
             clock_jump(&of(record), *by_s, &behind, *chi_square, *explains)
         }
         Finding::Copy { record, other, correlation } => format!(
-            "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a copy, \
-             and counts twice"
+            "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a \
+             copy, and counts twice"
         ),
         Finding::Turns { record, factor, slew_rate_deg_s } => turns(&of(record), *factor, *slew_rate_deg_s),
         Finding::Position { record, position, chi_square, factor } => {

@@ -1,7 +1,10 @@
 //! Documents and figures of found schemes.
 
 use obsdeg_core::model::Carry;
-use obsdeg_design::design::{BiasPoint, Certificate, Design, Found, PartsReport, SearchReport, Weight};
+use obsdeg_design::design::{
+    BiasPoint, Certificate, Design, EverywhereReport, Found, PartsReport, Rounded, SearchReport, TiesReport,
+    Weight,
+};
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
@@ -192,65 +195,9 @@ fn gimbal_angles(f: &Found) -> Block {
     Block::table("Gimbal angles of the first [deg]", columns, rows)
 }
 
+/// How the schemes were found and ordered, one sentence each.
 fn how(d: &Design, s: &SearchReport) -> Vec<String> {
-    let images = if d.symmetry > 1 {
-        format!(
-            ", one of every {} that turns of the platform axes make of each other (coefficients renamed)",
-            d.symmetry
-        )
-    } else {
-        String::new()
-    };
-    let evaluated = match s.excluded {
-        0 => format!("{} evaluated{images}", s.examined),
-        excluded => format!(
-            "{} evaluated, {excluded} excluded by a bound on what their last two positions can add{images}",
-            s.examined
-        ),
-    };
-    let known = s.certificate.as_ref().map(|c| {
-        format!("at most {} above the best of these candidates, by a bound", first_above(d, c).0.percent)
-    });
-    let mut out = vec![if s.proven {
-        let unrefined = searched(d);
-        let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
-        format!(
-            "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all \
-             sequences of {} of them within the constraints none has a smaller worst degree, or the same and \
-             a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left \
-             open",
-            d.candidates.len(),
-            if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
-            s.positions
-        )
-    } else if s.ties.is_some() && s.ranked.is_some() {
-        format!(
-            "not proven: all sequences were searched by sigma alone ({evaluated}), without what is not estimated"
-        )
-    } else if s.ties.is_some() {
-        format!(
-            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a \
-             probability of up to {}",
-            words::at_most(d.error_bound)
-        )
-    } else if s.interrupted {
-        let known = known.map_or_else(String::new, |k| format!(", {k}"));
-        format!("interrupted after {} sequences: the best so far{known}", s.examined)
-    } else {
-        let known = known.map_or_else(String::new, |k| format!("; {k}"));
-        let rounded =
-            s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
-        let by = match rounded {
-            true => {
-                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on \
-                 the grid of rounded angles"
-            }
-            false => "coordinate exchange from random starts",
-        };
-        let all =
-            s.sequences.map_or_else(String::new, |n| format!("; --within 0 searches all {n} sequences"));
-        format!("not proven: {by}, {} sequences examined{known}{all}", s.examined)
-    }];
+    let mut out = vec![searched_how(d, s)];
     out.extend(s.parts.as_ref().map(parts));
     if d.found.iter().any(|f| f.image_of.is_some()) {
         out.push(
@@ -271,29 +218,8 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             if s.conditions.slew_rate_deg_s.is_some() { " with the slews" } else { "" }
         ));
     }
-    out.extend(s.ties.map(|t| match t.sequences {
-        1 => format!(
-            "no other sequence is as good (worst degree equal, criterion within {:e} of it)",
-            t.within
-        ),
-        n => format!(
-            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within \
-             {:e} of it)",
-            t.within
-        ),
-    }));
-    out.push(
-        if s.order_matters && d.carry == Carry::Reset {
-            "orders of the same positions are different schemes: the noise of Z is correlated from one to \
-             the next; a position may be repeated"
-        } else if s.order_matters {
-            "orders of the same positions are different schemes: the dwell lets psi move in between; a \
-             position may be repeated"
-        } else {
-            "the order of positions does not matter under reset carry; a position may be repeated"
-        }
-        .into(),
-    );
+    out.extend(s.ties.map(equally_good));
+    out.push(orders_of_positions(d, s).into());
     if s.conditions.slew_rate_deg_s.is_some() {
         out.push(
             match s.degree_floor {
@@ -311,16 +237,139 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             .into(),
         );
         out.push(
-            "half turns are tried in both directions, which are different schemes: the axis about which they \
-             are right-handed stands before the position"
-                .into(),
+        "half turns are tried in both directions, which are different schemes: the axis about which they \
+         are right-handed stands before the position"
+            .into(),
         );
     }
+    out.push(order_of_schemes(s));
+    out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
+    out
+}
+
+/// Number of sequences that were evaluated and excluded.
+fn evaluated(d: &Design, s: &SearchReport) -> String {
+    let images = if d.symmetry > 1 {
+        format!(
+            ", one of every {} that turns of the platform axes make of each other (coefficients renamed)",
+            d.symmetry
+        )
+    } else {
+        String::new()
+    };
+    match s.excluded {
+        0 => format!("{} evaluated{images}", s.examined),
+        excluded => format!(
+            "{} evaluated, {excluded} excluded by a bound on what their last two positions can add{images}",
+            s.examined
+        ),
+    }
+}
+
+/// Sentence on the search: proven, exhaustive, interrupted or by exchange.
+fn searched_how(d: &Design, s: &SearchReport) -> String {
+    if s.proven {
+        proven_best(d, s)
+    } else if s.ties.is_some() {
+        exhausted(d, s)
+    } else {
+        exchanged(d, s)
+    }
+}
+
+/// Sentence on a proven best scheme.
+fn proven_best(d: &Design, s: &SearchReport) -> String {
+    let evaluated = evaluated(d, s);
+    let unrefined = searched(d);
+    let if_searched = by_parts(s).map_or("", |_| ", if the parts were searched as they state");
+    format!(
+        "{unrefined} is proven to be the best of these {} candidates{if_searched}, by {}: of all \
+         sequences of {} of them within the constraints none has a smaller worst degree, or the same and \
+         a smaller criterion ({evaluated}); other attitudes, dwells and numbers of positions are left \
+         open",
+        d.candidates.len(),
+        if s.excluded > 0 { "exhaustion with a bound" } else { "exhaustion" },
+        s.positions
+    )
+}
+
+/// Sentence on a search of all sequences that proves nothing.
+fn exhausted(d: &Design, s: &SearchReport) -> String {
+    let evaluated = evaluated(d, s);
+    if s.ranked.is_some() {
+        format!(
+            "not proven: all sequences were searched by sigma alone ({evaluated}), without what is not \
+             estimated"
+        )
+    } else {
+        format!(
+            "not proven: all sequences were searched ({evaluated}), but one may be overlooked with a \
+             probability of up to {}",
+            words::at_most(d.error_bound)
+        )
+    }
+}
+
+/// Sentence on a search of some sequences.
+fn exchanged(d: &Design, s: &SearchReport) -> String {
+    let known = s.certificate.as_ref().map(|c| {
+        format!("at most {} above the best of these candidates, by a bound", first_above(d, c).0.percent)
+    });
+    if s.interrupted {
+        let known = known.map_or_else(String::new, |k| format!(", {k}"));
+        format!("interrupted after {} sequences: the best so far{known}", s.examined)
+    } else {
+        let known = known.map_or_else(String::new, |k| format!("; {k}"));
+        let rounded =
+            s.certificate.as_ref().and_then(|c| c.everywhere.as_ref()).is_some_and(|e| e.rounded.is_some());
+        let by = match rounded {
+            true => {
+                "schemes of the cardinal attitudes, of the weights' and random ones, exchanged and moved on \
+                 the grid of rounded angles"
+            }
+            false => "coordinate exchange from random starts",
+        };
+        let all =
+            s.sequences.map_or_else(String::new, |n| format!("; --within 0 searches all {n} sequences"));
+        format!("not proven: {by}, {} sequences examined{known}{all}", s.examined)
+    }
+}
+
+/// Sentence on sequences that are as good as the best.
+fn equally_good(t: TiesReport) -> String {
+    match t.sequences {
+        1 => format!(
+            "no other sequence is as good (worst degree equal, criterion within {:e} of it)",
+            t.within
+        ),
+        n => format!(
+            "{n} sequences are as good, itself and its images counted (worst degree equal, criterion within \
+             {:e} of it)",
+            t.within
+        ),
+    }
+}
+
+/// Sentence on orders of the same positions.
+fn orders_of_positions(d: &Design, s: &SearchReport) -> &'static str {
+    if s.order_matters && d.carry == Carry::Reset {
+        "orders of the same positions are different schemes: the noise of Z is correlated from one to \
+         the next; a position may be repeated"
+    } else if s.order_matters {
+        "orders of the same positions are different schemes: the dwell lets psi move in between; a \
+         position may be repeated"
+    } else {
+        "the order of positions does not matter under reset carry; a position may be repeated"
+    }
+}
+
+/// Sentence on the order of schemes: worst degree and criterion.
+fn order_of_schemes(s: &SearchReport) -> String {
     let by = match s.conditions.bench {
         Some(_) => format!("{}; with the bench a sigma is a total uncertainty", criterion(&s.criterion)),
         None => criterion(&s.criterion).into(),
     };
-    out.push(match s.degree_floor {
+    match s.degree_floor {
         Some(floor) => format!(
             "a smaller worst degree comes first (no scheme of these candidates is below {floor}), then the \
              criterion, {by}"
@@ -329,9 +378,7 @@ fn how(d: &Design, s: &SearchReport) -> Vec<String> {
             "torquer errors act in every turn, so that only a whole scheme has degrees: schemes are ordered \
              by the criterion alone, {by}; what is listed is observable by the exact verdict"
         ),
-    });
-    out.extend(s.constraints.iter().map(|c| format!("constraint: {c}")));
-    out
+    }
 }
 
 /// Criterion of the first scheme of the search; not a number if there is none.
@@ -349,30 +396,56 @@ fn first_above(d: &Design, c: &Certificate) -> (Excess, Option<Excess>) {
 
 /// Sentences on the bound of the criterion, and on how close to it the found schemes are.
 fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
-    let Some(c) = &s.certificate else {
-        let why = match s.order_matters {
-            _ if s.conditions.accelerometer_bias.is_some() => {
-                "not known: the noise of Z is correlated from position to position, so the information of a \
-                 scheme is no sum over its positions, and no bound is computed"
-                    .into()
-            }
-            true => format!(
-                "not known: under {} carry the information of a scheme is no sum over its positions, and no \
-                 bound is computed",
-                d.carry
-            ),
-            false if s.interrupted => "not known: interrupted".into(),
-            false => "not known: the weights of the candidates prove nothing here".into(),
-        };
-        return vec![why];
+    let Some(c) = &s.certificate else { return vec![no_bound(d, s)] };
+    let (above_candidates, above_all) = first_above(d, c);
+    let mut out = bound_of_candidates(d, s, c, &above_candidates);
+    out.push(format!("weights, as parts of their sum: {}", weights(&c.weights)));
+    let Some((every, above)) = c.everywhere.as_ref().zip(above_all) else {
+        out.push("of all attitudes: no bound was computed".into());
+        return out;
     };
+    out.push(bound_of_all_attitudes(d, s, &above));
+    out.push(weights_on_all_attitudes(every));
+    let ratio = c.best_possible / every.attained;
+    match &every.rounded {
+        Some(rounded) => out.extend(cost_of_rounding(d, rounded)),
+        None if ratio > FAR => out.push(format!(
+            "these candidates cost: weights on other attitudes, as if positions could be divided, would \
+             reach a criterion {ratio:.2} times smaller than any scheme of these has (--candidates free or \
+             --refine look for them; so few positions may not come near it)"
+        )),
+        None => {}
+    }
+    out
+}
+
+/// Sentence on the reason why there is no bound.
+fn no_bound(d: &Design, s: &SearchReport) -> String {
+    match s.order_matters {
+        _ if s.conditions.accelerometer_bias.is_some() => {
+            "not known: the noise of Z is correlated from position to position, so the information of a \
+             scheme is no sum over its positions, and no bound is computed"
+                .into()
+        }
+        true => format!(
+            "not known: under {} carry the information of a scheme is no sum over its positions, and no \
+             bound is computed",
+            d.carry
+        ),
+        false if s.interrupted => "not known: interrupted".into(),
+        false => "not known: the weights of the candidates prove nothing here".into(),
+    }
+}
+
+/// Sentences on the bound for the candidates.
+fn bound_of_candidates(d: &Design, s: &SearchReport, c: &Certificate, above: &Excess) -> Vec<String> {
     let first = searched(d);
-    let (Excess { value, bound, percent }, above_all) = first_above(d, c);
+    let Excess { value, bound, percent } = above;
     let beyond = match s.proven {
         true => format!("{percent} above that bound"),
         false => format!("at most {percent} above the best of them"),
     };
-    let mut out = vec![
+    vec![
         format!(
             "proven by a bound, without a search: no scheme of {} of these candidates in equal dwells, of \
              whatever degrees, has a criterion below {bound}; {first}, of {value}, is {beyond} ({} {:.6} at \
@@ -386,13 +459,13 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
              could be divided: those listed would reach {}, and this way of bounding gives no more",
             number(c.attained)
         ),
-    ];
-    out.push(format!("weights, as parts of their sum: {}", weights(&c.weights)));
-    let Some((every, above)) = c.everywhere.as_ref().zip(above_all) else {
-        out.push("of all attitudes: no bound was computed".into());
-        return out;
-    };
-    out.push(format!(
+    ]
+}
+
+/// Sentence on the bound for all attitudes.
+fn bound_of_all_attitudes(d: &Design, s: &SearchReport, above: &Excess) -> String {
+    let first = searched(d);
+    format!(
         "proven by a bound, of all attitudes: no scheme of {} attitudes whatever in equal dwells has a \
          criterion below {}{}; {first}, of {}, is {} above that, and what lies between is left open: so few \
          positions may not reach the bound (attitudes that add most are sought on a net; between its points \
@@ -403,51 +476,48 @@ fn bound(d: &Design, s: &SearchReport) -> Vec<String> {
         if s.criterion == "margin" { ", requirements on psi left out" } else { "" },
         above.value,
         above.percent
-    ));
+    )
+}
+
+/// Sentence on the best weights on all attitudes.
+fn weights_on_all_attitudes(every: &EverywhereReport) -> String {
     let lighter = match every.lighter {
         0 => String::new(),
         n => format!("; {n} lighter ones, {} together, are not listed", number(every.lighter_weight)),
     };
-    out.push(format!(
+    format!(
         "weights on {} attitudes, as parts of their sum, would reach {}: {}{lighter}",
         every.weights.len() + every.lighter,
         number(every.attained),
         weights(&every.weights)
-    ));
-    let ratio = c.best_possible / every.attained;
-    match &every.rounded {
-        Some(rounded) => {
-            out.push(format!(
-                "the candidates are the cardinal attitudes, and those of weights and of schemes near them \
-                 with angles rounded to {} deg; every criterion listed is that of the angles as they are \
-                 listed",
-                rounded.step_deg
-            ));
-            out.push(match &rounded.finer {
-                Some(finer) => {
-                    let cost = Excess::new(first_value(d), finer.value, 0.0);
-                    format!(
-                        "rounding costs {}: with angles in hundredths of a degree a criterion of {} was \
-                         found, and here {}, at {}",
-                        cost.percent,
-                        cost.bound,
-                        cost.value,
-                        finer.angles.join(" ")
-                    )
-                }
-                None => "rounding costs nothing that was found: no better scheme with angles in hundredths \
-                         of a degree"
-                    .into(),
-            });
+    )
+}
+
+/// Sentences on angles that are rounded, and on the cost of rounding.
+fn cost_of_rounding(d: &Design, rounded: &Rounded) -> [String; 2] {
+    let on_a_grid = format!(
+        "the candidates are the cardinal attitudes, and those of weights and of schemes near them \
+         with angles rounded to {} deg; every criterion listed is that of the angles as they are \
+         listed",
+        rounded.step_deg
+    );
+    let cost = match &rounded.finer {
+        Some(finer) => {
+            let cost = Excess::new(first_value(d), finer.value, 0.0);
+            format!(
+                "rounding costs {}: with angles in hundredths of a degree a criterion of {} was \
+                 found, and here {}, at {}",
+                cost.percent,
+                cost.bound,
+                cost.value,
+                finer.angles.join(" ")
+            )
         }
-        None if ratio > FAR => out.push(format!(
-            "these candidates cost: weights on other attitudes, as if positions could be divided, would \
-             reach a criterion {ratio:.2} times smaller than any scheme of these has (--candidates free or \
-             --refine look for them; so few positions may not come near it)"
-        )),
-        None => {}
-    }
-    out
+        None => "rounding costs nothing that was found: no better scheme with angles in hundredths \
+                 of a degree"
+            .into(),
+    };
+    [on_a_grid, cost]
 }
 
 /// `0.25 each of NUE NDW; 0.1 of WUN`: equal weights together, largest first.

@@ -292,7 +292,7 @@ fn kept_constraints(a: &SystemAnalysis) -> String {
         match several {
             true =>
                 "; where it can hold in several ways (x^2 = y^2 by x = y or by x = -y), they are \
-                     those of one: state that one to choose",
+                 those of one: state that one to choose",
             false => "",
         }
     )
