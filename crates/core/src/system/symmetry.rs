@@ -1,7 +1,7 @@
 //! Scaling and translation symmetries: directions `c_i x_i + d_i` with rational `c_i`, `d_i` that change no
 //! output, at any point.
 
-use obsdeg_exact::{Reals, RowSpace};
+use obsdeg_exact::{Reals, RowSpace, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
@@ -79,7 +79,7 @@ pub struct Symmetries {
 
 /// Operations that remain for a search for symmetries: all points together take at most the limit of one
 /// verdict, and all searches for short vectors as much again.
-struct Budget {
+struct WorkBudget {
     limit: WorkLimit,
     /// Operations that are reserved for the changes that are tried afterwards.
     reserved: u64,
@@ -90,7 +90,7 @@ struct Budget {
     over: bool,
 }
 
-impl Budget {
+impl WorkBudget {
     /// Counts operations before they are done; false if they exceed the limit.
     fn spend(&mut self, operations: u64) -> bool {
         let most = self.limit.operations().saturating_sub(self.reserved);
@@ -196,119 +196,280 @@ fn symmetries_in<S: Values>(
     if defect == 0 {
         return Ok(Symmetries::default());
     }
-    let mut rng = model.random(seed, "symmetries");
-    let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
-    let mut basis = space(2 * n);
-    // an unknown that is not excited is reported separately; an observable one never changes
-    for c in (0..n).filter(|&c| !excited[c] || judged.findings.degrees.degree[c].is_some()) {
-        for column in [c, n + c] {
-            let unit: Vec<_> = (0..2 * n).map(|j| if j == column { f.one() } else { f.zero() }).collect();
-            basis.insert(&unit);
+    let mut search = SymmetrySearch::new(f, model, compiled, judged, seed);
+    let mut basis = search.still_unknowns();
+    let Some(at) = search.sample(&mut basis)? else {
+        let (stopped, work) = (search.budget.stopped(), search.budget.spent);
+        return Ok(Symmetries { stopped, work, ..Symmetries::default() });
+    };
+    let mut tangents = search.space(n);
+    let mut out = Symmetries { found: search.linear(&basis, &at, &mut tangents), ..Symmetries::default() };
+    if out.found.len() < defect {
+        out.polynomial = search.polynomial(defect - out.found.len(), &at, &mut tangents)?;
+    }
+    if out.found.len() + out.polynomial.len() < defect {
+        out.unexplained = search.unexplained(&at, &mut tangents);
+    }
+    out.invariants = invariants(&search.f, n, &out.found, &at, &mut search.budget);
+    (out.stopped, out.work) = (search.budget.stopped(), search.budget.spent);
+    Ok(out)
+}
+
+/// Search for the symmetries of a judged model in a field.
+struct SymmetrySearch<'a, S: Values> {
+    f: S,
+    model: &'a SystemModel,
+    compiled: &'a Compiled,
+    judged: &'a Judgement,
+    rng: SplitMix64,
+    budget: WorkBudget,
+    /// Operations of a point.
+    point_work: u64,
+}
+
+impl<'a, S: Values> SymmetrySearch<'a, S> {
+    fn new(f: S, model: &'a SystemModel, compiled: &'a Compiled, judged: &'a Judgement, seed: u64) -> Self {
+        let reserved = judged.work.saturating_mul(RESERVED).min(model.work_limit.operations() / 10);
+        Self {
+            f,
+            model,
+            compiled,
+            judged,
+            rng: model.random(seed, "symmetries"),
+            budget: WorkBudget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false },
+            // a verdict takes two points
+            point_work: judged.work / 2,
         }
     }
-    let (mut last, mut at): (usize, Option<PointDegrees<S>>) = (0, None);
-    let rank = judged.findings.degrees.rank();
-    let reserved = judged.work.saturating_mul(RESERVED).min(model.work_limit.operations() / 10);
-    let mut budget = Budget { limit: model.work_limit, reserved, spent: 0, short: 0, over: false };
-    // a verdict takes two points
-    let mut verdict = judged.work / 2;
-    // constraints that can hold in several ways have points with other verdicts
-    let alike = |at: &PointDegrees<S>| model.constraints.is_empty() || at.degrees == judged.findings.degrees;
-    let (mut point, mut elsewhere) = (0, 0);
-    while point < POINTS && elsewhere < ELSEWHERE {
-        if !budget.spend(cost_of_point::<S>(verdict, rank, 2 * n)) {
-            break;
+
+    /// Number of unknowns.
+    fn unknowns(&self) -> usize {
+        self.judged.layout.unknowns.len()
+    }
+
+    fn space(&self, columns: usize) -> S::Space {
+        <S::Space as RowSpace>::new(self.f.clone(), columns)
+    }
+
+    /// True if an unknown can change without a change of an output: it is excited and not observable.
+    fn can_move(&self, unknown: usize) -> bool {
+        let degrees = &self.judged.findings.degrees;
+        degrees.excited[unknown] && degrees.degree[unknown].is_none()
+    }
+
+    /// Unit vectors of the scalings and translations of unknowns that do not change.
+    fn still_unknowns(&self) -> S::Space {
+        let (f, n) = (&self.f, self.unknowns());
+        let mut basis = self.space(2 * n);
+        // an unknown that is not excited is reported separately; an observable one never changes
+        for c in (0..n).filter(|&c| !self.can_move(c)) {
+            for column in [c, n + c] {
+                let unit: Vec<_> = (0..2 * n).map(|j| if j == column { f.one() } else { f.zero() }).collect();
+                basis.insert(&unit);
+            }
         }
+        basis
+    }
+
+    /// True if a point has the verdicts of the model. Constraints that can hold in several ways have points
+    /// with other verdicts.
+    fn is_alike(&self, at: &PointDegrees<S>) -> bool {
+        self.model.constraints.is_empty() || at.degrees == self.judged.findings.degrees
+    }
+
+    /// Random point with its verdict, and the operations that it took.
+    fn point(&mut self) -> Result<(PointDegrees<S>, u64), ModelError> {
         let mut spent = Spent::default();
-        let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent)?;
-        if !alike(&here) {
-            elsewhere += 1;
-            continue;
-        }
-        for i in 0..here.span.rank() {
-            let row = here.span.row(i);
-            let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
-            let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
-            if !budget.insert::<S>(&mut basis, &both) {
+        let layout = &self.judged.layout;
+        let here = climb_at(self.model, self.compiled, layout, self.f.clone(), &mut self.rng, &mut spent)?;
+        Ok((here, spent.operations))
+    }
+
+    /// Adds the conditions on scalings and translations at random points to `basis`, until a point adds
+    /// nothing. Returns the last point; `None` if the work allows none.
+    fn sample(&mut self, basis: &mut S::Space) -> Result<Option<PointDegrees<S>>, ModelError> {
+        let f = self.f.clone();
+        let (n, rank) = (self.unknowns(), self.judged.findings.degrees.rank());
+        let (mut last, mut at): (usize, Option<PointDegrees<S>>) = (0, None);
+        let (mut point, mut elsewhere) = (0, 0);
+        while point < POINTS && elsewhere < ELSEWHERE {
+            if !self.budget.spend(cost_of_point::<S>(self.point_work, rank, 2 * n)) {
                 break;
             }
-        }
-        verdict = spent.operations;
-        at = Some(here);
-        if point >= 2 && basis.rank() == last {
-            break;
-        }
-        last = basis.rank();
-        point += 1;
-    }
-    let Some(at) = at else {
-        return Ok(Symmetries { stopped: budget.stopped(), work: budget.spent, ..Symmetries::default() });
-    };
-    let mut tangents = space(n);
-    let mut out = Symmetries::default();
-    let short = match !budget.over && basis.gap().is_decisive(S::BITS) {
-        true => budget.short_vectors(&f, &basis.null_space(), &basis, &mut space(2 * n)),
-        false => Vec::new(),
-    };
-    for v in short {
-        let tangent: Vec<_> = (0..n).map(|c| f.add(&f.mul(&v[c], &at.values[c]), &v[n + c])).collect();
-        let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
-        let terms = |half: &[(i64, i64)]| -> Vec<RationalTerm> {
-            half.iter().copied().enumerate().filter(|(_, k)| k.0 != 0).collect()
-        };
-        out.found.push(Symmetry { scaling: terms(&k[..n]), translation: terms(&k[n..]) });
-    }
-    if out.found.len() < defect {
-        let moved: Vec<usize> =
-            (0..n).filter(|&c| excited[c] && judged.findings.degrees.degree[c].is_none()).collect();
-        let mut draw = |budget: &mut Budget, columns: usize| {
-            for _ in 0..=ELSEWHERE {
-                if !budget.spend(cost_of_point::<S>(verdict, rank, columns)) {
+            let (here, operations) = self.point()?;
+            if !self.is_alike(&here) {
+                elsewhere += 1;
+                continue;
+            }
+            for i in 0..here.span.rank() {
+                let row = here.span.row(i);
+                let scaled = row.iter().zip(&here.values).map(|(r, x)| f.mul(r, x));
+                let both: Vec<_> = scaled.chain(row.iter().copied()).collect();
+                if !self.budget.insert::<S>(basis, &both) {
                     break;
                 }
-                let mut spent = Spent::default();
-                let here = climb_at(model, compiled, &judged.layout, f.clone(), &mut rng, &mut spent)?;
-                if alike(&here) {
-                    return Ok(Some(here));
-                }
             }
-            Ok(None)
+            self.point_work = operations;
+            at = Some(here);
+            if point >= 2 && basis.rank() == last {
+                break;
+            }
+            last = basis.rank();
+            point += 1;
+        }
+        Ok(at)
+    }
+
+    /// Scalings and translations: short null vectors of `basis` whose tangents at a point are independent.
+    fn linear(&mut self, basis: &S::Space, at: &PointDegrees<S>, tangents: &mut S::Space) -> Vec<Symmetry> {
+        let (f, n) = (self.f.clone(), self.unknowns());
+        let short = match !self.budget.over && basis.gap().is_decisive(S::BITS) {
+            true => {
+                let mut span = self.space(2 * n);
+                self.budget.short_vectors(&f, &basis.null_space(), basis, &mut span)
+            }
+            false => Vec::new(),
         };
-        // constants that all segments and experiments share may be factors too
+        let mut found = Vec::new();
+        for v in short {
+            let tangent: Vec<_> = (0..n).map(|c| f.add(&f.mul(&v[c], &at.values[c]), &v[n + c])).collect();
+            let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
+            let terms = |half: &[(i64, i64)]| -> Vec<RationalTerm> {
+                half.iter().copied().enumerate().filter(|(_, k)| k.0 != 0).collect()
+            };
+            found.push(Symmetry { scaling: terms(&k[..n]), translation: terms(&k[n..]) });
+        }
+        found
+    }
+
+    /// Polynomial directions, low degrees first, until `missing` are found.
+    fn polynomial(
+        &mut self,
+        missing: usize,
+        at: &PointDegrees<S>,
+        tangents: &mut S::Space,
+    ) -> Result<Vec<PolynomialDirection>, ModelError> {
+        let moved: Vec<usize> = (0..self.unknowns()).filter(|&c| self.can_move(c)).collect();
+        let factors = self.factors(&moved);
+        let mut out = Vec::new();
+        for degree in 1..=POLYNOMIAL_DEGREE {
+            let products = products(&factors, degree);
+            if out.len() == missing || moved.len() > MOVED || moved.len() * products.len() > S::COEFFICIENTS {
+                break;
+            }
+            out.extend(self.directions(&moved, &products, at, tangents)?);
+        }
+        Ok(out)
+    }
+
+    /// Factors of polynomial directions: unknowns, of many only those that change, and constants that all
+    /// segments and experiments share.
+    fn factors(&self, moved: &[usize]) -> Vec<usize> {
+        let (n, model) = (self.unknowns(), self.model);
         let changed =
             model.segments.iter().map(|s| &s.constants).chain(model.own.iter().map(|e| &e.constants));
         let changed: Vec<&String> = changed.flatten().map(|(name, _)| name).collect();
         let shared = |name: &String| !changed.contains(&name);
         let constants = model.constants.iter().enumerate().filter(|(_, c)| shared(&c.0.name));
-        let unknowns = if n <= MOVED { (0..n).collect() } else { moved.clone() };
-        let factors: Vec<usize> = unknowns.into_iter().chain(constants.map(|(i, _)| n + i)).collect();
-        for degree in 1..=POLYNOMIAL_DEGREE {
-            let products = products(&factors, degree);
-            if out.found.len() + out.polynomial.len() == defect
-                || moved.len() > MOVED
-                || moved.len() * products.len() > S::COEFFICIENTS
-            {
+        let unknowns = if n <= MOVED { (0..n).collect() } else { moved.to_vec() };
+        unknowns.into_iter().chain(constants.map(|(i, _)| n + i)).collect()
+    }
+
+    /// One more random point with the verdicts of the model, for rows of this many columns; `None` once the
+    /// work is used up.
+    fn draw(&mut self, columns: usize) -> Result<Option<PointDegrees<S>>, ModelError> {
+        let rank = self.judged.findings.degrees.rank();
+        for _ in 0..=ELSEWHERE {
+            if !self.budget.spend(cost_of_point::<S>(self.point_work, rank, columns)) {
                 break;
             }
-            out.polynomial.extend(directions(
-                &f,
-                &moved,
-                &products,
-                &mut tangents,
-                &at,
-                (&mut budget, &mut draw),
-            )?);
+            let (here, _) = self.point()?;
+            if self.is_alike(&here) {
+                return Ok(Some(here));
+            }
         }
+        Ok(None)
     }
-    if out.found.len() + out.polynomial.len() < defect {
+
+    /// Directions `v_i = sum_j a_ij m_j` over the unknowns that change, with m_j products of unknowns and
+    /// known constants. The a_ij solve a linear system of rows at several points, which are drawn as long as
+    /// work remains.
+    fn directions(
+        &mut self,
+        moved: &[usize],
+        products: &[Vec<usize>],
+        at: &PointDegrees<S>,
+        tangents: &mut S::Space,
+    ) -> Result<Vec<PolynomialDirection>, ModelError> {
+        let f = self.f.clone();
+        let width = products.len();
+        let Some(basis) = self.sample_products(moved, products)? else { return Ok(Vec::new()) };
+        let here = values_of(&f, products, at);
+        let mut span = self.space(moved.len() * width);
+        let mut out = Vec::new();
+        for v in self.budget.short_vectors(&f, &basis.null_space(), &basis, &mut span) {
+            let mut tangent = vec![f.zero(); tangents.columns()];
+            for (part, &m) in v.chunks_exact(width).zip(moved) {
+                tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
+            }
+            let Some(k) = rationals(&f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
+            let component = |(part, &m): (&[(i64, i64)], &usize)| {
+                let terms = products.iter().cloned().zip(part.iter().copied());
+                let terms: Vec<_> = terms.filter(|(_, k)| k.0 != 0).collect();
+                (!terms.is_empty()).then_some((m, terms))
+            };
+            let components = k.chunks_exact(width).zip(moved).filter_map(component).collect();
+            out.push(PolynomialDirection { components });
+        }
+        Ok(out)
+    }
+
+    /// Conditions on the coefficients a_ij at random points; `None` if the work or the digits do not suffice
+    /// for all of them.
+    fn sample_products(
+        &mut self,
+        moved: &[usize],
+        products: &[Vec<usize>],
+    ) -> Result<Option<S::Space>, ModelError> {
+        let f = self.f.clone();
+        let columns = moved.len() * products.len();
+        let mut basis = self.space(columns);
+        let (mut rank, mut still) = (0, 0);
+        for _ in 0..POLYNOMIAL_POINTS {
+            let Some(here) = self.draw(columns)? else { break };
+            let values = values_of(&f, products, &here);
+            for i in 0..here.span.rank() {
+                let row = here.span.row(i);
+                let entries = moved.iter().flat_map(|&m| values.iter().map(move |x| (m, x)));
+                let entries: Vec<_> = entries.map(|(m, x)| f.mul(&row[m], x)).collect();
+                if !self.budget.insert::<S>(&mut basis, &entries) {
+                    return Ok(None);
+                }
+            }
+            still = if basis.rank() == rank { still + 1 } else { 0 };
+            if still == 2 {
+                break;
+            }
+            rank = basis.rank();
+        }
+        Ok((still >= 2 && basis.gap().is_decisive(S::BITS)).then_some(basis))
+    }
+
+    /// Unknowns that each remaining direction changes, among excited unknowns.
+    fn unexplained(&mut self, at: &PointDegrees<S>, tangents: &mut S::Space) -> Vec<Vec<usize>> {
+        let f = self.f.clone();
+        let excited = &self.judged.findings.degrees.excited;
         let among_excited = |v: &Vec<S::Element>| support_in(&f, v).iter().all(|&c| excited[c]);
         let rest: Vec<Vec<S::Element>> = at.span.null_space().into_iter().filter(among_excited).collect();
-        let moving = budget.short_vectors(&f, &rest, &at.span, &mut tangents);
-        out.unexplained = moving.iter().map(|v| support_in(&f, v)).collect();
+        let moving = self.budget.short_vectors(&f, &rest, &at.span, tangents);
+        moving.iter().map(|v| support_in(&f, v)).collect()
     }
-    out.invariants = invariants(&f, n, &out.found, &at, &mut budget);
-    (out.stopped, out.work) = (budget.stopped(), budget.spent);
-    Ok(out)
+}
+
+/// Values of products of unknowns and constants at a point.
+fn values_of<S: Values>(f: &S, products: &[Vec<usize>], at: &PointDegrees<S>) -> Vec<S::Element> {
+    let value = |product: &Vec<usize>| product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]));
+    products.iter().map(value).collect()
 }
 
 /// All products of up to `degree` of the factors.
@@ -328,66 +489,6 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// Draws one more random point with its verdict, for rows of this many columns; `None` once the work is used
-/// up.
-type Draw<'a, S> = dyn FnMut(&mut Budget, usize) -> Result<Option<PointDegrees<S>>, ModelError> + 'a;
-
-/// Directions `v_i = sum_j a_ij m_j` over the unknowns that change, with m_j products of unknowns and known
-/// constants. The a_ij solve a linear system of rows at several points, which `draw` provides as long as
-/// work remains.
-fn directions<S: Values>(
-    f: &S,
-    moved: &[usize],
-    products: &[Vec<usize>],
-    tangents: &mut S::Space,
-    at: &PointDegrees<S>,
-    (budget, draw): (&mut Budget, &mut Draw<'_, S>),
-) -> Result<Vec<PolynomialDirection>, ModelError> {
-    let width = products.len();
-    let value = |at: &PointDegrees<S>, product: &Vec<usize>| {
-        product.iter().fold(f.one(), |x, &j| f.mul(&x, &at.values[j]))
-    };
-    let space = |columns: usize| <S::Space as RowSpace>::new(f.clone(), columns);
-    let mut basis = space(moved.len() * width);
-    let (mut rank, mut still) = (0, 0);
-    for _ in 0..POLYNOMIAL_POINTS {
-        let Some(here) = draw(budget, moved.len() * width)? else { break };
-        let values: Vec<S::Element> = products.iter().map(|p| value(&here, p)).collect();
-        for i in 0..here.span.rank() {
-            let row = here.span.row(i);
-            let entries = moved.iter().flat_map(|&m| values.iter().map(move |x| f.mul(&row[m], x)));
-            if !budget.insert::<S>(&mut basis, &entries.collect::<Vec<_>>()) {
-                return Ok(Vec::new());
-            }
-        }
-        still = if basis.rank() == rank { still + 1 } else { 0 };
-        if still == 2 {
-            break;
-        }
-        rank = basis.rank();
-    }
-    if still < 2 || !basis.gap().is_decisive(S::BITS) {
-        return Ok(Vec::new());
-    }
-    let here: Vec<S::Element> = products.iter().map(|p| value(at, p)).collect();
-    let mut out = Vec::new();
-    for v in budget.short_vectors(f, &basis.null_space(), &basis, &mut space(moved.len() * width)) {
-        let mut tangent = vec![f.zero(); tangents.columns()];
-        for (part, &m) in v.chunks_exact(width).zip(moved) {
-            tangent[m] = f.dot(&f.zero(), part.iter().zip(&here));
-        }
-        let Some(k) = rationals(f, &v).filter(|_| tangents.insert(&tangent)) else { continue };
-        let component = |(part, &m): (&[(i64, i64)], &usize)| {
-            let terms = products.iter().cloned().zip(part.iter().copied());
-            let terms: Vec<_> = terms.filter(|(_, k)| k.0 != 0).collect();
-            (!terms.is_empty()).then_some((m, terms))
-        };
-        let components = k.chunks_exact(width).zip(moved).filter_map(component).collect();
-        out.push(PolynomialDirection { components });
-    }
-    Ok(out)
-}
-
 /// Products of powers that every scaling leaves unchanged, and sums that every translation leaves unchanged,
 /// as far as they are observable.
 fn invariants<S: Values>(
@@ -395,7 +496,7 @@ fn invariants<S: Values>(
     n: usize,
     found: &[Symmetry],
     at: &PointDegrees<S>,
-    budget: &mut Budget,
+    budget: &mut WorkBudget,
 ) -> Vec<Invariant> {
     let mut out = Vec::new();
     let scalings: Vec<&Symmetry> = found.iter().filter(|s| s.translation.is_empty()).collect();
