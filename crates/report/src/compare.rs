@@ -275,108 +275,96 @@ fn lead(c: &Comparison) -> Vec<String> {
     out
 }
 
-impl Answer for Comparison {
-    fn layout(&self) -> Option<&str> {
-        Some(&self.schema)
-    }
+/// Sentence on the conditions and positions of a scheme.
+fn assumed(r: &ComparedScheme) -> String {
+    format!(
+        "{}: {}; positions {}{}",
+        r.name,
+        stated::measurement(&r.conditions).join("; "),
+        r.positions.join(", "),
+        half_turns(r)
+    )
+}
 
-    fn document(&self) -> Document {
-        // without requirements their columns would be empty
-        let judged = self.schemes.iter().any(|r| r.requirements.stated > 0);
-        let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
-        let mut assumed = Vec::new();
-        for r in &self.schemes {
-            assumed.push(format!(
-                "{}: {}; positions {}{}",
-                r.name,
-                stated::measurement(&r.conditions).join("; "),
-                r.positions.join(", "),
-                half_turns(r)
-            ));
+/// One row per scheme and position that is left out.
+fn without_one_position(schemes: &[ComparedScheme]) -> Block {
+    let drop_rows = schemes.iter().flat_map(|r| {
+        r.drop_one.iter().map(|d| {
+            vec![
+                r.name.clone(),
+                d.position.clone(),
+                list(&d.lost),
+                worst(d.worst.as_ref()),
+                requirements(&d.requirements),
+            ]
+        })
+    });
+    let figure = worst_heading(has_bench(schemes));
+    let columns = ["scheme", "without", "not observable any more", figure, REQUIREMENTS[0]].map(left);
+    Block::table("Without one position", columns, drop_rows)
+}
+
+/// One row per condition and scheme: rank and worst sigma under the condition.
+fn sensitivity(schemes: &[ComparedScheme]) -> Block {
+    let figure = worst_heading(has_bench(schemes));
+    let conditions = schemes.first().map_or(&[][..], |r| &r.sensitivity);
+    let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
+    for s in schemes.iter().flat_map(|r| &r.sensitivity) {
+        if !names.contains(&&s.condition) {
+            names.push(&s.condition);
         }
-        let first = vec![
-            overview(&self.schemes).without(left_out),
-            ratios(&self.schemes),
-            Block::list("Assumed", assumed),
-        ];
-        let mut blocks = vec![by_unknown(&self.schemes).without(left_out)];
-        blocks.extend(at_own_drifts(&self.schemes));
-        let drop_rows = self.schemes.iter().flat_map(|r| {
-            r.drop_one.iter().map(|d| {
-                vec![
+    }
+    let mut rows = Vec::new();
+    for name in names {
+        for r in schemes {
+            if let Some(s) = r.sensitivity.iter().find(|s| s.condition == *name) {
+                rows.push(vec![
+                    name.clone(),
                     r.name.clone(),
-                    d.position.clone(),
-                    list(&d.lost),
-                    worst(d.worst.as_ref()),
-                    requirements(&d.requirements),
-                ]
-            })
-        });
-        let figure = worst_heading(has_bench(&self.schemes));
-        let columns = ["scheme", "without", "not observable any more", figure, REQUIREMENTS[0]].map(left);
-        blocks.push(Block::table("Without one position", columns, drop_rows).without(left_out));
-        let conditions = self.schemes.first().map_or(&[][..], |r| &r.sensitivity);
-        let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
-        for s in self.schemes.iter().flat_map(|r| &r.sensitivity) {
-            if !names.contains(&&s.condition) {
-                names.push(&s.condition);
+                    rank(s.rank, r.has_accuracy_orders),
+                    worst(s.worst.as_ref()),
+                ]);
             }
         }
-        let mut rows = Vec::new();
-        for name in names {
-            for r in &self.schemes {
-                if let Some(s) = r.sensitivity.iter().find(|s| s.condition == *name) {
-                    rows.push(vec![
-                        name.clone(),
-                        r.name.clone(),
-                        rank(s.rank, r.has_accuracy_orders),
-                        worst(s.worst.as_ref()),
-                    ]);
-                }
-            }
+    }
+    Block::table(
+        format!("Sensitivity of the {figure}"),
+        [left("condition"), left("scheme"), right("rank with dwell"), left(figure)],
+        rows,
+    )
+}
+
+/// Noise floor of the coefficients in every scheme, with its meaning; empty if no scheme has one.
+fn noise_floor(schemes: &[ComparedScheme]) -> Vec<Block> {
+    let floors = || schemes.iter().filter_map(|r| Some((r, r.noise_floor.as_ref()?)));
+    if floors().next().is_none() {
+        return Vec::new();
+    }
+    let mut columns = vec![left("coefficient"), left("scheme"), left("unit")];
+    columns.extend(words::FLOOR.map(right));
+    let mut names: Vec<&String> = Vec::new();
+    for c in floors().flat_map(|(_, f)| &f.coefficients) {
+        if !names.contains(&&c.name) {
+            names.push(&c.name);
         }
-        blocks.push(Block::table(
-            format!("Sensitivity of the {figure}"),
-            [left("condition"), left("scheme"), right("rank with dwell"), left(figure)],
-            rows,
-        ));
-        for r in &self.schemes {
-            let whose = if self.schemes.len() > 1 { format!(" by {}", r.name) } else { String::new() };
-            blocks.extend(omitted::blocks(&r.omitted, &whose));
+    }
+    let mut rows = Vec::new();
+    for name in names {
+        for (r, f) in floors() {
+            let of = f.coefficients.iter().filter(|c| c.name == *name);
+            let lead = |c: &CoefficientFloor| vec![name.clone(), r.name.clone(), c.unit.clone()];
+            rows.extend(of.map(|c| [lead(c), words::floor(c).into()].concat()));
         }
-        let floors = || self.schemes.iter().filter_map(|r| Some((r, r.noise_floor.as_ref()?)));
-        if floors().next().is_some() {
-            let mut columns = vec![left("coefficient"), left("scheme"), left("unit")];
-            columns.extend(words::FLOOR.map(right));
-            let mut names: Vec<&String> = Vec::new();
-            for c in floors().flat_map(|(_, f)| &f.coefficients) {
-                if !names.contains(&&c.name) {
-                    names.push(&c.name);
-                }
-            }
-            let mut rows = Vec::new();
-            for name in names {
-                for (r, f) in floors() {
-                    let of = f.coefficients.iter().filter(|c| c.name == *name);
-                    let lead = |c: &CoefficientFloor| vec![name.clone(), r.name.clone(), c.unit.clone()];
-                    rows.extend(of.map(|c| [lead(c), words::floor(c).into()].concat()));
-                }
-            }
-            blocks.push(Block::table("Noise floor", columns, rows));
-            let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::floor_of(f).join("; ")));
-            let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
-            blocks.push(Block::list("Noise floor: what it is", means.collect()));
-        }
-        for r in &self.schemes {
-            let lines = gimbals::lines(r.gimbals.as_ref());
-            blocks.extend(Block::list_if_any(format!("Gimbals of {}", r.name), lines));
-        }
-        let missed = |r: &ComparedScheme| format!("{}: {}", r.name, stated::requirements(&r.requirements));
-        if judged {
-            blocks.push(Block::list("Requirements", self.schemes.iter().map(missed).collect()));
-        }
-        let mut lines = vec![
-        stated::predicted_of(self.schemes.iter().map(|r| &r.conditions)),
+    }
+    let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::floor_of(f).join("; ")));
+    let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
+    vec![Block::table("Noise floor", columns, rows), Block::list("Noise floor: what it is", means.collect())]
+}
+
+/// Meaning of the columns, one sentence each.
+fn meaning(c: &Comparison) -> Vec<String> {
+    let mut lines = vec![
+        stated::predicted_of(c.schemes.iter().map(|r| &r.conditions)),
         "sigma(D) in deg/h, deg/h/g; - where an unknown is not determined".into(),
         "excitation: a product of components of g, its root mean square over the arc of a rotating segment"
             .into(),
@@ -384,16 +372,51 @@ impl Answer for Comparison {
          stays so, and so that every requirement is met; only by: positions without which the unknown is not \
          observable"
             .into(),
-        format!("seed {}", self.seed),
+        format!("seed {}", c.seed),
     ];
-        if self.schemes.iter().any(|r| !r.slews.is_empty()) {
-            lines.push(
-                "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
-                    .into(),
-            );
+    if c.schemes.iter().any(|r| !r.slews.is_empty()) {
+        lines.push(
+            "no slews: slews need inertial carry, so other carries are taken with repositioning at once"
+                .into(),
+        );
+    }
+    lines
+}
+
+impl Answer for Comparison {
+    fn layout(&self) -> Option<&str> {
+        Some(&self.schema)
+    }
+
+    fn document(&self) -> Document {
+        let schemes = &self.schemes[..];
+        // without requirements their columns would be empty
+        let judged = schemes.iter().any(|r| r.requirements.stated > 0);
+        let left_out: &[&str] = if judged { &[] } else { &REQUIREMENTS };
+        let first = vec![
+            overview(schemes).without(left_out),
+            ratios(schemes),
+            Block::list("Assumed", schemes.iter().map(assumed).collect()),
+        ];
+        let mut blocks = vec![by_unknown(schemes).without(left_out)];
+        blocks.extend(at_own_drifts(schemes));
+        blocks.push(without_one_position(schemes).without(left_out));
+        blocks.push(sensitivity(schemes));
+        for r in schemes {
+            let whose = if schemes.len() > 1 { format!(" by {}", r.name) } else { String::new() };
+            blocks.extend(omitted::blocks(&r.omitted, &whose));
         }
-        blocks.push(Block::list("Meaning of the columns", lines));
-        let n = self.schemes.len();
+        blocks.extend(noise_floor(schemes));
+        for r in schemes {
+            let lines = gimbals::lines(r.gimbals.as_ref());
+            blocks.extend(Block::list_if_any(format!("Gimbals of {}", r.name), lines));
+        }
+        let missed = |r: &ComparedScheme| format!("{}: {}", r.name, stated::requirements(&r.requirements));
+        if judged {
+            blocks.push(Block::list("Requirements", schemes.iter().map(missed).collect()));
+        }
+        blocks.push(Block::list("Meaning of the columns", meaning(self)));
+        let n = schemes.len();
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
             lead: lead(self),

@@ -221,56 +221,22 @@ pub(crate) fn carry(of: Carry) -> &'static str {
 
 /// Assumptions, one sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
-    let latitude = a.latitude_deg.map_or_else(
-        || "generic: wN and wU independent, not zero".to_string(),
-        |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
-    );
     let terms: Vec<Term> = a.terms.parse::<Unknowns>().map(|u| u.terms().to_vec()).unwrap_or_default();
     let has = |source: Source| terms.iter().any(|t| t.source() == source);
     let has_others = has(Source::Rate) || has(Source::Force);
-    let units = [
-        has(Source::Rate).then_some("GS and GM as numbers, "),
-        has(Source::Force).then_some("K0, K2, K3 and Kx in g, K1 and M as numbers, "),
-    ];
-    let units: String = units.into_iter().flatten().collect();
-    let z = match (a.frame, has(Source::Force)) {
-        (Frame::N, false) => {
-            "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
-        }
-        (Frame::N, true) => {
-            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; \
-             primes are time derivatives"
-        }
-        (Frame::Platform, false) => {
-            "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives"
-        }
-        (Frame::Platform, true) => {
-            "Z = -[g x] psi + a in platform axes: Zx, Zy, Zz; primes are time derivatives"
-        }
-    };
     let mut out = vec![
         format!("carry {}", carry(a.carry)),
-        format!("latitude {latitude}"),
+        format!("latitude {}", latitude(a.latitude_deg)),
         format!(
             "{}; {} {}",
             gyros(&a.geometry),
             if has_others { "unknown terms" } else { "drift terms" },
             a.terms
         ),
-        format!("observation {z}"),
-        format!(
-            "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; {units}a blank multiplies"
-        ),
+        format!("observation {}", observation(a.frame, has(Source::Force))),
+        units(has(Source::Rate), has(Source::Force)),
     ];
-    if has(Source::Force) {
-        let inputs = ["X", "Y", "Z"].iter().zip(a.geometry.accelerometers.inputs());
-        let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
-        out.push(format!(
-            "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific \
-             force f = -g",
-            inputs.join(", ")
-        ));
-    }
+    out.extend(has(Source::Force).then(|| accelerometers(&a.geometry)));
     if has(Source::Rate) {
         out.push(
             "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, \
@@ -286,41 +252,9 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
                 .into(),
         );
     }
-    let turns = a.positions.iter().any(|p| p.rotation.is_some());
-    if turns && has_others {
-        out.push(
-            "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these \
-             errors share: at almost any rate; psi in n moves in it, by drift and by what torquer errors \
-             leave"
-                .into(),
-        );
-    } else if turns {
-        out.push(
-            "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric \
-             polynomials of degree m); psi in n goes on through it"
-                .into(),
-        );
-    }
-    let solved = a.quantities.iter().any(|q| q.solution.is_some());
-    let turned = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0));
-    if let Some(s) = turned.filter(|_| solved || !has_others) {
-        let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
-        let rate = s.rate.as_deref().unwrap_or_default();
-        out.push(format!(
-            "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: \
-             derivatives of Z there are those of the turning platform, and {rate} is the rate of that angle \
-             in rad/s",
-            s.label, s.position
-        ));
-    }
-    let local = |c: &obsdeg_core::analysis::CombinationReport| !c.requested && c.expression.contains("^n@");
-    if let Some(c) = a.combinations.iter().find(|c| local(c)) {
-        let at = c.expression.rsplit_once('@').map_or("", |(_, at)| at);
-        out.push(format!(
-            "eps_x^n@{at} is the drift along North at {at}, psi^n and y (Up), z (East) likewise{}",
-            if has(Source::Rate) { "" } else { "; --formulas writes them in the unknowns" }
-        ));
-    }
+    out.extend(rotations(a, has_others).map(String::from));
+    out.extend(turned_station(a, has_others));
+    out.extend(local_drift(a, has(Source::Rate)));
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
         out.push(
             "solutions take psi as it is carried from station to station: what the dwells change in it is \
@@ -332,6 +266,97 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
         out.push("azimuth psi_y^n is measured: Za".into());
     }
     out
+}
+
+/// Latitude with the components of the earth rate.
+fn latitude(latitude_deg: Option<f64>) -> String {
+    latitude_deg.map_or_else(
+        || "generic: wN and wU independent, not zero".to_string(),
+        |l| format!("{l} deg: wN = w_ie cos, wU = w_ie sin"),
+    )
+}
+
+/// The observation in its axes, with or without errors of accelerometers.
+fn observation(frame: Frame, force: bool) -> &'static str {
+    match (frame, force) {
+        (Frame::N, false) => {
+            "Z = -[g x] psi in North-Up-East axes: Z1 = psi_z, Z3 = -psi_x; primes are time derivatives"
+        }
+        (Frame::N, true) => {
+            "Z = -[g x] psi + a in North-Up-East axes: Z1 = psi_z + a_x^n, Z2 = a_y^n, Z3 = -psi_x + a_z^n; \
+             primes are time derivatives"
+        }
+        (Frame::Platform, false) => {
+            "Z = -[g x] psi in platform axes: Zx, Zy, Zz; primes are time derivatives"
+        }
+        (Frame::Platform, true) => {
+            "Z = -[g x] psi + a in platform axes: Zx, Zy, Zz; primes are time derivatives"
+        }
+    }
+}
+
+/// Units in formulas; with those of torquer errors and of errors of accelerometers.
+fn units(rate: bool, force: bool) -> String {
+    let units = [
+        rate.then_some("GS and GM as numbers, "),
+        force.then_some("K0, K2, K3 and Kx in g, K1 and M as numbers, "),
+    ];
+    let units: String = units.into_iter().flatten().collect();
+    format!(
+        "units in formulas: psi in rad, D in rad/s (per g), wN and wU in rad/s, Z in g; {units}a blank \
+         multiplies"
+    )
+}
+
+/// Input axes of the accelerometers, and their error.
+fn accelerometers(geometry: &Geometry) -> String {
+    let inputs = ["X", "Y", "Z"].iter().zip(geometry.accelerometers.inputs());
+    let inputs: Vec<String> = inputs.map(|(name, axis)| format!("{name}: I={axis}")).collect();
+    format!(
+        "accelerometers {}; their error a is K0, and K1, M, K2, K3, Kx times components of the specific \
+         force f = -g",
+        inputs.join(", ")
+    )
+}
+
+/// Sentence on rotating segments; `None` without any.
+fn rotations(a: &Analysis, has_others: bool) -> Option<&'static str> {
+    let turns = a.positions.iter().any(|p| p.rotation.is_some());
+    turns.then_some(if has_others {
+        "a rotation is the whole course of Z while it goes on at a steady rate, which drift and these \
+         errors share: at almost any rate; psi in n moves in it, by drift and by what torquer errors \
+         leave"
+    } else {
+        "a rotation is all its attitudes at once: rows at 2m+1 of them span it (trigonometric \
+         polynomials of degree m); psi in n goes on through it"
+    })
+}
+
+/// Sentence on the first station where the platform has turned; `None` without one, or if there are errors of
+/// torquers or accelerometers and nothing is solved.
+fn turned_station(a: &Analysis, has_others: bool) -> Option<String> {
+    let solved = a.quantities.iter().any(|q| q.solution.is_some());
+    let turned = a.stations.iter().find(|s| s.turned_deg.is_some_and(|t| t != 0.0));
+    let s = turned.filter(|_| solved || !has_others)?;
+    let (angle, about) = (s.turned_deg.unwrap_or_default(), s.about.as_deref().unwrap_or_default());
+    let rate = s.rate.as_deref().unwrap_or_default();
+    Some(format!(
+        "{} is {} when it has turned by {angle} deg (right-handed about {about}) and turns on: \
+         derivatives of Z there are those of the turning platform, and {rate} is the rate of that angle \
+         in rad/s",
+        s.label, s.position
+    ))
+}
+
+/// Sentence on the drift in n as a name in combinations; `None` if no combination has it.
+fn local_drift(a: &Analysis, rate: bool) -> Option<String> {
+    let local = |c: &&CombinationReport| !c.requested && c.expression.contains("^n@");
+    let c = a.combinations.iter().find(local)?;
+    let at = c.expression.rsplit_once('@').map_or("", |(_, at)| at);
+    Some(format!(
+        "eps_x^n@{at} is the drift along North at {at}, psi^n and y (Up), z (East) likewise{}",
+        if rate { "" } else { "; --formulas writes them in the unknowns" }
+    ))
 }
 
 /// The angles of a position, with the rotation that starts there.
