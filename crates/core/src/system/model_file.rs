@@ -17,7 +17,7 @@ use super::nominal::{SimulationEntry, nominal};
 use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
-use crate::model::recording::ModelRecord;
+use crate::model::recording::{ModelRecord, Recording};
 use crate::title_block::TitleBlock;
 
 /// Layout of a model file. Expressions are texts with `+ - * / ^`, brackets, decimals (exact),
@@ -394,6 +394,112 @@ impl ModelReader<'_> {
         }
         Ok(out)
     }
+
+    /// Title block of the review, if it is right.
+    fn title_block(&self, file: &ModelFile) -> Result<TitleBlock, ModelError> {
+        let Some(document) = &file.document else { return Ok(TitleBlock::default()) };
+        match document.get_ref().wrong() {
+            Some(message) => Err(self.at(document.span(), "the title block".into(), message)),
+            None => Ok(document.get_ref().clone()),
+        }
+    }
+
+    fn number_of_experiments(&self, file: &ModelFile) -> Result<usize, ModelError> {
+        let given = file.experiments.as_ref();
+        if let Some(number) = given.filter(|n| !(1..=MAX_EXPERIMENTS).contains(n.get_ref())) {
+            let message = format!("expected 1 to {MAX_EXPERIMENTS}");
+            return Err(self.at(number.span(), "experiments".into(), message));
+        }
+        let own = file.own.len();
+        if own == 0 {
+            return Ok(given.map_or(1, |n| *n.get_ref()));
+        }
+        if let Some(number) = given.filter(|n| *n.get_ref() != own) {
+            let message =
+                format!("{}, and {own} [[experiment]]; expected as many, or no number", number.get_ref());
+            return Err(self.at(number.span(), "experiments".into(), message));
+        }
+        if own > MAX_EXPERIMENTS {
+            let message = format!("{own} [[experiment]]; expected at most {MAX_EXPERIMENTS}");
+            return Err(ModelError { what: "experiments".into(), message, span: None });
+        }
+        Ok(own)
+    }
+
+    /// States, parameters, inputs, constants and definitions.
+    fn quantities(&mut self, file: &ModelFile, model: &mut SystemModel) -> Result<(), ModelError> {
+        // sizes first: expressions may use names that are declared later
+        let (states, known, unknown) =
+            (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
+        for (key, value) in states.iter().chain(&known).chain(&unknown) {
+            self.declare(key, value.span())?;
+        }
+        if let Some(parameters) = &file.parameters {
+            model.parameters = self.parameters(parameters)?;
+        }
+        let (constants, definitions) = (in_order(&file.constants), in_order(&file.definitions));
+        self.names_of_their_own(&[&states, &known, &unknown, &constants, &definitions], &model.parameters)?;
+        for (key, value) in self.by_use("the constant", &constants)? {
+            model.constants.extend(self.constants(key, value)?);
+        }
+        for (key, value) in self.by_use("the definition of", &definitions)? {
+            let what = format!("the definition of {}", base(key));
+            let (name, parts) = self.defined((key, &what), value.get_ref(), value.span())?;
+            model.definitions.extend(self.entries(name).into_iter().zip(parts));
+        }
+        for (key, value) in states {
+            model.states.extend(self.states(base(key), value)?);
+        }
+        for (key, value) in known {
+            model.known_inputs.extend(self.known_inputs(base(key), value)?);
+        }
+        for (key, value) in unknown {
+            model.unknown_inputs.extend(self.unknown_inputs(base(key), value)?);
+        }
+        Ok(())
+    }
+
+    /// Outputs; returns their shapes.
+    fn outputs(&self, file: &ModelFile, model: &mut SystemModel) -> Result<Shapes, ModelError> {
+        let mut shapes = Shapes::new();
+        for (key, value) in in_order(&file.outputs) {
+            let (named, found) = self.output(key, value)?;
+            shapes.insert(base(key).into(), found.shape);
+            model.outputs.extend(named.into_iter().zip(found.parts));
+        }
+        Ok(shapes)
+    }
+
+    /// Constraints and combinations.
+    fn conditions(&self, file: &ModelFile, model: &mut SystemModel) -> Result<(), ModelError> {
+        for c in &file.constraints {
+            let (constraints, not_negative) = self.constraint(c)?;
+            model.constraints.extend(constraints);
+            model.not_negative.extend(not_negative);
+        }
+        for c in &file.combinations {
+            let what = format!("the combination {}", c.get_ref());
+            let found = self.formulas(&what, &Value::String(c.get_ref().clone()), c.span())?;
+            let whole = format!("({})", c.get_ref().trim());
+            let texts = match found.shape {
+                Shape::SCALAR => vec![c.get_ref().clone()],
+                shape => shape.names(&whole),
+            };
+            let entries = found.parts.into_iter().zip(texts);
+            model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
+        }
+        Ok(())
+    }
+
+    /// Reading of the records, of known inputs and outputs of the model only.
+    fn recording(&self, record: &Spanned<ModelRecord>, model: &SystemModel) -> Result<Recording, ModelError> {
+        let inputs: Vec<&str> = model.known_inputs.iter().map(|i| i.0.name.as_str()).collect();
+        let outputs: Vec<&str> = model.outputs.iter().map(|o| o.0.name.as_str()).collect();
+        let wrong = |message| self.at(record.span(), "the record".into(), message);
+        let recording = Recording::from(record.get_ref().clone());
+        recording.check_model(&inputs, &outputs).map_err(wrong)?;
+        Ok(recording)
+    }
 }
 
 /// True if a text is meant as a model, not a scheme.
@@ -414,104 +520,34 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let mut r = ModelReader { text, shapes: Shapes::new() };
     let mut model = SystemModel {
         name: file.name.clone().unwrap_or_default(),
-        description: file.description,
-        experiments: 1,
+        description: file.description.clone(),
+        document: r.title_block(&file)?,
+        experiments: r.number_of_experiments(&file)?,
         ..SystemModel::default()
     };
-    if let Some(document) = &file.document {
-        model.document = document.get_ref().clone();
-        if let Some(message) = model.document.wrong() {
-            return Err(r.at(document.span(), "the title block".into(), message));
-        }
-    }
-    if let Some(experiments) = &file.experiments {
-        model.experiments = *experiments.get_ref();
-        if !(1..=MAX_EXPERIMENTS).contains(&model.experiments) {
-            let message = format!("expected 1 to {MAX_EXPERIMENTS}");
-            return Err(r.at(experiments.span(), "experiments".into(), message));
-        }
-    }
-    if !file.own.is_empty() {
-        let (own, said) = (file.own.len(), file.experiments.as_ref());
-        if let Some(said) = said.filter(|n| *n.get_ref() != own) {
-            let message =
-                format!("{}, and {own} [[experiment]]; expected as many, or no number", said.get_ref());
-            return Err(r.at(said.span(), "experiments".into(), message));
-        }
-        if own > MAX_EXPERIMENTS {
-            let message = format!("{own} [[experiment]]; expected at most {MAX_EXPERIMENTS}");
-            return Err(ModelError { what: "experiments".into(), message, span: None });
-        }
-        model.experiments = own;
-    }
-    // sizes first: expressions may use names that are declared later
-    let (states, known, unknown) =
-        (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
-    for (key, value) in states.iter().chain(&known).chain(&unknown) {
-        r.declare(key, value.span())?;
-    }
-    if let Some(parameters) = &file.parameters {
-        model.parameters = r.parameters(parameters)?;
-    }
-    let (constants, definitions) = (in_order(&file.constants), in_order(&file.definitions));
-    r.names_of_their_own(&[&states, &known, &unknown, &constants, &definitions], &model.parameters)?;
-    for (key, value) in r.by_use("the constant", &constants)? {
-        model.constants.extend(r.constants(key, value)?);
-    }
-    for (key, value) in r.by_use("the definition of", &definitions)? {
-        let what = format!("the definition of {}", base(key));
-        let (name, parts) = r.defined((key, &what), value.get_ref(), value.span())?;
-        model.definitions.extend(r.entries(name).into_iter().zip(parts));
-    }
-    for (key, value) in states {
-        model.states.extend(r.states(base(key), value)?);
-    }
-    for (key, value) in known {
-        model.known_inputs.extend(r.known_inputs(base(key), value)?);
-    }
-    for (key, value) in unknown {
-        model.unknown_inputs.extend(r.unknown_inputs(base(key), value)?);
-    }
+    r.quantities(&file, &mut model)?;
     for (i, own) in file.own.iter().enumerate() {
         model.own.push(r.experiment(i, own, &model)?);
     }
-    let mut outputs = Shapes::new();
-    for (key, value) in in_order(&file.outputs) {
-        let (named, found) = r.output(key, value)?;
-        outputs.insert(base(key).into(), found.shape);
-        model.outputs.extend(named.into_iter().zip(found.parts));
-    }
+    let outputs = r.outputs(&file, &mut model)?;
     for (i, segment) in file.segments.iter().enumerate() {
         model.segments.push(r.segment(i, segment)?);
     }
     model.time = file.time.as_ref().map_or(Ok(StartTime::Zero), |time| r.time(time))?;
-    for c in &file.constraints {
-        let (constraints, not_negative) = r.constraint(c)?;
-        model.constraints.extend(constraints);
-        model.not_negative.extend(not_negative);
-    }
-    for c in &file.combinations {
-        let what = format!("the combination {}", c.get_ref());
-        let found = r.formulas(&what, &Value::String(c.get_ref().clone()), c.span())?;
-        let whole = format!("({})", c.get_ref().trim());
-        let texts = match found.shape {
-            Shape::SCALAR => vec![c.get_ref().clone()],
-            shape => shape.names(&whole),
-        };
-        let entries = found.parts.into_iter().zip(texts);
-        model.combinations.extend(entries.map(|(part, text)| PlacedExpression { text, ..part }));
-    }
+    r.conditions(&file, &mut model)?;
     model.candidates = r.file_candidates(&in_order(&file.candidates))?;
     model.check_candidates()?;
     nominal(&r, &outputs, &file.simulation, &mut model)?;
     if let Some(record) = &file.record {
-        let inputs: Vec<&str> = model.known_inputs.iter().map(|i| i.0.name.as_str()).collect();
-        let outputs: Vec<&str> = model.outputs.iter().map(|o| o.0.name.as_str()).collect();
-        let wrong = |message| r.at(record.span(), "the record".into(), message);
-        let recording = crate::model::Recording::from(record.get_ref().clone());
-        recording.check_model(&inputs, &outputs).map_err(wrong)?;
-        model.recording = recording;
+        model.recording = r.recording(record, &model)?;
     }
+    check_whole(text, file.name.is_some(), &model)?;
+    Ok(model.by_one_factor())
+}
+
+/// Checks that concern the model as a whole. Errors without a place get that of the last mention of their
+/// subject.
+fn check_whole(text: &str, is_named: bool, model: &SystemModel) -> Result<(), ModelError> {
     let placed =
         |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
     model.check().map_err(placed)?;
@@ -519,12 +555,15 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         model.measuring(&model.candidates, true).0.compile().map_err(placed)?;
     }
     // the missing name concerns no equation: faults of these are reported first
-    if file.name.is_none() {
+    if !is_named {
         model.compile().map_err(placed)?;
-        let message = "the key `name` is missing; expected it at the top of the file".into();
-        return Err(r.at(0..text.chars().next().map_or(0, char::len_utf8), "the model file".into(), message));
+        return Err(ModelError {
+            what: "the model file".into(),
+            message: "the key `name` is missing; expected it at the top of the file".into(),
+            span: Some(0..text.chars().next().map_or(0, char::len_utf8)),
+        });
     }
-    Ok(model.by_one_factor())
+    Ok(())
 }
 
 /// Places of keys in a text: the line that a key begins, or its place in an inline table in the first part
