@@ -66,7 +66,112 @@ struct SegmentSeries {
     nodes: Vec<Vec<Polynomial>>,
 }
 
-impl Equations<'_> {
+impl<'a> Equations<'a> {
+    /// Variables at a point, without runs.
+    fn new(
+        compiled: &'a Compiled,
+        judged: &'a Judgement,
+        CountingPoint { f, known, .. }: CountingPoint<'_>,
+        rows: SystemRows<'a, Field>,
+        work: &'a mut Work,
+    ) -> Self {
+        let layout = &judged.layout;
+        let values = rows.values(compiled, layout, 0);
+        let free = |lane: usize| {
+            known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
+        };
+        let lane = |(lane, &value): (usize, &u64)| match free(lane) {
+            true => Polynomial::constant(value),
+            false => Polynomial::variable(&f, lane as u32),
+        };
+        let state_weights = state_weights(compiled);
+        let weight = |u: &Unknown| match u.role {
+            Role::State(s) => state_weights[s],
+            Role::Parameter(_) => 1,
+            _ => STATE,
+        };
+        Self {
+            f,
+            compiled,
+            layout,
+            rows,
+            work,
+            weights: layout.unknowns.iter().map(weight).collect(),
+            state_weights,
+            lanes: values.iter().enumerate().map(lane).collect(),
+            values,
+            zero: known.zero.clone(),
+            runs: Vec::new(),
+        }
+    }
+
+    /// Appends a run without coefficients; returns its number.
+    fn add_run(&mut self, experiment: usize, initial: Vec<Polynomial>) -> usize {
+        let nodes = vec![Vec::new(); self.compiled.dag.ops.len()];
+        self.runs.push(SegmentSeries { experiment, initial, nodes });
+        self.runs.len() - 1
+    }
+
+    /// States at the start of an experiment: unknowns, and numbers for known ones.
+    fn initial(&mut self, model: &SystemModel, experiment: usize) -> Result<Vec<Polynomial>, NotCounted> {
+        let segments = self.compiled.segments.len().max(1);
+        let mut initial = Vec::new();
+        for s in 0..model.states.len() {
+            initial.push(match self.layout.lane(Role::State(s), experiment) {
+                Some(lane) => self.lanes[lane].clone(),
+                None => {
+                    let node = self.compiled.node_of(Role::State(s)).ok_or(NotCounted::NoPoint)?;
+                    Polynomial::constant(self.rows.coefficient(experiment * segments, node, 0))
+                }
+            });
+        }
+        Ok(initial)
+    }
+
+    /// Appends a run for every segment of an experiment, with its constraints and jumps.
+    fn add_segments(&mut self, model: &SystemModel, experiment: usize) -> Result<(), NotCounted> {
+        let compiled = self.compiled;
+        let mut initial = self.initial(model, experiment)?;
+        for segment in 0..compiled.segments.len().max(1) {
+            let r = self.add_run(experiment, initial);
+            let given = compiled.starts.iter().enumerate().filter_map(|(s, node)| Some((s, (*node)?)));
+            let given: Vec<(usize, usize)> = given.filter(|_| segment == 0).collect();
+            let jumps = compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
+            self.jump(r, &given)?;
+            if segment == 0 {
+                for &node in &compiled.constraints {
+                    let p = self.start(r, node)?;
+                    self.zero.push(p);
+                }
+            }
+            self.jump(r, jumps)?;
+            initial = self.runs[r].initial.clone();
+        }
+        Ok(())
+    }
+
+    /// Adds the equations of the outputs of all runs, order by order, each solved for what it gives.
+    fn add_outputs(&mut self, model: &SystemModel, order: usize) -> Result<(), NotCounted> {
+        let (compiled, f) = (self.compiled, self.f);
+        let needed: Vec<Vec<bool>> = (0..model.experiments.max(1))
+            .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
+            .collect();
+        for k in 0..=order {
+            for r in 0..self.runs.len() {
+                let experiment = self.runs[r].experiment;
+                self.extend(r, &needed[experiment], k)?;
+                for &o in compiled.outputs(experiment) {
+                    let mut p = self.runs[r].nodes[o][k].clone();
+                    let value = Polynomial::constant(self.rows.coefficient(r, o, k));
+                    p.add_scaled(&f, &value, f.neg(f.one()));
+                    self.zero.push(p);
+                }
+            }
+            self.solve()?;
+        }
+        Ok(())
+    }
+
     fn variable(&mut self, value: u64, weight: u32) -> Polynomial {
         self.values.push(value);
         self.weights.push(weight);
@@ -276,110 +381,34 @@ fn state_weights(compiled: &Compiled) -> Vec<u32> {
     weights.into_iter().map(|weight| weight.max(STATE)).collect()
 }
 
-/// Equations at a random point, with derivatives of the outputs up to `order`.
+/// Equations at a random point, with derivatives of the outputs up to the order of `at`.
 fn equations<'a>(
     model: &SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    CountingPoint { f, order, others, known, .. }: CountingPoint<'_>,
+    at: CountingPoint<'_>,
     (rng, verdict): (&mut SplitMix64, &'a work::Work),
     work: &'a mut Work,
 ) -> Result<Equations<'a>, NotCounted> {
-    let layout = &judged.layout;
-    let mut rows = SystemRows::with_inputs(model, compiled, layout, f, (rng, others), verdict)
+    let mut rows = SystemRows::with_inputs(model, compiled, &judged.layout, at.f, (rng, at.others), verdict)
         .map_err(|_| NotCounted::NoPoint)?;
     let segments = compiled.segments.len().max(1);
-    let experiments = model.experiments.max(1);
-    for e in 0..experiments {
+    for e in 0..model.experiments.max(1) {
         // values of unknown inputs are Taylor coefficients
-        let highest = layout.unknowns.iter().map(|u| u.derivative).max().unwrap_or(0);
+        let highest = judged.layout.unknowns.iter().map(|u| u.derivative).max().unwrap_or(0);
         rows.coefficient(e * segments, 0, highest);
     }
-    let values = rows.values(compiled, layout, 0);
-    let free = |lane: usize| {
-        known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
-    };
-    let lane = |(lane, &value): (usize, &u64)| match free(lane) {
-        true => Polynomial::constant(value),
-        false => Polynomial::variable(&f, lane as u32),
-    };
-    let state_weights = state_weights(compiled);
-    let weight = |u: &Unknown| match u.role {
-        Role::State(s) => state_weights[s],
-        Role::Parameter(_) => 1,
-        _ => STATE,
-    };
-    let mut out = Equations {
-        f,
-        compiled,
-        layout,
-        rows,
-        work,
-        weights: layout.unknowns.iter().map(weight).collect(),
-        state_weights,
-        lanes: values.iter().enumerate().map(lane).collect(),
-        values,
-        zero: known.zero.clone(),
-        runs: Vec::new(),
-    };
-    for experiment in 0..experiments {
-        let mut initial = Vec::new();
-        for s in 0..model.states.len() {
-            initial.push(match layout.lane(Role::State(s), experiment) {
-                Some(lane) => out.lanes[lane].clone(),
-                None => {
-                    let node = compiled.node_of(Role::State(s)).ok_or(NotCounted::NoPoint)?;
-                    Polynomial::constant(out.rows.coefficient(experiment * segments, node, 0))
-                }
-            });
-        }
-        for segment in 0..segments {
-            let r = out.runs.len();
-            out.runs.push(SegmentSeries {
-                experiment,
-                initial,
-                nodes: vec![Vec::new(); compiled.dag.ops.len()],
-            });
-            let given = compiled.starts.iter().enumerate().filter_map(|(s, node)| Some((s, (*node)?)));
-            let given: Vec<(usize, usize)> = given.filter(|_| segment == 0).collect();
-            let jumps = compiled.segments.get(segment).map_or(&[][..], |s| &s.carry);
-            out.jump(r, &given)?;
-            if segment == 0 {
-                for &node in &compiled.constraints {
-                    let p = out.start(r, node)?;
-                    out.zero.push(p);
-                }
-            }
-            out.jump(r, jumps)?;
-            initial = out.runs[r].initial.clone();
-        }
+    let mut out = Equations::new(compiled, judged, at, rows, work);
+    for experiment in 0..model.experiments.max(1) {
+        out.add_segments(model, experiment)?;
     }
-    for _ in 0..others {
+    for _ in 0..at.others {
         let initial = out.runs[0].initial.clone();
-        out.runs.push(SegmentSeries {
-            experiment: 0,
-            initial,
-            nodes: vec![Vec::new(); compiled.dag.ops.len()],
-        });
+        out.add_run(0, initial);
     }
-    let needed: Vec<Vec<bool>> = (0..experiments)
-        .map(|e| reached(compiled, compiled.outputs(e), |s| Some(compiled.rates(e)[s])))
-        .collect();
-    for k in 0..=order {
-        for r in 0..out.runs.len() {
-            let experiment = out.runs[r].experiment;
-            out.extend(r, &needed[experiment], k)?;
-            for &o in compiled.outputs(experiment) {
-                let mut p = out.runs[r].nodes[o][k].clone();
-                let value = Polynomial::constant(out.rows.coefficient(r, o, k));
-                p.add_scaled(&f, &value, f.neg(f.one()));
-                out.zero.push(p);
-            }
-        }
-        out.solve()?;
-    }
+    out.add_outputs(model, at.order)?;
     // the point itself must be a solution
-    let holds = out.zero.iter().all(|p| p.at(&f, &out.values) == 0);
+    let holds = out.zero.iter().all(|p| p.at(&at.f, &out.values) == 0);
     if holds { Ok(out) } else { Err(NotCounted::NoPoint) }
 }
 
