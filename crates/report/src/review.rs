@@ -14,6 +14,7 @@ mod verdict;
 use obsdeg_calibration::Calibration;
 use obsdeg_core::analysis::Analysis;
 use obsdeg_core::degree::Status as Exact;
+use obsdeg_design::design::Minimum;
 use obsdeg_design::review::{DesignReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
@@ -48,9 +49,8 @@ pub(crate) fn document(
     origin: &Origin,
 ) -> Document {
     let alone = r.schemes.len() + r.generic.len() + r.models.len() == 1;
-    let reviewed = || r.schemes.iter().zip(&r.comparison.schemes);
     let certified = !origin.certificates.is_empty();
-    let answers: Vec<answers::Answers> = (reviewed()
+    let answers: Vec<answers::Answers> = (reviewed(r)
         .map(|(s, review)| answers::of_scheme(s, review, certified)))
     .chain(r.generic.iter().map(generic::answers))
     .chain(r.models.iter().map(model::answers))
@@ -62,38 +62,66 @@ pub(crate) fn document(
         first::comparison(&mut blocks, r, compared);
     }
     blocks.push(Block::Text(GRADES.into()));
-    let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
-    let all = (reviewed().map(|(s, review)| verdict::status(s, review)))
-        .chain(r.generic.iter().map(generic::status))
-        .chain(r.models.iter().map(model::status))
-        .chain(run);
-    blocks.push(Block::Status(all.collect()));
+    blocks.push(statuses(r, calibrations));
     blocks.extend(own);
     if alone {
-        blocks.extend(reviewed().map(|(s, review)| first::margins(s, review, "s1")));
+        blocks.extend(reviewed(r).map(|(s, review)| first::margins(s, review, "s1")));
         blocks.extend(r.generic.iter().map(|g| first::generic_degrees(g, "g1")));
         blocks.extend(r.models.iter().map(|m| first::model_degrees(&m.analysis, "m1")));
     }
     if r.schemes.len() > 1 {
-        let comparison = r.comparison.document();
-        let mut own: Vec<Block> = vec![compare::ratios(&r.comparison.schemes)];
-        own.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
-        own.extend(comparison.blocks.into_iter().filter_map(|b| match b {
-            Block::Fold(details) => Some(Block::Fold(Fold { level: 2, ..details })),
-            _ => None,
-        }));
-        blocks.push(Block::fold(1, "Comparison of the schemes", own));
+        blocks.push(comparison(r));
     }
     for (i, (name, c)) in calibrations.iter().enumerate() {
         let mut own = vec![Block::Text(CALIBRATED.into())];
         own.extend(calibrated::section(c, &format!("c{}", i + 1)));
         blocks.push(Block::fold(1, format!("Calibration {name}"), own));
     }
+    parts(&mut blocks, r, alone);
+    blocks.extend(certificates(origin));
+    blocks.push(Block::fold(1, "Notation", vec![notation::notation(r)]));
+    blocks.push(about(r, origin));
+    let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
+        .chain(r.generic.iter().map(|g| g.name.as_str()))
+        .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
+        .collect();
+    Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
+}
+
+/// Schemes with their predictions.
+fn reviewed(r: &DesignReview) -> impl Iterator<Item = (&SchemeReview, &ComparedScheme)> {
+    r.schemes.iter().zip(&r.comparison.schemes)
+}
+
+/// Status of every scheme, model and calibration.
+fn statuses(r: &DesignReview, calibrations: &[(String, Calibration)]) -> Block {
+    let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
+    let all = (reviewed(r).map(|(s, review)| verdict::status(s, review)))
+        .chain(r.generic.iter().map(generic::status))
+        .chain(r.models.iter().map(model::status))
+        .chain(run);
+    Block::Status(all.collect())
+}
+
+/// Comparison of the schemes.
+fn comparison(r: &DesignReview) -> Block {
+    let comparison = r.comparison.document();
+    let mut own: Vec<Block> = vec![compare::ratios(&r.comparison.schemes)];
+    own.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
+    own.extend(comparison.blocks.into_iter().filter_map(|b| match b {
+        Block::Fold(details) => Some(Block::Fold(Fold { level: 2, ..details })),
+        _ => None,
+    }));
+    Block::fold(1, "Comparison of the schemes", own)
+}
+
+/// Parts of the schemes and models; a single one has no fold of its own.
+fn parts(blocks: &mut Vec<Block>, r: &DesignReview, alone: bool) {
     let mut part = |title: String, own: Vec<Block>| match alone {
         true => blocks.extend(own),
         false => blocks.extend([Block::NewPage, Block::fold(1, title, own)]),
     };
-    for (i, (s, review)) in reviewed().enumerate() {
+    for (i, (s, review)) in reviewed(r).enumerate() {
         let (mut own, id) = (Vec::new(), format!("s{}", i + 1));
         if !alone {
             own.push(first::margins(s, review, &id));
@@ -117,14 +145,6 @@ pub(crate) fn document(
         model::part(&mut own, m, if alone { 1 } else { 2 }, &id);
         part(format!("Model {}", m.analysis.name), own);
     }
-    blocks.extend(certificates(origin));
-    blocks.push(Block::fold(1, "Notation", vec![notation::notation(r)]));
-    blocks.push(about(r, origin));
-    let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
-        .chain(r.generic.iter().map(|g| g.name.as_str()))
-        .chain(r.models.iter().map(|m| m.analysis.name.as_str()))
-        .collect();
-    Document { title: format!("Design review: {}", names.join(", ")), lead: Vec::new(), blocks }
 }
 
 /// Program, command and files of the review.
@@ -605,48 +625,64 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
     })
 }
 
+/// Fewest positions, the best scheme of the cardinal attitudes, and what each position is needed for.
 fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
     let mut lines = Vec::new();
-    let alternatives = &s.alternatives;
-    if let Some(kept) = &alternatives.kept {
-        lines.push(match kept.positions {
-            Some(k) if k == s.positions.len() => {
-                // what slews determine besides is in the rows without one position
-                let beside = match review.slews.is_empty() {
-                    true => "",
-                    false => "; what follows counts the slews too",
-                };
-                format!(
-                    "all {k} positions are needed to observe {} by repositioning at once{beside}",
-                    alternatives.required.join(", ")
-                )
-            }
-            Some(k) => format!(
-                "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
-                 another question",
-                s.positions.len(),
-                kept.witness.join(", "),
-                alternatives.required.join(", ")
-            ),
-            None => "too many sets of positions to look for the fewest".into(),
-        });
-    }
+    lines.extend(s.alternatives.kept.as_ref().map(|kept| fewest_of_these(kept, s, review)));
     lines.extend(fewest_of_all(s, review));
-    if let (Some(c), Some(best)) = (
-        &alternatives.certificate,
-        alternatives.front.iter().find(|f| s.positions.first().is_some_and(|p| p.dwell_s == f.dwell_s)),
-    ) {
-        let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
-        lines.push(format!(
-            "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} \
-             (optimal weights); the best found has {value}, at most {percent} above",
-            alternatives.front_positions,
-            number(best.dwell_s),
-            alternatives.required.join(", "),
-        ));
-    }
+    lines.extend(best_of_all(s));
     lines.extend(resolve::position_to_drop(review));
     blocks.push(Block::list("", lines));
+    if !review.drop_one.is_empty() {
+        blocks.push(without_one_position(review));
+    }
+}
+
+/// Sentence on the fewest positions of the scheme that observe what it observes.
+fn fewest_of_these(kept: &Minimum, s: &SchemeReview, review: &ComparedScheme) -> String {
+    let required = &s.alternatives.required;
+    match kept.positions {
+        Some(k) if k == s.positions.len() => {
+            // what slews determine besides is in the rows without one position
+            let beside = match review.slews.is_empty() {
+                true => "",
+                false => "; what follows counts the slews too",
+            };
+            format!(
+                "all {k} positions are needed to observe {} by repositioning at once{beside}",
+                required.join(", ")
+            )
+        }
+        Some(k) => format!(
+            "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
+             another question",
+            s.positions.len(),
+            kept.witness.join(", "),
+            required.join(", ")
+        ),
+        None => "too many sets of positions to look for the fewest".into(),
+    }
+}
+
+/// Sentence on the best scheme of cardinal attitudes at the dwell of this one, and on the bound of its
+/// criterion.
+fn best_of_all(s: &SchemeReview) -> Option<String> {
+    let alternatives = &s.alternatives;
+    let c = alternatives.certificate.as_ref()?;
+    let same_dwell = |dwell_s: f64| s.positions.first().is_some_and(|p| p.dwell_s == dwell_s);
+    let best = alternatives.front.iter().find(|f| same_dwell(f.dwell_s))?;
+    let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
+    Some(format!(
+        "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} \
+         (optimal weights); the best found has {value}, at most {percent} above",
+        alternatives.front_positions,
+        number(best.dwell_s),
+        alternatives.required.join(", "),
+    ))
+}
+
+/// Table of the scheme without one of its positions.
+fn without_one_position(review: &ComparedScheme) -> Block {
     let row = |d: &obsdeg_evidence::compare::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
         vec![
@@ -656,15 +692,13 @@ fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
             compare::requirements(&d.requirements),
         ]
     };
-    if !review.drop_one.is_empty() {
-        let figure = match review.conditions.bench.is_some() {
-            true => "worst total(D), with the bench [deg/h, /g]",
-            false => "worst sigma(D) [deg/h, /g]",
-        };
-        let columns = ["without", "not observable any more", figure, compare::REQUIREMENTS[0]].map(left);
-        let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
-        blocks.push(table.without(&left_out(review)));
-    }
+    let figure = match review.conditions.bench.is_some() {
+        true => "worst total(D), with the bench [deg/h, /g]",
+        false => "worst sigma(D) [deg/h, /g]",
+    };
+    let columns = ["without", "not observable any more", figure, compare::REQUIREMENTS[0]].map(left);
+    let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
+    table.without(&left_out(review))
 }
 
 /// Largest number of pictures of slopes, one for each unit, in the printed part of an appendix.

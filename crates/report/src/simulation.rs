@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_evidence::simulation::{
-    CoefficientFloor, ConditionsReport, Estimate, FilterReason, FilterReport, Outcome, Simulation,
-    TimelineReport, Validity,
+    CoefficientFloor, ConditionsReport, Estimate, FilterReason, FilterReport, NoiseFloor, Outcome,
+    Simulation, TimelineReport, Validity,
 };
 
 use crate::document::{Block, Document, left, number, optional, right};
@@ -247,41 +247,94 @@ fn lead(s: &Simulation) -> Vec<String> {
     out
 }
 
+/// Meaning of the degree in the table of estimates.
+fn degree_heading(s: &Simulation) -> &'static str {
+    // torquer errors act in slews, which the verdicts assume to be fast
+    let torqued = s.quantities.iter().any(|q| q.name.starts_with("GS_") || q.name.starts_with("GM_"));
+    if torqued && s.timeline.iter().any(|t| t.slew) {
+        "exact verdict of turns fast against the earth rate, - not observable; outcome: with the slews"
+    } else if s.timeline.iter().any(|t| t.slew) {
+        "exact verdict of repositioning at once, - not observable; outcome: with the slews"
+    } else {
+        "exact verdict, - not observable"
+    }
+}
+
+/// Tables of the estimates of unknowns and of combinations.
+fn estimates(s: &Simulation) -> Vec<Block> {
+    let mut columns = vec![left("unknown"), left("unit")];
+    columns.extend(words::ESTIMATE.map(right));
+    columns.extend([right("predicted"), right("at [s]"), left("outcome")]);
+    let table =
+        |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
+    let degree = degree_heading(s);
+    let bench = match s.requirements.with_bench {
+        true => ", where the total with the bench does; reached: the total",
+        false => "",
+    };
+    let mut blocks = vec![table(
+        &format!(
+            "Estimates at the end (degree: {degree}; predicted: sigma by what is stated; at: when sigma met the \
+             requirement{bench})"
+        ),
+        &s.quantities,
+    )];
+    if !s.combinations.is_empty() {
+        blocks.push(table("Combinations (psi: of the end)", &s.combinations));
+    }
+    blocks
+}
+
+/// Table of the linear filter on the same measurements.
+fn beside_linear(s: &Simulation) -> Block {
+    let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
+    let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();
+    let rows = s.quantities.iter().chain(&s.combinations).filter_map(linear);
+    Block::table("Beside it, the linear filter on the same measurements", columns, rows)
+}
+
+/// Sentences on the consistency of the run.
+fn consistency(s: &Simulation) -> Vec<String> {
+    let mut consistency = words::consistency(&s.consistency);
+    if s.consistency.consistent && !s.filter.trusted {
+        consistency[0] = "this run is consistent with its truth, which says little of this filter (see \
+                          Filter): the errors of many runs decide (obsdeg crosscheck)"
+            .into();
+    }
+    consistency
+}
+
+/// Noise floor of the coefficients, with its meaning.
+fn noise_floor(f: &NoiseFloor) -> [Block; 2] {
+    let mut columns = vec![left("coefficient"), left("unit")];
+    columns.extend(words::FLOOR.map(right));
+    let row = |c: &CoefficientFloor| [vec![c.name.clone(), c.unit.clone()], words::floor(c).into()].concat();
+    let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
+    [
+        Block::table("Noise floor", columns, f.coefficients.iter().map(row)),
+        Block::list("Noise floor: what it is", means.collect()),
+    ]
+}
+
+/// Conditions of the run, with its carry, seed, requirements and bench.
+fn assumed(s: &Simulation) -> Vec<String> {
+    let mut assumed = conditions(&s.conditions, &s.timeline);
+    assumed.push(format!("carry {}; seed {}", s.carry, s.seed));
+    let required = requirements(&s.quantities);
+    if !required.is_empty() {
+        assumed.push(format!("required sigma {}", required.join(", ")));
+    }
+    assumed.extend(s.conditions.bench.as_deref().map(words::bench));
+    assumed
+}
+
 impl Answer for Simulation {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
     }
 
     fn document(&self) -> Document {
-        let mut columns = vec![left("unknown"), left("unit")];
-        columns.extend(words::ESTIMATE.map(right));
-        columns.extend([right("predicted"), right("at [s]"), left("outcome")]);
-        let table =
-            |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
-        let end = self.timeline.last().map_or(0.0, |t| t.end_s);
-        // torquer errors act in slews, which the verdicts assume to be fast
-        let torqued = self.quantities.iter().any(|q| q.name.starts_with("GS_") || q.name.starts_with("GM_"));
-        let degree = if torqued && self.timeline.iter().any(|t| t.slew) {
-            "exact verdict of turns fast against the earth rate, - not observable; outcome: with the slews"
-        } else if self.timeline.iter().any(|t| t.slew) {
-            "exact verdict of repositioning at once, - not observable; outcome: with the slews"
-        } else {
-            "exact verdict, - not observable"
-        };
-        let bench = match self.requirements.with_bench {
-            true => ", where the total with the bench does; reached: the total",
-            false => "",
-        };
-        let mut blocks = vec![table(
-            &format!(
-                "Estimates at the end (degree: {degree}; predicted: sigma by what is stated; at: when sigma met the \
-                 requirement{bench})"
-            ),
-            &self.quantities,
-        )];
-        if !self.combinations.is_empty() {
-            blocks.push(table("Combinations (psi: of the end)", &self.combinations));
-        }
+        let mut blocks = estimates(self);
         blocks.extend(Block::list_if_any(
             "Known from the prior only: on which priors",
             priors(&self.quantities, self.filter.kind),
@@ -289,42 +342,18 @@ impl Answer for Simulation {
         blocks.extend(omitted::blocks(&self.omitted, ""));
         blocks.push(Block::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {
-            let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
-            let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();
-            let rows = self.quantities.iter().chain(&self.combinations).filter_map(linear);
-            blocks.push(Block::table("Beside it, the linear filter on the same measurements", columns, rows));
+            blocks.push(beside_linear(self));
         }
-        let mut consistency = words::consistency(&self.consistency);
-        if self.consistency.consistent && !self.filter.trusted {
-            consistency[0] = "this run is consistent with its truth, which says little of this filter (see \
-                              Filter): the errors of many runs decide (obsdeg crosscheck)"
-                .into();
-        }
-        blocks.push(Block::list("Consistency", consistency));
+        blocks.push(Block::list("Consistency", consistency(self)));
         blocks.push(Block::list(
             "Validity of the small-angle model",
             validity(&self.validity, &self.conditions),
         ));
-        if let Some(f) = &self.noise_floor {
-            let mut columns = vec![left("coefficient"), left("unit")];
-            columns.extend(words::FLOOR.map(right));
-            let row = |c: &CoefficientFloor| {
-                [vec![c.name.clone(), c.unit.clone()], words::floor(c).into()].concat()
-            };
-            blocks.push(Block::table("Noise floor", columns, f.coefficients.iter().map(row)));
-            let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
-            blocks.push(Block::list("Noise floor: what it is", means.collect()));
-        }
+        blocks.extend(self.noise_floor.iter().flat_map(noise_floor));
         blocks.extend(gimbals::block(self.gimbals.as_ref()));
-        let mut assumed = conditions(&self.conditions, &self.timeline);
-        assumed.push(format!("carry {}; seed {}", self.carry, self.seed));
-        let required = requirements(&self.quantities);
-        if !required.is_empty() {
-            assumed.push(format!("required sigma {}", required.join(", ")));
-        }
-        assumed.extend(self.conditions.bench.as_deref().map(words::bench));
-        blocks.push(Block::list("Assumed", assumed));
+        blocks.push(Block::list("Assumed", assumed(self)));
         let positions = self.timeline.iter().filter(|t| !t.slew).count();
+        let end = self.timeline.last().map_or(0.0, |t| t.end_s);
         Document {
             title: format!(
                 "Simulation: {positions} position{}, {} carry, {} s",

@@ -1,7 +1,7 @@
 //! Recommended actions by the findings on a scheme, a model or a calibration.
 
 use obsdeg_calibration::Calibration;
-use obsdeg_calibration::answer::{CellKind, Estimated, Finding, PositionFit};
+use obsdeg_calibration::answer::{CellKind, ClockRate, Estimated, Finding, PositionFit};
 use obsdeg_core::degree::Status as Exact;
 use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
@@ -21,61 +21,18 @@ const FAILING: &str = "First explain the filter checks that fail (section Eviden
 
 /// Actions for a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
-    let mut out = Vec::new();
     let missed = |why: Miss| -> Vec<&str> {
         review.requirements.missed.iter().filter(|m| m.why == why).map(|m| m.name.as_str()).collect()
     };
-    let unseen = missed(Miss::NotObservable);
-    if !unseen.is_empty() {
-        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
-        out.push(format!(
-            "Add or change positions: these do not determine {}{fewest}.",
-            words::names(unseen)
-        ));
-        out.extend(resolve::to_resolve_in_scheme(&s.analysis));
-    }
-    let stated = review.requirements.stated;
-    let open: Vec<&str> = (review.quantities.iter())
-        .filter(|q| stated == 0 && q.status != Exact::Observable && q.sigma.is_none())
-        .filter(|q| !q.name.starts_with("psi"))
-        .map(|q| q.name.as_str())
-        .collect();
-    if !open.is_empty() {
-        let fewest = fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
-        out.push(format!(
-            "If you need {}, add or change positions: these do not determine them{fewest}.",
-            words::names(open)
-        ));
-    }
+    let mut out = unobservable(s, review, missed(Miss::NotObservable));
     let large = missed(Miss::TooLarge);
     if !large.is_empty() {
         let advised =
             review.omitted.advice.iter().find(|a| a.met).map(|a| format!("{}.", omitted::advised(a)));
         out.push(advised.unwrap_or_else(|| longer(s, review, &large)));
     }
-    let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
-    let in_run = s.simulation.run.requirements.missed.iter().map(|m| m.name.as_str());
-    let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
-    if !only_there.is_empty() {
-        out.push(format!(
-            "Look at the run: it misses {} although the prediction does not ({}).",
-            words::names(only_there),
-            stated::run(&s.simulation.run, &s.simulation.conditions)
-        ));
-    }
-    if !s.simulation.validity.holds {
-        let of = match stated::drifts_by_default(&s.simulation.conditions) {
-            true => {
-                "State the drifts of your gyros (true values of the simulation): at those of the paper, which \
-                 stand in their place, the small-angle model does not hold. Then compensate"
-            }
-            false => "At these drifts the small-angle model does not hold: compensate",
-        };
-        out.push(format!(
-            "{of} known drifts before the run, or use a filter with full attitudes (a simulation with the exact \
-             truth shows its sigmas)."
-        ));
-    }
+    out.extend(missed_in_run(s, review));
+    out.extend(large_angles(s));
     if gimbals::lead(s.analysis.gimbals.as_ref()).is_some() {
         out.push("Change positions or paths that the gimbals cannot follow (Positions).".into());
     }
@@ -88,24 +45,88 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String
         Ok(e) if !e.passed => out.push(FAILING.into()),
         _ => {}
     }
-    let met = review.requirements.all_met();
-    if stated == 0 {
+    if review.requirements.stated == 0 {
         out.push("State requirements: nothing says yet what is good enough.".into());
     }
     if out.is_empty() {
-        out.push(match (met, &s.evidence) {
-            (false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).".into(),
-            (_, Ok(_)) => "No action: every requirement is met, by prediction and in the run, and no \
-                              check fails."
-                .into(),
-            (_, Err(_)) => {
-                "No action from what was computed: every requirement is met, by prediction and in the run. \
-                 Evidence by a filter was not taken."
-                    .into()
-            }
-        });
+        out.push(no_action(s, review).into());
     }
     out
+}
+
+/// Actions for unknowns that the positions do not determine: required ones, and without requirements all.
+fn unobservable(s: &SchemeReview, review: &ComparedScheme, required: Vec<&str>) -> Vec<String> {
+    let mut out = Vec::new();
+    let fewest = || fewest_of_all(s, review).map_or_else(String::new, |text| format!("; {text}"));
+    if !required.is_empty() {
+        out.push(format!(
+            "Add or change positions: these do not determine {}{}.",
+            words::names(required),
+            fewest()
+        ));
+        out.extend(resolve::to_resolve_in_scheme(&s.analysis));
+    }
+    let stated = review.requirements.stated;
+    let open: Vec<&str> = (review.quantities.iter())
+        .filter(|q| stated == 0 && q.status != Exact::Observable && q.sigma.is_none())
+        .filter(|q| !q.name.starts_with("psi"))
+        .map(|q| q.name.as_str())
+        .collect();
+    if !open.is_empty() {
+        out.push(format!(
+            "If you need {}, add or change positions: these do not determine them{}.",
+            words::names(open),
+            fewest()
+        ));
+    }
+    out
+}
+
+/// Action for requirements that the run misses and the prediction does not; `None` without any.
+fn missed_in_run(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
+    let here: Vec<&str> = review.requirements.missed.iter().map(|m| m.name.as_str()).collect();
+    let in_run = s.simulation.run.requirements.missed.iter().map(|m| m.name.as_str());
+    let only_there: Vec<&str> = in_run.filter(|name| !here.contains(name)).collect();
+    (!only_there.is_empty()).then(|| {
+        format!(
+            "Look at the run: it misses {} although the prediction does not ({}).",
+            words::names(only_there),
+            stated::run(&s.simulation.run, &s.simulation.conditions)
+        )
+    })
+}
+
+/// Action for drifts at which the small-angle model does not hold; `None` where it does.
+fn large_angles(s: &SchemeReview) -> Option<String> {
+    if s.simulation.validity.holds {
+        return None;
+    }
+    let of = match stated::drifts_by_default(&s.simulation.conditions) {
+        true => {
+            "State the drifts of your gyros (true values of the simulation): at those of the paper, which \
+             stand in their place, the small-angle model does not hold. Then compensate"
+        }
+        false => "At these drifts the small-angle model does not hold: compensate",
+    };
+    Some(format!(
+        "{of} known drifts before the run, or use a filter with full attitudes (a simulation with the exact \
+         truth shows its sigmas)."
+    ))
+}
+
+/// Sentence of a scheme that needs no action.
+fn no_action(s: &SchemeReview, review: &ComparedScheme) -> &'static str {
+    match (review.requirements.all_met(), &s.evidence) {
+        (false, _) => "Look at the unknowns without a number (Unknowns, Evidence by a filter).",
+        (_, Ok(_)) => {
+            "No action: every requirement is met, by prediction and in the run, and no \
+             check fails."
+        }
+        (_, Err(_)) => {
+            "No action from what was computed: every requirement is met, by prediction and in the run. \
+             Evidence by a filter was not taken."
+        }
+    }
 }
 
 /// True if the sigma of an unknown alone meets its requirement.
@@ -225,6 +246,25 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
             out.push(line);
         }
     }
+    out.extend(undetermined(c));
+    out.extend(missed_requirements(c));
+    let met = c.requirements.as_ref().is_some_and(|r| !r.with_bench && r.all_met());
+    let limits = if met && c.consistent { omitted::main_limits(c) } else { String::new() };
+    if !limits.is_empty() {
+        out.push(format!(
+            "State the bench: without it errors outside the model count as zero, and the requirements are met \
+             only while these are small ({limits}, each by itself)."
+        ));
+    }
+    if out.is_empty() {
+        out.push("No action: every unknown is determined, and model and sigmas explain the record.".into());
+    }
+    out
+}
+
+/// Actions for unknowns that the calibration does not determine.
+fn undetermined(c: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
     let without = |of: fn(&Estimated) -> bool| -> Vec<&str> {
         c.quantities.iter().filter(|u| !u.determined && of(u)).map(|u| u.name.as_str()).collect()
     };
@@ -250,6 +290,12 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
             words::names(by_record)
         ));
     }
+    out
+}
+
+/// Actions for requirements that the record misses.
+fn missed_requirements(c: &Calibration) -> Vec<String> {
+    let mut out = Vec::new();
     let missed = c.requirements.iter().flat_map(|r| r.missed.iter().map(|m| m.name.as_str()));
     let missed = missed.filter(|name| c.quantities.iter().any(|q| q.name == *name && q.determined));
     let by_bench = |name: &&str| c.next_runs.iter().any(|n| n.unknown == *name && n.required_sigma == 0.0);
@@ -267,17 +313,6 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
              (a design of the next position after this calibration names it).",
             words::names(missed)
         ));
-    }
-    let met = c.requirements.as_ref().is_some_and(|r| !r.with_bench && r.all_met());
-    let limits = if met && c.consistent { omitted::main_limits(c) } else { String::new() };
-    if !limits.is_empty() {
-        out.push(format!(
-            "State the bench: without it errors outside the model count as zero, and the requirements are met \
-             only while these are small ({limits}, each by itself)."
-        ));
-    }
-    if out.is_empty() {
-        out.push("No action: every unknown is determined, and model and sigmas explain the record.".into());
     }
     out
 }
@@ -318,27 +353,10 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
              in the scheme file."
                 .into()
         }
-        Finding::Clock { by_changes: Some(_), .. } => "Compare the times of the record and of its positions \
-                                                        with those of its run: either the clock is wrong, and \
-                                                        drifts by the same part, or the scheme has other times."
-            .into(),
-        Finding::Clock { by_durations, by_durations_sigma, by_earth, .. } => match (by_durations, by_earth) {
-            (Some(_), Some(_))
-                if is_clock(durations(*by_durations, *by_durations_sigma).as_ref(), by_earth.as_ref()) =>
-            {
-                "Correct the times of the record: its clock fits neither the scheme nor the earth rate. \
-                 Drifts are wrong by the same part or more."
-            }
-            (_, Some(_)) => {
-                "Look at latitude, rate of turns and times of the record, and at errors that are no \
-                 unknowns: its rates are not those of the scheme."
-            }
-            (_, None) => {
-                "Compare the times of the record with those of its run: if its clock is wrong, drifts are \
-                 wrong by the same part or more."
-            }
+        Finding::Clock { by_durations, by_durations_sigma, by_changes, by_earth, .. } => {
+            let by_durations = durations(*by_durations, *by_durations_sigma);
+            of_clock(by_durations.as_ref(), by_changes.as_ref(), by_earth.as_ref()).into()
         }
-        .into(),
         Finding::Cells { column, kind_of_cells: CellKind::Code, .. } => format!(
             "Look at column {column} of the record: state its codes of missing values in the scheme file."
         ),
@@ -355,9 +373,7 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
              by a clock that nobody sets."
         ),
         Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
-        Finding::Turns { .. } => {
-            "State the rate of the turns of this run, and calibrate again.".into()
-        }
+        Finding::Turns { .. } => "State the rate of the turns of this run, and calibrate again.".into(),
         Finding::Force { .. } => {
             "Add scales and zeros of the accelerometers to the unknowns (K1, K0), or state the \
              gravity of the place, for forces in m/s^2."
@@ -394,6 +410,32 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         ),
         Finding::Known { .. } => {
             "Calibrate without the earlier calibration: it does not agree with these records.".into()
+        }
+    }
+}
+
+/// Action for a clock that is fast or slow by durations of positions, changes of position or the earth rate.
+fn of_clock(
+    by_durations: Option<&ClockRate>,
+    by_changes: Option<&ClockRate>,
+    by_earth: Option<&ClockRate>,
+) -> &'static str {
+    match (by_changes, by_durations, by_earth) {
+        (Some(_), ..) => {
+            "Compare the times of the record and of its positions with those of its run: either the clock is \
+             wrong, and drifts by the same part, or the scheme has other times."
+        }
+        (None, Some(_), Some(_)) if is_clock(by_durations, by_earth) => {
+            "Correct the times of the record: its clock fits neither the scheme nor the earth rate. \
+             Drifts are wrong by the same part or more."
+        }
+        (None, _, Some(_)) => {
+            "Look at latitude, rate of turns and times of the record, and at errors that are no \
+             unknowns: its rates are not those of the scheme."
+        }
+        (None, _, None) => {
+            "Compare the times of the record with those of its run: if its clock is wrong, drifts are \
+             wrong by the same part or more."
         }
     }
 }

@@ -124,10 +124,26 @@ fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
 
 /// Verdict: missed requirements, limits, determined unknowns, accuracy.
 pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) -> String {
+    let with_dwell: Vec<&Quantity> = coefficients.iter().filter(|q| q.sigma.is_some()).copied().collect();
+    let first = determined(s, coefficients, &with_dwell);
+    let accuracy = accuracy(review, &with_dwell);
+    let limits = limits(s);
+    let filter = filter_agreement(s, limits.is_empty());
+    let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
+    // margins and the run are in the status
+    let missed = match requirements(s, review).0 {
+        Grade::Missed => format!("{}. ", stated::capital(&stated::verdict(&review.requirements))),
+        _ => String::new(),
+    };
+    format!("{missed}{lead}{first}. {accuracy}{filter}.")
+}
+
+/// Number of unknowns that the scheme determines, with their degrees, and the unknowns that it does not.
+/// `with_dwell` are those of `coefficients` that samples determine.
+fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quantity]) -> String {
     let a = &s.analysis;
     let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
     let seen: Vec<&&Quantity> = of(Exact::Observable).collect();
-    let with_dwell: Vec<&&Quantity> = coefficients.iter().filter(|q| q.sigma.is_some()).collect();
     let (all, what) = (coefficients.len(), kind(coefficients));
     let same = seen.iter().map(|q| &q.name).eq(with_dwell.iter().map(|q| &q.name));
     let mut first = match (seen.len(), same) {
@@ -159,10 +175,15 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     if !silent.is_empty() {
         first.push_str(&format!("; it does not excite {silent}"));
     }
+    first
+}
+
+/// Largest predicted sigma of the coefficients that samples determine, and the largest total with a bench.
+fn accuracy(review: &ComparedScheme, with_dwell: &[&Quantity]) -> String {
     // other units do not compare
-    let rates: Vec<&&Quantity> = match with_dwell.iter().any(|q| q.unit.starts_with("deg/h")) {
+    let rates: Vec<&Quantity> = match with_dwell.iter().any(|q| q.unit.starts_with("deg/h")) {
         true => with_dwell.iter().filter(|q| q.unit.starts_with("deg/h")).copied().collect(),
-        false => with_dwell.clone(),
+        false => with_dwell.to_vec(),
     };
     let worst = rates.iter().filter_map(|q| Some((q, q.sigma?))).max_by(|x, y| x.1.total_cmp(&y.1));
     let accuracy = worst.map_or_else(
@@ -182,22 +203,19 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
     let total = total.map_or_else(String::new, |(q, total)| {
         format!(", with the bench the largest total uncertainty is {} {} ({})", number(total), q.unit, q.name)
     });
-    let limits = limits(s);
-    let filter = match (&s.evidence, limits.is_empty()) {
+    format!("{accuracy}{total}")
+}
+
+/// Agreement of a filter with the verdicts, within limits or without.
+fn filter_agreement(s: &SchemeReview, unlimited: bool) -> &'static str {
+    match (&s.evidence, unlimited) {
         (Ok(e), true) if e.passed && e.counts.not_resolvable == 0 => {
             ", and the filter agrees with all verdicts"
         }
         (Ok(e), true) if e.passed => ", and the filter agrees with the verdicts as far as it shows them",
         (Ok(e), false) if e.passed => "; within these limits a filter agrees with the exact verdicts",
         _ => "",
-    };
-    let lead = if limits.is_empty() { String::new() } else { format!("Limited: {}. ", limits.join("; ")) };
-    // margins and the run are in the status
-    let missed = match requirements(s, review).0 {
-        Grade::Missed => format!("{}. ", stated::capital(&stated::verdict(&review.requirements))),
-        _ => String::new(),
-    };
-    format!("{missed}{lead}{first}. {accuracy}{total}{filter}.")
+    }
 }
 
 /// Sentences on errors outside the model that requirements rest on: of those without a stated size the sizes
@@ -212,76 +230,76 @@ fn outside(review: &ComparedScheme) -> String {
 
 /// Status of a scheme.
 pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
-    let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
-    let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
-        format!("{} of {}", of(psi).filter(seen).count(), of(psi).count())
-    };
-    let coefficients: Vec<&Quantity> = of(false).collect();
     let lost = lost_with_dwell(s);
     let every = review.quantities.iter().all(|q| q.status == Exact::Observable) && lost.is_empty();
-    let observable = {
-        let what = kind(&coefficients);
-        let [by, with]: [fn(&&Quantity) -> bool; 2] =
-            [|q| q.status == Exact::Observable, |q| q.sigma.is_some()];
-        let text = format!("{} {what}, {} of psi", count(false, by), count(true, by));
-        if review.quantities.iter().all(|q| by(&q) == with(&q)) {
-            text
-        } else {
-            let how = dwell_or_slews(s);
-            format!("by derivatives {text}; with {how} {} and {}", count(false, with), count(true, with))
-        }
-    };
-    let dwell = match lost.is_empty() {
-        true => String::new(),
-        false => format!(", without {}", words::names(lost)),
-    };
     let grade = |good: bool| if good { Grade::Good } else { Grade::Limited };
-    let consistency = &s.simulation.consistency;
-    let prior = by_prior(s);
     let (checks, agreement) = evidence(s);
     let (required, requirements) = requirements(s, review);
     let requirements = match review.requirements.stated {
         0 => requirements,
         _ => format!("{requirements}{}", outside(review)),
     };
-    let row = |what, grade, text| StatusRow { what, grade, text };
-    let beyond = gimbals::lead(s.analysis.gimbals.as_ref()).map(|text| row("Gimbals", Grade::Missed, text));
-    let first = [
-        row("Observable", grade(every), format!("{observable}{dwell}")),
+    let prior = by_prior(s);
+    let mut rows = vec![
+        row("Observable", grade(every), observable(s, review, &lost)),
         row("Requirements", required, requirements),
     ];
-    Status {
-        title: s.name.clone(),
-        rows: first.into_iter().chain(beyond).chain([
-            row(
-                "Small-angle model",
-                match stated::drifts_by_default(&s.simulation.conditions) {
-                    true => Grade::Open,
-                    false => grade(s.simulation.validity.holds),
-                },
-                small_angles(s)
-                    .unwrap_or_else(|| format!("holds for {}", stated::drifts(&s.simulation.conditions))),
-            ),
-            row(
-                "Filter, one run",
-                grade(consistency.consistent && s.simulation.filter.trusted),
-                match (consistency.consistent, s.simulation.filter.trusted) {
-                    (true, true) => "consistent with its truth".into(),
-                    (true, false) => {
-                        "consistent with its truth, which says little: its sigmas are not to be trusted at \
-                         these drifts"
-                            .into()
-                    }
-                    (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
-                },
-            ),
-            row("Filter and exact verdicts", checks, agreement),
-            row(
-                "Resting on the prior",
-                grade(prior.is_empty()),
-                if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
-            ),
-        ]).collect(),
-        actions: super::actions::of_scheme(s, review),
+    let beyond = gimbals::lead(s.analysis.gimbals.as_ref());
+    rows.extend(beyond.map(|text| row("Gimbals", Grade::Missed, text)));
+    let small = match stated::drifts_by_default(&s.simulation.conditions) {
+        true => Grade::Open,
+        false => grade(s.simulation.validity.holds),
+    };
+    let holds = || format!("holds for {}", stated::drifts(&s.simulation.conditions));
+    let consistent = s.simulation.consistency.consistent;
+    rows.extend([
+        row("Small-angle model", small, small_angles(s).unwrap_or_else(holds)),
+        row("Filter, one run", grade(consistent && s.simulation.filter.trusted), one_run(s)),
+        row("Filter and exact verdicts", checks, agreement),
+        row(
+            "Resting on the prior",
+            grade(prior.is_empty()),
+            if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
+        ),
+    ]);
+    Status { title: s.name.clone(), rows, actions: super::actions::of_scheme(s, review) }
+}
+
+/// Answer to one question of a status.
+fn row(what: &'static str, grade: Grade, text: String) -> StatusRow {
+    StatusRow { what, grade, text }
+}
+
+/// Numbers of observable unknowns, by derivatives and with dwell; `lost` have a degree that dwell takes away.
+fn observable(s: &SchemeReview, review: &ComparedScheme, lost: &[&str]) -> String {
+    let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
+    let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
+        format!("{} of {}", of(psi).filter(seen).count(), of(psi).count())
+    };
+    let coefficients: Vec<&Quantity> = of(false).collect();
+    let what = kind(&coefficients);
+    let [by, with]: [fn(&&Quantity) -> bool; 2] = [|q| q.status == Exact::Observable, |q| q.sigma.is_some()];
+    let text = format!("{} {what}, {} of psi", count(false, by), count(true, by));
+    let observable = if review.quantities.iter().all(|q| by(&q) == with(&q)) {
+        text
+    } else {
+        let how = dwell_or_slews(s);
+        format!("by derivatives {text}; with {how} {} and {}", count(false, with), count(true, with))
+    };
+    match lost.is_empty() {
+        true => observable,
+        false => format!("{observable}, without {}", words::names(lost.iter().copied())),
+    }
+}
+
+/// Consistency of the run of the filter.
+fn one_run(s: &SchemeReview) -> String {
+    let consistency = &s.simulation.consistency;
+    match (consistency.consistent, s.simulation.filter.trusted) {
+        (true, true) => "consistent with its truth".into(),
+        (true, false) => "consistent with its truth, which says little: its sigmas are not to be trusted at \
+                          these drifts"
+            .into(),
+        (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
     }
 }
