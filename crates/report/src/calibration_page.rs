@@ -155,8 +155,13 @@ fn budget(c: &Calibration) -> Block {
 
 /// Changes since an earlier calibration.
 fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
+    let texts = significance(change).into_iter().map(|s| Block::Text(format!("{}.", stated::capital(&s))));
+    std::iter::once(changed_coefficients(change, earlier)).chain(texts).collect()
+}
+
+/// Table of the coefficients with their changes.
+fn changed_coefficients(change: &CalibrationChange, earlier: &str) -> Block {
     let independent = change.shared.is_empty() && change.consistent;
-    let shares = !change.shared.is_empty();
     let columns = [
         left("coefficient"),
         left("unit"),
@@ -182,7 +187,11 @@ fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
         ];
         texts.into_iter().map(Cell::from).chain([marked]).collect::<Vec<_>>()
     });
-    let mut out = vec![Block::table(format!("Changes since {earlier}"), columns, rows)];
+    Block::table(format!("Changes since {earlier}"), columns, rows)
+}
+
+/// Sentences on the significance of the changes.
+fn significance(change: &CalibrationChange) -> Vec<String> {
     let mut said: Vec<String> = Vec::new();
     if let Some(t) = change.together {
         let outcome = if t.probability < CHANCE {
@@ -212,11 +221,10 @@ fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
                 .into(),
         );
     }
-    if shares {
+    if !change.shared.is_empty() {
         let shared = names(change.shared.iter().map(String::as_str));
         said.push(format!("both rest on {shared}, so that no change has a significance"));
     }
     said.extend((!change.differs.is_empty()).then(|| format!("other setup: {}", change.differs.join("; "))));
-    out.extend(said.into_iter().map(|s| Block::Text(format!("{}.", stated::capital(&s)))));
-    out
+    said
 }

@@ -2,7 +2,8 @@
 
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_evidence::crosscheck::{
-    Agreement, Check, Control, Counts, CrossCheck, MonteCarlo, NullEvidence, QuantityEvidence, Statistic,
+    Agreement, Check, Control, Counts, CrossCheck, MonteCarlo, NullEvidence, QuantityEvidence, Ranking,
+    Statistic,
 };
 
 use crate::Answer;
@@ -132,9 +133,6 @@ fn by_direction(c: &CrossCheck) -> Block {
 
 /// Checks of the whole scheme: the number of directions of item b, and items c to f.
 fn whole(c: &CrossCheck) -> Block {
-    let row = |evidence: String, predicted: String, measured: String, band: String, pass: bool| {
-        vec![evidence, predicted, measured, band, passed(pass)]
-    };
     let spaces = c.spaces.iter().map(|s| {
         let what = format!("a. {}", s.what);
         vec![what, s.predicted.clone(), s.measured.clone(), String::new(), mark(s.outcome)]
@@ -151,30 +149,55 @@ fn whole(c: &CrossCheck) -> Block {
         let limit = format!("up to {:.0e}", d.limit);
         vec![format!("c. {}", d.name), "0".into(), format!("{:.1e}", d.difference), limit, mark(d.outcome)]
     }));
-    rows.extend(c.monte_carlo.statistics.iter().map(|s: &Statistic| {
-        let of = match c.monte_carlo.filter {
+    rows.extend(of_monte_carlo(&c.monte_carlo));
+    rows.extend(of_ranking(&c.ranking));
+    rows.extend(c.controls.iter().map(|k: &Control| {
+        let name = format!("f. {}: failing checks of a, b; NIS", k.name);
+        let found = format!("{} of {}; {}", k.failed, k.checks, number(k.nis));
+        vec![name, "fails".into(), found, format!("(99.9 %: {})", band(k.band)), mark(k.outcome)]
+    }));
+    let columns =
+        [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("finding")];
+    Block::table("The filter as a whole", columns, rows)
+}
+
+/// Row of a check that passes or fails.
+fn row(evidence: String, predicted: String, measured: String, band: String, pass: bool) -> Vec<String> {
+    vec![evidence, predicted, measured, band, passed(pass)]
+}
+
+/// Item d: statistics of the Monte Carlo runs.
+fn of_monte_carlo(d: &MonteCarlo) -> Vec<Vec<String>> {
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    rows.extend(d.statistics.iter().map(|s: &Statistic| {
+        let of = match d.filter {
             FilterKind::Linear => String::new(),
             other => format!(" of the {} filter", other.name()),
         };
-        let name = format!("d. {}, {} runs{of}", s.name, c.monte_carlo.runs);
+        let name = format!("d. {}, {} runs{of}", s.name, d.runs);
         let bands = format!("{} (99.9 %: {})", band(s.band), band(s.wide_band));
         row(name, number(s.expected), number(s.measured), bands, s.pass)
     }));
     rows.push(row(
         "d. innovations white".into(),
         String::new(),
-        number(c.monte_carlo.whiteness_probability),
+        number(d.whiteness_probability),
         "above 0.001".into(),
-        c.monte_carlo.white,
+        d.white,
     ));
-    rows.push(vec![
+    rows
+}
+
+/// Item e: orders of the unknowns by sigma.
+fn of_ranking(r: &Ranking) -> Vec<Vec<String>> {
+    let mut rows = vec![vec![
         "e. Kendall tau-b of predicted and measured orders".into(),
         "1".into(),
-        c.ranking.kendall_tau.map_or_else(|| "all tied".into(), number),
+        r.kendall_tau.map_or_else(|| "all tied".into(), number),
         String::new(),
-        passed(c.ranking.pass),
-    ]);
-    rows.extend(c.ranking.errors.map(|tau| {
+        passed(r.pass),
+    ]];
+    rows.extend(r.errors.map(|tau| {
         let name = "e. Kendall tau-b of predicted orders and errors of the runs, in sigmas of the prior";
         vec![
             name.into(),
@@ -184,14 +207,7 @@ fn whole(c: &CrossCheck) -> Block {
             String::new(),
         ]
     }));
-    rows.extend(c.controls.iter().map(|k: &Control| {
-        let name = format!("f. {}: failing checks of a, b; NIS", k.name);
-        let found = format!("{} of {}; {}", k.failed, k.checks, number(k.nis));
-        vec![name, "fails".into(), found, format!("(99.9 %: {})", band(k.band)), mark(k.outcome)]
-    }));
-    let columns =
-        [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("finding")];
-    Block::table("The filter as a whole", columns, rows)
+    rows
 }
 
 /// True if the statistics of the Monte Carlo runs are within their bands.
@@ -229,7 +245,7 @@ fn lead(c: &CrossCheck) -> Vec<String> {
             }
             FilterKind::Extended => {
                 "; the extended filter is linearised before the drifts are known, the iterated one (--filter \
-                                     iterated) along the whole run"
+                 iterated) along the whole run"
                     .into()
             }
             FilterKind::Iterated => "; the iterated filter has full attitudes".into(),

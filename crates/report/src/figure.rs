@@ -148,7 +148,20 @@ impl Figure {
         (!self.points.is_empty()).then(|| Plot::from(plot))
     }
 
+    /// Layout of the figure with these plots.
     fn layout(&self, plots: &[Plot]) -> Layout {
+        let layout = self.with_scales(self.frame(plots));
+        let mut layout = self.with_ticks(layout);
+        for &x in &self.marks {
+            layout = layout.with_reference_line(
+                ReferenceLine::vertical(x).with_color(GREY).with_dasharray("2 3").with_stroke_width(1.0),
+            );
+        }
+        layout
+    }
+
+    /// Size, title, labels of the axes and legend.
+    fn frame(&self, plots: &[Plot]) -> Layout {
         let mut layout = Layout::auto_from_plots(plots)
             .with_x_label(shown(&self.x_label))
             .with_y_label(shown(&self.y_label))
@@ -169,6 +182,11 @@ impl Figure {
             layout = layout.with_legend_position(LegendPosition::OutsideBottomCenter);
             layout.force_margin_right = Some(MARGINS.1);
         }
+        layout
+    }
+
+    /// Logarithmic axes, and the ranges of both.
+    fn with_scales(&self, mut layout: Layout) -> Layout {
         // an axis without positive values cannot be logarithmic
         let anything = |of: fn(&(f64, f64)) -> f64| {
             self.lines.iter().flat_map(|l| &l.points).any(|p| of(p) > 0.0 && of(p).is_finite())
@@ -190,6 +208,11 @@ impl Figure {
         if let Some((low, high)) = self.y_range {
             layout = layout.with_y_axis_min(low).with_y_axis_max(high);
         }
+        layout
+    }
+
+    /// Names along x, or whole numbers.
+    fn with_ticks(&self, mut layout: Layout) -> Layout {
         if !self.x_names.is_empty() {
             let names: Vec<String> = self.x_names.iter().map(|name| shown(name)).collect();
             let name = move |x: f64| {
@@ -205,11 +228,6 @@ impl Figure {
             };
             layout = layout.with_x_tick_step(step(self.x_range)).with_y_tick_step(step(self.y_range));
             layout = layout.with_tick_format(TickFormat::Integer);
-        }
-        for &x in &self.marks {
-            layout = layout.with_reference_line(
-                ReferenceLine::vertical(x).with_color(GREY).with_dasharray("2 3").with_stroke_width(1.0),
-            );
         }
         layout
     }

@@ -280,14 +280,6 @@ fn curves(f: &Figure) -> Json {
         let (high, low) = (edge(|p| p.2), edge(|p| p.1));
         bands.push(json!({ "series": [high, low], "color": color }));
     }
-    let dash = |l: &Line| -> &'static [u32] {
-        match l.stroke {
-            Stroke::Solid => &[],
-            Stroke::Dashed => &[8, 4],
-            Stroke::DashDot => &[8, 4, 2, 4],
-            Stroke::Dotted => &[2, 3],
-        }
-    };
     // a line without a label is a piece of the one before, if it is drawn alike
     let alike = |a: &Line, b: &Line| b.label.is_empty() && a.color == b.color && dash(a) == dash(b);
     for pieces in f.lines.chunk_by(alike) {
@@ -301,6 +293,16 @@ fn curves(f: &Figure) -> Json {
         "orders": f.orders, "x_range": f.x_range, "y_range": f.y_range, "marks": f.marks,
         "series": series, "tables": tables, "bands": bands,
     })
+}
+
+/// Dashes of a line in pixels; empty for a solid one.
+fn dash(l: &Line) -> &'static [u32] {
+    match l.stroke {
+        Stroke::Solid => &[],
+        Stroke::Dashed => &[8, 4],
+        Stroke::DashDot => &[8, 4, 2, 4],
+        Stroke::Dotted => &[2, 3],
+    }
 }
 
 #[cfg(test)]

@@ -149,21 +149,7 @@ fn validity(n: &NextPositions) -> Vec<String> {
         ),
         false => format!("interrupted after {} extensions: another one may be better", n.examined),
     }];
-    if let Some(bound) = &n.bound {
-        let dwell = number(n.conditions.dwell_s);
-        out.extend(bound.ratio.map(|ratio| {
-            format!(
-                "no attitude, candidate or not, gives a smallest margin above {} with a dwell of {dwell} s",
-                number(1.0 / ratio)
-            )
-        }));
-        out.extend(bound.worst_dph.map(|worst| {
-            format!(
-                "no attitude, candidate or not, gives a worst sigma below {} deg/h (per g) with a dwell of {dwell} s",
-                number(worst)
-            )
-        }));
-    }
+    out.extend(of_all_attitudes(n));
     if n.as_good > 1 {
         out.push(format!("{} extensions are as good as the first", n.as_good));
     }
@@ -200,6 +186,25 @@ fn validity(n: &NextPositions) -> Vec<String> {
         out.push(format!("beyond the gimbals: {}", names(n.beyond_gimbals.iter().map(String::as_str))));
     }
     out
+}
+
+/// Sentences on the bound over all attitudes.
+fn of_all_attitudes(n: &NextPositions) -> Vec<String> {
+    let Some(bound) = &n.bound else { return Vec::new() };
+    let dwell = number(n.conditions.dwell_s);
+    let margin = bound.ratio.map(|ratio| {
+        format!(
+            "no attitude, candidate or not, gives a smallest margin above {} with a dwell of {dwell} s",
+            number(1.0 / ratio)
+        )
+    });
+    let sigma = bound.worst_dph.map(|worst| {
+        format!(
+            "no attitude, candidate or not, gives a worst sigma below {} deg/h (per g) with a dwell of {dwell} s",
+            number(worst)
+        )
+    });
+    margin.into_iter().chain(sigma).collect()
 }
 
 impl Answer for NextPositions {

@@ -7,7 +7,7 @@ use crate::figure::{AMBER, BLACK, BLUE, FONT, GREEN, GREY, ORANGE, PURPLE, SKY};
 use crate::visible::escaped;
 
 /// Row of a chart.
-pub(crate) struct Row {
+pub(crate) struct ChartRow {
     pub(crate) name: String,
     pub(crate) remark: String,
     /// Values of its marks, one per series; `None` for no mark.
@@ -31,7 +31,7 @@ pub(crate) struct Chart {
     pub(crate) threshold: Option<f64>,
     /// Names of the series; empty for a single one.
     pub(crate) series: Vec<String>,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<ChartRow>,
 }
 
 /// Widths of names, remarks, axis and texts, and the height of a row, in pixels.
@@ -45,6 +45,35 @@ const APART: f64 = 7.0;
 
 /// Colours of series; each series also has a shape of its own.
 const COLORS: [&str; 6] = [BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER];
+
+/// Places of a chart, in pixels, and the range of its axis.
+struct ChartScale {
+    /// Left end of the axis.
+    left: f64,
+    /// Width of the chart.
+    width: f64,
+    /// Height of the legend.
+    legend: f64,
+    /// Upper end of the rows.
+    top: f64,
+    /// Lower end of the rows.
+    bottom: f64,
+    /// Height of a row.
+    height: f64,
+    /// Lowest and highest value of the axis: exponents of ten, or orders.
+    low: f64,
+    high: f64,
+    /// True if the axis has orders.
+    orders: bool,
+}
+
+impl ChartScale {
+    /// Place of a value on the axis.
+    fn at(&self, x: f64) -> f64 {
+        let share = if self.orders { x } else { x.log10() };
+        self.left + AXIS * ((share - self.low) / (self.high - self.low)).clamp(0.0, 1.0)
+    }
+}
 
 impl Chart {
     /// The lowest and the highest value of the axis: exponents of ten, or orders.
@@ -92,6 +121,34 @@ impl Chart {
 
     /// The chart as SVG.
     pub(crate) fn svg(&self) -> String {
+        let scale = self.scale();
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" \
+             font-family=\"{FONT}\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />",
+            scale.width,
+            scale.bottom + 6.0
+        );
+        self.legend(&mut out, &scale);
+        self.axis(&mut out, &scale);
+        for (i, row) in self.rows.iter().enumerate() {
+            self.row(&mut out, &scale, row, scale.top + scale.height * (i as f64 + 0.5));
+        }
+        if let Some(threshold) = self.threshold {
+            let _ = write!(
+                out,
+                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" \
+                 stroke-width=\"1.5\" />",
+                scale.at(threshold),
+                scale.top - 4.0,
+                bottom = scale.bottom
+            );
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+
+    /// Places of the axis and of the rows.
+    fn scale(&self) -> ChartScale {
         let count = self.series.len().max(1);
         let height = ROW.max(APART * (count as f64 + 1.0));
         // without any text its column is left out, but for a margin
@@ -101,75 +158,67 @@ impl Chart {
         let top = 40.0 + legend;
         let (width, bottom) = (left + AXIS + texts, top + height * self.rows.len() as f64);
         let [low, high] = self.range();
-        let at = |x: f64| {
-            let share = if self.orders { x } else { x.log10() };
-            left + AXIS * ((share - low) / (high - low)).clamp(0.0, 1.0)
-        };
-        let mut out = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{0}\" \
-             font-family=\"{FONT}\" font-size=\"11\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />",
-            bottom + 6.0
-        );
+        ChartScale { left, width, legend, top, bottom, height, low, high, orders: self.orders }
+    }
+
+    /// Draws the names of the series beside their marks.
+    fn legend(&self, out: &mut String, scale: &ChartScale) {
         for (i, name) in self.series.iter().enumerate() {
             let y = 9.0 + 16.0 * i as f64;
-            self.mark(&mut out, i, 10.0, y, Grade::Good);
-            let room = width - 22.0;
-            fitting(&mut out, [18.0, y + 4.0], "start", name, room);
+            self.mark(out, i, 10.0, y, Grade::Good);
+            let room = scale.width - 22.0;
+            fitting(out, [18.0, y + 4.0], "start", name, room);
         }
-        text(&mut out, left + AXIS / 2.0, legend + 14.0, "middle", &self.label);
-        text(&mut out, NAMES + REMARKS / 2.0 - 4.0, legend + 30.0, "middle", self.remark);
+    }
+
+    /// Draws the headings and the lines of the axis.
+    fn axis(&self, out: &mut String, scale: &ChartScale) {
+        let ChartScale { left, legend, top, bottom, low, high, .. } = *scale;
+        text(out, left + AXIS / 2.0, legend + 14.0, "middle", &self.label);
+        text(out, NAMES + REMARKS / 2.0 - 4.0, legend + 30.0, "middle", self.remark);
         let every = ((high - low) / 8.0).ceil().max(1.0);
         let ticks = (0..).map(|k| low + f64::from(k) * every).take_while(|t| *t <= high);
         for tick in ticks {
-            let x = at(if self.orders { tick } else { 10f64.powf(tick) });
+            let x = scale.at(if self.orders { tick } else { 10f64.powf(tick) });
             let _ = write!(
                 out,
                 "<line x1=\"{x:.1}\" y1=\"{:.1}\" x2=\"{x:.1}\" y2=\"{bottom:.1}\" stroke=\"{GREY}\" \
                  stroke-width=\"0.5\" />",
                 top - 4.0
             );
-            text(&mut out, x, top - 10.0, "middle", &power(tick, self.orders));
+            text(out, x, top - 10.0, "middle", &power(tick, self.orders));
         }
-        for (i, row) in self.rows.iter().enumerate() {
-            let y = top + height * (i as f64 + 0.5);
-            fitting(&mut out, [4.0, y + 4.0], "start", &row.name, NAMES - 8.0);
-            text(&mut out, NAMES + REMARKS / 2.0 - 4.0, y + 4.0, "middle", &row.remark);
-            text(&mut out, left + AXIS + 10.0, y + 4.0, "start", &row.text);
-            if let Some(limit) = row.limit {
-                let _ = write!(
-                    out,
-                    "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" \
-                     stroke-width=\"2\" />",
-                    at(limit),
-                    y - height / 2.0 + 2.0,
-                    y + height / 2.0 - 2.0
-                );
-            }
-            for (k, x) in row.marks.iter().enumerate().filter_map(|(k, x)| Some((k, (*x)?))) {
-                let y = y + APART * (k as f64 - (count as f64 - 1.0) / 2.0);
-                if let Some(threshold) = self.threshold {
-                    let _ = write!(
-                        out,
-                        "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" \
-                         stroke-width=\"2\" />",
-                        at(threshold),
-                        at(x)
-                    );
-                }
-                self.mark(&mut out, k, at(x), y, row.grade);
-            }
-        }
-        if let Some(threshold) = self.threshold {
+    }
+
+    /// Draws a row around a height in pixels.
+    fn row(&self, out: &mut String, scale: &ChartScale, row: &ChartRow, y: f64) {
+        fitting(out, [4.0, y + 4.0], "start", &row.name, NAMES - 8.0);
+        text(out, NAMES + REMARKS / 2.0 - 4.0, y + 4.0, "middle", &row.remark);
+        text(out, scale.left + AXIS + 10.0, y + 4.0, "start", &row.text);
+        if let Some(limit) = row.limit {
             let _ = write!(
                 out,
-                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{bottom:.1}\" stroke=\"{BLACK}\" \
-                 stroke-width=\"1.5\" />",
-                at(threshold),
-                top - 4.0
+                "<line x1=\"{0:.1}\" y1=\"{1:.1}\" x2=\"{0:.1}\" y2=\"{2:.1}\" stroke=\"{BLACK}\" \
+                 stroke-width=\"2\" />",
+                scale.at(limit),
+                y - scale.height / 2.0 + 2.0,
+                y + scale.height / 2.0 - 2.0
             );
         }
-        out.push_str("</svg>\n");
-        out
+        let count = self.series.len().max(1);
+        for (k, x) in row.marks.iter().enumerate().filter_map(|(k, x)| Some((k, (*x)?))) {
+            let y = y + APART * (k as f64 - (count as f64 - 1.0) / 2.0);
+            if let Some(threshold) = self.threshold {
+                let _ = write!(
+                    out,
+                    "<line x1=\"{:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"{GREY}\" \
+                     stroke-width=\"2\" />",
+                    scale.at(threshold),
+                    scale.at(x)
+                );
+            }
+            self.mark(out, k, scale.at(x), y, row.grade);
+        }
     }
 }
 
@@ -211,8 +260,8 @@ fn fitting(out: &mut String, [x, y]: [f64; 2], anchor: &str, text: &str, room: f
 mod tests {
     use super::*;
 
-    fn row(mark: Option<f64>, grade: Grade) -> Row {
-        Row {
+    fn row(mark: Option<f64>, grade: Grade) -> ChartRow {
+        ChartRow {
             name: "D_<X>".into(),
             remark: "1".into(),
             marks: vec![mark],
@@ -222,7 +271,7 @@ mod tests {
         }
     }
 
-    fn chart(orders: bool, rows: Vec<Row>) -> Chart {
+    fn chart(orders: bool, rows: Vec<ChartRow>) -> Chart {
         Chart {
             remark: "degree",
             label: "margin".into(),

@@ -170,7 +170,32 @@ fn proof(s: &Sensors, f: &FrontSet) -> String {
 fn validity(s: &Sensors) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(s.stopped.as_ref().map(|reason| format!("the search ended early: {reason}")));
-    out.push(match (s.minimal_sets, s.complete_to) {
+    out.push(completeness(s));
+    let idle: Vec<&str> = s.candidates.iter().filter(|c| !c.tells).map(|c| c.name.as_str()).collect();
+    if !idle.is_empty() {
+        let verb = if idle.len() == 1 { "depends" } else { "depend" };
+        out.push(format!("{} {verb} on no unknown: measuring adds nothing to any set", idle.join(", ")));
+    }
+    out.extend(s.one_solution.as_ref().map_or_else(Vec::new, counted_solutions));
+    if !s.closed {
+        out.push(format!(
+            "derivatives of some outputs are computed up to order {} without a proven end: \
+             \"not observable\" means up to this order",
+            s.last_order
+        ));
+    }
+    out.push(format!(
+        "{}; {} judged again by `analyze`: the same degrees; seed {}",
+        certainty(s),
+        count(s.confirmed_sets, "set"),
+        s.seed
+    ));
+    out
+}
+
+/// Sentence on the number of minimal sets.
+fn completeness(s: &Sensors) -> String {
+    match (s.minimal_sets, s.complete_to) {
         (Some(n), _) => format!(
             "{}: every set that makes {} observable contains one of them, because an additional output \
              never raises a degree",
@@ -183,33 +208,29 @@ fn validity(s: &Sensors) -> Vec<String> {
             count(most, "output")
         ),
         _ => "minimal sets were not searched".into(),
-    });
-    let idle: Vec<&str> = s.candidates.iter().filter(|c| !c.tells).map(|c| c.name.as_str()).collect();
-    if !idle.is_empty() {
-        let verb = if idle.len() == 1 { "depends" } else { "depend" };
-        out.push(format!("{} {verb} on no unknown: measuring adds nothing to any set", idle.join(", ")));
     }
-    if let Some(CountedSets { counted, undecided }) = &s.one_solution {
+}
+
+/// Sentences on the number of solutions under the sets.
+fn counted_solutions(sets: &CountedSets) -> Vec<String> {
+    let CountedSets { counted, undecided } = sets;
+    let mut out = vec![format!(
+        "one solution of every required unknown is required: solutions under {} counted as `analyze` counts them",
+        count(*counted, "set")
+    )];
+    if *undecided > 0 {
         out.push(format!(
-            "one solution of every required unknown is required: solutions under {} counted as `analyze` counts them",
-            count(*counted, "set")
-        ));
-        if *undecided > 0 {
-            out.push(format!(
-                "under {} the number of solutions is not decided; these sets count as failing, so that a cheaper \
-                 one may leave one solution",
-                count(*undecided, "set")
-            ));
-        }
-    }
-    if !s.closed {
-        out.push(format!(
-            "derivatives of some outputs are computed up to order {} without a proven end: \
-             \"not observable\" means up to this order",
-            s.last_order
+            "under {} the number of solutions is not decided; these sets count as failing, so that a cheaper \
+             one may leave one solution",
+            count(*undecided, "set")
         ));
     }
-    let certainty = match (s.error_bound, s.digits) {
+    out
+}
+
+/// Sentence on the certainty of the degrees.
+fn certainty(s: &Sensors) -> String {
+    match (s.error_bound, s.digits) {
         (Some(bound), _) => format!(
             "degrees under {} by ranks at a random point, those of the {} that this answer rests on at a \
              second one too; one of these is wrong with probability below {}",
@@ -223,13 +244,7 @@ fn validity(s: &Sensors) -> Vec<String> {
             count(s.judged_sets, "set"),
             s.relied_on_sets
         ),
-    };
-    out.push(format!(
-        "{certainty}; {} judged again by `analyze`: the same degrees; seed {}",
-        count(s.confirmed_sets, "set"),
-        s.seed
-    ));
-    out
+    }
 }
 
 fn unknown_row(u: &SensorUnknown) -> Vec<String> {

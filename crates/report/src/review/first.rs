@@ -11,7 +11,7 @@ use super::pictures::still;
 use super::{duration, joined};
 use crate::compare::{deciding, unknowns};
 use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
-use crate::rows::{Chart, Row};
+use crate::rows::{Chart, ChartRow};
 use crate::{compare, stated, words};
 
 /// Largest number of rows of a chart, so that it fits a page.
@@ -60,7 +60,7 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
         let (text, grade) = predicted.map_or_else(|| ("-".into(), Grade::Open), margin);
-        let row = Row {
+        let row = ChartRow {
             name: q.name.clone(),
             remark: words::degree(q.degree),
             marks: vec![predicted.and_then(|p| p.margin)],
@@ -71,7 +71,7 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
         (row, predicted.is_some_and(|p| p.requirement.is_some()))
     };
     // what is required and not determined first, then by margin, then what is not required
-    let worse = |(row, required): &(Row, bool)| match (required, row.marks[0]) {
+    let worse = |(row, required): &(ChartRow, bool)| match (required, row.marks[0]) {
         (true, None) => f64::INFINITY,
         (true, Some(margin)) => 1.0 / margin,
         (false, _) => -1.0,
@@ -95,7 +95,7 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
 
 /// Chart of the degrees alone, of many unknowns the largest.
 fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count: usize, id: &str) -> Block {
-    let row = |(name, status, degree): (&str, Exact, Option<usize>)| Row {
+    let row = |(name, status, degree): (&str, Exact, Option<usize>)| ChartRow {
         name: name.into(),
         remark: words::degree(degree),
         marks: vec![degree.map(|k| k as f64)],
@@ -338,7 +338,7 @@ fn sigmas(schemes: &[ComparedScheme]) -> Block {
     let row = |q: &&Quantity| {
         let required = || schemes.iter().filter_map(|s| of(s, &q.name)).map(|q| q.requirement);
         let same = required().all(|r| r == q.requirement);
-        Row {
+        ChartRow {
             name: q.name.clone(),
             remark: q.unit.clone(),
             marks: schemes.iter().map(|s| of(s, &q.name).as_ref().and_then(deciding)).collect(),
