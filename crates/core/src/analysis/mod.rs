@@ -13,7 +13,7 @@ pub use why::explain;
 pub use crate::findings::AnalysisError;
 
 use crate::degree::coefficient::{Coefficient, readable};
-use crate::degree::ensemble::degrees;
+use crate::degree::ensemble::{Verdicts, degrees};
 use crate::degree::status::Verdict;
 use crate::engine::EngineBusy;
 use crate::findings::{CombinationFinding, Judged, SchemeFindings};
@@ -25,6 +25,7 @@ use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
 use crate::model::{Angle, Carry, OmittedModel, Position, Scheme, Source, Term, Unknowns};
 use crate::omitted::omitted_verdicts;
+use crate::remedies::Remedies;
 use crate::solution::FoundBy;
 use crate::solution::combinations::NullVector;
 use crate::solution::formulas::formulas;
@@ -81,15 +82,8 @@ pub fn analyze(
     let quantities = quantities(&platform, &findings, &mut printer)?;
     let combinations: Vec<CombinationReport> =
         findings.combinations.iter().map(|c| combination_report(c, &mut printer)).collect();
-    let found = loci(&platform, verdicts, &mut printer.solver, options.seed);
-    // true if no engine was available and the loci gave no reason of their own
-    let untold_loci = found.is_ok();
-    let found = printer.noted(found).unwrap_or_default();
-    let generic = !scheme.generic_names().is_empty();
-    let incomplete_loci = match found.loci {
-        None if untold_loci && generic => Some("not sought without the symbolic engine".into()),
-        _ => found.incomplete.clone(),
-    };
+    let (found, is_explained) = printer.degenerate_loci(&platform, verdicts, options.seed);
+    let loci_unexplained = !is_explained && !scheme.generic_names().is_empty();
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
     printer.notes.extend(term_notes(scheme));
@@ -98,54 +92,61 @@ pub fn analyze(
     printer.notes.extend(untold);
     let omitted = options.omitted.then(|| OmittedModel::new(&platform));
     let omitted = omitted.and_then(|model| omitted_verdicts(&platform, &model, options.seed).ok());
-    let omitted = omitted.filter(|o| !o.terms.is_empty());
-    if scheme.slews() && !scheme.torquers_act() {
-        printer.notes.push(
-            "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning \
-             at once, and with slews of finite duration they need not hold"
-                .into(),
-        );
-    }
-    let asked = (options.solutions && !course, untold_loci && generic);
-    let missing = MissingParts::new(&quantities, &combinations, &findings, &found, asked);
+    printer.notes.extend(slew_note(scheme));
+    let asked = (options.solutions && !course, loci_unexplained);
     let missing = MissingParts {
         left_out: printer.solver.left_out(),
         formulas: options.formulas && formulas.is_none(),
-        ..missing
+        ..MissingParts::new(&quantities, &combinations, &findings, &found, asked)
     };
     let sought = (options.solutions && !course || missing.formulas) && missing.any();
-    if sought {
-        let note = engine_note(built, &mut printer.solver, &missing);
-        printer.notes.extend(note);
-    }
-    let failure = printer.solver.worker().and_then(|w| w.failure().cloned());
-    let engine_busy = failure.filter(|_| sought).and_then(|failure| EngineBusy::of(&failure));
-
+    let engine_busy = if sought { printer.note_missing(built, &missing) } else { None };
     Ok(Analysis {
+        quantities,
+        combinations,
+        carries,
+        omitted: omitted.filter(|o| !o.terms.is_empty()),
+        to_resolve,
+        degenerate_loci_incomplete: match found.loci {
+            None if loci_unexplained => Some("not sought without the symbolic engine".into()),
+            _ => found.incomplete,
+        },
+        degenerate_loci: found.loci,
+        formulas,
+        notes: printer.notes,
+        engine_busy,
+        ..outline(&platform, &findings, options.frame)
+    })
+}
+
+/// Answer with the scheme and its ranks alone.
+fn outline(platform: &Platform, findings: &SchemeFindings, frame: Frame) -> Analysis {
+    let scheme = platform.scheme();
+    Analysis {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
-        stations: printer.stations,
+        stations: stations(scheme),
         carry: scheme.carry,
         latitude_deg: scheme.latitude.map(|l| l.degrees()),
         geometry: scheme.geometry,
         terms: scheme.unknowns.to_string(),
         measured_azimuth: scheme.measured_azimuth,
-        positions: position_reports(&platform),
+        positions: position_reports(platform),
         rank_profile: findings.verdicts.degrees.rank_profile.clone(),
         rank: findings.verdicts.degrees.rank(),
         unknowns: platform.names().to_vec(),
         has_accuracy_orders: findings.accuracy.is_ok(),
-        quantities,
-        combinations,
-        null_space: findings.null_space.iter().map(|v| null_report(&platform, v)).collect(),
-        carries,
-        omitted,
-        to_resolve,
+        quantities: Vec::new(),
+        combinations: Vec::new(),
+        null_space: findings.null_space.iter().map(|v| null_report(platform, v)).collect(),
+        carries: Vec::new(),
+        omitted: None,
+        to_resolve: Remedies::default(),
         why: Vec::new(),
-        degenerate_loci: found.loci,
-        degenerate_loci_incomplete: incomplete_loci,
-        formulas,
-        frame: options.frame,
+        degenerate_loci: None,
+        degenerate_loci_incomplete: None,
+        formulas: None,
+        frame,
         gimbals: scheme.gimbal_report(),
         certainty: Certainty {
             method: "exact ranks modulo two random 61-bit primes that agree".into(),
@@ -153,8 +154,17 @@ pub fn analyze(
             primes: findings.certainty.primes_as_text(),
             seed: findings.verdicts.seed,
         },
-        notes: printer.notes,
-        engine_busy,
+        notes: Vec::new(),
+        engine_busy: None,
+    }
+}
+
+/// Note on slews that the verdicts do not contain; `None` if there are none.
+fn slew_note(scheme: &Scheme) -> Option<String> {
+    (scheme.slews() && !scheme.torquers_act()).then(|| {
+        "the slews of this scheme are not part of it: verdicts and formulas are those of repositioning at \
+         once, and with slews of finite duration they need not hold"
+            .into()
     })
 }
 
@@ -187,6 +197,27 @@ impl Printer<'_> {
                 None
             }
         }
+    }
+
+    /// Degenerate loci of a scheme; an error becomes a note. True if there was one: it explains why loci are
+    /// missing.
+    fn degenerate_loci(
+        &mut self,
+        platform: &Platform,
+        verdicts: &Verdicts,
+        seed: u64,
+    ) -> (DegenerateLoci, bool) {
+        let found = loci(platform, verdicts, &mut self.solver, seed);
+        let is_explained = found.is_err();
+        (self.noted(found).unwrap_or_default(), is_explained)
+    }
+
+    /// Notes the missing parts with their reason. Returns the process that has the engine, if this is it.
+    fn note_missing(&mut self, built: bool, missing: &MissingParts) -> Option<EngineBusy> {
+        let note = engine_note(built, &mut self.solver, missing);
+        self.notes.extend(note);
+        let failure = self.solver.worker().and_then(|w| w.failure().cloned());
+        failure.and_then(|failure| EngineBusy::of(&failure))
     }
 
     /// Value of a result; an error becomes a note.

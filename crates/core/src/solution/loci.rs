@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use obsdeg_exact::{Echelon, Field, PrimeError, SplitMix64, polynomial};
-use obsdeg_symbolic::{Job, Request};
+use obsdeg_symbolic::{Job, Request, Worker};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -112,60 +112,89 @@ pub(crate) fn loci(
     }
     let requests = candidate_requests(platform, verdicts, solver, &names);
     let Some(worker) = solver.worker() else { return Ok(DegenerateLoci::default()) };
+    let (conditions, stopped) = conditions(&names, &requests, worker);
+    let mut rng = platform.scheme().random(seed, "degenerate angles");
+    let mut found = FoundLoci::default();
+    for condition in conditions {
+        found.judge(platform, verdicts, (&condition, &names), &mut rng)?;
+    }
+    let incomplete = found.incomplete(stopped);
+    Ok(DegenerateLoci { loci: Some(found.loci.into_iter().map(finished).collect()), incomplete })
+}
+
+/// Half turns of all angles and the different factors of the requests; with the reason why some requests have
+/// no answer.
+fn conditions(
+    names: &[String],
+    requests: &[Request],
+    worker: &mut Worker,
+) -> (Vec<Condition>, Option<String>) {
     let mut conditions: Vec<Condition> = names.iter().cloned().map(Condition::HalfTurn).collect();
     let mut seen: Vec<String> = Vec::new();
-    let mut incomplete = None;
     for request in requests {
-        let factors = match worker.ask(&request) {
+        let factors = match worker.ask(request) {
             Ok((factors, _)) => factors,
-            Err(e) => {
-                incomplete = Some(e.to_string());
-                break;
-            }
+            Err(e) => return (conditions, Some(e.to_string())),
         };
         for factor in factors.into_iter().filter(|f| !seen.contains(f)).collect::<Vec<_>>() {
             conditions.push(Condition::Factor(factor.clone()));
             seen.push(factor);
         }
     }
-    let mut rng = platform.scheme().random(seed, "degenerate angles");
-    let mut found: Vec<(LocusPoints, Locus)> = Vec::new();
-    let mut undecided = 0;
-    for condition in conditions {
-        let place = match LocusPoints::of(&condition, &names) {
-            RealPoints::Nowhere => continue,
+    (conditions, None)
+}
+
+/// Loci found so far.
+#[derive(Default)]
+struct FoundLoci {
+    /// Points of each locus, and its effect; its condition is not yet written.
+    loci: Vec<(LocusPoints, Locus)>,
+    /// Number of conditions of which the points or the effect are not known.
+    undecided: usize,
+}
+
+impl FoundLoci {
+    /// Adds a condition if it changes the verdicts.
+    fn judge(
+        &mut self,
+        platform: &Platform,
+        verdicts: &Verdicts,
+        (condition, names): (&Condition, &[String]),
+        rng: &mut SplitMix64,
+    ) -> Result<(), LociError> {
+        let place = match LocusPoints::of(condition, names) {
+            RealPoints::Nowhere => return Ok(()),
             RealPoints::At(place) => Some(place),
             RealPoints::Unknown => None,
         };
-        let Some(there) = degrees_on(platform, &condition, &names, &mut rng)? else {
-            undecided += 1;
-            continue;
+        let Some(there) = degrees_on(platform, condition, names, rng)? else {
+            self.undecided += 1;
+            return Ok(());
         };
-        let changes: Vec<Difference> = platform
-            .names()
-            .iter()
-            .enumerate()
-            .map(|(c, name)| Difference {
-                name: name.clone(),
-                here: Verdict::of(&verdicts.degrees, c),
-                there: Verdict::of(&there, c),
-            })
-            .filter(|d| d.here != d.there)
-            .collect();
+        let difference = |(c, name): (usize, &String)| Difference {
+            name: name.clone(),
+            here: Verdict::of(&verdicts.degrees, c),
+            there: Verdict::of(&there, c),
+        };
+        let differences = platform.names().iter().enumerate().map(difference);
+        let changes: Vec<Difference> = differences.filter(|d| d.here != d.there).collect();
         if changes.is_empty() && there.rank_profile == verdicts.degrees.rank_profile {
-            continue;
+            return Ok(());
         }
-        let Some(place) = place else {
-            undecided += 1;
-            continue;
-        };
-        let rank_profile = there.rank_profile;
-        // values of one angle with the same effect are one condition
+        match place {
+            Some(place) => self.add(place, there.rank_profile, changes),
+            None => self.undecided += 1,
+        }
+        Ok(())
+    }
+
+    /// Adds a locus. Values of one angle with the same effect are one condition.
+    fn add(&mut self, place: LocusPoints, rank_profile: Vec<usize>, changes: Vec<Difference>) {
         let same = |l: &&mut (LocusPoints, Locus)| {
             let same_angle = l.0.angle.is_some() && l.0.angle == place.angle && l.0.words == place.words;
             same_angle && l.1.rank_profile == rank_profile && l.1.changes == changes
         };
-        match found.iter_mut().find(same) {
+        match self.loci.iter_mut().find(same) {
             Some((other, _)) => other.points_deg.extend(place.points_deg),
             None => {
                 let blank = Locus {
@@ -175,29 +204,36 @@ pub(crate) fn loci(
                     rank_profile,
                     changes,
                 };
-                found.push((place, blank));
+                self.loci.push((place, blank));
             }
         }
     }
-    let finished = |(mut place, locus): (LocusPoints, Locus)| {
-        let angle = place.angle.clone();
-        place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
-        Locus {
-            condition: place.condition(),
-            complete: angle.is_some() && place.words.is_none(),
-            points_deg: place.points_deg,
-            ..locus
+
+    /// Reason why loci may be missing, with the one for which the requests were `stopped`.
+    fn incomplete(&self, stopped: Option<String>) -> Option<String> {
+        let undecided = self.undecided;
+        if undecided == 0 {
+            return stopped;
         }
-    };
-    if undecided > 0 {
         let few = format!(
             "of {undecided} {} it is not known whether angles meet {} or what changes there",
             if undecided == 1 { "condition" } else { "conditions" },
             if undecided == 1 { "it" } else { "them" },
         );
-        incomplete = Some(incomplete.map_or(few.clone(), |e| format!("{e}; {few}")));
+        Some(stopped.map_or(few.clone(), |e| format!("{e}; {few}")))
     }
-    Ok(DegenerateLoci { loci: Some(found.into_iter().map(finished).collect()), incomplete })
+}
+
+/// Locus with its condition and sorted points.
+fn finished((mut place, locus): (LocusPoints, Locus)) -> Locus {
+    let angle = place.angle.clone();
+    place.points_deg.sort_by(|a, b| angle.as_ref().map_or(Ordering::Equal, |n| a[n].total_cmp(&b[n])));
+    Locus {
+        condition: place.condition(),
+        complete: angle.is_some() && place.words.is_none(),
+        points_deg: place.points_deg,
+        ..locus
+    }
 }
 
 /// Requests, one per candidate matrix, over `t_name = tan(name/2)`.
