@@ -19,7 +19,7 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
 use super::jump::Jump;
-use super::observe::channel_name;
+use super::placed::channel_name;
 use super::offset::{Later, Offset};
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};

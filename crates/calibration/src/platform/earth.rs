@@ -14,7 +14,7 @@ use obsdeg_evidence::simulation::{Conditions, Plan};
 use super::clock::bounds;
 use super::diagnose::Parts;
 use super::estimate::{Problem, WEAK};
-use super::observe::{By, Reading, TOLERANCE};
+use super::placed::{By, Reading, TOLERANCE};
 use super::run::Run;
 use super::timeline::{narrow, slews};
 use super::{CalibrationError, STRICT};

@@ -6,7 +6,7 @@
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
 use super::diagnose::{MapBoth, Parts};
-use super::gross::Why;
+use super::gross::GrossReason;
 use super::length::wrong;
 use super::run::Run;
 use super::successions::LeftOut;
@@ -185,9 +185,9 @@ fn cells(run: &Run) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for (cell, own) in &run.reading.cells {
         let kind = match cell.why {
-            Why::Far => continue,
-            Why::Code => CellKind::Code,
-            Why::Stuck => CellKind::Stuck,
+            GrossReason::Far => continue,
+            GrossReason::Code => CellKind::Code,
+            GrossReason::Stuck => CellKind::Stuck,
         };
         let same = out.iter_mut().find_map(|f| match f {
             Finding::Cells { column, kind_of_cells, value, count, lines, .. }

@@ -35,7 +35,7 @@ const STUCK: usize = 4;
 
 /// Row of a record, or the median of a dense bin of rows.
 #[derive(Debug, Clone)]
-pub(crate) struct Row {
+pub(crate) struct MedianRow {
     /// First and last line.
     pub lines: (u64, u64),
     /// Time of the row, for a median the median of its times, in s of the record's clock.
@@ -50,7 +50,7 @@ pub(crate) struct Row {
 
 /// Reason to leave a cell out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Why {
+pub(crate) enum GrossReason {
     /// Far from the polynomials of the rows around it.
     Far,
     /// Code of missing values: far from its neighbours, and equal to other cells to the last digit.
@@ -61,7 +61,7 @@ pub(crate) enum Why {
 
 /// Cell that is left out.
 #[derive(Debug, Clone)]
-pub(crate) struct Cell {
+pub(crate) struct GrossCell {
     /// First and last line.
     pub lines: (u64, u64),
     /// Index of its row within its position; `None` for a sample of a dense bin.
@@ -73,7 +73,7 @@ pub(crate) struct Cell {
     pub value: f64,
     /// Distance from the expected value, in standard deviations.
     pub sigmas: f64,
-    pub why: Why,
+    pub why: GrossReason,
 }
 
 /// Median of some numbers; zero for none.
@@ -97,101 +97,164 @@ fn beside(values: &[f64], i: usize) -> f64 {
     off.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
-/// The cells of a window whose values are gross: index, sigmas and why. Rows have `t`, the value, and
-/// weights, 1 for the usual number of samples, less for fewer. `noise` is about the standard deviation of a
-/// row; values are stuck where the expected number of such successions by chance, from how
-/// often two neighbours are equal, is below `stuck`.
-fn window(t: &[f64], values: &[f64], weights: &[f64], noise: f64, stuck: f64) -> Vec<(usize, f64, Why)> {
-    let n = values.len();
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let count = |x: f64| sorted.partition_point(|y| *y <= x) - sorted.partition_point(|y| *y < x);
-    let steps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
-    // a converter with steps above the noise
-    let step = if 2 * steps.len() < n { steps.iter().copied().fold(f64::INFINITY, f64::min) } else { 0.0 };
-    // a code in many rows is in most differences of neighbours
-    let often = sorted.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len()).map(|equal| equal[0]);
-    let others: Vec<f64> = values.iter().copied().filter(|x| Some(*x) != often).collect();
-    let usual = if CLEARED * scatter(&others) < scatter(values) { &others } else { values };
-    let s = scatter(usual).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
-    let mut out: Vec<(usize, f64, Why)> = Vec::new();
-    let far = (CODE * s).max(STEPS * median(usual.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
-    // an output that gets stuck holds a value that fits the row before; a code does not
-    let mut gets_stuck = vec![false; n];
-    let mut start = 0;
-    for run in values.chunk_by(|a, b| a == b) {
-        let near = start > 0 && (values[start] - values[start - 1]).abs() <= far;
-        gets_stuck[start..start + run.len()].fill(near && run.len() >= STUCK);
-        start += run.len();
+/// Column of a window: times, values, and weights of the rows, 1 for the usual number of samples, less for
+/// fewer.
+struct Window<'a> {
+    t: &'a [f64],
+    values: &'a [f64],
+    weights: &'a [f64],
+    /// Values in ascending order.
+    sorted: Vec<f64>,
+    /// Differences between different values next to each other in size.
+    steps: Vec<f64>,
+    /// Standard deviation of a row.
+    s: f64,
+    /// Least distance of a code from its neighbours.
+    far: f64,
+}
+
+/// Gross cell of a window: index, sigmas and reason.
+type GrossValue = (usize, f64, GrossReason);
+
+impl<'a> Window<'a> {
+    /// Window with a standard deviation of a row of about `noise`.
+    fn new(t: &'a [f64], values: &'a [f64], weights: &'a [f64], noise: f64) -> Self {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let steps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0).collect();
+        // a converter with steps above the noise
+        let coarse = 2 * steps.len() < values.len();
+        let step = if coarse { steps.iter().copied().fold(f64::INFINITY, f64::min) } else { 0.0 };
+        // a code in many rows is in most differences of neighbours
+        let often = sorted.chunk_by(|a, b| a == b).max_by_key(|equal| equal.len()).map(|equal| equal[0]);
+        let others: Vec<f64> = values.iter().copied().filter(|x| Some(*x) != often).collect();
+        let usual = if CLEARED * scatter(&others) < scatter(values) { &others } else { values };
+        let s = scatter(usual).max(LEAST * noise).max(if step.is_finite() { step } else { 0.0 });
+        let far = (CODE * s).max(STEPS * median(usual.windows(2).map(|w| (w[1] - w[0]).abs()).collect()));
+        Self { t, values, weights, sorted, steps, s, far }
     }
-    for (i, &x) in values.iter().enumerate() {
-        let off = beside(values, i);
-        if (x == 0.0 || count(x) > 1) && off.abs() * weights[i] > far && !gets_stuck[i] {
-            out.push((i, off * weights[i] / s, Why::Code));
+
+    /// True for each row of an output that gets stuck: it holds a value that fits the row before, which a code
+    /// does not.
+    fn gets_stuck(&self) -> Vec<bool> {
+        let values = self.values;
+        let mut out = vec![false; values.len()];
+        let mut start = 0;
+        for run in values.chunk_by(|a, b| a == b) {
+            let near = start > 0 && (values[start] - values[start - 1]).abs() <= self.far;
+            out[start..start + run.len()].fill(near && run.len() >= STUCK);
+            start += run.len();
         }
+        out
     }
-    let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
-    // steps of a converter below the noise, as the least difference shows them: normal values equal their
-    // neighbours this often, too seldom to count; values that move by more than the noise do not
-    let step_of_values = steps.iter().copied().filter(|d| *d < s).fold(f64::INFINITY, f64::min);
-    let by_step = if step_of_values.is_finite() {
-        step_of_values / (s * (4.0 * std::f64::consts::PI).sqrt())
-    } else {
-        0.0
-    };
-    // values that hardly ever repeat, and then do many times in a row
-    for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
-        *at += run.len();
-        Some(*at - run.len()..*at)
-    }) {
-        let seldom = 2 * steps.len() > n - run.len();
-        let equal = equal.saturating_sub(run.len() - 1) as f64 / n as f64;
-        let by_chance = n as f64 * equal.max(by_step).powi(run.len() as i32 - 1);
-        let seldom = seldom && by_chance < stuck;
-        if run.len() >= STUCK && seldom && out.iter().all(|o| !run.contains(&o.0)) {
-            out.extend((run.start + 1..run.end).map(|i| (i, 0.0, Why::Stuck)));
+
+    /// Codes of missing values.
+    fn codes(&self) -> Vec<GrossValue> {
+        let gets_stuck = self.gets_stuck();
+        let below = |is: &dyn Fn(f64) -> bool| self.sorted.partition_point(|y| is(*y));
+        let count = |x: f64| below(&|y| y <= x) - below(&|y| y < x);
+        let mut out = Vec::new();
+        for (i, &x) in self.values.iter().enumerate() {
+            let off = beside(self.values, i);
+            if (x == 0.0 || count(x) > 1) && off.abs() * self.weights[i] > self.far && !gets_stuck[i] {
+                out.push((i, off * self.weights[i] / self.s, GrossReason::Code));
+            }
         }
+        out
     }
-    let (from, to) = (t[0], t[n - 1]);
-    let x = |t: f64| if to > from { (2.0 * t - from - to) / (to - from) } else { 0.0 };
-    let mut kept: Vec<usize> = (0..n).filter(|i| out.iter().all(|o| o.0 != *i)).collect();
-    while kept.len() >= FEWEST / 2 && (out.len() as f64) < MOST * n as f64 {
-        let a = DMatrix::from_fn(kept.len(), CUBIC, |i, j| x(t[kept[i]]).powi(j as i32));
-        let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
-        let q = a.qr().q();
-        let left = &y - &q * (q.transpose() * &y);
-        // residual of a row from the cubic of all others
-        let alone = |i: usize| {
-            let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
-            (i, left[i] * weights[kept[i]] / free.sqrt() / s)
+
+    /// Adds the rows of a stuck output: values that hardly ever repeat, and then do many times in a row. The
+    /// expected number of such successions by chance, from how often two neighbours are equal, is below
+    /// `stuck`.
+    fn add_stuck(&self, stuck: f64, out: &mut Vec<GrossValue>) {
+        let (values, steps, n) = (self.values, &self.steps, self.values.len());
+        let equal = values.windows(2).filter(|w| w[0] == w[1]).count();
+        // steps of a converter below the noise, as the least difference shows them: normal values equal their
+        // neighbours this often, too seldom to count; values that move by more than the noise do not
+        let step_of_values = steps.iter().copied().filter(|d| *d < self.s).fold(f64::INFINITY, f64::min);
+        let by_step = if step_of_values.is_finite() {
+            step_of_values / (self.s * (4.0 * std::f64::consts::PI).sqrt())
+        } else {
+            0.0
         };
-        let furthest = (0..kept.len()).map(alone).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
-        out.push((kept.remove(i), sigmas, Why::Far));
+        for run in values.chunk_by(|a, b| a == b).scan(0, |at, run| {
+            *at += run.len();
+            Some(*at - run.len()..*at)
+        }) {
+            let seldom = 2 * steps.len() > n - run.len();
+            let equal = equal.saturating_sub(run.len() - 1) as f64 / n as f64;
+            let by_chance = n as f64 * equal.max(by_step).powi(run.len() as i32 - 1);
+            let seldom = seldom && by_chance < stuck;
+            if run.len() >= STUCK && seldom && out.iter().all(|o| !run.contains(&o.0)) {
+                out.extend((run.start + 1..run.end).map(|i| (i, 0.0, GrossReason::Stuck)));
+            }
+        }
     }
-    if kept.len() >= FEWEST {
-        let powers = |i: usize| DVector::from_fn(QUINTIC, |j, _| x(t[i]).powi(j as i32));
-        let a = DMatrix::from_fn(kept.len(), QUINTIC, |i, j| x(t[kept[i]]).powi(j as i32));
-        let y = DVector::from_fn(kept.len(), |i, _| values[kept[i]]);
+
+    /// Time of a row, from -1 to 1 over the window.
+    fn x(&self, i: usize) -> f64 {
+        let (from, to) = (self.t[0], self.t[self.t.len() - 1]);
+        if to > from { (2.0 * self.t[i] - from - to) / (to - from) } else { 0.0 }
+    }
+
+    /// Powers of the time (rows x `count`) at the rows `kept`, and their values.
+    fn powers(&self, kept: &[usize], count: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let a = DMatrix::from_fn(kept.len(), count, |i, j| self.x(kept[i]).powi(j as i32));
+        (a, DVector::from_fn(kept.len(), |i, _| self.values[kept[i]]))
+    }
+
+    /// Moves rows that are far from the cubic of all others from `kept` to `out`, the farthest first.
+    fn add_far(&self, kept: &mut Vec<usize>, out: &mut Vec<GrossValue>) {
+        while kept.len() >= FEWEST / 2 && (out.len() as f64) < MOST * self.values.len() as f64 {
+            let (a, y) = self.powers(kept, CUBIC);
+            let q = a.qr().q();
+            let left = &y - &q * (q.transpose() * &y);
+            // residual of a row from the cubic of all others
+            let alone = |i: usize| {
+                let free = (1.0 - q.row(i).norm_squared()).max(1e-6);
+                (i, left[i] * self.weights[kept[i]] / free.sqrt() / self.s)
+            };
+            let furthest = (0..kept.len()).map(alone).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+            let Some((i, sigmas)) = furthest.filter(|f| f.1.abs() > GROSS) else { break };
+            out.push((kept.remove(i), sigmas, GrossReason::Far));
+        }
+    }
+
+    /// Takes rows back that fit a polynomial of the fifth degree through the rows `kept`.
+    fn take_back(&self, kept: &[usize], out: &mut Vec<GrossValue>) {
+        if kept.len() < FEWEST {
+            return;
+        }
+        let (a, y) = self.powers(kept, QUINTIC);
         if let Some(normal) = (a.transpose() * &a).cholesky() {
             let coefficients = normal.solve(&(a.transpose() * y));
             let far = |i: usize| {
-                let row = powers(i);
-                let variance = 1.0 / weights[i].powi(2) + row.dot(&normal.solve(&row));
-                (values[i] - row.dot(&coefficients)).abs() > GROSS * s * variance.sqrt()
+                let row = DVector::from_fn(QUINTIC, |j, _| self.x(i).powi(j as i32));
+                let variance = 1.0 / self.weights[i].powi(2) + row.dot(&normal.solve(&row));
+                (self.values[i] - row.dot(&coefficients)).abs() > GROSS * self.s * variance.sqrt()
             };
-            out.retain(|o| o.2 != Why::Far || far(o.0));
+            out.retain(|o| o.2 != GrossReason::Far || far(o.0));
         }
     }
-    // so many are no errors of single cells
-    if out.len() as f64 >= MOST * n as f64 {
-        out.retain(|o| o.2 == Why::Code)
+
+    /// Cells whose values are gross; `stuck` as in [`Self::add_stuck`].
+    fn gross(&self, stuck: f64) -> Vec<GrossValue> {
+        let n = self.values.len();
+        let mut out = self.codes();
+        self.add_stuck(stuck, &mut out);
+        let mut kept: Vec<usize> = (0..n).filter(|i| out.iter().all(|o| o.0 != *i)).collect();
+        self.add_far(&mut kept, &mut out);
+        self.take_back(&kept, &mut out);
+        // so many are no errors of single cells
+        if out.len() as f64 >= MOST * n as f64 {
+            out.retain(|o| o.2 == GrossReason::Code)
+        }
+        out
     }
-    out
 }
 
 /// First and last row (exclusive) of every window of a position.
-fn windows(rows: &[Row]) -> Vec<(usize, usize)> {
+fn windows(rows: &[MedianRow]) -> Vec<(usize, usize)> {
     let (mut out, mut from) = (Vec::new(), 0);
     while from < rows.len() {
         let long = |to: usize| to - from >= FEWEST && rows[to - 1].t - rows[from].t >= WINDOW_S;
@@ -207,15 +270,15 @@ fn windows(rows: &[Row]) -> Vec<(usize, usize)> {
 
 /// The gross cells of the rows of a position; `noise` is about the standard deviation of a sample, `stuck`
 /// the probability that chance makes an output look stuck.
-pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
+pub(crate) fn cells(rows: &[MedianRow], noise: f64, stuck: f64) -> Vec<GrossCell> {
     let mut out = Vec::new();
     let windows = windows(rows);
     let stuck = stuck / (3 * windows.len()) as f64;
     for &(from, to) in &windows {
         let own = &rows[from..to];
         for axis in 0..3 {
-            let finite = |(_, r): &(usize, &Row)| r.values[axis].is_finite();
-            let there: Vec<(usize, &Row)> = (from..).zip(own).filter(finite).collect();
+            let finite = |(_, r): &(usize, &MedianRow)| r.values[axis].is_finite();
+            let there: Vec<(usize, &MedianRow)> = (from..).zip(own).filter(finite).collect();
             if there.len() < FEWEST / 2 {
                 continue;
             }
@@ -223,24 +286,23 @@ pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
             let samples: Vec<f64> = there.iter().map(|(_, r)| r.samples as f64).collect();
             let usual = median(samples.clone());
             let weights: Vec<f64> = samples.iter().map(|n| (n / usual).min(1.0).sqrt()).collect();
-            out.extend(window(&t, &values, &weights, noise, stuck).into_iter().map(|(i, sigmas, why)| {
-                Cell {
-                    lines: there[i].1.lines,
-                    row: Some(there[i].0),
-                    t: there[i].1.t,
-                    axis,
-                    value: values[i],
-                    sigmas,
-                    why,
-                }
+            let window = Window::new(&t, &values, &weights, noise);
+            out.extend(window.gross(stuck).into_iter().map(|(i, sigmas, why)| GrossCell {
+                lines: there[i].1.lines,
+                row: Some(there[i].0),
+                t: there[i].1.t,
+                axis,
+                value: values[i],
+                sigmas,
+                why,
             }));
         }
     }
     // a run of equal values that a window ends in
     let held: Vec<(usize, f64)> =
-        out.iter().filter(|c| c.why == Why::Stuck).map(|c| (c.axis, c.value)).collect();
+        out.iter().filter(|c| c.why == GrossReason::Stuck).map(|c| (c.axis, c.value)).collect();
     for cell in out.iter_mut().filter(|c| held.contains(&(c.axis, c.value))) {
-        (cell.why, cell.sigmas) = (Why::Stuck, 0.0);
+        (cell.why, cell.sigmas) = (GrossReason::Stuck, 0.0);
     }
     out.sort_by_key(|c| (c.lines, c.axis));
     out
@@ -248,10 +310,10 @@ pub(crate) fn cells(rows: &[Row], noise: f64, stuck: f64) -> Vec<Cell> {
 
 /// Position, column and value of an output that holds one value through a position of at least [`FEWEST`]
 /// rows, while most of its values differ at every other position (not so for coarse steps of a converter).
-pub(crate) fn held(positions: &[Vec<Row>]) -> Option<(usize, usize, f64)> {
+pub(crate) fn held(positions: &[Vec<MedianRow>]) -> Option<(usize, usize, f64)> {
     (0..3).find_map(|axis| {
         // number of values, and those that differ
-        let values = |rows: &Vec<Row>| {
+        let values = |rows: &Vec<MedianRow>| {
             let mut out: Vec<f64> = rows.iter().map(|r| r.values[axis]).filter(|x| x.is_finite()).collect();
             out.sort_by(f64::total_cmp);
             let all = out.len();
@@ -271,12 +333,12 @@ const TURNS_DEG: f64 = 1.0;
 
 /// Keeps rows at the beginning and the end of a position whose force has the usual length and another
 /// direction: the platform turns there.
-pub(crate) fn keep_turns(rows: &[Row], found: &mut Vec<Cell>) {
+pub(crate) fn keep_turns(rows: &[MedianRow], found: &mut Vec<GrossCell>) {
     let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let is_found = |r: &Row| found.iter().any(|c| c.lines == r.lines && c.why == Why::Far);
-    let good: Vec<&Row> = rows.iter().filter(|r| !is_found(r)).collect();
+    let is_found = |r: &MedianRow| found.iter().any(|c| c.lines == r.lines && c.why == GrossReason::Far);
+    let good: Vec<&MedianRow> = rows.iter().filter(|r| !is_found(r)).collect();
     let (Some(first), Some(last)) = (good.first(), good.last()) else { return };
-    let turns = |r: &Row, beside: &Row| {
+    let turns = |r: &MedianRow, beside: &MedianRow| {
         let dot: f64 = r.values.iter().zip(&beside.values).map(|(a, b)| a * b).sum();
         let (own, usual) = (length(&r.values), length(&beside.values));
         let turned = (dot / (own * usual)).clamp(-1.0, 1.0).acos().to_degrees();
@@ -295,13 +357,13 @@ mod tests {
     use super::*;
 
     /// Rows of a platform that drifts by thirteen degrees an hour about its second axis, with noise of 1e-5.
-    fn rows(seed: u64) -> Vec<Row> {
+    fn rows(seed: u64) -> Vec<MedianRow> {
         let mut noise = Noise::new(seed, 0);
         let of = |i: usize| {
             let t = 10.0 * i as f64;
             let angle = 0.3 + 6.3e-5 * t;
             let values = [angle.cos(), 0.2, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-            Row { lines: (i as u64 + 2, i as u64 + 2), t, samples: 1, values, bin: i }
+            MedianRow { lines: (i as u64 + 2, i as u64 + 2), t, samples: 1, values, bin: i }
         };
         (0..250).map(of).collect()
     }
@@ -319,10 +381,10 @@ mod tests {
             let held = spoiled[200].values[2];
             (200..206).for_each(|i| spoiled[i].values[2] = held);
             let found = cells(&spoiled, 1e-5, 5e-4);
-            let mut expected: Vec<(u64, usize, Why)> =
-                vec![(2, 0, Why::Far), (62, 2, Why::Far), (132, 1, Why::Far)];
-            expected.extend((162..174).map(|line| (line, 0, Why::Code)));
-            expected.extend((203..208).map(|line| (line, 2, Why::Stuck)));
+            let mut expected: Vec<(u64, usize, GrossReason)> =
+                vec![(2, 0, GrossReason::Far), (62, 2, GrossReason::Far), (132, 1, GrossReason::Far)];
+            expected.extend((162..174).map(|line| (line, 0, GrossReason::Code)));
+            expected.extend((203..208).map(|line| (line, 2, GrossReason::Stuck)));
             let found: Vec<_> = found.iter().map(|c| (c.lines.0, c.axis, c.why)).collect();
             assert_eq!(found, expected, "{seed}");
         }
@@ -338,9 +400,9 @@ mod tests {
             let of = |i: usize| {
                 let angle = 0.1 * seed as f64 + 130f64.to_radians() / 3600.0 * 10.0 * i as f64;
                 let values = [angle.cos(), 0.0, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-                Row { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
+                MedianRow { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
             };
-            let mut rows: Vec<Row> = (0..101).map(of).collect();
+            let mut rows: Vec<MedianRow> = (0..101).map(of).collect();
             assert!(cells(&rows, 1e-5, 5e-4).is_empty(), "{seed}: {:?}", cells(&rows, 1e-5, 5e-4));
             rows[100].values[0] += 3e-4;
             found += usize::from(cells(&rows, 1e-5, 5e-4).iter().any(|c| c.lines.0 == 100));
@@ -358,12 +420,12 @@ mod tests {
         for _ in 0..10_000 {
             let of = |i: usize| {
                 let values = [0; 3].map(|_| (10.0 * noise.normal()).round() * 1e-6);
-                Row { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
+                MedianRow { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
             };
-            let own: Vec<Row> = (0..100).map(of).collect();
-            let equal = |w: &&[Row]| (0..3).any(|k| w.iter().all(|r| r.values[k] == w[0].values[k]));
+            let own: Vec<MedianRow> = (0..100).map(of).collect();
+            let equal = |w: &&[MedianRow]| (0..3).any(|k| w.iter().all(|r| r.values[k] == w[0].values[k]));
             successions += own.windows(4).filter(equal).count();
-            found += usize::from(cells(&own, 1e-5, 5e-4).iter().any(|c| c.why == Why::Stuck));
+            found += usize::from(cells(&own, 1e-5, 5e-4).iter().any(|c| c.why == GrossReason::Stuck));
         }
         assert!(successions > 20 && found <= 15, "{successions} {found}");
     }

@@ -6,7 +6,7 @@ use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::PlatformState;
 
 use super::estimate::{Estimate, Problem};
-use super::observe::Reading;
+use super::placed::Reading;
 use super::run::Run;
 use super::timeline::Gap;
 use super::{CalibrationError, STRICT};

@@ -1,5 +1,6 @@
 //! Calibration of a torquing scheme from the records of its runs.
 
+mod assignment;
 mod clock;
 mod copies;
 mod curvature;
@@ -17,40 +18,34 @@ mod mistaken;
 mod next;
 mod observe;
 mod offset;
+mod placed;
 mod posterior;
 mod reading;
+mod record_columns;
 mod residuals;
+mod rounds;
 mod run;
 mod shooting;
 mod successions;
 mod suspects;
 mod timeline;
 
-use std::cell::Cell;
-
 use nalgebra::{DMatrix, DVector};
-use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
-use obsdeg_ekf::consistency::chi_square_quantile;
-use obsdeg_evidence::simulation::{
-    Conditions, Plan, PlatformState, RunStart, SimulationError, predict, si_per_shown,
-};
+use obsdeg_evidence::simulation::{Conditions, Plan, RunStart, SimulationError, predict, si_per_shown};
 
 use crate::Going;
 use crate::answer::{Before, Calibration, CovarianceTable};
 pub use crate::record::STANDARD_GRAVITY;
 use crate::record::{Record, RecordError};
-use crate::setup::{Basis, Setup};
-use diagnose::Diagnosed;
-use estimate::{Problem, Unknowns};
-use observe::Reading;
-use offset::Offset;
-use run::Run;
+use crate::setup::Setup;
+use estimate::Unknowns;
+use rounds::{CalibrationInputs, RoundEnd, Rounds};
 
 pub use mistaken::Mistaken;
-pub(crate) use observe::TIMES;
 pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
+pub(crate) use record_columns::TIMES;
 
 /// Reason why a scheme cannot be calibrated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -259,10 +254,6 @@ impl Default for Options {
 
 /// Probability with which what a right record leaves is below a bound that asks for a closer look.
 const STRICT: f64 = 0.999;
-/// Most rounds of leaving out outliers, or of estimating the noise.
-const ROUNDS: usize = 6;
-/// Largest fraction of all measurements that may be outliers.
-const MOST_OUTLIERS: f64 = 0.02;
 
 /// Checks that records of this scheme are supported: positions at rest, at least one record.
 fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> {
@@ -288,183 +279,36 @@ pub fn calibrate(
     concern(scheme, &records)?;
     let own = run::conditions(conditions);
     let planned = Plan::new(scheme, &own)?;
-    let mut sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
-    let mut runs = Vec::with_capacity(records.len());
-    let before = options.prior.as_ref();
-    if before.is_some_and(|b| b.of.geometry != scheme.geometry) {
+    let sigmas: Vec<f64> = planned.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
+    if options.prior.as_ref().is_some_and(|b| b.of.geometry != scheme.geometry) {
         return Err(CalibrationError::OtherPlatform {
             what: "another mounting of the sensors (geometry)".into(),
         });
     }
-    let mut rests_on: Vec<Basis> = Vec::new();
-    for record in records {
-        let reading = observe::observe(
-            record,
-            &planned,
-            options.gravity_m_s2,
-            conditions.step_s,
-            sigmas.clone(),
-            going,
-        )?;
-        let basis = Basis { record: reading.name.clone(), digest: reading.digest.clone() };
-        let same = |other: String| CalibrationError::SameRecord { record: basis.record.clone(), other };
-        if let Some(other) = basis.among(&rests_on) {
-            return Err(same(other.record.clone()));
-        }
-        if let Some(other) = before.and_then(|b| basis.among(&b.rests_on)) {
-            return Err(same(format!("{}, which the calibration before rests on", other.record)));
-        }
-        rests_on.push(basis);
-        runs.push(Run::new(reading, scheme, &planned, &own)?);
-    }
-    rests_on.extend(before.iter().flat_map(|b| b.rests_on.iter().cloned()));
+    let inputs = CalibrationInputs { scheme, conditions, own: &own, planned: &planned, options, going };
+    let (mut runs, rests_on) = inputs.runs(records, &sigmas)?;
     let prediction = predict(&planned, options.seed)?;
     let start = RunStart::new(&planned, &own)?;
-    let (n, coefficients, biases) =
-        (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
-    // priors that a prior calibration already includes do not count again
-    let held =
-        |name: &String| before.is_some_and(|b| b.priors.contains(name) && b.estimates.names.contains(name));
-    let counts = |name: &String| own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
-    let stated: Vec<bool> =
-        planned.platform.names().iter().map(counts).chain(std::iter::repeat_n(false, biases)).collect();
-    let mut unknowns = Unknowns::new(
-        runs.len(),
-        [n - coefficients, coefficients, biases],
-        &start.sigma,
-        &start.estimate,
-        &prediction.null_space,
-        &stated,
-    );
-    let known = before.map(|b| known(&b.estimates, &planned, &prediction, &unknowns)).transpose()?;
-    let (known, known_names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
-    let mut prior = unknowns.stated_rows();
-    if let Some((rows, _)) = &known {
-        let above = prior.nrows();
-        prior = prior.resize_vertically(above + rows.nrows(), 0.0);
-        prior.rows_mut(above, rows.nrows()).copy_from(rows);
-    }
-    unknowns.determined_by(&prior);
-    let mut x: Vec<PlatformState> =
-        runs.iter().map(|_| PlatformState::of_unknowns(&start.estimate, planned.constants())).collect();
-    let first = x.clone();
-    let (mut round, mut passes, mut too_many) = (0, 0, None);
-    let lay = |reading: Reading| Run::new(reading, scheme, &planned, &own);
-    let mut rivals = 0;
-    let (mut beginnings, mut elsewhere, mut offsets) = (0, false, vec![None; runs.len()]);
+    let known = inputs.unknowns(runs.len(), &start, &prediction)?;
+    let mut rounds = Rounds::new(&inputs, (&start, &prediction), &known, sigmas, runs.len());
     loop {
-        round += 1;
-        let problem = Problem {
-            conditions: &own,
-            runs: &runs,
-            unknowns: &unknowns,
-            sigmas: sigmas.clone(),
-            known: known.clone(),
-            going,
-            passes: Cell::new(passes),
-            stopped: Cell::new(false),
-        };
-        let mut estimate = problem.estimate(x, round == 1)?;
-        if round == 1 {
-            rivals = estimate.rivals;
-        }
-        estimate.rivals = rivals;
-        if beginnings < ROUNDS && !problem.stopped.get() {
-            beginnings += 1;
-            offsets = problem.open(&estimate, &lay)?;
-            passes = problem.passes.get();
-            if offsets.iter().flatten().any(|o: &Offset| o.by.abs() > offset::SETTLED * o.sigma) {
-                for (run, o) in runs.iter_mut().zip(&offsets) {
-                    if let Some(o) = o {
-                        let counts = std::mem::take(&mut run.counts);
-                        *run = lay(run.reading.later(o.by))?;
-                        run.counts = counts;
-                    }
-                }
-                (x, round) = (estimate.at.x, 0);
-                continue;
-            }
-        }
-        let found = Diagnosed::of(&problem, &estimate, &prediction)?;
-        passes = problem.passes.get();
-        let interrupted = problem.stopped.get();
-        let last = round == ROUNDS || interrupted;
-        // noise first: a gate needs it
-        let rescaled = options.estimate_noise.then(|| found.channel_factors(sigmas.len()));
-        let settled = rescaled.as_ref().is_none_or(|f| f.iter().all(|f| (f - 1.0).abs() < 1e-3));
-        let off = found.beyond(gate(options.gate, found.all.len()));
-        let many = off.len() as f64 > MOST_OUTLIERS * found.all.len() as f64;
-        if many {
-            too_many = Some(off.len());
-        }
-        let leave_out = !off.is_empty() && !many;
-        if !last && settled && !leave_out && !elsewhere {
-            elsewhere = true;
-            let begins = |r: usize| problem.begins_elsewhere(&estimate, r, &lay);
-            let found = (0..runs.len()).map(begins).collect::<Result<Vec<bool>, _>>()?;
-            if found.contains(&true) {
+        let problem = rounds.problem(&runs);
+        match rounds.round(&problem)? {
+            RoundEnd::Later => rounds.shift(&mut runs)?,
+            RoundEnd::Open(found) => {
                 for (run, found) in runs.iter_mut().zip(found) {
                     let (at, interval) = (run.reading.origin, run.reading.interval);
                     run.reading.open = found.then_some((at - interval, at + interval)).or(run.reading.open);
                 }
-                (x, beginnings) = (estimate.at.x, 0);
-                continue;
             }
-        }
-        if last || (settled && !leave_out) {
-            let linear = estimate.solution.clone();
-            let bent = problem.bent(&estimate, options.seed)?;
-            if let Some((_, root)) = &bent.found {
-                estimate.solution.inverse_root.clone_from(root);
+            RoundEnd::LeftOut(off) => {
+                for (run, key) in off {
+                    runs[run].counts[key.bin][key.channel] = false;
+                }
             }
-            for o in offsets.iter().flatten() {
-                let root = &mut estimate.solution.inverse_root;
-                let columns = root.ncols();
-                *root = std::mem::take(root).insert_column(columns, 0.0);
-                root.set_column(columns, &(&o.direction * o.sigma));
-            }
-            let later = problem.later(&estimate, &lay)?;
-            let jump = problem.jump(&estimate, &first, &lay)?;
-            let parts = diagnose::Parts {
-                scheme,
-                conditions,
-                options,
-                planned: &planned,
-                prediction: &prediction,
-                problem: &problem,
-                estimate: &estimate,
-                linear: &linear,
-                bent: &bent,
-                found: &found,
-                offsets: &offsets,
-                later: &later,
-                jump,
-                too_many: too_many.filter(|_| many),
-                known: known_names,
-                rests_on,
-                interrupted: problem.stopped.get(),
-            };
-            return parts.answer();
+            RoundEnd::Last(last) => return rounds.answer(&problem, *last, rests_on),
         }
-        let next = estimate.at.x.clone();
-        if let Some(factors) = rescaled {
-            sigmas.iter_mut().zip(factors).for_each(|(s, f)| *s *= f);
-        }
-        if leave_out {
-            for (run, key) in off {
-                runs[run].counts[key.bin][key.channel] = false;
-            }
-        }
-        x = next;
     }
-}
-
-/// Distance, in standard deviations, beyond which a measurement out of `of` is left out.
-fn gate(probability: f64, of: usize) -> f64 {
-    if probability >= 1.0 {
-        return f64::INFINITY;
-    }
-    chi_square_quantile(1.0, 1.0 - (1.0 - probability) / of.max(1) as f64).sqrt()
 }
 
 /// Prior information on the coefficients and their combinations: rows with unit errors, and names.

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use obsdeg_ekf::consistency::chi_square_band;
 
 use super::estimate::{Estimate, Problem, WEAK};
-use super::observe::{By, Reading};
+use super::placed::{By, Reading};
 use super::run::Run;
 use super::{CalibrationError, STRICT};
 use crate::least_squares::Information;

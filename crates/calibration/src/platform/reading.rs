@@ -5,8 +5,9 @@ use obsdeg_evidence::simulation::{Conditions, Plan};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::gross::Why;
-use super::observe::{Reading, observe};
+use super::gross::GrossReason;
+use super::observe::observe;
+use super::placed::Reading;
 use super::{CalibrationError, Options, run};
 use crate::Going;
 use crate::answer::{EmptyCells, Gap, PositionsBy};
@@ -134,14 +135,14 @@ fn of(r: &Reading, scheme: &Scheme) -> RecordRead {
         bins: r.bins[p].len(),
         force_g: r.lengths[p].map(|l| l.length),
     };
-    let cell = |(cell, column): &(super::gross::Cell, String)| CellRead {
+    let cell = |(cell, column): &(super::gross::GrossCell, String)| CellRead {
         lines: cell.lines,
         column: column.clone(),
         value: cell.value,
         why: match cell.why {
-            Why::Far => "far",
-            Why::Code => "code",
-            Why::Stuck => "stuck",
+            GrossReason::Far => "far",
+            GrossReason::Code => "code",
+            GrossReason::Stuck => "stuck",
         },
     };
     let column = |(column, factor): &(String, f64)| ColumnRead { column: column.clone(), factor: *factor };

@@ -5,7 +5,7 @@ use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
 use super::diagnose::{MeasurementResidual, Parts};
-use super::observe::channel_name;
+use super::placed::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
 /// Fewest residuals of a position whose correlation with the temperature is told.

@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Seg
 
 use super::CalibrationError;
 use super::clock::words;
-use super::observe::{By, Reading};
+use super::placed::{By, Reading};
 use super::timeline::slews;
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;

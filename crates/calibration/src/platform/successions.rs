@@ -3,8 +3,8 @@
 
 use super::CalibrationError;
 use super::diagnose::Parts;
-use super::gross::Why;
-use super::observe::channel_name;
+use super::gross::GrossReason;
+use super::placed::channel_name;
 use super::run::Run;
 use crate::answer::{Finding, Outlier};
 
@@ -42,7 +42,7 @@ impl Parts<'_> {
                 sigmas,
             };
             let at = |t: f64| reading.stays.iter().rposition(|stay| stay.0 <= t).unwrap_or(0);
-            for (cell, column) in reading.cells.iter().filter(|(c, _)| c.why == Why::Far) {
+            for (cell, column) in reading.cells.iter().filter(|(c, _)| c.why == GrossReason::Far) {
                 let outlier = outlier(cell.lines, cell.t, column.clone(), cell.sigmas);
                 out.push(LeftOut { position: at(cell.t), place: cell.row, outlier });
             }

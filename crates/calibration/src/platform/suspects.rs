@@ -12,7 +12,7 @@ use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{OmittedModel, OmittedTerm, Platform};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, EkfError, Form};
+use obsdeg_ekf::{Covariance, EkfError, Form, Gains};
 use obsdeg_evidence::simulation::omitted::{
     Bench, ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
 };
@@ -25,6 +25,7 @@ use super::estimate::{Estimate, Problem};
 use super::offset::Later;
 use super::run::{Key, Run};
 use crate::answer::{Estimated, Omitted, SilentError};
+use crate::least_squares::Linearised;
 use crate::levels;
 
 /// Factor by which the start of the filter is wider than the prior.
@@ -213,54 +214,17 @@ fn tested(
     let mut changes = Vec::new();
     for (r, (run, (linear, keys))) in problem.runs.iter().zip(&estimate.at.runs).enumerate() {
         let columns = columns(run, model, keys, run.tilts(problem.conditions, &estimate.at.x[r])?)?;
-        let prior = problem.unknowns.index[r]
-            .iter()
-            .enumerate()
-            .map(|(s, &i)| problem.unknowns.prior[i] * if s < run.plan.unknowns() { WIDE } else { 1.0 });
-        let prior: Vec<f64> = prior.collect();
-        let n = prior.len();
-        let variances = nalgebra::DVector::from_iterator(n, prior.iter().map(|s| s * s));
-        let covariance = Covariance::new("P0", &DMatrix::from_diagonal(&variances), Form::Ud)?;
-        let gains = covariance_pass(&linear.stages, covariance, |_, _| {})?;
-        let through = |z: &[f64]| -> Result<(Vec<f64>, Vec<f64>), EkfError> {
-            let (mut x, mut whitened, mut next) = (vec![0.0; n], Vec::with_capacity(z.len()), 0);
-            let measure = |_: usize, _: usize, out: &mut [f64]| {
-                out.copy_from_slice(&z[next..next + out.len()]);
-                next += out.len();
-            };
-            state_pass(&linear.stages, &gains, &mut x, measure, |_, _, w| whitened.extend_from_slice(w))?;
-            Ok((x, whitened))
-        };
-        let (_, mut own) = through(&linear.residuals)?;
-        let mut passed = columns.iter().map(|z| through(z)).collect::<Result<Vec<_>, _>>()?;
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let filter = DiffuseFilter::new(problem, r, linear)?;
+        let (_, mut own) = filter.through(&linear.residuals)?;
+        let mut passed = columns.iter().map(|z| filter.through(z)).collect::<Result<Vec<_>, _>>()?;
         score.chi_square += dot(&own, &own);
         let unknowns = run.plan.unknowns() + usize::from(later[r].is_some());
         score.degrees_of_freedom += own.len() as f64 - unknowns as f64;
         if let Some(later) = &later[r] {
-            let (x, mut of_beginning) = through(&later.column)?;
-            // one more measurement, of the beginning by the labels; the fit has settled with it
-            let known = later.weight.sqrt();
-            own.push(-dot(&of_beginning, &own) / known);
-            of_beginning.push(known);
-            let squares = dot(&of_beginning, &of_beginning);
-            for (of, column) in &mut passed {
-                column.push(0.0);
-                let share = dot(column, &of_beginning) / squares;
-                column.iter_mut().zip(&of_beginning).for_each(|(c, w)| *c -= share * w);
-                of.iter_mut().zip(&x).for_each(|(c, x)| *c -= share * x);
-            }
+            let of_beginning = filter.through(&later.column)?;
+            without_beginning(&mut own, &mut passed, of_beginning, later.weight);
         }
-        for (j, (_, column)) in passed.iter().enumerate() {
-            score.against[j] += dot(column, &own);
-            for (k, (_, other)) in passed.iter().enumerate().take(j + 1) {
-                let product = dot(column, other);
-                score.products[(j, k)] += product;
-                if k < j {
-                    score.products[(k, j)] += product;
-                }
-            }
-        }
+        add_products(&mut score, &own, &passed);
         if r == 0 {
             let platform = &run.plan.platform;
             let coefficients = run.plan.unknowns() - platform.coefficients()..run.plan.unknowns();
@@ -273,6 +237,82 @@ fn tested(
         }
     }
     Ok(Tested { score, changes })
+}
+
+/// Filter with a diffuse start along a linearised run: its gains.
+struct DiffuseFilter<'a> {
+    linear: &'a Linearised,
+    gains: Gains,
+    /// Number of states.
+    n: usize,
+}
+
+/// Estimates at the end of a filter, and whitened innovations.
+type Passed = (Vec<f64>, Vec<f64>);
+
+impl<'a> DiffuseFilter<'a> {
+    /// Filter along the run `r`.
+    fn new(problem: &Problem<'_>, r: usize, linear: &'a Linearised) -> Result<Self, EkfError> {
+        let own = problem.runs[r].plan.unknowns();
+        let prior = problem.unknowns.index[r]
+            .iter()
+            .enumerate()
+            .map(|(s, &i)| problem.unknowns.prior[i] * if s < own { WIDE } else { 1.0 });
+        let prior: Vec<f64> = prior.collect();
+        let n = prior.len();
+        let variances = nalgebra::DVector::from_iterator(n, prior.iter().map(|s| s * s));
+        let covariance = Covariance::new("P0", &DMatrix::from_diagonal(&variances), Form::Ud)?;
+        let gains = covariance_pass(&linear.stages, covariance, |_, _| {})?;
+        Ok(Self { linear, gains, n })
+    }
+
+    /// Passes the measurements `z` through the filter.
+    fn through(&self, z: &[f64]) -> Result<Passed, EkfError> {
+        let (mut x, mut whitened, mut next) = (vec![0.0; self.n], Vec::with_capacity(z.len()), 0);
+        let measure = |_: usize, _: usize, out: &mut [f64]| {
+            out.copy_from_slice(&z[next..next + out.len()]);
+            next += out.len();
+        };
+        state_pass(&self.linear.stages, &self.gains, &mut x, measure, |_, _, w| {
+            whitened.extend_from_slice(w);
+        })?;
+        Ok((x, whitened))
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()
+}
+
+/// Takes the beginning of the scheme, as one more unknown, out of the residuals `own` and the passed columns.
+/// `weight` is that of the labels.
+fn without_beginning(own: &mut Vec<f64>, passed: &mut [Passed], (x, mut of_beginning): Passed, weight: f64) {
+    // one more measurement, of the beginning by the labels; the fit has settled with it
+    let known = weight.sqrt();
+    let beginning = -dot(&of_beginning, own) / known;
+    own.push(beginning);
+    of_beginning.push(known);
+    let squares = dot(&of_beginning, &of_beginning);
+    for (of, column) in passed {
+        column.push(0.0);
+        let share = dot(column, &of_beginning) / squares;
+        column.iter_mut().zip(&of_beginning).for_each(|(c, w)| *c -= share * w);
+        of.iter_mut().zip(&x).for_each(|(c, x)| *c -= share * x);
+    }
+}
+
+/// Adds the products of the passed columns with the residuals `own` and with each other.
+fn add_products(score: &mut Score, own: &[f64], passed: &[Passed]) {
+    for (j, (_, column)) in passed.iter().enumerate() {
+        score.against[j] += dot(column, own);
+        for (k, (_, other)) in passed.iter().enumerate().take(j + 1) {
+            let product = dot(column, other);
+            score.products[(j, k)] += product;
+            if k < j {
+                score.products[(k, j)] += product;
+            }
+        }
+    }
 }
 
 /// Columns of all errors in the measurements of a run, in their order, at these tilts.
@@ -318,6 +358,25 @@ fn suspicion(
             indistinguishable: names(group),
         }
     });
+    let changes = suspected_changes(found, tested, quantities);
+    let moved = changes.iter().map(|c| {
+        let most = (c.lowest - c.estimate).abs().max((c.highest - c.estimate).abs());
+        (c.unknown.clone(), most)
+    });
+    let moved = moved.collect();
+    let suspicion = Suspicion {
+        errors: errors.collect(),
+        indistinguishable: names(&found.groups[0]),
+        explained: found.explained,
+        chi_square_fall: found.fall,
+        probability: found.probability,
+        changes: changes.into_iter().take(CHANGES).collect(),
+    };
+    (suspicion, moved)
+}
+
+/// Changes of the estimates by suspected errors, the largest in sigma first.
+fn suspected_changes(found: &Explanation, tested: &Tested, quantities: &[Estimated]) -> Vec<SuspectedChange> {
     // each error of a group explains the residuals as well, and may change the estimates differently
     let alone = |&j: &usize| vec![(j, tested.score.against[j] / tested.score.products[(j, j)])];
     let best: Vec<(usize, f64)> =
@@ -346,18 +405,5 @@ fn suspicion(
         changes.push((most / sigma, change));
     }
     changes.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let moved = changes.iter().map(|(_, c)| {
-        let most = (c.lowest - c.estimate).abs().max((c.highest - c.estimate).abs());
-        (c.unknown.clone(), most)
-    });
-    let moved = moved.collect();
-    let suspicion = Suspicion {
-        errors: errors.collect(),
-        indistinguishable: names(&found.groups[0]),
-        explained: found.explained,
-        chi_square_fall: found.fall,
-        probability: found.probability,
-        changes: changes.into_iter().take(CHANGES).map(|(_, c)| c).collect(),
-    };
-    (suspicion, moved)
+    changes.into_iter().map(|(_, change)| change).collect()
 }
